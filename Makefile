@@ -1,0 +1,69 @@
+# Everything is set up here: on a fresh Debian machine `make walker` or `make test` is all that is needed.
+.DEFAULT_GOAL := help
+SHELL := /bin/bash
+PYTHON ?= python3
+WALKERS := .venv/bin/walkers
+OUT ?= runs
+CASE ?= fig1b
+
+.PHONY: help
+help: ## List the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+.PHONY: walker
+walker: setup ## Run the walker of Fig. 1b (or CASE=...): velocity, pictures, ParaView files
+	@$(WALKERS) run $(CASE) --out $(OUT)
+	@echo "pictures:"
+	@$(WALKERS) plot $(CASE) --out $(OUT) | sed 's/^/  /'
+	@$(WALKERS) render $(CASE) --out $(OUT) | sed 's/^/  /'
+	@echo "for ParaView:"
+	@$(WALKERS) vtk $(CASE) --out $(OUT) | sed 's/^/  /'
+
+.PHONY: test
+test: setup ## Lint, check types, run the tests (a 2-bead smoke test first)
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+	.venv/bin/mypy
+	.venv/bin/pytest -q -m smoke
+	.venv/bin/pytest -q -n 2 -m "not smoke"
+
+.PHONY: bench
+bench: setup ## Measure what docs/performance.md states
+	.venv/bin/python tests/benchmark.py
+
+.PHONY: clean
+clean: ## Remove the environment and caches, never the runs
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info
+
+.PHONY: setup
+setup: engine .venv/ready ## Install what is missing: liggghts (apt-get) and .venv
+
+# As root, through sudo, or with one message for whoever is root. $(1): packages, $(2): what they are for.
+define debian
+	@if [ "$$(id -u)" = 0 ]; then apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $(1) >/dev/null; \
+	elif command -v sudo >/dev/null && { [ -t 0 ] || sudo -n true 2>/dev/null; }; then \
+	  sudo apt-get update -qq && sudo DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $(1) >/dev/null; \
+	else echo "$(2) is missing and cannot be installed without root. Ask an administrator to run: apt-get install $(1)" >&2; exit 1; fi
+endef
+
+.PHONY: engine
+ifeq ($(shell command -v liggghts),)
+engine:
+	@echo "installing the engine, liggghts"
+	$(call debian,liggghts,liggghts)
+else
+engine:
+endif
+
+.venv/ready: requirements.txt pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed: make PYTHON=/path/to/python3.11" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || $(MAKE) --no-print-directory venv-package
+	@echo "installing Python packages into .venv"
+	@rm -rf .venv && $(PYTHON) -m venv .venv
+	@.venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@.venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	@touch $@
+
+.PHONY: venv-package
+venv-package:
+	$(call debian,python3-venv,python3-venv)

@@ -1,0 +1,119 @@
+"""From what pydantic says of an unusable case to sentences that name key, value and what was expected."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from pydantic_core import ErrorDetails
+
+from inputs.errors import Problem
+from inputs.library import suggestion
+from inputs.schema import WalkerFile
+
+_EXAMPLES = {
+    "beads": 'a [beads] table with the radii, such as radii = ["0.3 mm", "0.2 mm"]',
+    "beads.radii": 'such as ["0.3 mm", "0.2 mm"]',
+    "liquid": 'a [liquid] table, such as name = "Si AK5"',
+    "substrate": 'a [substrate] table, such as material = "chromium-coated glass"',
+    "substrate.material": 'such as "chromium-coated glass"',
+    "drive": "a [drive] table with a frequency and a peak_acceleration or gamma0",
+    "drive.frequency": 'such as "80 Hz"',
+}
+
+
+_BOUNDS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
+_BOUND_UNITS = {
+    "contact.youngs_modulus": " Pa (softer contacts change the speed)",
+    "liquid.contact_angle": " rad",
+}
+_PLAIN = {
+    "too_long": "expected two radii",
+    "tuple_type": f"expected a list, {_EXAMPLES['beads.radii']}",
+    "bool_type": "expected true or false",
+    "bool_parsing": "expected true or false",
+    "string_type": "expected text in quotes",
+    "finite_number": "expected a finite number",
+}
+
+
+def quoted(document: Mapping[str, Any], location: Sequence[str | int]) -> str | None:
+    """The value at a place of a document as the user may have written it, shortened; None if there is none."""
+    value: Any = document
+    for part in location:
+        known = value if isinstance(value, Mapping) else dict(enumerate(value)) if isinstance(value, list) else {}
+        if part not in known:
+            return None
+        value = known[part]
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def problem_of(details: ErrorDetails, document: Mapping[str, Any]) -> Problem:
+    """One of pydantic's errors as a `Problem`."""
+    location = details["loc"]
+    key = _dotted(location)
+    if details["type"] == "missing":
+        if isinstance(location[-1], int):
+            return Problem(_dotted(location[:-1]), quoted(document, location[:-1]), "expected two radii")
+        return Problem(key, None, f"missing; expected {_EXAMPLES.get(key, 'a value')}")
+    return Problem(key, quoted(document, location), _expectation(details, key))
+
+
+def _dotted(location: Sequence[str | int]) -> str:
+    key = ""
+    for part in location:
+        key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else str(part)
+    return key
+
+
+def _expectation(details: ErrorDetails, key: str) -> str:
+    kind, context = details["type"], details.get("ctx", {})
+    if kind in _PLAIN:
+        return _PLAIN[kind]
+    if kind == "extra_forbidden":
+        return _unknown_key([str(part) for part in details["loc"]])
+    if kind == "literal_error":
+        choices = str(context["expected"]).replace(" or ", ", ").replace("'", "").split(", ")
+        return f"expected {context['expected']}{suggestion(str(details['input']), choices)}"
+    if kind in ("model_type", "dict_type", "model_attributes_type"):
+        return f"expected a table [{key}]"
+    bounds = " and ".join(f"{words} {context[name]:g}" for name, words in _BOUNDS.items() if name in context)
+    return f"expected {bounds}{_BOUND_UNITS.get(key, '')}" if bounds else details["msg"]
+
+
+def _table_at(location: Sequence[str]) -> type[BaseModel] | None:
+    table: type[BaseModel] = WalkerFile
+    for part in location:
+        field = table.model_fields.get(part)
+        if field is None:
+            return None
+        annotations = [field.annotation, *get_args(field.annotation)]
+        nested = [kind for kind in annotations if isinstance(kind, type) and issubclass(kind, BaseModel)]
+        if not nested:
+            return None
+        table = nested[0]
+    return table
+
+
+def _all_keys(table: type[BaseModel], prefix: str = "") -> list[str]:
+    keys: list[str] = []
+    for name in table.model_fields:
+        nested = _table_at([*prefix.split("."), name] if prefix else [name])
+        dotted = f"{prefix}.{name}" if prefix else name
+        keys += _all_keys(nested, dotted) if nested else [dotted]
+    return keys
+
+
+def _unknown_key(location: list[str]) -> str:
+    word = location[-1]
+    table = _table_at(location[:-1])
+    siblings = list(table.model_fields) if table else []
+    hint = suggestion(word, siblings)
+    elsewhere = [key for key in _all_keys(WalkerFile) if key.split(".")[-1] == word]
+    if not hint and elsewhere:
+        hint = f'; did you mean "{elsewhere[0]}"?'
+    place = f"[{'.'.join(location[:-1])}]" if location[:-1] else "a case"
+    return f"unknown key; {place} takes {', '.join(siblings)}{hint}"

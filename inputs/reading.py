@@ -1,0 +1,97 @@
+"""Case files: found, read as TOML, validated and resolved.
+
+Whatever is wrong ends as one `InputError` that names the file, the key, the value and what was expected.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from inputs.case import WalkerCase
+from inputs.errors import InputError, Problem
+from inputs.library import suggestion
+from inputs.messages import problem_of, quoted
+from inputs.resolving import UnusableKeyError, resolve
+from inputs.schema import WalkerFile
+
+_SHIPPED = Path(__file__).parent / "cases"
+
+
+def shipped_cases() -> dict[str, Path]:
+    """The cases that come with the project: name to file."""
+    return {path.stem: path for path in sorted(_SHIPPED.glob("*.toml"))}
+
+
+def load_case(case: str | Path) -> WalkerCase:
+    """Read and resolve a case.
+
+    Parameters
+    ----------
+    case
+        A TOML file, or the name of a shipped case such as ``fig1b``.
+
+    Returns
+    -------
+    WalkerCase
+        Named after the file.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or anything in it cannot be used.
+    """
+    path = Path(case)
+    if not path.exists():
+        shipped = shipped_cases()
+        if str(case) not in shipped:
+            known = ", ".join(shipped)
+            hint = suggestion(str(case), shipped)
+            raise InputError(str(case), [Problem("", None, f"no such file, nor a shipped case ({known}){hint}")])
+        path = shipped[str(case)]
+    return resolve_case(_read_toml(path), source=str(case), name=path.stem)
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8"))
+    except UnicodeDecodeError as error:
+        found = f"byte {error.object[error.start]:#04x} at offset {error.start}"
+        raise InputError(str(path), [Problem("", None, f"expected UTF-8 text, found {found}")]) from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(str(path), [Problem("", None, f"not TOML: {error}")]) from error
+    except OSError as error:
+        raise InputError(str(path), [Problem("", None, f"cannot be read: {error.strerror}")]) from error
+
+
+def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> WalkerCase:
+    """Validate a case given as nested tables and fill in what the library supplies.
+
+    Parameters
+    ----------
+    document
+        The tables of a case file, quantities as strings with units.
+    source
+        What an error message calls the input.
+    name
+        Name of the case; its run directory begins with it.
+
+    Raises
+    ------
+    InputError
+        If anything in it cannot be used.
+    """
+    try:
+        file = WalkerFile.model_validate(document)
+    except ValidationError as error:
+        problems = [problem_of(details, document) for details in error.errors()]
+        raise InputError(source, problems) from error
+    try:
+        return resolve(file, name)
+    except UnusableKeyError as unusable:
+        value = quoted(document, unusable.key.split("."))
+        raise InputError(source, [Problem(unusable.key, value, unusable.expected)]) from unusable

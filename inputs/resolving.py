@@ -1,0 +1,172 @@
+"""From a validated file to a resolved case: the library's numbers filled in, the checks between keys made."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from inputs import library
+from inputs.case import Beads, Contact, Drive, Liquid, Run, Start, WalkerCase
+from inputs.dimer import Dimer, contact_loads, horizontal_distance, reach
+from inputs.library import suggestion
+from inputs.schema import LiquidTable, WalkerFile
+from inputs.timestep import fit_into_cycle, time_step_limits
+
+
+class UnusableKeyError(Exception):
+    """A problem found between keys; `inputs.reading` adds the file and the value."""
+
+    def __init__(self, key: str, expected: str) -> None:
+        self.key = key
+        self.expected = expected
+        super().__init__(expected)
+
+
+def resolve(file: WalkerFile, name: str) -> WalkerCase:
+    """Resolve a validated file.
+
+    Raises
+    ------
+    UnusableKeyError
+        If something is missing that the library does not know, or keys contradict each other.
+    """
+    beads = _beads(file)
+    liquid = _liquid(file.liquid)
+    contact = _contact(file)
+    dimer = Dimer(beads.radii, beads.density, liquid.surface_tension)
+    drive = _drive(file, dimer)
+    run = _run(file, dimer, contact, liquid, drive)
+    table = file.start
+    start = Start(
+        replicates=table.replicates,
+        facing=table.facing,
+        angle=table.angle,
+        angle_spread=table.angle_spread,
+        gap=table.gap,
+        gap_spread=table.gap_spread,
+        spacing=0.0,
+        seed=table.seed,
+    )
+    gravity = file.environment.gravity
+    case = WalkerCase(name, file.title, beads, liquid, file.substrate.material, contact, drive, start, run, gravity)
+    return _placed(case, table.spacing)
+
+
+def _known(key: str, name: str, names: tuple[str, ...]) -> str:
+    if name not in names:
+        raise UnusableKeyError(key, f"not in the library; expected one of {', '.join(names)}{suggestion(name, names)}")
+    return name
+
+
+def _beads(file: WalkerFile) -> Beads:
+    table = file.beads
+    density = table.density
+    if table.material is not None:
+        density = density or library.material(_known("beads.material", table.material, library.materials()))["density"]
+    if density is None:
+        raise UnusableKeyError("beads.material", "missing; expected a material of the library, or a density")
+    return Beads(radii=table.radii, density=density, material=table.material)
+
+
+def _liquid(table: LiquidTable) -> Liquid:
+    known: dict[str, float] = {}
+    if table.name is not None:
+        known = library.liquid(_known("liquid.name", table.name, library.liquids()))
+    if table.kinematic_viscosity is not None and table.dynamic_viscosity is not None:
+        raise UnusableKeyError(
+            "liquid.dynamic_viscosity", "expected either kinematic_viscosity or dynamic_viscosity, not both"
+        )
+    tension = table.surface_tension or known.get("surface_tension")
+    density = table.density or known.get("density")
+    kinematic = table.kinematic_viscosity if table.kinematic_viscosity is not None else known.get("kinematic_viscosity")
+    viscosity = table.dynamic_viscosity
+    if viscosity is None and kinematic is not None:
+        if density is None:
+            raise UnusableKeyError("liquid.density", "missing; a kinematic_viscosity needs the liquid's density")
+        viscosity = float(f"{kinematic * density:.15g}")
+    if tension is None or viscosity is None:
+        lacking = "surface_tension" if tension is None else "dynamic_viscosity"
+        raise UnusableKeyError(f"liquid.{lacking}", "missing; expected a liquid of the library by name, or this number")
+    return Liquid(tension, viscosity, density, table.volume_fraction, table.contact_angle, table.name)
+
+
+def _contact(file: WalkerFile) -> Contact:
+    table, bead, wall = file.contact, file.beads.material, file.substrate.material
+    _known("substrate.material", wall, library.materials())
+    pairs = {"bead_bead": library.surface_pair(bead, bead), "bead_wall": library.surface_pair(bead, wall)}
+
+    def friction(which: str, given: float | None) -> float:
+        pair = pairs[which]
+        if given is None and pair is None:
+            raise UnusableKeyError(
+                f"contact.friction.{which}", "missing; the library has no friction for these two materials"
+            )
+        return given if given is not None else pair["friction"]  # type: ignore[index]
+
+    rolling, pair = table.rolling_friction, pairs["bead_wall"]
+    if rolling is None:
+        if pair is None:
+            raise UnusableKeyError("contact.rolling_friction", "missing; the library has none for these two materials")
+        rolling = pair["rolling_friction"]
+    return Contact(
+        youngs_modulus=table.youngs_modulus,
+        poissons_ratio=table.poissons_ratio,
+        restitution=table.restitution,
+        friction_bead_bead=friction("bead_bead", table.friction.bead_bead),
+        friction_bead_wall=friction("bead_wall", table.friction.bead_wall),
+        rolling_friction=rolling,
+        minimum_separation_ratio=table.minimum_separation_ratio,
+    )
+
+
+def _drive(file: WalkerFile, dimer: Dimer) -> Drive:
+    table = file.drive
+    if (table.peak_acceleration is None) == (table.gamma0 is None):
+        if table.gamma0 is None:
+            raise UnusableKeyError("drive.peak_acceleration", 'missing; expected it (such as "4 g") or gamma0')
+        raise UnusableKeyError("drive.gamma0", "expected either peak_acceleration or gamma0, not both")
+    acceleration = table.peak_acceleration
+    if acceleration is None:
+        acceleration = dimer.peak_acceleration(table.gamma0 or 0.0)
+    return Drive(table.axis, table.frequency, acceleration, table.frame)
+
+
+def _run(file: WalkerFile, dimer: Dimer, contact: Contact, liquid: Liquid, drive: Drive) -> Run:
+    table = file.run
+    if table.cycles - table.settling_cycles < 2:
+        raise UnusableKeyError("run.settling_cycles", f"expected at most cycles - 2 = {table.cycles - 2}")
+    if table.samples_per_cycle % table.bridge_samples_per_cycle:
+        raise UnusableKeyError(
+            "run.bridge_samples_per_cycle", f"expected a divisor of samples_per_cycle = {table.samples_per_cycle}"
+        )
+    limits = time_step_limits(dimer, contact, liquid, drive)
+    exceeded = limits.exceeded_by(table.time_step) if table.time_step is not None else []
+    if exceeded and not table.allow_unstable:
+        allowed = min(limits.as_dict().values())
+        raise UnusableKeyError(
+            "run.time_step",
+            f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed * 1e6:.3g} us, "
+            '"auto", or allow_unstable = true',
+        )
+    largest = table.time_step if table.time_step is not None else limits.recommended()
+    time_step, steps = fit_into_cycle(largest, drive.frequency, table.samples_per_cycle)
+    return Run(
+        time_step, steps, table.cycles, table.settling_cycles, table.samples_per_cycle, table.bridge_samples_per_cycle
+    )
+
+
+def _placed(case: WalkerCase, spacing: float | None) -> WalkerCase:
+    """Settle the spacing of the walkers and refuse starts in which beads overlap."""
+    smallest, gap = min(case.beads.radii), case.start.gap
+    if gap is not None and gap > 0.0:
+        raise UnusableKeyError("start.gap", "expected zero or less: a bridge forms on contact, beads apart have none")
+    overlaps = contact_loads(case).overlaps if gap is None else (-gap, -gap, -gap)
+    if max(overlaps) * (1.0 + case.start.gap_spread) > 0.02 * smallest:
+        key = "start.gap" if gap is not None else "contact.youngs_modulus"
+        raise UnusableKeyError(key, "the beads overlap by more than 2 % of the smallest radius")
+    length = horizontal_distance(case.beads.radii, overlaps) + sum(case.beads.radii)
+    if spacing is not None and case.start.replicates > 1 and spacing < 1.5 * length:
+        raise UnusableKeyError(
+            "start.spacing",
+            f'neighbouring walkers would touch or overlap; expected at least {1.5e3 * length:.3g} mm, or "auto"',
+        )
+    return replace(case, start=replace(case.start, spacing=spacing if spacing is not None else 2.0 * reach(case)))

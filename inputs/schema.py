@@ -1,0 +1,154 @@
+"""What a case file may say: keys, types, defaults and bounds, as pydantic models.
+
+A quantity is written as a string with its unit and held here as a number in SI units. Keys that the library of
+materials and liquids can supply are optional; `inputs.reading` fills them in.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+from inputs.units import (
+    Acceleration,
+    Angle,
+    Density,
+    DynamicViscosity,
+    Frequency,
+    KinematicViscosity,
+    Length,
+    Modulus,
+    NonNegativeAngle,
+    SignedLength,
+    SurfaceTension,
+    Time,
+)
+
+
+def _auto(value: object) -> object:
+    if isinstance(value, str) and value.strip().lower() == "auto":
+        return None
+    return value
+
+
+def _plain_number(value: object) -> object:
+    """Accept TOML's integers and floats only: neither "0.3" nor true is a coefficient."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise PydanticCustomError("plain", "{expected}", {"expected": "expected a plain number without a unit"})
+    return value
+
+
+def _whole_number(value: object) -> object:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise PydanticCustomError("whole", "{expected}", {"expected": "expected a whole number"})
+    return value
+
+
+Number = Annotated[float, BeforeValidator(_plain_number), Field(allow_inf_nan=False)]
+Whole = Annotated[int, BeforeValidator(_whole_number)]
+Coefficient = Annotated[Number, Field(ge=0)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class BeadsTable(_Table):
+    """``[beads]``: the radii, first the bead that leads (the large one, as in the paper), and what they are made of."""
+
+    radii: Annotated[tuple[Length, Length], Field(description="radii of the two beads")]
+    material: str | None = None
+    density: Density | None = None
+
+
+class LiquidTable(_Table):
+    """``[liquid]``: a name from the library, or its numbers, or both (the numbers win)."""
+
+    name: str | None = None
+    surface_tension: SurfaceTension | None = None
+    density: Density | None = None
+    kinematic_viscosity: KinematicViscosity | None = None
+    dynamic_viscosity: DynamicViscosity | None = None
+    volume_fraction: Annotated[Number, Field(gt=0, le=0.5)] = 0.01
+    contact_angle: Annotated[NonNegativeAngle, Field(le=1.5707963267948966)] = 0.0
+
+
+class SubstrateTable(_Table):
+    """``[substrate]``."""
+
+    material: str
+
+
+class FrictionTable(_Table):
+    """``[contact.friction]``: Coulomb coefficients; left out, the library's value for the two materials holds."""
+
+    bead_bead: Coefficient | None = None
+    bead_wall: Coefficient | None = None
+
+
+class ContactTable(_Table):
+    """``[contact]``: the model of the contacts."""
+
+    friction: FrictionTable = FrictionTable()
+    rolling_friction: Coefficient | None = None
+    restitution: Annotated[Number, Field(gt=0, le=1)] = 0.3
+    youngs_modulus: Annotated[Modulus, Field(ge=5e6)] = 5e7
+    poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = 0.3
+    minimum_separation_ratio: Annotated[Number, Field(gt=0, le=1)] = 0.01
+
+
+class DriveTable(_Table):
+    """``[drive]``: how the substrate is shaken; exactly one of ``peak_acceleration`` and ``gamma0``."""
+
+    axis: Literal["x", "y", "z"] = "x"
+    frequency: Frequency
+    peak_acceleration: Acceleration | None = None
+    gamma0: Coefficient | None = None
+    frame: Literal["lab", "container"] = "lab"
+
+
+class StartTable(_Table):
+    """``[start]``: how many walkers there are and how each begins."""
+
+    replicates: Annotated[Whole, Field(ge=1, le=1000)] = 6
+    facing: Literal["both", "right", "left"] = "both"
+    angle: Angle = 0.0
+    angle_spread: NonNegativeAngle = 0.017453292519943295
+    gap: Annotated[SignedLength | None, BeforeValidator(_auto)] = None
+    gap_spread: Annotated[Number, Field(ge=0, lt=1)] = 0.2
+    spacing: Annotated[Length | None, BeforeValidator(_auto)] = None
+    seed: Annotated[Whole, Field(ge=0)] = 1
+
+
+class RunTable(_Table):
+    """``[run]``: the time step, the length of the run and what is recorded."""
+
+    time_step: Annotated[Time | None, BeforeValidator(_auto)] = None
+    allow_unstable: bool = False
+    cycles: Annotated[Whole, Field(ge=2)] = 60
+    settling_cycles: Annotated[Whole, Field(ge=0)] = 20
+    samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] = 20
+    bridge_samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] = 1
+
+
+class EnvironmentTable(_Table):
+    """``[environment]``."""
+
+    gravity: Acceleration = 9.81
+
+
+class WalkerFile(_Table):
+    """A case file of a walker."""
+
+    kind: Literal["walker"] = "walker"
+    title: str = ""
+    beads: BeadsTable
+    liquid: LiquidTable
+    substrate: SubstrateTable
+    contact: ContactTable = ContactTable()
+    drive: DriveTable
+    start: StartTable = StartTable()
+    run: RunTable = RunTable()
+    environment: EnvironmentTable = EnvironmentTable()

@@ -1,0 +1,138 @@
+"""Physical quantities: a string with its unit in, a number in SI units out.
+
+Units are pint's. Two of its readings are wrong for this field and are caught here: its ``g`` is the gram, while the
+literature on shaken grains writes accelerations in g (the paper: 1 g = 9.8 m/s²); and it takes radians for pure
+numbers, so that "500 rad/s" would pass for 500 Hz.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BeforeValidator
+from pydantic_core import PydanticCustomError
+
+if TYPE_CHECKING:
+    from pint import UnitRegistry
+
+ACCELERATION_OF_ONE_G = 9.8
+"""m/s²; "1 g = 9.8 m/s²" in the caption of Fig. 1 of Khan et al., *Self-assembled granular walkers*."""
+
+# pint's own expression parser reads "0,3 mm" as 0 mm and "0.3 mm; 2" as 0.6 mm: only its unit parser is used.
+_NUMBER_AND_UNIT = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s%,;][^%,;]*)")
+_GRAM_SYMBOL = re.compile(r"(?<![A-Za-z_])g(?![A-Za-z_0-9])")
+_ANGLE_UNITS = frozenset({"degree", "radian", "milliradian", "arcminute", "arcsecond"})
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a quantity is: its name, its SI unit and an example to show to a user who got it wrong."""
+
+    name: str
+    unit: str
+    example: str
+
+    @property
+    def expectation(self) -> str:
+        """The end of an error message."""
+        article = "an" if self.name[0] in "aeiou" else "a"
+        return f'expected {article} {self.name} with its unit, such as "{self.example}"'
+
+
+@cache
+def registry() -> UnitRegistry[float]:
+    """Pint's registry with the ``gee`` (9.8 m/s²) added; pint keeps the parsed definitions in the user's cache."""
+    import pint
+
+    units: UnitRegistry[float]
+    try:
+        units = pint.UnitRegistry(cache_folder=":auto:")
+    except OSError:  # a home directory that cannot be written: parse the definitions anew
+        units = pint.UnitRegistry()
+    units.define(f"gee = {ACCELERATION_OF_ONE_G} * meter / second ** 2")
+    return units
+
+
+def parse_quantity(text: str, kind: Kind) -> float:
+    """Read a quantity.
+
+    Parameters
+    ----------
+    text
+        A number with its unit, such as ``"0.3 mm"``. For an acceleration ``g`` means 9.8 m/s².
+    kind
+        What the quantity must be.
+
+    Returns
+    -------
+    float
+        The value in ``kind.unit``.
+
+    Raises
+    ------
+    ValueError
+        If the text is no quantity, has no unit, or has the dimension of something else.
+    """
+    match = _NUMBER_AND_UNIT.fullmatch(text.strip())
+    if match is None:
+        raise ValueError(kind.expectation)
+    symbol = _GRAM_SYMBOL.sub("gee", match["unit"]) if kind is ACCELERATION else match["unit"]
+    units = registry()
+    try:
+        unit = units.parse_units(symbol)
+        converted = units.Quantity(float(match["number"]), unit).to(kind.unit).magnitude
+        value = float(f"{converted:.15g}")  # 4.0 g/cm³ is 4000 kg/m³, not 3999.9999999999995
+    except Exception as error:  # pint's parser raises a dozen types, the tokenizer's errors among them
+        raise ValueError(kind.expectation) from error
+    if kind is ANGLE and str(unit) not in _ANGLE_UNITS:
+        raise ValueError(kind.expectation)
+    if kind is FREQUENCY and "radian" in str(units.Quantity(1.0, unit).to_root_units().units):
+        raise ValueError(kind.expectation + " (cycles a second, not an angular frequency)")
+    if not math.isfinite(value):
+        raise ValueError(kind.expectation + "; it must be finite")
+    return value
+
+
+def _validator(kind: Kind, *, positive: bool, zero: bool) -> Any:
+    def validate(value: object) -> float:
+        if not isinstance(value, str):
+            raise PydanticCustomError("quantity", "{expected}", {"expected": kind.expectation})
+        try:
+            number = parse_quantity(value, kind)
+        except ValueError as error:
+            raise PydanticCustomError("quantity", "{expected}", {"expected": str(error)}) from error
+        if positive and (number < 0 or (number == 0 and not zero)):
+            bound = "zero or more" if zero else "more than zero"
+            raise PydanticCustomError("quantity", "{expected}", {"expected": f"{kind.expectation}; it must be {bound}"})
+        return number
+
+    return BeforeValidator(validate)
+
+
+LENGTH = Kind("length", "m", "0.3 mm")
+FREQUENCY = Kind("frequency", "Hz", "80 Hz")
+ACCELERATION = Kind("acceleration", "m/s^2", "4 g")
+TIME = Kind("time", "s", "2 us")
+ANGLE = Kind("angle", "rad", "10 deg")
+DENSITY = Kind("density", "kg/m^3", "4.0 g/cm^3")
+SURFACE_TENSION = Kind("surface tension", "N/m", "19.2 mN/m")
+KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s")
+DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s")
+MODULUS = Kind("modulus", "Pa", "50 MPa")
+
+Length = Annotated[float, _validator(LENGTH, positive=True, zero=False)]
+SignedLength = Annotated[float, _validator(LENGTH, positive=False, zero=True)]
+Frequency = Annotated[float, _validator(FREQUENCY, positive=True, zero=False)]
+Acceleration = Annotated[float, _validator(ACCELERATION, positive=True, zero=True)]
+Time = Annotated[float, _validator(TIME, positive=True, zero=False)]
+Angle = Annotated[float, _validator(ANGLE, positive=False, zero=True)]
+NonNegativeAngle = Annotated[float, _validator(ANGLE, positive=True, zero=True)]
+Density = Annotated[float, _validator(DENSITY, positive=True, zero=False)]
+SurfaceTension = Annotated[float, _validator(SURFACE_TENSION, positive=True, zero=False)]
+KinematicViscosity = Annotated[float, _validator(KINEMATIC_VISCOSITY, positive=True, zero=True)]
+DynamicViscosity = Annotated[float, _validator(DYNAMIC_VISCOSITY, positive=True, zero=True)]
+Modulus = Annotated[float, _validator(MODULUS, positive=True, zero=False)]

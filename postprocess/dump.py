@@ -1,0 +1,124 @@
+"""Read the engine's binary dumps (``dump custom … .bin``) as numpy arrays on a memory map.
+
+A frame is int64 step, int64 rows, int32 triclinic, 6 int32 boundary, 6 float64 box, int32 columns, int32 processes,
+then for each process int32 count and that many float64. Columns have no names: the layout beside the dump has them.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+_HEADER = struct.Struct("=qqi6i6dii")
+_COUNT = struct.Struct("=i")
+
+
+class DumpError(ValueError):
+    """A file that is no binary dump, or one of other columns than expected."""
+
+
+@dataclass(frozen=True)
+class _Frame:
+    step: int
+    rows: int
+    columns: int
+    blocks: tuple[tuple[int, int], ...]
+    """Offset in bytes and number of values of each process's part."""
+
+
+class BinaryDump:
+    """The frames of a binary dump.
+
+    Parameters
+    ----------
+    path
+        The ``.bin`` file.
+    columns
+        Names of its columns.
+
+    Attributes
+    ----------
+    steps : ndarray of int64, shape (frames,)
+        The engine's step of each complete frame.
+    truncated : bool
+        Whether the file ends within a frame; the incomplete frame is left out.
+
+    Raises
+    ------
+    DumpError
+        If the file is not such a dump.
+    """
+
+    def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
+        self.path = path
+        self.columns = columns
+        size = path.stat().st_size
+        self._bytes: npt.NDArray[np.uint8] = (
+            np.memmap(path, dtype=np.uint8, mode="r") if size else np.empty(0, dtype=np.uint8)
+        )
+        self._frames: list[_Frame] = []
+        self.truncated = False
+        offset = 0
+        while offset < size:
+            read = self._read_header(offset, size)
+            if read is None:
+                self.truncated = True
+                break
+            frame, offset = read
+            self._frames.append(frame)
+        self.steps = np.array([frame.step for frame in self._frames], dtype=np.int64)
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def _read_header(self, offset: int, size: int) -> tuple[_Frame, int] | None:
+        if offset + _HEADER.size > size:
+            return None
+        values = _HEADER.unpack(self._bytes[offset : offset + _HEADER.size].tobytes())
+        step, rows, columns, processes = values[0], values[1], values[15], values[16]
+        if columns != len(self.columns) or rows < 0 or not 1 <= processes < 1_000_000 or step < 0:
+            raise DumpError(f"{self.path}: no dump of {len(self.columns)} columns (byte {offset})")
+        offset += _HEADER.size
+        blocks = []
+        for _ in range(processes):
+            if offset + _COUNT.size > size:
+                return None
+            (count,) = _COUNT.unpack(self._bytes[offset : offset + _COUNT.size].tobytes())
+            offset += _COUNT.size
+            if offset + 8 * count > size:
+                return None
+            blocks.append((offset, count))
+            offset += 8 * count
+        if sum(count for _, count in blocks) != rows * columns:
+            raise DumpError(f"{self.path}: the parts of the frame of step {step} do not add up")
+        return _Frame(step, rows, columns, tuple(blocks)), offset
+
+    def frame(self, number: int) -> FloatArray:
+        """One frame, shape (rows, columns)."""
+        frame = self._frames[number]
+        parts = [self._bytes[start : start + 8 * count].view(np.float64) for start, count in frame.blocks]
+        return np.concatenate(parts).reshape(frame.rows, frame.columns)
+
+    def stack(self) -> FloatArray:
+        """All frames, shape (frames, rows, columns).
+
+        Raises
+        ------
+        DumpError
+            If the number of rows changes.
+        """
+        if not self._frames:
+            return np.empty((0, 0, len(self.columns)))
+        if len({frame.rows for frame in self._frames}) > 1:
+            raise DumpError(f"{self.path}: the number of beads changes")
+        return np.stack([self.frame(number) for number in range(len(self))])
+
+    def column(self, name: str) -> int:
+        """Number of a column."""
+        return self.columns.index(name)

@@ -1,0 +1,147 @@
+"""Figures of a run (matplotlib): where the walkers went and turned, and their gait through two cycles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inputs.case import WalkerCase
+from inputs.dimer import dimer_of
+from postprocess.gait import distance_walked, fit_slopes, gait
+from postprocess.trajectory import Trajectory, read_trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WALK_NAME = "walk.png"
+GAIT_NAME = "gait.png"
+_STYLE = Path(__file__).parent / "style.mplstyle"
+_FEWEST_SAMPLES = 8
+"""Samples a cycle below which a gait shows nothing."""
+
+
+def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
+    """Draw the figures of a run.
+
+    Parameters
+    ----------
+    directory
+        A run directory.
+    destination
+        Folder for the pictures; the run directory itself if None.
+
+    Returns
+    -------
+    list of Path
+        ``walk.png`` (strobed positions, distance walked and orientation against time) and, if the run was sampled at
+        least eight times a cycle, ``gait.png`` (velocity and rotation velocities through two cycles, as in Fig. 4 of
+        Khan et al.).
+    """
+    trajectory = read_trajectory(directory)
+    destination = destination or directory
+    destination.mkdir(parents=True, exist_ok=True)
+    written = [_save(_walk_figure(trajectory), destination / WALK_NAME, directory)]
+    if trajectory.case.run.samples_per_cycle >= _FEWEST_SAMPLES:
+        written.append(_save(_gait_figure(trajectory), destination / GAIT_NAME, directory))
+    return written
+
+
+def _save(figure: Figure, path: Path, directory: Path) -> Path:
+    beside = path.with_name(path.name + ".new")
+    figure.savefig(beside, format="png", metadata={"Source": directory.name, "Software": "granular-walkers"})
+    beside.replace(path)
+    return path
+
+
+def _figure(**options: Any) -> tuple[Figure, Any]:
+    """A figure in the project's style, without pyplot's global state."""
+    import matplotlib.style
+    from matplotlib.figure import Figure
+
+    matplotlib.style.use(_STYLE)
+    figure = Figure(figsize=options.pop("figsize"), layout="constrained")
+    mosaic = options.pop("mosaic", None)
+    return figure, figure.subplots(**options) if mosaic is None else figure.subplot_mosaic(mosaic, **options)
+
+
+def _title(case: WalkerCase) -> str:
+    gamma0 = dimer_of(case).gamma0(case.drive.peak_acceleration)
+    first, second = (f"{radius * 1e3:g}" for radius in case.beads.radii)
+    return (
+        f"{case.title or case.name}\nR = {first}/{second} mm, {case.drive.frequency:g} Hz, "
+        f"$a_0$ = {case.drive.peak_acceleration:.3g} m/s² ($\\Gamma_0$ = {gamma0:.3g})"
+    )
+
+
+def _walk_figure(trajectory: Trajectory) -> Figure:
+    figure, axes = _figure(
+        mosaic=[["strobe", "walked"], ["strobe", "turned"]], figsize=(7.6, 5.4), width_ratios=[1, 1.6]
+    )
+    top, middle, bottom = axes["strobe"], axes["walked"], axes["turned"]
+    figure.suptitle(_title(trajectory.case), fontsize=10)
+    _draw_strobe(top, trajectory)
+    time, distance = distance_walked(trajectory)
+    settled = trajectory.case.run.settling_cycles
+    slope, _ = fit_slopes(time[settled:], distance[settled:])
+    strobe = trajectory.case.run.samples_per_cycle
+    for number, walker in enumerate(trajectory.layout.walkers):
+        label = f"{'right' if walker.facing > 0 else 'left'}, {slope[number] * 1e3:.3g} mm/s"
+        middle.plot(time, distance[:, number] * 1e3, "o" if number % 2 == 0 else "s", mfc="none", label=label)
+        bottom.plot(time, np.degrees(trajectory.orientation[::strobe, number]))
+    middle.axvspan(0.0, time[settled], color="0.93", zorder=0)
+    middle.set(ylabel="distance walked (mm)", xlabel="time (s)")
+    if len(trajectory.layout.walkers) <= 12:
+        middle.legend(fontsize=7, ncols=2, title="facing, velocity", title_fontsize=7)
+    bottom.set(ylabel=r"orientation $\psi$ (°)", xlabel="time (s)")
+    return figure
+
+
+def _draw_strobe(axes: Axes, trajectory: Trajectory) -> None:
+    """The first walker from above, both beads to scale, at eight times (as in Fig. 1b of the paper)."""
+    from matplotlib.patches import Circle
+
+    strobe = trajectory.case.run.samples_per_cycle
+    position = trajectory.position[::strobe, 0, :, :2] * 1e3
+    radii = trajectory.radii * 1e3
+    shown = np.unique(np.linspace(0, len(position) - 1, 8).round().astype(int))
+    pitch = 2.6 * float(radii.max())
+    origin = position[0].mean(axis=0)
+    for row, frame in enumerate(shown):
+        for bead in range(2):
+            x, y = position[frame, bead] - origin
+            axes.add_patch(
+                Circle((x, y - row * pitch), float(radii[bead]), fc="0.75" if bead else "0.45", ec="0.2", lw=0.6)
+            )
+        seconds = trajectory.time[frame * strobe]
+        axes.annotate(
+            f"{seconds:.2f} s", (1.01, -row * pitch), xycoords=("axes fraction", "data"), fontsize=7, va="center"
+        )
+    low, high = position[..., 0].min() - origin[0], position[..., 0].max() - origin[0]
+    axes.set(xlim=(low - 2 * radii.max(), high + 2 * radii.max()), ylim=(-pitch * (len(shown) - 0.4), 0.6 * pitch))
+    axes.set_aspect("equal")
+    axes.set(xlabel="x relative to the substrate (mm)", yticks=[], title="walker 0 from above")
+    axes.grid(visible=False)
+
+
+def _gait_figure(trajectory: Trajectory) -> Figure:
+    run = trajectory.case.run
+    motion = gait(trajectory)
+    last = slice((run.cycles - 2) * run.samples_per_cycle, run.cycles * run.samples_per_cycle + 1)
+    phase = trajectory.time[last] * trajectory.case.drive.frequency - (run.cycles - 2)
+    figure, axes = _figure(figsize=(6.4, 3.8))
+    figure.suptitle(_title(trajectory.case), fontsize=10)
+    series = [
+        ("velocity of the walker", motion.velocity[last, 0], "s", "#c4473a"),
+        (r"$-R\,\mathrm{d}\varphi/\mathrm{d}t$, bead 1", motion.rotation[last, 0, 0], "o", "0.1"),
+        (r"$-R\,\mathrm{d}\varphi/\mathrm{d}t$, bead 2", motion.rotation[last, 0, 1], "^", "#1f3b73"),
+    ]
+    for label, values, marker, colour in series:
+        mean = values[:-1].mean() * 1e3
+        axes.plot(phase, values * 1e3, marker=marker, color=colour, label=f"{label} (mean {mean:.2f} mm/s)")
+    axes.axhline(0.0, color="0.4", lw=0.6)
+    axes.set(xlabel="time (cycles of the drive)", ylabel="mm/s")
+    figure.legend(fontsize=7, ncols=3, loc="outside lower center")
+    return figure

@@ -1,0 +1,178 @@
+"""Files for ParaView: beads, bridges and the moving substrate as .vtp, joined by one .pvd in physical seconds."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+
+import numpy as np
+import numpy.typing as npt
+
+from postprocess.dump import FloatArray
+from postprocess.tables import read_table
+from postprocess.trajectory import Trajectory, read_trajectory
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyvista as pv
+
+FOLDER_NAME = "vtk"
+COLLECTION_NAME = "walkers.pvd"
+
+
+def write_vtk(
+    directory: Path, *, every_sample: bool = False, vtu: bool = False, destination: Path | None = None
+) -> Path:
+    """Write a run for ParaView.
+
+    Parameters
+    ----------
+    directory
+        A run directory with its tables.
+    every_sample
+        All samples instead of one frame a cycle. Bridges are in the frames in which the engine reported them.
+    vtu
+        Also write the beads as ``.vtu`` (through meshio).
+    destination
+        Folder to write, replaced if it exists; ``vtk`` in the run directory if None.
+
+    Returns
+    -------
+    Path
+        The ``.pvd`` file: its times are seconds; part 0 the beads, part 1 the substrate, part 2 the bridges.
+    """
+    trajectory = read_trajectory(directory)
+    bridges = read_table(directory, "bridges")
+    place = destination or directory / FOLDER_NAME
+    beside = place.with_name(place.name + ".new")
+    shutil.rmtree(beside, ignore_errors=True)
+    beside.mkdir(parents=True)
+    stride = 1 if every_sample else trajectory.case.run.samples_per_cycle
+    entries: list[_Entry] = []
+    for frame in range(0, len(trajectory.time), stride):
+        entries += _write_frame(beside, trajectory, bridges, frame, vtu)
+    _write_collection(beside / COLLECTION_NAME, entries)
+    shutil.rmtree(place, ignore_errors=True)
+    beside.rename(place)
+    return place / COLLECTION_NAME
+
+
+@dataclass(frozen=True)
+class _Entry:
+    time: float
+    part: int
+    file: str
+
+
+def _write_frame(folder: Path, trajectory: Trajectory, bridges: pd.DataFrame, frame: int, vtu: bool) -> list[_Entry]:
+    time = float(trajectory.time[frame])
+    beads = beads_at(trajectory, frame)
+    meshes: dict[int, tuple[str, pv.PolyData]] = {
+        0: ("beads", beads),
+        1: ("substrate", substrate_at(trajectory, frame)),
+    }
+    joined = bridges_at(trajectory, bridges, frame)
+    if joined is not None:
+        meshes[2] = ("bridges", joined)
+    entries = []
+    for part, (name, mesh) in meshes.items():
+        file = f"{name}_{frame:06d}.vtp"
+        mesh.save(folder / file, binary=True)
+        entries.append(_Entry(time, part, file))
+    if vtu:
+        _write_vtu(folder / f"beads_{frame:06d}.vtu", beads)
+    return entries
+
+
+def _in_frame_of_run(trajectory: Trajectory, frame: int) -> FloatArray:
+    """Bead centres, shape (W, 2, 3), with the motion of the substrate put back (in the container frame it has none)."""
+    moved: FloatArray = trajectory.position[frame] + trajectory.substrate[frame]
+    return moved
+
+
+def beads_at(trajectory: Trajectory, frame: int) -> pv.PolyData:
+    """Beads of a frame as points with ``id``, ``walker``, ``bead`` (1 or 2), ``radius``, ``velocity``, ``omega``.
+
+    Positions are in the frame of the run, velocities relative to the substrate; SI units.
+    """
+    import pyvista as pv
+
+    walkers = trajectory.layout.walkers
+    count = len(walkers)
+    mesh = pv.PolyData(_in_frame_of_run(trajectory, frame).reshape(-1, 3).copy())
+    arrays: dict[str, npt.NDArray[Any]] = {
+        "id": np.array([bead for walker in walkers for bead in walker.beads]),
+        "walker": np.repeat([walker.walker for walker in walkers], 2),
+        "bead": np.tile([1, 2], count),
+        "radius": np.tile(trajectory.radii, count),
+        "velocity": trajectory.velocity[frame].reshape(-1, 3),
+        "omega": trajectory.spin[frame].reshape(-1, 3),
+    }
+    for name, values in arrays.items():
+        mesh.point_data[name] = np.ascontiguousarray(values)
+    return mesh
+
+
+def substrate_at(trajectory: Trajectory, frame: int) -> pv.PolyData:
+    """The part of the substrate that the walkers use, as a rectangle that moves with it."""
+    import pyvista as pv
+
+    ground = trajectory.position[..., :2]
+    margin = 4.0 * float(trajectory.radii.max())
+    low, high = ground.min(axis=(0, 1, 2)) - margin, ground.max(axis=(0, 1, 2)) + margin
+    corners = np.array([[low[0], low[1], 0], [high[0], low[1], 0], [high[0], high[1], 0], [low[0], high[1], 0]])
+    return pv.PolyData(corners + trajectory.substrate[frame], faces=[4, 0, 1, 2, 3])
+
+
+def bridges_at(trajectory: Trajectory, bridges: pd.DataFrame, frame: int) -> pv.PolyData | None:
+    """Bridges of a frame as lines with ``gap`` (m), ``normal_force`` (N), ``touching`` and ``contact``.
+
+    A line joins two centres, or a centre and the point of the substrate below it. None if the engine reported no
+    bridges in that frame.
+    """
+    import pyvista as pv
+
+    half_step = 0.5 * trajectory.layout.time_step
+    rows = bridges[np.abs(bridges["time"] - trajectory.time[frame]) < half_step]
+    if rows.empty:
+        return None
+    centres = {
+        bead: centre
+        for walker, pair in zip(trajectory.layout.walkers, _in_frame_of_run(trajectory, frame), strict=True)
+        for bead, centre in zip(walker.beads, pair, strict=True)
+    }
+    floor = np.array([1.0, 1.0, 0.0])
+    ends = [
+        (centres[first], centres[second] if second else centres[first] * floor)
+        for first, second in zip(rows["bead_1"], rows["bead_2"], strict=True)
+    ]
+    numbers = np.arange(2 * len(ends)).reshape(-1, 2)
+    lines = np.hstack([np.full((len(ends), 1), 2), numbers]).ravel()
+    mesh = pv.PolyData(np.array(ends).reshape(-1, 3), lines=lines)
+    for name in ("gap", "normal_force", "touching", "contact", "walker"):
+        mesh.cell_data[name] = rows[name].to_numpy().astype(np.float64)
+    return mesh
+
+
+def _write_vtu(path: Path, beads: pv.PolyData) -> None:
+    import meshio
+
+    points = np.asarray(beads.points)
+    cells = [("vertex", np.arange(len(points)).reshape(-1, 1))]
+    arrays = {name: np.asarray(beads.point_data[name]) for name in beads.point_data}
+    meshio.Mesh(points, cells, point_data=arrays).write(path)
+
+
+def _write_collection(path: Path, entries: Iterable[_Entry]) -> None:
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    collection = ElementTree.SubElement(root, "Collection")
+    for entry in entries:
+        ElementTree.SubElement(
+            collection, "DataSet", timestep=repr(entry.time), group="", part=str(entry.part), file=entry.file
+        )
+    ElementTree.indent(root)
+    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)

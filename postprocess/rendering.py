@@ -1,0 +1,130 @@
+"""Pictures of walkers rendered off-screen with pyvista; no X server is needed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postprocess.dump import FloatArray
+from postprocess.trajectory import Trajectory, read_trajectory
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+PICTURE_NAME = "walker.png"
+_RUBY = ("#b0203c", "#e0566c")
+
+
+def render_run(
+    directory: Path,
+    destination: Path | None = None,
+    *,
+    walker: int = 0,
+    images: int = 4,
+    size: tuple[int, int] = (1280, 800),
+) -> Path:
+    """Render one walker at several times of its way, one below the other as in Fig. 1b of Khan et al.
+
+    Parameters
+    ----------
+    directory
+        A run directory.
+    destination
+        The PNG to write; ``walker.png`` in the run directory if None.
+    walker
+        Number of the walker.
+    images
+        How many times to show, evenly from the start to the end of the run.
+    size
+        Width and height in pixels.
+
+    Returns
+    -------
+    Path
+        The picture.
+
+    Raises
+    ------
+    IndexError
+        If there is no such walker.
+    """
+    trajectory = read_trajectory(directory)
+    path = destination or directory / PICTURE_NAME
+    path.parent.mkdir(parents=True, exist_ok=True)
+    plotter = _scene(trajectory, walker, images, size)
+    beside = path.with_name(f".{path.stem}.new.png")
+    plotter.screenshot(beside)
+    plotter.close()
+    beside.replace(path)
+    return path
+
+
+def _scene(trajectory: Trajectory, walker: int, images: int, size: tuple[int, int]) -> pv.Plotter:
+    # Without this VTK tries an X server first and says so.
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    import pyvista as pv
+
+    strobe = trajectory.case.run.samples_per_cycle
+    frames = np.linspace(0, (len(trajectory.time) - 1) // strobe, images).round().astype(int) * strobe
+    radii = trajectory.radii * 1e3
+    pitch = 2.4 * float(radii.max())
+    position = trajectory.position[frames, walker] * 1e3
+    position = position - np.array([*position[0].mean(axis=0)[:2], 0.0])
+    position[:, :, 1] -= pitch * np.arange(images)[:, None]
+    low = position.min(axis=(0, 1)) - 2.2 * radii.max()
+    high = position.max(axis=(0, 1)) + np.array([4.5, 3.0, 0.0]) * radii.max()
+    plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
+    plotter.background_color = pv.Color("white")
+    _add_floor(plotter, low, high)
+    for frame, centres in zip(frames, position, strict=True):
+        for bead in range(2):
+            sphere = pv.Sphere(radius=radii[bead], center=centres[bead], theta_resolution=80, phi_resolution=80)
+            plotter.add_mesh(sphere, color=_RUBY[bead], smooth_shading=True, specular=0.6, specular_power=40)
+        place = [high[0] - 2.2 * radii.max(), float(centres[:, 1].mean()), 0.02]
+        _add_label(plotter, place, f"{trajectory.time[frame]:.2f} s")
+    _add_scale_bar(plotter, [low[0] + 0.6 * radii.max(), low[1] + 0.5 * radii.max(), 0.02])
+    _aim(plotter, (low + high) / 2.0, high - low, size)
+    return plotter
+
+
+def _add_floor(plotter: pv.Plotter, low: FloatArray, high: FloatArray) -> None:
+    import pyvista as pv
+
+    middle, extent = (low + high) / 2.0, high - low
+    floor = pv.Plane(center=(middle[0], middle[1], 0.0), i_size=extent[0], j_size=extent[1], direction=(0.0, 0.0, 1.0))
+    plotter.add_mesh(floor, color="#c9d2d8", lighting=False)
+
+
+def _add_label(plotter: pv.Plotter, place: list[float], text: str) -> None:
+    plotter.add_point_labels(
+        [place],
+        [text],
+        font_size=20,
+        text_color="black",
+        shape=None,
+        show_points=False,
+        always_visible=True,
+        justification_horizontal="center",
+        justification_vertical="center",
+    )
+
+
+def _add_scale_bar(plotter: pv.Plotter, start: list[float], length: float = 0.5) -> None:
+    import pyvista as pv
+
+    plotter.add_mesh(pv.Line(start, [start[0] + length, *start[1:]]), color="black", line_width=5)
+    _add_label(plotter, [start[0] + length + 0.3, *start[1:]], f"{length:g} mm")
+
+
+def _aim(plotter: pv.Plotter, middle: FloatArray, extent: FloatArray, size: tuple[int, int]) -> None:
+    """Look down at 55° from the side of the walkers, without perspective so that the scale bar holds everywhere."""
+    elevation = np.radians(55.0)
+    away = 5.0 * float(extent.max())
+    camera = (middle[0], middle[1] - away * np.cos(elevation), away * np.sin(elevation))
+    plotter.camera_position = [camera, (middle[0], middle[1], 0.0), (0.0, 0.0, 1.0)]
+    plotter.camera.parallel_projection = True
+    height = max(extent[1] * np.sin(elevation), extent[0] * size[1] / size[0])
+    plotter.camera.parallel_scale = 0.52 * float(height)

@@ -1,0 +1,66 @@
+"""A run's result as text, in the units of the paper (mm/s, degrees)."""
+
+from __future__ import annotations
+
+from math import degrees
+from pathlib import Path
+from typing import Any
+
+_CONTACTS = {"contact_1": "bead 1", "contact_2": "bead 2", "contact_3": "bead on bead"}
+
+
+def describe_result(directory: Path, result: dict[str, Any], *, found: bool = False) -> str:
+    """The result of a run in a few lines.
+
+    Parameters
+    ----------
+    directory
+        The run directory.
+    result
+        As `postprocess.result.tabulate` returns it.
+    found
+        Whether the run was there before.
+    """
+    velocity, rotation, turned = result["velocity"], result["rotation"], result["orientation_end"]
+    error = velocity["standard_error"]
+    spread = f" ± {_speed(error)} mm/s" if error is not None else " mm/s"
+    steady = f"{result['steady']} of {result['walkers']} steady"
+    sliding = ", ".join(f"{name} {_speed(result['sliding'][contact])}" for contact, name in _CONTACTS.items())
+    lines = [
+        f"{result['case']}: {result['frequency']:g} Hz, a0 = {result['peak_acceleration']:.4g} m/s², "
+        f"Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}" + (" (already run)" if found else ""),
+        f"  velocity   {_speed(velocity['mean'])}{spread} toward the large bead; "
+        f"{velocity['n']} walkers, {_speed(velocity['smallest'])} to {_speed(velocity['largest'])}, {steady}",
+        f"    facing right {_side(result['right_facing'])}, facing left {_side(result['left_facing'])}",
+        f"  rotation   bead 1 {_speed(rotation['bead_1'])}, bead 2 {_speed(rotation['bead_2'])} mm/s",
+        f"  sliding    {sliding} mm/s",
+        f"  orientation at the end {degrees(turned['smallest']):.2f}° to {degrees(turned['largest']):.2f}°",
+    ]
+    if any(result["open"].values()):
+        shares = ", ".join(f"{name} {100 * result['open'][contact]:.1f} %" for contact, name in _CONTACTS.items())
+        lines.append(f"  contacts open: {shares} of the time")
+    lines += [f"  warning: {warning}" for warning in _warnings(result)]
+    lines.append(f"  run        {directory}")
+    return "\n".join(lines)
+
+
+def _speed(value: float | None) -> str:
+    """A speed in m/s as text in mm/s: three decimals, or its order of magnitude where these would all be zero."""
+    if value is None:
+        return "-"
+    return f"{value * 1e3:.3f}" if abs(value) >= 5e-7 or value == 0.0 else f"{value * 1e3:.1e}"
+
+
+def _side(side: dict[str, Any]) -> str:
+    return f"{_speed(side['mean'])} ({side['n']})" if side["n"] else "none"
+
+
+def _warnings(result: dict[str, Any]) -> list[str]:
+    warnings = []
+    if result["steady"] < result["walkers"]:
+        warnings.append("some walkers are not steady: the velocity depends on the length of the run")
+    if result["walkers_met"]:
+        warnings.append("walkers came close to each other and are not independent: give them more start.spacing")
+    if result["truncated"]:
+        warnings.append("the dump ends within a frame")
+    return warnings

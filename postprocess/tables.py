@@ -1,0 +1,134 @@
+"""The tables of a run: parquet files whose columns carry their unit and meaning.
+
+Written with pyarrow alone (pandas takes a third of a second to import); read into pandas.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_CONTACTS = "contacts 1, 2: beads on the substrate, 3: bead on bead"
+
+TRAJECTORY = {
+    "walker": ("", "number of the walker, from 0"),
+    "time": ("s", "simulated time"),
+    "cycle": ("", "time in cycles of the drive"),
+    "x": ("m", "mass centre relative to the substrate"),
+    "y": ("m", "mass centre relative to the substrate"),
+    "z": ("m", "mass centre above the substrate"),
+    "orientation": ("rad", "angle of bead 2 to bead 1 from the direction that the walker was to face"),
+    "velocity": ("m/s", "mass centre relative to the substrate, along the heading (small bead to large bead)"),
+    "rotation_1": ("m/s", "rotation velocity -R dphi/dt of bead 1"),
+    "rotation_2": ("m/s", "rotation velocity -R dphi/dt of bead 2"),
+    "sliding_1": ("m/s", f"sliding velocity; {_CONTACTS}"),
+    "sliding_2": ("m/s", f"sliding velocity; {_CONTACTS}"),
+    "sliding_3": ("m/s", f"sliding velocity; {_CONTACTS}"),
+    "gap_1": ("m", f"gap, negative where they touch; {_CONTACTS}"),
+    "gap_2": ("m", f"gap, negative where they touch; {_CONTACTS}"),
+    "gap_3": ("m", f"gap, negative where they touch; {_CONTACTS}"),
+}
+"""``trajectory.parquet``: a row a sample and walker."""
+
+WALKERS = {
+    "walker": ("", "number of the walker, from 0"),
+    "facing": ("", "where bead 1 points at the start: 1 along the drive axis (right), -1 against it (left)"),
+    "start_angle": ("rad", "orientation at the start"),
+    "velocity": ("m/s", "along the heading after the settling cycles, positive toward the large bead"),
+    "standard_error": ("m/s", "of the fit of the velocity"),
+    "first_half": ("m/s", "velocity in the first half of the fitted cycles"),
+    "second_half": ("m/s", "velocity in the second half of the fitted cycles"),
+    "steady": ("", "whether the two halves agree"),
+    "axial_velocity": ("m/s", "mass centre along the drive axis"),
+    "lateral_velocity": ("m/s", "mass centre across the drive axis"),
+    "orientation_mean": ("rad", "mean orientation after the settling cycles"),
+    "orientation_end": ("rad", "orientation at the end"),
+    "rotation_1": ("m/s", "mean rotation velocity -R dphi/dt of bead 1"),
+    "rotation_2": ("m/s", "mean rotation velocity -R dphi/dt of bead 2"),
+    "sliding_1": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
+    "sliding_2": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
+    "sliding_3": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
+    "open_1": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
+    "open_2": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
+    "open_3": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
+}
+"""``walkers.parquet``: a row a walker; means are over the cycles after the settling ones."""
+
+BRIDGES = {
+    "time": ("s", "simulated time"),
+    "walker": ("", "number of the walker, from 0"),
+    "contact": ("", "1, 2: bead on the substrate, 3: bead on bead"),
+    "bead_1": ("", "id of the bead"),
+    "bead_2": ("", "id of the other bead, 0 for the substrate"),
+    "gap": ("m", "gap, negative where they touch"),
+    "touching": ("", "whether the surfaces touch"),
+    "normal_force": ("N", "net normal force (capillary, viscous, elastic), positive where it pulls the two together"),
+}
+"""``bridges.parquet``: a row a bridge and frame."""
+
+TABLES = {"trajectory": TRAJECTORY, "walkers": WALKERS, "bridges": BRIDGES}
+
+
+def write_table(directory: Path, name: str, columns: Mapping[str, npt.NDArray[Any]]) -> None:
+    """Write a table of `TABLES` beside its place and rename it.
+
+    Parameters
+    ----------
+    directory
+        The run directory.
+    name
+        Name of the table.
+    columns
+        One array a column, all of the same length.
+
+    Raises
+    ------
+    KeyError
+        If a column of the table is missing.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    description = TABLES[name]
+    arrays = [_arrow(columns[key]) for key in description]
+    fields = [
+        pa.field(key, array.type, metadata={"unit": unit, "meaning": meaning})
+        for (key, (unit, meaning)), array in zip(description.items(), arrays, strict=True)
+    ]
+    beside = directory / f"{name}.parquet.new"
+    reals = [field.name for field in fields if pa.types.is_floating(field.type)]
+    pq.write_table(
+        pa.Table.from_arrays(arrays, schema=pa.schema(fields)),
+        beside,
+        compression="zstd",
+        use_dictionary=[field.name for field in fields if field.name not in reals],
+        use_byte_stream_split=reals,
+    )
+    beside.replace(directory / f"{name}.parquet")
+
+
+def _arrow(values: npt.NDArray[Any]) -> Any:
+    """An arrow array on numpy's memory; ``pyarrow.array`` would import pandas to see whether it was given a series."""
+    import pyarrow as pa
+
+    if values.dtype == np.bool_:
+        return pa.Array.from_buffers(
+            pa.bool_(), len(values), [None, pa.py_buffer(np.packbits(values, bitorder="little").tobytes())]
+        )
+    kind = pa.from_numpy_dtype(values.dtype)
+    return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(np.ascontiguousarray(values))])
+
+
+def read_table(directory: Path, name: str) -> pd.DataFrame:
+    """Read a table of a run directory (``trajectory``, ``walkers`` or ``bridges``) into pandas, SI units."""
+    import pyarrow.parquet as pq
+
+    frame: pd.DataFrame = pq.read_table(directory / f"{name}.parquet").to_pandas()
+    return frame

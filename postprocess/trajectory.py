@@ -1,0 +1,134 @@
+"""The motion of a run's walkers relative to their substrate, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from inputs.case import WalkerCase
+from inputs.dimer import dimer_of
+from postprocess.dump import BinaryDump, FloatArray
+from runner.directory import CASE_NAME, read_json
+from templates.deck import LAYOUT_NAME
+from templates.layout import Layout
+from templates.placement import axis_vector
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Positions and velocities relative to the substrate; F frames, W walkers, 2 beads each.
+
+    Attributes
+    ----------
+    case, layout
+        Of the run.
+    time : ndarray, shape (F,)
+        s.
+    position, velocity : ndarray, shape (F, W, 2, 3)
+        Of the bead centres, m and m/s.
+    spin : ndarray, shape (F, W, 2, 3)
+        Angular velocity, rad/s.
+    force : ndarray, shape (F, W, 2, 3)
+        Total force as dumped by the engine, N.
+    substrate : ndarray, shape (F, 3)
+        Displacement of the substrate in the frame of the run, m.
+    truncated : bool
+        Whether the dump ends within a frame.
+    """
+
+    case: WalkerCase
+    layout: Layout
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    spin: FloatArray
+    force: FloatArray
+    substrate: FloatArray
+    truncated: bool
+
+    @property
+    def radii(self) -> FloatArray:
+        """Radii of the two beads, m, shape (2,)."""
+        return np.array(self.case.beads.radii)
+
+    @property
+    def mass_centre(self) -> FloatArray:
+        """Centres of mass, m, shape (F, W, 3)."""
+        masses = np.array(dimer_of(self.case).masses)
+        centre: FloatArray = np.einsum("fwbx,b->fwx", self.position, masses / masses.sum())
+        return centre
+
+    @property
+    def drive_axis(self) -> FloatArray:
+        """Direction from which orientations are measured, in the plane of the substrate: the drive's, or x."""
+        axis = np.array(axis_vector(self.case.drive.axis))
+        return axis if axis[2] == 0.0 else np.array([1.0, 0.0, 0.0])
+
+    @property
+    def heading(self) -> FloatArray:
+        """Unit vectors in the plane of the substrate from the small bead to the large one, shape (F, W, 3).
+
+        Of equal beads the first counts as the large one.
+        """
+        first, second = self.case.beads.radii
+        arm = self.position[:, :, 0] - self.position[:, :, 1]
+        arm = np.where(first >= second, arm, -arm)
+        arm[..., 2] = 0.0
+        heading: FloatArray = arm / np.linalg.norm(arm, axis=-1, keepdims=True)
+        return heading
+
+    @property
+    def orientation(self) -> FloatArray:
+        """ψ, rad, shape (F, W): angle of bead 2 → bead 1 from the direction that the walker was to face, unwrapped."""
+        arm = self.position[:, :, 0] - self.position[:, :, 1]
+        facing = np.array([walker.facing for walker in self.layout.walkers])
+        axis = self.drive_axis
+        across = np.cross([0.0, 0.0, 1.0], axis)
+        angle = np.arctan2(facing * (arm @ across), facing * (arm @ axis))
+        unwrapped: FloatArray = np.unwrap(angle, axis=0)
+        return unwrapped
+
+
+def read_trajectory(directory: Path) -> Trajectory:
+    """Read the bead dump of a run directory.
+
+    Parameters
+    ----------
+    directory
+        A run directory (finished or not) with ``case.json``, ``layout.json`` and the dump.
+
+    Raises
+    ------
+    postprocess.dump.DumpError
+        If the dump cannot be read.
+    FileNotFoundError
+        If a file is not there.
+    """
+    case = WalkerCase.from_dict(read_json(directory / CASE_NAME))
+    layout = Layout.from_dict(read_json(directory / LAYOUT_NAME))
+    dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
+    frames = dump.stack()
+    rows_of_beads = np.array([walker.beads for walker in layout.walkers]) - 1  # sorted by id, which begins at 1
+
+    def vectors(prefix: str) -> FloatArray:
+        start = dump.column(prefix + "x")
+        return frames[:, :, start : start + 3]
+
+    def of_beads(values: FloatArray) -> FloatArray:
+        return values[:, rows_of_beads]
+
+    position, velocity, rider = vectors(""), vectors("v"), layout.rider - 1
+    shift = position[:, rider] - position[:1, rider]
+    return Trajectory(
+        case=case,
+        layout=layout,
+        time=dump.steps.astype(np.float64) * layout.time_step,
+        position=of_beads(position) - shift[:, None, None],
+        velocity=of_beads(velocity) - velocity[:, rider][:, None, None],
+        spin=of_beads(vectors("omega")),
+        force=of_beads(vectors("f")),
+        substrate=shift,
+        truncated=dump.truncated,
+    )

@@ -1,0 +1,22 @@
+"""Runs: a deck launched in a directory of its own, watched, and finished or failed.
+
+Knows cases and decks (`inputs`, `templates`); knows nothing of what the dumps mean.
+"""
+
+from runner.binary import Engine, find_engine
+from runner.directory import FinishedRun, OpenRun, finished_run, open_run, run_name
+from runner.failures import EngineFailure
+from runner.launch import Progress, launch
+
+__all__ = [
+    "Engine",
+    "EngineFailure",
+    "FinishedRun",
+    "OpenRun",
+    "Progress",
+    "find_engine",
+    "finished_run",
+    "launch",
+    "open_run",
+    "run_name",
+]

@@ -1,0 +1,72 @@
+"""The engine's binary: where it is and what exactly it is."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from runner.failures import EngineMissing
+
+ENGINE_VARIABLE = "WALKERS_ENGINE"
+_BANNER = re.compile(rb"\(Version ([^,\n]+),")
+_LIBRARY = re.compile(r"libliggghts\S* => (\S+)")
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A liggghts binary.
+
+    Attributes
+    ----------
+    path
+        The executable.
+    sha256
+        Of the executable and, where it is a thin front, of the ``libliggghts`` that it loads.
+    """
+
+    path: Path
+    sha256: str
+
+
+def find_engine(wanted: str | None = None) -> Engine:
+    """Find the engine.
+
+    Parameters
+    ----------
+    wanted
+        A name or path; else the environment variable ``WALKERS_ENGINE``, else ``liggghts``.
+
+    Raises
+    ------
+    EngineMissing
+        If there is no such executable.
+    """
+    name = wanted or os.environ.get(ENGINE_VARIABLE) or "liggghts"
+    found = shutil.which(name)
+    if found is None:
+        raise EngineMissing(name)
+    path = Path(found).resolve()
+    return Engine(path, _identity(path, path.stat().st_mtime_ns))
+
+
+@lru_cache(maxsize=8)
+def _identity(path: Path, _modified: int) -> str:
+    # Debian's executable is an 18 kB front; the physics is in the shared library.
+    digest = hashlib.sha256()
+    listing = subprocess.run(["ldd", str(path)], capture_output=True, text=True, errors="replace", check=False).stdout
+    for part in [path, *(Path(match) for match in _LIBRARY.findall(listing))]:
+        with part.open("rb") as file:
+            digest.update(hashlib.file_digest(file, "sha256").digest())
+    return digest.hexdigest()
+
+
+def version_in(output: bytes) -> str | None:
+    """The version that the engine's banner names, such as ``LIGGGHTS-PUBLIC 3.8.0``."""
+    match = _BANNER.search(output[:4096])
+    return match.group(1).decode("utf-8", "replace").strip() if match else None

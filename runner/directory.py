@@ -1,0 +1,250 @@
+"""Run directories: one a run, named by the case and by the hash of all that determines the run.
+
+A run is made in ``<name>-<hash>.part`` and renamed to ``<name>-<hash>`` when its manifest has been written, last: a
+directory without a manifest is not a run, and a run that is made anew replaces the old one only when it has finished.
+While it is made, the file ``<name>-<hash>.lock`` is locked, also by the engine itself, so that an engine which outlives
+its launcher keeps others away.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import platform
+import shutil
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from inputs.case import WalkerCase
+from runner.binary import Engine
+from runner.failures import DiskFull, EngineFailure, RunBusy
+from runner.launch import EngineReport
+from templates.deck import DECK_NAME, LAYOUT_NAME, Deck
+from templates.layout import Layout
+
+MANIFEST_NAME = "manifest.json"
+CASE_NAME = "case.json"
+FAILURE_NAME = "failure.json"
+_FORMAT = 1
+
+
+def run_name(case: WalkerCase, deck: Deck, engine: Engine) -> str:
+    """Name of a run's directory: the case's name and 12 hex digits over resolved case, deck, its files and engine."""
+    determinants = {
+        "case": case.determinants(),
+        "deck": deck.text,
+        "files": dict(deck.files),
+        "engine": engine.sha256,
+        "format": _FORMAT,
+    }
+    text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
+    return f"{case.name}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """A run that has its manifest."""
+
+    directory: Path
+
+    @property
+    def manifest(self) -> dict[str, Any]:
+        """The manifest."""
+        return read_json(self.directory / MANIFEST_NAME)
+
+    @property
+    def case(self) -> WalkerCase:
+        """The resolved case."""
+        return WalkerCase.from_dict(read_json(self.directory / CASE_NAME))
+
+    @property
+    def layout(self) -> Layout:
+        """What the dumps hold."""
+        return Layout.from_dict(read_json(self.directory / LAYOUT_NAME))
+
+
+def finished_run(directory: Path) -> FinishedRun | None:
+    """The run in a directory, or None if it has no manifest."""
+    return FinishedRun(directory) if (directory / MANIFEST_NAME).is_file() else None
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a JSON object."""
+    contents: dict[str, Any] = json.loads(path.read_text("utf-8"))
+    return contents
+
+
+def write_json(path: Path, contents: Mapping[str, Any]) -> None:
+    """Write a JSON object beside its place, then rename: readers see the old file or the new one, never a part."""
+    beside = path.with_name(path.name + ".new")
+    with beside.open("w", encoding="utf-8") as file:
+        json.dump(contents, file, indent=2, ensure_ascii=False)
+        file.write("\n")
+        file.flush()
+        os.fsync(file.fileno())
+    beside.replace(path)
+
+
+@dataclass
+class OpenRun:
+    """A run that is being made, in a directory of its own beside its final place."""
+
+    case: WalkerCase
+    deck: Deck
+    engine: Engine
+    directory: Path
+    place: Path
+    lock: int
+    started: float
+
+    def finish(self, report: EngineReport) -> FinishedRun:
+        """Write the manifest, last, and move the directory to its place."""
+        manifest = _manifest(self, report)
+        write_json(self.directory / MANIFEST_NAME, manifest)
+        replaced = _aside(self.place)
+        if self.place.exists():
+            self.place.rename(replaced)
+        self.directory.rename(self.place)
+        shutil.rmtree(replaced, ignore_errors=True)
+        return FinishedRun(self.place)
+
+
+def _aside(place: Path) -> Path:
+    return place.with_name(place.name + ".replaced")
+
+
+@contextmanager
+def open_run(case: WalkerCase, deck: Deck, engine: Engine, out: Path) -> Iterator[OpenRun]:
+    """Make a fresh directory for a run, with its case, deck, files and layout in it.
+
+    Parameters
+    ----------
+    case, deck, engine
+        What determines the run.
+    out
+        Folder of the run directories; made if need be.
+
+    Yields
+    ------
+    OpenRun
+        Call its `OpenRun.finish` at the end. Left without that, the directory stays as ``….part`` with a
+        ``failure.json`` if it was an `EngineFailure`.
+
+    Raises
+    ------
+    RunBusy
+        If another process is making the same run.
+    DiskFull
+        If there is no room even for the deck.
+    """
+    place = out / run_name(case, deck, engine)
+    part = place.with_name(place.name + ".part")
+    out.mkdir(parents=True, exist_ok=True)
+    lock_file = place.with_name(place.name + ".lock")
+    lock = _lock(lock_file, part)
+    try:
+        _recover(place)
+        shutil.rmtree(part, ignore_errors=True)
+        run = OpenRun(case, deck, engine, part, place, lock, time.time())
+        try:
+            with _room_on_disk(part, deck):
+                _write_deck(run)
+                yield run
+        except EngineFailure as failure:
+            _record(part, failure)
+            raise
+    finally:
+        lock_file.unlink(missing_ok=True)
+        os.close(lock)
+
+
+def _lock(lock_file: Path, part: Path) -> int:
+    """Lock a file that others may be removing at this moment: the lock counts only on the file that has the name."""
+    while True:
+        lock = os.open(lock_file, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.path.samestat(os.fstat(lock), lock_file.stat()):
+                return lock
+        except BlockingIOError as error:
+            os.close(lock)
+            raise RunBusy(part) from error
+        except FileNotFoundError:
+            pass
+        os.close(lock)
+
+
+def _recover(place: Path) -> None:
+    """Undo a replacement that was interrupted between its two renames."""
+    replaced = _aside(place)
+    if replaced.exists() and not place.exists():
+        replaced.rename(place)
+
+
+@contextmanager
+def _room_on_disk(part: Path, deck: Deck) -> Iterator[None]:
+    import errno
+
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        raise DiskFull(deck.layout.bead_dump_bytes, shutil.disk_usage(part.parent).free, part) from error
+
+
+def _write_deck(run: OpenRun) -> None:
+    run.directory.mkdir()
+    write_deck(run.deck, run.directory)
+    write_json(run.directory / CASE_NAME, run.case.as_dict())
+
+
+def write_deck(deck: Deck, directory: Path) -> None:
+    """Write a deck, its files and its layout into a directory."""
+    for name, text in {DECK_NAME: deck.text, **deck.files}.items():
+        (directory / name).write_text(text, encoding="utf-8", errors="surrogateescape")
+    write_json(directory / LAYOUT_NAME, deck.layout.as_dict())
+
+
+def _record(part: Path, failure: EngineFailure) -> None:
+    with suppress(OSError):  # a full disk: the message reaches the user all the same
+        write_json(part / FAILURE_NAME, {"reason": failure.reason, "message": str(failure)})
+
+
+def _manifest(run: OpenRun, report: EngineReport) -> dict[str, Any]:
+    finished = time.time()
+    try:
+        own_version = version("granular-walkers")
+    except PackageNotFoundError:
+        own_version = "not installed"
+    return {
+        "format": _FORMAT,
+        "status": "finished",
+        "name": run.case.name,
+        "run": run.place.name,
+        "engine": {"path": str(run.engine.path), "version": report.version, "sha256": run.engine.sha256},
+        "granular_walkers": own_version,
+        "host": platform.node(),
+        "platform": platform.platform(),
+        "started": _iso(run.started),
+        "finished": _iso(finished),
+        "seconds": {
+            "total": finished - run.started,
+            "engine": report.wall_seconds,
+            "engine_loop": report.loop_seconds,
+        },
+        "steps": report.steps,
+        "steps_per_second": report.steps / report.loop_seconds if report.loop_seconds else None,
+        "files": {path.name: path.stat().st_size for path in sorted(run.directory.iterdir())},
+    }
+
+
+def _iso(seconds: float) -> str:
+    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))

@@ -1,0 +1,109 @@
+"""Every way in which a run is known to fail: what it is called, how it is seen, what the user is told.
+
+The engine's own signs are unreliable (an ERROR line without an exit status, an exit status without a line, silence), so
+each failure is recognised by what it leaves behind. `runner.launch` raises them.
+"""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+from inputs.errors import WalkersError
+
+INSTALL_COMMAND = "sudo apt-get install liggghts"
+
+
+class EngineFailure(WalkersError):
+    """Root of the failures of a run; ``directory`` is where its remains are."""
+
+    def __init__(self, message: str, directory: Path | None = None) -> None:
+        self.directory = directory
+        super().__init__(f"{message} (see {directory})" if directory else message)
+
+    @property
+    def reason(self) -> str:
+        """Name of the failure, as stored in ``failure.json``."""
+        return type(self).__name__
+
+
+class EngineMissing(EngineFailure):
+    """There is no liggghts to run. Seen before anything is written."""
+
+    def __init__(self, wanted: str) -> None:
+        super().__init__(
+            f"no engine: {wanted} is not an executable file on this machine; install it with: {INSTALL_COMMAND}"
+        )
+
+
+class EngineError(EngineFailure):
+    """The engine stopped with an ERROR line, or with a non-zero status and none. The line is quoted."""
+
+    def __init__(self, line: str, directory: Path) -> None:
+        self.line = line
+        super().__init__(f"the engine stopped: {line}", directory)
+
+
+class EngineKilled(EngineFailure):
+    """A signal ended the engine: a crash of its own (SIGSEGV), or somebody's kill."""
+
+    def __init__(self, number: int, directory: Path) -> None:
+        self.signal = number
+        try:
+            name = signal.Signals(number).name
+        except ValueError:
+            name = f"signal {number}"
+        super().__init__(f"the engine was ended by {name}", directory)
+
+
+class MissingFrames(EngineFailure):
+    """The engine ended without complaint but its dump is short."""
+
+    def __init__(self, found: float, expected: int, directory: Path) -> None:
+        super().__init__(f"the engine wrote {found:.10g} of {expected} frames and reported no error", directory)
+
+
+class BeadsLost(EngineFailure):
+    """Beads left the simulation box. Seen in the number of atoms, which the engine prints every cycle."""
+
+    def __init__(self, lost: int, step: int, directory: Path) -> None:
+        self.lost = lost
+        super().__init__(f"{lost} bead(s) left the simulation box before step {step}", directory)
+
+
+class BlowUp(EngineFailure):
+    """A bead is faster than the drive can make it, or its speed is no number: most often too large a time step."""
+
+    def __init__(self, speed: float, fastest: float, step: int, directory: Path) -> None:
+        super().__init__(
+            f"blow-up: a bead moves at {speed:.3g} m/s at step {step}, "
+            f"the drive cannot give more than {fastest:.3g} m/s; most often the time step is too large",
+            directory,
+        )
+
+
+class DiskFull(EngineFailure):
+    """No room for the output. Seen beforehand from the known size of the dump, or while the engine writes."""
+
+    def __init__(self, needed: int, free: int, directory: Path) -> None:
+        super().__init__(
+            f"disk full: {needed / 1e6:.3g} MB are still to be written, {free / 1e6:.3g} MB are free", directory
+        )
+
+
+class TimeLimitExceeded(EngineFailure):
+    """The run took longer than it was allowed to."""
+
+    def __init__(self, limit: float, step: int, steps: int, directory: Path) -> None:
+        super().__init__(f"time limit of {limit:g} s reached at step {step} of {steps}", directory)
+
+
+class RunBusy(EngineFailure):
+    """Another process, perhaps an engine whose launcher was killed, is writing into this run."""
+
+    def __init__(self, directory: Path) -> None:
+        super().__init__("another process is still running this case", directory)
+
+
+class EngineVersionWarning(UserWarning):
+    """The engine is another version than the one that the decks' remedies were measured on."""

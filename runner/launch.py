@@ -1,0 +1,223 @@
+"""Launch the engine on a deck and watch it until it ends, well or badly."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import shutil
+import signal
+import subprocess
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from runner.binary import Engine, version_in
+from runner.failures import (
+    BeadsLost,
+    BlowUp,
+    DiskFull,
+    EngineError,
+    EngineKilled,
+    EngineVersionWarning,
+    MissingFrames,
+    TimeLimitExceeded,
+)
+from templates.deck import DECK_NAME, OUTPUT_NAME, Deck
+from templates.engine import AUDITED_VERSION
+
+_POLL_SECONDS = 0.05
+_GRACE_SECONDS = 2.0
+_SPARE_BYTES = 64 * 1024
+_STATUS_LINE = re.compile(rb"^\s*(\d+)\s+(\d+)\s+(\S+)\s*$", re.MULTILINE)
+_ERROR_LINE = re.compile(rb"^.*\bERROR\b.*$", re.MULTILINE)
+_LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is: steps done and in all, simulated time in s, wall time in s since the launch."""
+
+    step: int
+    steps: int
+    simulated: float
+    elapsed: float
+
+
+@dataclass(frozen=True)
+class EngineReport:
+    """What a run of the engine took: wall time and time in its loop (s), steps, and the version it named."""
+
+    version: str
+    wall_seconds: float
+    loop_seconds: float
+    steps: int
+
+
+def launch(
+    deck: Deck,
+    directory: Path,
+    engine: Engine,
+    *,
+    on_progress: Callable[[Progress], None] | None = None,
+    time_limit: float | None = None,
+    keep_open: Sequence[int] = (),
+) -> EngineReport:
+    """Run a deck that has been written into a directory, until its end or its first sign of failure.
+
+    Parameters
+    ----------
+    deck
+        The deck; its files are in ``directory`` already.
+    directory
+        Working directory of the engine; its output goes to ``engine.log`` there.
+    engine
+        The binary.
+    on_progress
+        Called a few times a second.
+    time_limit
+        Wall time in s after which the run is stopped.
+    keep_open
+        File descriptors that the engine inherits (the lock of the run).
+
+    Raises
+    ------
+    EngineFailure
+        One of the failures of `runner.failures`; the engine and its children have ended by then.
+    """
+    free = shutil.disk_usage(directory).free
+    if free < deck.layout.bead_dump_bytes + _SPARE_BYTES:
+        raise DiskFull(deck.layout.bead_dump_bytes, free, directory)
+    begin = time.perf_counter()
+    with (directory / OUTPUT_NAME).open("wb") as output:
+        process = subprocess.Popen(
+            [str(engine.path), "-log", "none", "-in", DECK_NAME],
+            cwd=directory,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            pass_fds=tuple(keep_open),
+        )
+    watch = _Watch(deck, directory, begin)
+    try:
+        while process.poll() is None:
+            try:
+                process.wait(_POLL_SECONDS)
+            except subprocess.TimeoutExpired:
+                watch.look()
+                watch.check(time_limit)
+                if on_progress:
+                    on_progress(watch.progress)
+    finally:
+        _end(process)
+    wall_seconds = time.perf_counter() - begin
+    watch.look()
+    watch.check(None)
+    return _verdict(watch, process.returncode, wall_seconds)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End the engine and its children: politely, then not."""
+    if process.poll() is None:
+        for number in (signal.SIGTERM, signal.SIGKILL):
+            try:
+                os.killpg(process.pid, number)
+                process.wait(_GRACE_SECONDS)
+                break
+            except ProcessLookupError:
+                break
+            except subprocess.TimeoutExpired:
+                continue
+    process.wait()
+
+
+class _Watch:
+    """Reads the engine's output as it grows."""
+
+    def __init__(self, deck: Deck, directory: Path, begin: float) -> None:
+        self.deck = deck
+        self.directory = directory
+        self.begin = begin
+        self.output = b""
+        self.step = 0
+        self.atoms = deck.layout.atoms
+        self.speed = 0.0
+        self._offset = 0
+        self._parsed = 0
+
+    @property
+    def progress(self) -> Progress:
+        layout = self.deck.layout
+        return Progress(self.step, layout.steps, self.step * layout.time_step, time.perf_counter() - self.begin)
+
+    def look(self) -> None:
+        """Take in what the engine has written since the last look."""
+        with (self.directory / OUTPUT_NAME).open("rb") as output:
+            output.seek(self._offset)
+            fresh = output.read()
+        self._offset += len(fresh)
+        self.output += fresh
+        complete = self.output.rfind(b"\n") + 1
+        for match in _STATUS_LINE.finditer(self.output, self._parsed, complete):
+            self.step, self.atoms = int(match[1]), int(match[2])
+            try:
+                self.speed = float(match[3])
+            except ValueError:
+                self.speed = math.nan
+            if self.lost or self.blown_up:
+                break
+        self._parsed = complete
+
+    @property
+    def lost(self) -> int:
+        return self.deck.layout.atoms - self.atoms
+
+    @property
+    def blown_up(self) -> bool:
+        return not self.speed <= self.deck.fastest
+
+    def check(self, time_limit: float | None) -> None:
+        """Raise the failure that shows while the engine runs, if any."""
+        # A blow-up throws beads out of the box as well: it is the cause, the loss its consequence.
+        if self.blown_up:
+            raise BlowUp(self.speed, self.deck.fastest, self.step, self.directory)
+        if self.lost > 0:
+            raise BeadsLost(self.lost, self.step, self.directory)
+        if time_limit is not None and time.perf_counter() - self.begin > time_limit:
+            raise TimeLimitExceeded(time_limit, self.step, self.deck.layout.steps, self.directory)
+        self.check_disk()
+
+    def check_disk(self) -> None:
+        missing = self.deck.layout.bead_dump_bytes - self.written
+        free = shutil.disk_usage(self.directory).free
+        if missing > 0 and free < _SPARE_BYTES:
+            raise DiskFull(missing, free, self.directory)
+
+    @property
+    def written(self) -> int:
+        dump = self.directory / self.deck.layout.bead_dump
+        return dump.stat().st_size if dump.exists() else 0
+
+
+def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
+    """Judge a run that has ended: raise its failure or report what it took."""
+    layout, directory = watch.deck.layout, watch.directory
+    errors = _ERROR_LINE.findall(watch.output)
+    if errors:
+        raise EngineError(errors[0].decode("utf-8", "backslashreplace").strip(), directory)
+    if status < 0:
+        raise EngineKilled(-status, directory)
+    if status > 0:
+        last = watch.output.rstrip().rsplit(b"\n", 1)[-1].decode("utf-8", "backslashreplace")
+        raise EngineError(f"exit status {status}, last words: {last}", directory)
+    if watch.written != layout.bead_dump_bytes:
+        raise MissingFrames(watch.written / layout.bead_dump_bytes * layout.frames, layout.frames, directory)
+    version = version_in(watch.output) or "unknown"
+    if version != AUDITED_VERSION:
+        message = f"the engine is {version}; the decks' remedies were measured on {AUDITED_VERSION}"
+        warnings.warn(message, EngineVersionWarning, stacklevel=3)
+    loop = _LOOP_TIME.findall(watch.output)
+    return EngineReport(version, wall_seconds, float(loop[-1]) if loop else math.nan, layout.steps)

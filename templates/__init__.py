@@ -1,0 +1,9 @@
+"""Decks: what LIGGGHTS is told, and why.
+
+Knows the cases (`inputs`); knows nothing of processes, files on disk or results. Everything that is peculiar to the
+engine, and every remedy for what it gets wrong, is in `templates.engine`.
+"""
+
+from templates.deck import Deck, Layout, PlacedWalker, render_deck
+
+__all__ = ["Deck", "Layout", "PlacedWalker", "render_deck"]

@@ -1,0 +1,80 @@
+"""What a deck writes and which bead is which: the contract between a deck and those who read its output."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+BEAD_COLUMNS = (
+    *("id", "type", "radius", "x", "y", "z", "vx", "vy", "vz"),
+    *("omegax", "omegay", "omegaz", "fx", "fy", "fz"),
+)
+"""Columns of the bead dump, in the engine's names (m, m/s, rad/s, N)."""
+
+PAIR_BRIDGE_COLUMNS = ("x1", "y1", "z1", "x2", "y2", "z2", "id1", "id2", "periodic", "fx", "fy", "fz", "overlap")
+"""Columns of the dump of bridges between beads; the force acts on bead ``id1``."""
+
+WALL_BRIDGE_COLUMNS = ("x", "y", "z", "bead_x", "bead_y", "bead_z", "mesh", "triangle", "id", "fx", "fy", "fz")
+"""Columns of the dump of bridges to walls; the force acts on bead ``id``. A wall that stands twice has two rows."""
+
+
+@dataclass(frozen=True)
+class PlacedWalker:
+    """One walker of a deck: its beads' ids and how it was started.
+
+    ``facing`` is the direction in which the first bead points, +1 along the drive axis (right) or −1 (left);
+    ``start_angle`` in rad is measured from that direction; ``origin`` in m.
+    """
+
+    walker: int
+    beads: tuple[int, int]
+    facing: int
+    start_angle: float
+    origin: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Dumps of a deck (file names, columns, steps between frames, frames expected) and its walkers."""
+
+    bead_dump: str
+    bead_columns: tuple[str, ...]
+    sample_every: int
+    frames: int
+    pair_bridge_dump: str
+    pair_bridge_columns: tuple[str, ...]
+    wall_bridge_dump: str
+    wall_bridge_columns: tuple[str, ...]
+    bridge_every: int
+    bridge_frames: int
+    atoms: int
+    steps: int
+    time_step: float
+    rider: int
+    walkers: tuple[PlacedWalker, ...]
+
+    @property
+    def bead_dump_bytes(self) -> int:
+        """Size of the complete bead dump."""
+        header = 8 + 8 + 4 + 6 * 4 + 6 * 8 + 4 + 4 + 4
+        return self.frames * (header + 8 * self.atoms * len(self.bead_columns))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Layout:
+        """Rebuild from `as_dict`."""
+        walkers = tuple(
+            PlacedWalker(
+                walker=entry["walker"],
+                beads=(entry["beads"][0], entry["beads"][1]),
+                facing=entry["facing"],
+                start_angle=entry["start_angle"],
+                origin=(entry["origin"][0], entry["origin"][1]),
+            )
+            for entry in values["walkers"]
+        )
+        columns = {key: tuple(values[key]) for key in values if key.endswith("_columns")}
+        return cls(**{**values, **columns, "walkers": walkers})

@@ -1,0 +1,36 @@
+"""``walkers deck``: the LIGGGHTS deck of a case."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from walkers.commands.arguments import Case
+
+Folder = Annotated[
+    Path | None, typer.Option("--to", help="Write the deck and its files into this new folder, to run by hand.")
+]
+
+
+def command(case: Case, to: Folder = None) -> None:
+    """Print the LIGGGHTS deck of a case, or write it with its files."""
+    from inputs.errors import InputError, Problem
+    from inputs.reading import load_case
+    from templates.deck import DECK_NAME, render_deck
+
+    deck = render_deck(load_case(case))
+    if to is None:
+        print(deck.text, end="")
+        return
+    from runner.directory import write_deck
+
+    try:
+        to.mkdir(parents=True)
+    except OSError as error:
+        raise InputError(
+            str(to), [Problem("", None, f"expected a folder that can be made ({error.strerror})")]
+        ) from error
+    write_deck(deck, to)
+    print(f"{to / DECK_NAME}    run it there with: liggghts -in {DECK_NAME} > engine.log")

@@ -1,0 +1,22 @@
+"""``walkers plot``: the figures of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from walkers.commands.arguments import Out, Run
+from walkers.pipeline import DEFAULT_OUT
+
+Folder = Annotated[Path | None, typer.Option("--to", help="Folder for the figures; the run directory if left out.")]
+
+
+def command(run: Run, out: Out = DEFAULT_OUT, to: Folder = None) -> None:
+    """Draw where the walkers went and turned, and their gait through two cycles."""
+    from postprocess.figures import plot_run
+    from walkers.pipeline import find_run
+
+    for path in plot_run(find_run(run, out).directory, to):
+        print(path)

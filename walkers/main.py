@@ -1,0 +1,63 @@
+"""The program ``walkers``. Exit status: 0 done, 1 a run failed, 2 bad input, 130 interrupted, 143 terminated."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from types import FrameType
+from typing import Any, NoReturn
+
+import typer
+
+from walkers.commands import deck, plot, render, result, run, show, vtk
+
+app = typer.Typer(
+    name="walkers",
+    help="Wet granular walkers, simulated with LIGGGHTS.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+for command in (show, deck, run, result, plot, vtk, render):
+    app.command(name=command.__name__.rsplit(".", 1)[-1])(command.command)
+
+
+class _Terminated(BaseException):
+    """SIGTERM, as an exception so that engines are stopped on the way out."""
+
+
+def _on_sigterm(_number: int, _frame: FrameType | None) -> NoReturn:
+    raise _Terminated
+
+
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Run the program and exit."""
+    signal.signal(signal.SIGTERM, _on_sigterm)
+    sys.exit(_status(arguments))
+
+
+def _status(arguments: list[str] | None) -> int:
+    from inputs.errors import InputError, WalkersError
+
+    try:
+        outcome: Any = app(arguments, standalone_mode=False)
+    except (WalkersError, KeyboardInterrupt, typer.Abort, _Terminated) as stop:
+        statuses = ((InputError, 2), (WalkersError, 1), (_Terminated, 143), (BaseException, 130))
+        status = next(status for kind, status in statuses if isinstance(stop, kind))
+        message = str(stop) or {143: "terminated", 130: "interrupted"}[status]
+        print(f"walkers: {message}", file=sys.stderr)
+        return status
+    except BrokenPipeError:  # the reader of our output has had enough
+        sys.stderr.close()
+        return 0
+    except Exception as error:
+        # Typer's usage errors know how to show themselves and which status they are.
+        if not hasattr(error, "show") or not hasattr(error, "exit_code"):
+            raise
+        error.show()
+        return int(error.exit_code)
+    return outcome if isinstance(outcome, int) else 0
+
+
+if __name__ == "__main__":
+    main()

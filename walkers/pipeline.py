@@ -1,0 +1,149 @@
+"""A case from file to result: what the commands do, for use from Python."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from inputs.errors import InputError, Problem
+
+if TYPE_CHECKING:
+    from inputs.case import WalkerCase
+    from runner.directory import FinishedRun
+    from runner.launch import Progress
+
+DEFAULT_OUT = Path("runs")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished run, its result (SI units), and whether it was there before."""
+
+    run: FinishedRun
+    result: dict[str, Any]
+    found: bool
+
+
+def run_case(
+    case: WalkerCase,
+    out: Path = DEFAULT_OUT,
+    *,
+    engine: str | None = None,
+    force: bool = False,
+    on_progress: Callable[[Progress], None] | None = None,
+    time_limit: float | None = None,
+) -> Outcome:
+    """Run a case, unless its run is there already, and tabulate it.
+
+    Parameters
+    ----------
+    case
+        A resolved case (`inputs.load_case`).
+    out
+        Folder of the run directories.
+    engine
+        Name or path of the binary; see `runner.find_engine`.
+    force
+        Run again; the old run is replaced only by a finished one.
+    on_progress
+        Called a few times a second while the engine runs.
+    time_limit
+        Wall time in s that the engine may take.
+
+    Returns
+    -------
+    Outcome
+
+    Raises
+    ------
+    runner.EngineFailure
+        If the engine fails in one of the known ways.
+    """
+    from runner.binary import find_engine
+    from runner.directory import finished_run, open_run, run_name
+    from runner.launch import launch
+    from templates.deck import render_deck
+
+    deck, binary = render_deck(case), find_engine(engine)
+    old = finished_run(out / run_name(case, deck, binary))
+    if old is not None and not force:
+        return Outcome(old, _result_of(old), found=True)
+    # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
+    loading = threading.Thread(target=_load_postprocess, daemon=True)
+    loading.start()
+    with open_run(case, deck, binary, out) as run:
+        report = launch(
+            deck, run.directory, binary, on_progress=on_progress, time_limit=time_limit, keep_open=[run.lock]
+        )
+        loading.join()
+        from postprocess.result import tabulate
+
+        result = tabulate(run.directory)
+        return Outcome(run.finish(report), result, found=False)
+
+
+def _load_postprocess() -> None:
+    import pyarrow.parquet  # noqa: F401
+
+    import postprocess.result  # noqa: F401
+
+
+def _result_of(run: FinishedRun) -> dict[str, Any]:
+    from postprocess.result import read_result, tabulate
+
+    try:
+        return read_result(run.directory)
+    except FileNotFoundError:
+        return tabulate(run.directory)
+
+
+def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
+    """Find a finished run.
+
+    Parameters
+    ----------
+    run
+        A run directory; or a case (file or shipped name), whose run with the installed engine is looked up in ``out``.
+    out
+        Folder of the run directories.
+
+    Raises
+    ------
+    InputError
+        If there is none, or its manifest, case or layout cannot be read.
+    runner.EngineFailure
+        If a case is given and there is no engine to look it up for.
+    """
+    from runner.directory import finished_run, run_name
+
+    path = Path(run)
+    if path.is_dir():
+        found = finished_run(path)
+        if found is None:
+            raise InputError(
+                str(run), [Problem("", None, "not a finished run: expected a folder with a manifest.json")]
+            )
+    else:
+        from inputs.reading import load_case
+        from runner.binary import find_engine
+        from templates.deck import render_deck
+
+        case = load_case(path)
+        place = out / run_name(case, render_deck(case), find_engine())
+        found = finished_run(place)
+        if found is None:
+            raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
+    return _readable(found)
+
+
+def _readable(run: FinishedRun) -> FinishedRun:
+    for name in ("manifest", "case", "layout"):
+        try:
+            getattr(run, name)
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
+            raise InputError(str(run.directory), [problem]) from error
+    return run

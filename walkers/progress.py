@@ -1,0 +1,70 @@
+"""Progress on the terminal: a bar where there is one, plain lines where there is not; both on standard error."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from inputs.case import WalkerCase
+    from runner.launch import Progress
+
+_SECONDS_BETWEEN_LINES = 5.0
+
+
+@contextmanager
+def progress_of(case: WalkerCase) -> Iterator[Callable[[Progress], None]]:
+    """Yield a function that shows how far a run of a case is."""
+    if sys.stderr.isatty():
+        with _bar(case) as advance:
+            yield advance
+    else:
+        yield _lines(case)
+
+
+@contextmanager
+def _bar(case: WalkerCase) -> Iterator[Callable[[Progress], None]]:
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[simulated]:.3f} s simulated, {task.fields[rate]:.0f} steps/s"),
+        TimeRemainingColumn(),
+    )
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(case.name, total=case.run.steps, simulated=0.0, rate=0.0)
+
+        def advance(progress: Progress) -> None:
+            bar.update(task, completed=progress.step, simulated=progress.simulated, rate=_rate(progress))
+
+        yield advance
+
+
+def _lines(case: WalkerCase) -> Callable[[Progress], None]:
+    last = time.perf_counter()
+
+    def advance(progress: Progress) -> None:
+        nonlocal last
+        if time.perf_counter() - last < _SECONDS_BETWEEN_LINES:
+            return
+        last = time.perf_counter()
+        rate = _rate(progress)
+        left = f"{(progress.steps - progress.step) / rate:.0f} s left" if rate else "starting"
+        print(
+            f"{case.name}: {100 * progress.step / progress.steps:.0f} %, {progress.simulated:.3f} s simulated, "
+            f"{rate:.0f} steps/s, {left}",
+            file=sys.stderr,
+            flush=True,
+        )
+
+    return advance
+
+
+def _rate(progress: Progress) -> float:
+    return progress.step / progress.elapsed if progress.elapsed else 0.0
