@@ -61,21 +61,20 @@ def bridge_columns(directory: Path, case: WalkerCase, layout: Layout) -> Columns
 def _pairs(steps: npt.NDArray[np.int64], rows: FloatArray, layout: Layout) -> Columns:
     rows, force, steps = _held(rows, layout.pair_bridge_columns, steps)
     column = layout.pair_bridge_columns.index
-    first = rows[:, column("x1") : column("x1") + 3]
-    arm = rows[:, column("x2") : column("x2") + 3] - first
-    toward_second = arm / np.linalg.norm(arm, axis=1, keepdims=True)
+    _, pull = _along(force, rows, column("x1"), column("x2"))
     return {
         "step": steps,
         "bead_1": rows[:, column("id1")].astype(np.int64),
         "bead_2": rows[:, column("id2")].astype(np.int64),
         "gap": -rows[:, column("overlap")],
-        "normal_force": np.einsum("nx,nx->n", force, toward_second),
+        "normal_force": pull,
     }
 
 
 def _walls(steps: npt.NDArray[np.int64], rows: FloatArray, layout: Layout, radius: dict[int, float]) -> Columns:
     rows, force, steps = _held(rows, layout.wall_bridge_columns, steps)
     column = layout.wall_bridge_columns.index
+    distance, pull = _along(force, rows, column("bead_x"), column("x"))
     keys = np.stack([steps, rows[:, column("id")].astype(np.int64)], axis=1)
     unique, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     radii = np.array([radius[int(bead)] for bead in unique[:, 1]])
@@ -83,9 +82,16 @@ def _walls(steps: npt.NDArray[np.int64], rows: FloatArray, layout: Layout, radiu
         "step": unique[:, 0],
         "bead_1": unique[:, 1],
         "bead_2": np.zeros(len(unique), dtype=np.int64),
-        "gap": rows[first, column("bead_z")] - radii,
-        "normal_force": np.bincount(which.reshape(-1), weights=-force[:, 2], minlength=len(unique)),
+        "gap": distance[first] - radii,
+        "normal_force": np.bincount(which.reshape(-1), weights=pull, minlength=len(unique)),
     }
+
+
+def _along(force: FloatArray, rows: FloatArray, start: int, end: int) -> tuple[FloatArray, FloatArray]:
+    """Distance between the points whose coordinates begin at two columns, and the force along the way, both (rows,)."""
+    way = rows[:, end : end + 3] - rows[:, start : start + 3]
+    distance = np.linalg.norm(way, axis=1)
+    return distance, np.einsum("nx,nx->n", force, way) / distance
 
 
 def _held(

@@ -31,7 +31,7 @@ from templates.engine import AUDITED_VERSION
 _POLL_SECONDS = 0.05
 _GRACE_SECONDS = 2.0
 _SPARE_BYTES = 64 * 1024
-_STATUS_LINE = re.compile(rb"^\s*(\d+)\s+(\d+)\s+(\S+)\s*$", re.MULTILINE)
+_STATUS_LINE = re.compile(rb"^ *(\d+) +(\d+) +(\S+)((?: +[-+.\w]+){6}) *$", re.MULTILINE)
 _ERROR_LINE = re.compile(rb"^.*\bERROR\b.*$", re.MULTILINE)
 _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
 
@@ -134,6 +134,22 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
+@dataclass(frozen=True)
+class _Status:
+    """A line of the engine's status: step, atoms, fastest bead (m/s) and the beads' bounds (m: x, x, y, y, z, z)."""
+
+    step: int
+    atoms: int
+    speed: float
+    bounds: tuple[float, ...]
+
+    def clearance(self, box: tuple[Sequence[float], Sequence[float]]) -> float:
+        """Distance from the outermost bead to the nearest face of the box, m."""
+        lower, upper = box
+        sides = zip(lower, upper, self.bounds[::2], self.bounds[1::2], strict=True)
+        return min(min(low - floor, ceiling - high) for floor, ceiling, low, high in sides)
+
+
 class _Watch:
     """Reads the engine's output as it grows."""
 
@@ -142,11 +158,13 @@ class _Watch:
         self.directory = directory
         self.begin = begin
         self.output = b""
-        self.step = 0
-        self.atoms = deck.layout.atoms
-        self.speed = 0.0
-        self._offset = 0
+        self.status: _Status | None = None
+        self.failure: BlowUp | BeadsLost | None = None
         self._parsed = 0
+
+    @property
+    def step(self) -> int:
+        return self.status.step if self.status else 0
 
     @property
     def progress(self) -> Progress:
@@ -156,41 +174,37 @@ class _Watch:
     def look(self) -> None:
         """Take in what the engine has written since the last look."""
         with (self.directory / OUTPUT_NAME).open("rb") as output:
-            output.seek(self._offset)
-            fresh = output.read()
-        self._offset += len(fresh)
-        self.output += fresh
+            output.seek(len(self.output))
+            self.output += output.read()
         complete = self.output.rfind(b"\n") + 1
         for match in _STATUS_LINE.finditer(self.output, self._parsed, complete):
-            self.step, self.atoms = int(match[1]), int(match[2])
-            try:
-                self.speed = float(match[3])
-            except ValueError:
-                self.speed = math.nan
-            if self.lost or self.blown_up:
-                break
+            status = _Status(int(match[1]), int(match[2]), float(match[3]), tuple(map(float, match[4].split())))
+            self.failure = self.failure or self._judge(status)
+            self.status = status
         self._parsed = complete
 
-    @property
-    def lost(self) -> int:
-        return self.deck.layout.atoms - self.atoms
-
-    @property
-    def blown_up(self) -> bool:
-        return not self.speed <= self.deck.fastest
+    def _judge(self, status: _Status) -> BlowUp | BeadsLost | None:
+        """What a status line tells of the beads, given the one before."""
+        fastest = self.deck.fastest
+        if not status.speed <= fastest:
+            return BlowUp(status.speed, fastest, status.step, self.directory)
+        lost = self.deck.layout.atoms - status.atoms
+        if lost <= 0:
+            return None
+        if self.status is not None:
+            # A bead that has left the box since the last line was at least this fast.
+            seconds = (status.step - self.status.step) * self.deck.layout.time_step
+            needed = self.status.clearance(self.deck.box) / seconds
+            if needed > fastest:
+                return BlowUp(needed, fastest, status.step, self.directory)
+        return BeadsLost(lost, status.step, self.directory)
 
     def check(self, time_limit: float | None) -> None:
         """Raise the failure that shows while the engine runs, if any."""
-        # A blow-up throws beads out of the box as well: it is the cause, the loss its consequence.
-        if self.blown_up:
-            raise BlowUp(self.speed, self.deck.fastest, self.step, self.directory)
-        if self.lost > 0:
-            raise BeadsLost(self.lost, self.step, self.directory)
+        if self.failure is not None:
+            raise self.failure
         if time_limit is not None and time.perf_counter() - self.begin > time_limit:
             raise TimeLimitExceeded(time_limit, self.step, self.deck.layout.steps, self.directory)
-        self.check_disk()
-
-    def check_disk(self) -> None:
         missing = self.deck.layout.bead_dump_bytes - self.written
         free = shutil.disk_usage(self.directory).free
         if missing > 0 and free < _SPARE_BYTES:

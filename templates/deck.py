@@ -9,10 +9,10 @@ from math import sqrt
 from typing import TYPE_CHECKING
 
 from inputs.case import WalkerCase
-from inputs.dimer import contact_loads, dimer_of
+from inputs.dimer import contact_loads, dimer_of, hop_height
 from templates.engine import WALL_COPIES, contact_angle_setting, separation_cap, substrate_triangle
 from templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
-from templates.placement import Scene, axis_vector, place_walkers
+from templates.placement import Point, Scene, axis_vector, place_walkers
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -21,20 +21,33 @@ DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
 SUBSTRATE_NAME = "substrate.stl"
+STATUS_LINES_PER_CYCLE = 4
 
 __all__ = ["DECK_NAME", "LAYOUT_NAME", "OUTPUT_NAME", "Deck", "Layout", "PlacedWalker", "render_deck"]
 
 
 @dataclass(frozen=True)
 class Deck:
-    """A deck ready to run: its text, the files that it reads (name to text) and what it will write.
+    """A deck ready to run.
 
-    ``fastest`` is a speed in m/s that no bead can reach by the drive, gravity and the capillary forces alone.
+    Attributes
+    ----------
+    text
+        What LIGGGHTS reads.
+    files
+        The files that it reads in turn, name to text.
+    layout
+        What it will write.
+    box
+        Lower and upper corner of the simulation box, m.
+    fastest
+        A speed that no bead can reach by the drive, gravity and the capillary forces alone, m/s.
     """
 
     text: str
     files: Mapping[str, str]
     layout: Layout
+    box: tuple[Point, Point]
     fastest: float
 
 
@@ -71,6 +84,8 @@ def render_deck(case: WalkerCase) -> Deck:
             contact_model=_contact_model(case),
             contact_angle_setting=contact_angle_setting(case.liquid.contact_angle),
             separation_cap=separation_cap(case.beads.radii, loads.rupture[:2], loads.rupture[2]),
+            bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
+            status_every=-(-case.run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
             axis=axis,
             amplitude=[drive.amplitude * component for component in axis],
             peak_velocity=[drive.peak_velocity * component for component in axis],
@@ -80,8 +95,8 @@ def render_deck(case: WalkerCase) -> Deck:
             bin_size=_bin_size(case, scene),
         )
     )
-    half_width = max(scene.upper[0], scene.upper[1])
-    return Deck(text, {SUBSTRATE_NAME: substrate_triangle(half_width)}, layout, _fastest(case))
+    files = {SUBSTRATE_NAME: substrate_triangle(max(scene.upper[:2]))}
+    return Deck(text, files, layout, (scene.lower, scene.upper), _fastest(case))
 
 
 def _contact_model(case: WalkerCase) -> str:
@@ -96,10 +111,10 @@ def _bin_size(case: WalkerCase, scene: Scene) -> float:
 
 
 def _fastest(case: WalkerCase) -> float:
-    """Ten times the substrate's peak velocity, plus a fall of 0.1 m, plus what a bridge's pull can give."""
+    """Ten times the substrate's peak velocity, plus a fall from the highest hop, plus what a bridge's pull can give."""
     loads = contact_loads(case)
     pull = sqrt(2.0 * max(loads.capillary) * max(loads.rupture) / min(dimer_of(case).masses))
-    fall = sqrt(2.0 * case.gravity * 0.1)
+    fall = sqrt(2.0 * case.gravity * hop_height(case))
     return 10.0 * case.drive.peak_velocity + fall + pull
 
 

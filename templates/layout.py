@@ -15,7 +15,8 @@ PAIR_BRIDGE_COLUMNS = ("x1", "y1", "z1", "x2", "y2", "z2", "id1", "id2", "period
 """Columns of the dump of bridges between beads; the force acts on bead ``id1``."""
 
 WALL_BRIDGE_COLUMNS = ("x", "y", "z", "bead_x", "bead_y", "bead_z", "mesh", "triangle", "id", "fx", "fy", "fz")
-"""Columns of the dump of bridges to walls; the force acts on bead ``id``. A wall that stands twice has two rows."""
+"""Columns of the dump of bridges to walls: nearest point of the wall, centre of the bead, force on bead ``id``.
+A wall that stands twice has two rows."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -12,7 +11,8 @@ if TYPE_CHECKING:
     from inputs.case import WalkerCase
     from runner.launch import Progress
 
-_SECONDS_BETWEEN_LINES = 5.0
+_FIRST_LINE_SECONDS = 1.0
+_LONGEST_SILENCE_SECONDS = 60.0
 
 
 @contextmanager
@@ -47,13 +47,14 @@ def _bar(case: WalkerCase) -> Iterator[Callable[[Progress], None]]:
 
 
 def _lines(case: WalkerCase) -> Callable[[Progress], None]:
-    last = time.perf_counter()
+    """Lines that grow rarer as the run grows older, down to one a minute."""
+    due = _FIRST_LINE_SECONDS
 
     def advance(progress: Progress) -> None:
-        nonlocal last
-        if time.perf_counter() - last < _SECONDS_BETWEEN_LINES:
+        nonlocal due
+        if progress.elapsed < due:
             return
-        last = time.perf_counter()
+        due = progress.elapsed + min(progress.elapsed, _LONGEST_SILENCE_SECONDS)
         rate = _rate(progress)
         left = f"{(progress.steps - progress.step) / rate:.0f} s left" if rate else "starting"
         print(

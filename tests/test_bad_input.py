@@ -1,0 +1,253 @@
+"""Bad input: one message that names file, key, value and what was expected; exit status 2; no traceback."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.conftest import document, make_case, to_toml
+from walkers.main import main
+
+# name: (changed tables, key in the message, value in the message, expectation in the message)
+BAD: dict[str, tuple[dict[str, Any], str, str, str]] = {
+    "radius without unit": ({"beads": {"radii": ["0.3", "0.2 mm"]}}, "beads.radii[0]", '"0.3"', "length with its unit"),
+    "radius as number": ({"beads": {"radii": [0.3, "0.2 mm"]}}, "beads.radii[0]", "0.3", '"0.3 mm"'),
+    "radius in the wrong unit": ({"beads": {"radii": ["0.3 g", "0.2 mm"]}}, "beads.radii[0]", '"0.3 g"', "length"),
+    "negative radius": ({"beads": {"radii": ["-0.3 mm", "0.2 mm"]}}, "beads.radii[0]", '"-0.3 mm"', "more than zero"),
+    "zero radius": ({"beads": {"radii": ["0.3 mm", "0 mm"]}}, "beads.radii[1]", '"0 mm"', "more than zero"),
+    "decimal comma": ({"beads": {"radii": ["0,3 mm", "0.2 mm"]}}, "beads.radii[0]", '"0,3 mm"', "length"),
+    "misspelt unit": ({"beads": {"radii": ["0.3 mmm", "0.2 mm"]}}, "beads.radii[0]", '"0.3 mmm"', "length"),
+    "unit without number": ({"beads": {"radii": ["mm", "0.2 mm"]}}, "beads.radii[0]", '"mm"', "length"),
+    "two quantities": ({"beads": {"radii": ["0.3 mm; 2", "0.2 mm"]}}, "beads.radii[0]", '"0.3 mm; 2"', "length"),
+    "infinite radius": ({"beads": {"radii": ["1e999 mm", "0.2 mm"]}}, "beads.radii[0]", '"1e999 mm"', "finite"),
+    "one radius": ({"beads": {"radii": ["0.3 mm"]}}, "beads.radii", '["0.3 mm"]', "two radii"),
+    "three radii": ({"beads": {"radii": ["0.3 mm"] * 3}}, "beads.radii", '["0.3 mm"', "two radii"),
+    "radii not a list": ({"beads": {"radii": "0.3 mm"}}, "beads.radii", '"0.3 mm"', "list"),
+    "unknown material": ({"beads": {"material": "rubi"}}, "beads.material", '"rubi"', 'did you mean "ruby"'),
+    "material not text": ({"beads": {"material": 3}}, "beads.material", "3", "text"),
+    "density as number": ({"beads": {"density": 4000}}, "beads.density", "4000", "density with its unit"),
+    "unknown liquid": ({"liquid": {"name": "Si AK 5"}}, "liquid.name", '"Si AK 5"', 'did you mean "Si AK5"'),
+    "fraction in per cent": ({"liquid": {"volume_fraction": "1 %"}}, "liquid.volume_fraction", '"1 %"', "plain number"),
+    "fraction zero": ({"liquid": {"volume_fraction": 0}}, "liquid.volume_fraction", "0", "more than 0"),
+    "fraction too large": ({"liquid": {"volume_fraction": 1.0}}, "liquid.volume_fraction", "1.0", "at most 0.5"),
+    "angle without unit": ({"liquid": {"contact_angle": "0.5"}}, "liquid.contact_angle", '"0.5"', "angle"),
+    "angle too large": ({"liquid": {"contact_angle": "120 deg"}}, "liquid.contact_angle", '"120 deg"', "at most"),
+    "negative tension": (
+        {"liquid": {"surface_tension": "-19 mN/m"}},
+        "liquid.surface_tension",
+        '"-19 mN/m"',
+        "more than zero",
+    ),
+    "two viscosities": (
+        {"liquid": {"dynamic_viscosity": "5 mPa*s", "kinematic_viscosity": "5 mm^2/s"}},
+        "liquid.dynamic_viscosity",
+        '"5 mPa*s"',
+        "not both",
+    ),
+    "unknown key": ({"liquid": {"volume_fracton": 0.01}}, "liquid.volume_fracton", "0.01", '"volume_fraction"?'),
+    "unknown table": ({"substrat": {"material": "glass"}}, "substrat", "glass", 'did you mean "substrate"'),
+    "key in the wrong table": ({"frequency": "80 Hz"}, "frequency", '"80 Hz"', 'did you mean "drive.frequency"'),
+    "unknown substrate": ({"substrate": {"material": "teflon"}}, "substrate.material", '"teflon"', "one of"),
+    "negative friction": (
+        {"contact": {"friction": {"bead_wall": -0.1}}},
+        "contact.friction.bead_wall",
+        "-0.1",
+        "at least 0",
+    ),
+    "friction as text": (
+        {"contact": {"friction": {"bead_wall": "0.1"}}},
+        "contact.friction.bead_wall",
+        '"0.1"',
+        "plain number",
+    ),
+    "friction not a table": ({"contact": {"friction": 0.1}}, "contact.friction", "0.1", "table"),
+    "restitution above one": ({"contact": {"restitution": 1.2}}, "contact.restitution", "1.2", "at most 1"),
+    "restitution zero": ({"contact": {"restitution": 0}}, "contact.restitution", "0", "more than 0"),
+    "modulus as density": (
+        {"contact": {"youngs_modulus": "50 kg/m^3"}},
+        "contact.youngs_modulus",
+        '"50 kg/m^3"',
+        "modulus",
+    ),
+    "modulus too soft": (
+        {"contact": {"youngs_modulus": "1 MPa"}},
+        "contact.youngs_modulus",
+        '"1 MPa"',
+        "at least 5e+06 Pa",
+    ),
+    "separation zero": (
+        {"contact": {"minimum_separation_ratio": 0}},
+        "contact.minimum_separation_ratio",
+        "0",
+        "more than 0",
+    ),
+    "mass for an acceleration": (
+        {"drive": {"peak_acceleration": "4 kg"}},
+        "drive.peak_acceleration",
+        '"4 kg"',
+        '"4 g"',
+    ),
+    "acceleration without unit": (
+        {"drive": {"peak_acceleration": "4"}},
+        "drive.peak_acceleration",
+        '"4"',
+        "acceleration",
+    ),
+    "negative acceleration": (
+        {"drive": {"peak_acceleration": "-4 g"}},
+        "drive.peak_acceleration",
+        '"-4 g"',
+        "zero or more",
+    ),
+    "acceleration and gamma0": ({"drive": {"gamma0": 0.5}}, "drive.gamma0", "0.5", "not both"),
+    "frequency in mm": ({"drive": {"frequency": "80 mm"}}, "drive.frequency", '"80 mm"', '"80 Hz"'),
+    "angular frequency": ({"drive": {"frequency": "500 rad/s"}}, "drive.frequency", '"500 rad/s"', "cycles a second"),
+    "unknown axis": ({"drive": {"axis": "w"}}, "drive.axis", '"w"', "'x', 'y' or 'z'"),
+    "unknown frame": ({"drive": {"frame": "labs"}}, "drive.frame", '"labs"', 'did you mean "lab"'),
+    "no replicates": ({"start": {"replicates": 0}}, "start.replicates", "0", "at least 1"),
+    "half a replicate": ({"start": {"replicates": 1.5}}, "start.replicates", "1.5", "whole number"),
+    "true replicates": ({"start": {"replicates": True}}, "start.replicates", "true", "whole number"),
+    "unknown facing": ({"start": {"facing": "up"}}, "start.facing", '"up"', "'both', 'right' or 'left'"),
+    "beads apart": ({"start": {"gap": "1 um"}}, "start.gap", '"1 um"', "zero or less"),
+    "beads overlap": ({"start": {"gap": "-50 um"}}, "start.gap", '"-50 um"', "overlap"),
+    "walkers overlap": ({"start": {"replicates": 2, "spacing": "0.5 mm"}}, "start.spacing", '"0.5 mm"', "overlap"),
+    "step over the limit": ({"run": {"time_step": "20 us"}}, "run.time_step", '"20 us"', "rayleigh"),
+    "step not a time": ({"run": {"time_step": "2"}}, "run.time_step", '"2"', "time with its unit"),
+    "settling too long": ({"run": {"cycles": 10, "settling_cycles": 10}}, "run.settling_cycles", "10", "at most"),
+    "uneven bridges": ({"run": {"bridge_samples_per_cycle": 3}}, "run.bridge_samples_per_cycle", "3", "divisor"),
+    "unstable not a truth": (
+        {"run": {"allow_unstable": "yes please"}},
+        "run.allow_unstable",
+        "yes please",
+        "true or false",
+    ),
+    "unknown kind": ({"kind": "pendulum"}, "kind", '"pendulum"', "'walker'"),
+    "table given as text": ({"drive": "x"}, "drive", '"x"', "table"),
+}
+
+
+def _message(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    with pytest.raises(SystemExit) as exit_:
+        main(list(arguments))
+    assert exit_.value.code == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "Traceback" not in printed.err
+    return printed.err
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_value(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    changes, key, value, expected = BAD[name]
+    file = tmp_path / "bad.toml"
+    file.write_text(to_toml(document(**changes)), encoding="utf-8")
+    message = _message(capsys, "show", str(file))
+    assert message.count("\n") == 1, "one problem, one line"
+    for part in (str(file), key, value, expected):
+        assert part in message
+
+
+MISSING = {
+    "beads": "beads: missing",
+    "liquid": "liquid: missing",
+    "substrate": "substrate: missing",
+    "drive": "drive: missing",
+    "beads.radii": "beads.radii: missing",
+    "beads.material": "beads.material: missing",
+    "liquid.name": "liquid.surface_tension: missing",
+    "substrate.material": "substrate.material: missing",
+    "drive.frequency": "drive.frequency: missing",
+    "drive.peak_acceleration": "drive.peak_acceleration: missing",
+}
+
+
+@pytest.mark.parametrize("key", MISSING)
+def test_missing_key(key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    values = document()
+    table, _, name = key.partition(".")
+    if name:
+        del values[table][name]
+    else:
+        del values[table]
+    file = tmp_path / "bad.toml"
+    file.write_text(to_toml(values), encoding="utf-8")
+    assert MISSING[key] in _message(capsys, "show", str(file))
+
+
+def test_friction_that_the_library_does_not_know(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    values = document(beads={"material": "polystyrene"})
+    del values["contact"]["friction"]
+    file = tmp_path / "bad.toml"
+    file.write_text(to_toml(values))
+    assert "contact.friction.bead_bead: missing" in _message(capsys, "show", str(file))
+
+
+@pytest.mark.parametrize(
+    ("contents", "expected"),
+    [
+        (b"[beads\nradii = 3", "line 1"),
+        (b'[beads]\nradii = ["0.3 mm", \xff]', "UTF-8"),
+        (b"[beads]\nradii = 1\nradii = 2", "not TOML"),
+        (b"", "beads: missing"),
+        (b"\x00\x01\x02", "not TOML"),
+    ],
+)
+def test_files_that_are_no_cases(
+    contents: bytes, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "bad.toml"
+    file.write_bytes(contents)
+    message = _message(capsys, "show", str(file))
+    assert str(file) in message
+    assert expected in message
+
+
+def test_files_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "no such file" in _message(capsys, "show", str(tmp_path / "nothing.toml"))
+    assert 'did you mean "fig1b"' in _message(capsys, "show", "fig1")
+    assert "cannot be read" in _message(capsys, "show", str(tmp_path))
+
+
+def test_several_mistakes_are_told_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "bad.toml"
+    file.write_text(to_toml(document(drive={"frequency": "80 mm", "axis": "w"})))
+    message = _message(capsys, "show", str(file))
+    assert "drive.frequency" in message
+    assert "drive.axis" in message
+
+
+def test_a_mistake_in_the_last_file_stops_before_the_first_run(
+    in_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (in_folder / "bad.toml").write_text(to_toml(document(drive={"frequency": "80 mm"})))
+    _message(capsys, "run", "fig1b", "bad.toml")
+    assert not (in_folder / "runs").exists()
+
+
+@pytest.mark.parametrize("command", ["result", "plot", "vtk", "render"])
+def test_runs_that_are_not_there(command: str, in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "no finished run in runs; first do: walkers run fig1b" in _message(capsys, command, "fig1b")
+    (in_folder / "empty").mkdir()
+    assert "not a finished run" in _message(capsys, command, "empty")
+    (in_folder / "broken").mkdir()
+    (in_folder / "broken" / "manifest.json").write_text("{")
+    assert "manifest.json cannot be read" in _message(capsys, command, "broken")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["show"], ["shw", "fig1b"], ["run", "fig1b", "--limit", "-1"], ["run", "fig1b", "--no-such-option"], ["run"]],
+)
+def test_misuse_of_the_program(arguments: list[str]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "walkers.main", *arguments], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert done.stderr.strip()
+
+
+def test_a_step_over_the_limit_is_taken_if_the_case_insists() -> None:
+    assert make_case(run={"time_step": "20 us", "allow_unstable": True}).run.time_step > 19e-6

@@ -1,0 +1,108 @@
+"""The deck: readable, exact, and with every remedy for what the engine gets wrong."""
+
+import re
+from math import radians
+
+import pytest
+
+from inputs import load_case, shipped_cases
+from templates import render_deck
+from templates.engine import contact_angle_setting, separation_cap
+from templates.placement import place_walkers
+from tests.conftest import make_case
+
+
+@pytest.fixture(scope="module")
+def deck() -> str:
+    return render_deck(load_case("fig1b")).text
+
+
+def _lines(deck: str, start: str) -> list[list[str]]:
+    return [line.split() for line in deck.splitlines() if line.startswith(start)]
+
+
+def test_the_rider_is_created_first_and_atoms_are_not_sorted(deck: str) -> None:
+    case = load_case("fig1b")
+    first = _lines(deck, "create_atoms")[0]
+    assert tuple(map(float, first[3:6])) == place_walkers(case).rider
+    assert _lines(deck, "group           rider") == [["group", "rider", "id", "1"]]
+    assert ["atom_modify", "map", "array", "sort", "0", "0"] in _lines(deck, "atom_modify")
+
+
+def test_the_substrate_stands_twice_as_one_triangle(deck: str) -> None:
+    meshes = [line[1] for line in _lines(deck, "fix") if line[3] == "mesh/surface"]
+    assert len(meshes) == 2
+    (wall,) = [line for line in _lines(deck, "fix") if line[3] == "wall/gran"]
+    assert wall[-5:] == ["n_meshes", "2", "meshes", *meshes]
+    (stl,) = render_deck(load_case("fig1b")).files.values()
+    assert stl.count("facet normal") == 1
+
+
+def test_the_triangle_is_far_larger_than_the_box_and_its_centroid_in_it() -> None:
+    case = load_case("fig4b")
+    (stl,) = render_deck(case).files.values()
+    corners = [tuple(map(float, match)) for match in re.findall(r"vertex (\S+) (\S+) (\S+)", stl)]
+    scene = place_walkers(case)
+    centroid = [sum(corner[axis] for corner in corners) / 3 for axis in range(3)]
+    assert all(low < middle < high for low, middle, high in zip(scene.lower, centroid, scene.upper, strict=True))
+    assert min(abs(corner[1]) for corner in corners) > 10 * scene.upper[1]
+
+
+def test_beads_start_with_the_substrate_in_the_laboratory_frame(deck: str) -> None:
+    case = load_case("fig1b")
+    (velocity,) = _lines(deck, "velocity")
+    assert float(velocity[3]) == case.drive.peak_velocity
+    assert len([line for line in _lines(deck, "fix") if "wiggle" in line]) == 3  # two meshes and the rider
+
+
+def test_the_container_frame_has_a_signed_gravity_and_walls_at_rest() -> None:
+    deck = render_deck(make_case(drive={"frame": "container"})).text
+    assert "wiggle" not in deck
+    assert not _lines(deck, "velocity")
+    (drive,) = [line for line in _lines(deck, "fix") if "v_drive" in line]
+    assert drive[-4:] == ["vector", "1.0", "0.0", "0.0"]
+    (gravity,) = [line for line in _lines(deck, "fix") if line[1] == "gravity"]
+    assert gravity[2:5] == ["beads", "gravity", "9.81"]
+
+
+@pytest.mark.parametrize("degrees", [0.0, 10.0, 30.0, 60.0])
+def test_contact_angle_is_translated(degrees: float) -> None:
+    """The engine computes half the product of the two types' angles, in radians."""
+    deck = render_deck(make_case(liquid={"contact_angle": f"{degrees} deg"})).text
+    (angle,) = [line for line in _lines(deck, "fix") if "contactAngle" in line]
+    given = [radians(float(value)) for value in angle[-2:]]
+    assert 0.5 * given[0] * given[1] == pytest.approx(radians(degrees), rel=1e-12, abs=1e-15)
+
+
+def test_no_bridge_is_cut_before_it_ruptures() -> None:
+    radii = (3e-4, 2e-4)
+    assert separation_cap(radii, (1e-5, 1e-5), 1e-5) == 1.2
+    cap = separation_cap(radii, (3e-4, 2e-4), 2e-4)
+    assert (cap - 1) * 2 * radii[0] > 3e-4
+    assert (cap - 1) * sum(radii) > 2e-4
+
+
+def test_rolling_friction_is_left_out_where_there_is_none() -> None:
+    assert "rolling" not in "\n".join(line for line in render_deck(make_case()).text.splitlines() if line[:1] != "#")
+    assert render_deck(make_case(contact={"rolling_friction": 0.003})).text.count("rolling_friction cdt") == 2
+
+
+@pytest.mark.parametrize("name", shipped_cases())
+def test_numbers_are_rendered_in_full_precision(name: str) -> None:
+    case = load_case(name)
+    deck = render_deck(case).text
+    assert f"timestep        {case.run.time_step!r}\n" in deck
+    starts = [tuple(map(float, line[3:6])) for line in _lines(deck, "create_atoms")[1:]]
+    assert starts == [bead.centre for bead in place_walkers(case).beads]
+    assert contact_angle_setting(0.0) == 0.0
+
+
+def test_every_block_says_why_it_is_as_it_is(deck: str) -> None:
+    blocks = re.split(r"^# --- .*$", deck, flags=re.MULTILINE)[1:]
+    assert len(blocks) == 9
+    assert all(block.lstrip("\n").startswith("# ") for block in blocks)
+
+
+def test_there_is_one_run_and_one_thermo_style(deck: str) -> None:
+    assert len(_lines(deck, "run ")) == 1
+    assert len(_lines(deck, "thermo_style")) == 1

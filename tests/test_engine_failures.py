@@ -1,0 +1,242 @@
+"""Every failure of a run, provoked for real on the installed engine."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from inputs.case import WalkerCase
+from runner import Engine, find_engine, launch, open_run
+from runner.failures import (
+    BeadsLost,
+    BlowUp,
+    DiskFull,
+    EngineError,
+    EngineFailure,
+    EngineKilled,
+    EngineMissing,
+    EngineVersionWarning,
+    MissingFrames,
+    TimeLimitExceeded,
+)
+from templates import Deck, render_deck
+from tests.conftest import SHORT, document, engines_in, make_case, to_toml
+from walkers import run_case
+
+LONG = {"cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
+
+
+def _launch(case: WalkerCase, out: Path, change: Callable[[str], str] = str, **options: object) -> None:
+    deck = render_deck(case)
+    _launch_deck(case, replace(deck, text=change(deck.text)), out, **options)
+
+
+def _launch_deck(case: WalkerCase, deck: Deck, out: Path, **options: object) -> None:
+    with open_run(case, deck, find_engine(), out) as run:
+        launch(deck, run.directory, run.engine, keep_open=[run.lock], **options)  # type: ignore[arg-type]
+
+
+def _remains(out: Path) -> dict[str, str]:
+    """What a failed run leaves: one unfinished directory that says why."""
+    (part,) = out.glob("*.part")
+    assert not list(out.glob("*/manifest.json"))
+    failure: dict[str, str] = json.loads((part / "failure.json").read_text())
+    return failure
+
+
+def test_engine_missing(tmp_path: Path) -> None:
+    with pytest.raises(EngineMissing, match="apt-get install liggghts"):
+        run_case(make_case(), tmp_path / "runs", engine="no-such-liggghts")
+    assert not (tmp_path / "runs").exists()
+
+
+def test_another_version_of_the_engine_is_a_warning(tmp_path: Path) -> None:
+    """The real engine behind a front that changes the version in its banner."""
+    front = tmp_path / "liggghts-next"
+    front.write_text('#!/bin/sh\nliggghts "$@" | sed "s/LIGGGHTS-PUBLIC 3.8.0/LIGGGHTS-PUBLIC 4.0.0/"\n')
+    front.chmod(0o755)
+    with pytest.warns(EngineVersionWarning, match=r"4\.0\.0.*3\.8\.0"):
+        outcome = run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front))
+    assert outcome.run.manifest["engine"]["version"] == "LIGGGHTS-PUBLIC 4.0.0"
+
+
+def test_the_audited_version_gives_no_warning(tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run_case(make_case(run=SHORT), tmp_path)
+
+
+def test_error_line_is_quoted(tmp_path: Path) -> None:
+    with pytest.raises(EngineError, match=r"ERROR: Unknown command: wobble") as failure:
+        _launch(make_case(run=SHORT), tmp_path, lambda text: text.replace("run             ", "wobble          "))
+    assert failure.value.line.startswith("ERROR")
+    assert _remains(tmp_path)["reason"] == "EngineError"
+
+
+def test_error_line_with_bytes_that_are_not_utf8(tmp_path: Path) -> None:
+    with pytest.raises(EngineError, match=r"Unknown command: w\\xff\\xfebble"):
+        _launch(make_case(run=SHORT), tmp_path, lambda text: text.replace("run             ", "w\udcff\udcfebble "))
+
+
+def test_crash_of_the_engine(tmp_path: Path) -> None:
+    """Reading a mesh with ``-screen none`` crashes this engine."""
+    front = tmp_path / "front"
+    front.write_text('#!/bin/sh\nexec liggghts -screen none "$@"\n')
+    front.chmod(0o755)
+    with pytest.raises(EngineKilled, match="SIGSEGV"):
+        run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front))
+    assert _remains(tmp_path / "runs")["reason"] == "EngineKilled"
+
+
+def test_engine_killed(tmp_path: Path) -> None:
+    def kill_soon() -> None:
+        while not (engines := engines_in(tmp_path)):
+            time.sleep(0.02)
+        time.sleep(0.3)
+        for engine in engines:
+            os.kill(engine, signal.SIGKILL)
+
+    killer = threading.Thread(target=kill_soon)
+    killer.start()
+    with pytest.raises(EngineKilled, match="SIGKILL") as failure:
+        _launch(make_case(run=LONG), tmp_path)
+    killer.join()
+    assert failure.value.signal == signal.SIGKILL
+    assert _remains(tmp_path)["reason"] == "EngineKilled"
+
+
+def test_exit_without_the_expected_frames(tmp_path: Path) -> None:
+    def stop_half_way(text: str) -> str:
+        steps = int(re.findall(r"^run +(\d+)", text, re.MULTILINE)[0])
+        return text.replace(f"run             {steps}", f"run             {steps // 2}")
+
+    with pytest.raises(MissingFrames, match="31 of 61 frames"):
+        _launch(make_case(run=SHORT), tmp_path, stop_half_way)
+    assert _remains(tmp_path)["reason"] == "MissingFrames"
+
+
+def test_lost_beads(tmp_path: Path) -> None:
+    """A box whose wall stands one and a half millimetres ahead of the walker."""
+
+    def narrow(text: str) -> str:
+        return re.sub(r"(region +box block \S+) \S+", r"\1 0.0010", text).replace(
+            re.findall(r"create_atoms +1 single (\S+)", text)[0], "0.0005"
+        )
+
+    case = make_case(drive={"peak_acceleration": "8 g"}, run={"cycles": 60, "settling_cycles": 2})
+    with pytest.raises(BeadsLost, match="left the simulation box"):
+        _launch(case, tmp_path, narrow)
+    assert _remains(tmp_path)["reason"] == "BeadsLost"
+
+
+def test_too_large_a_time_step_blows_up(tmp_path: Path) -> None:
+    case = make_case(
+        liquid={"name": "glycerol 87 %"},
+        run={"time_step": "40 us", "allow_unstable": True, "samples_per_cycle": 1, "cycles": 60, "settling_cycles": 2},
+    )
+    with pytest.raises(BlowUp, match="time step"):
+        _launch(case, tmp_path)
+    assert _remains(tmp_path)["reason"] == "BlowUp"
+
+
+def test_time_limit(tmp_path: Path) -> None:
+    begin = time.monotonic()
+    with pytest.raises(TimeLimitExceeded, match=r"0\.6 s"):
+        _launch(make_case(run=LONG), tmp_path, time_limit=0.6)
+    assert time.monotonic() - begin < 5.0
+    assert not engines_in(tmp_path)
+    assert _remains(tmp_path)["reason"] == "TimeLimitExceeded"
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of two megabytes."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(place)], capture_output=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip("a small file system can only be mounted by root")
+    yield place
+    subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+def test_no_room_for_the_dump_is_seen_before_the_launch(small_disk: Path) -> None:
+    case = make_case(run={"cycles": 600, "samples_per_cycle": 20})
+    with pytest.raises(DiskFull, match="disk full"):
+        _launch(case, small_disk / "runs")
+    assert _remains(small_disk / "runs")["reason"] == "DiskFull"
+
+
+def test_a_disk_that_fills_up_during_the_run(small_disk: Path) -> None:
+    case = make_case(run={"cycles": 180, "settling_cycles": 2, "samples_per_cycle": 20})
+
+    def fill() -> None:
+        while not list(small_disk.glob("runs/*.part/beads.bin")):
+            time.sleep(0.01)
+        with suppress(OSError), (small_disk / "ballast").open("wb", buffering=0) as file:
+            while file.write(b"\0" * 4096):
+                pass
+
+    filler = threading.Thread(target=fill)
+    filler.start()
+    with pytest.raises(DiskFull):
+        _launch(case, small_disk / "runs")
+    filler.join()
+    assert not list(small_disk.glob("runs/*/manifest.json"))
+    assert not engines_in(small_disk)
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_interrupts_stop_the_engine_and_leave_no_run(number: signal.Signals, status: int, in_folder: Path) -> None:
+    (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
+    program = subprocess.Popen(
+        ["walkers", "run", "long.toml"], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    while not engines_in(in_folder):
+        assert program.poll() is None
+        time.sleep(0.02)
+    program.send_signal(number)
+    _, errors = program.communicate(timeout=10)
+    assert program.returncode == status
+    assert "Traceback" not in errors
+    assert not engines_in(in_folder)
+    assert not list(in_folder.glob("runs/*/manifest.json"))
+
+
+def test_a_failed_run_is_reported_and_the_next_one_goes_on(in_folder: Path) -> None:
+    (in_folder / "hot.toml").write_text(
+        to_toml(
+            document(
+                liquid={"name": "glycerol 87 %"},
+                run={"time_step": "40 us", "allow_unstable": True, "samples_per_cycle": 1},
+            )
+        )
+    )
+    (in_folder / "good.toml").write_text(to_toml(document(run=SHORT)))
+    done = subprocess.run(
+        ["walkers", "run", "hot.toml", "good.toml", "--json"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "walkers: hot: blow-up" in done.stderr
+    assert json.loads(done.stdout)["case"] == "good"
+
+
+def test_every_failure_says_where_its_remains_are(tmp_path: Path) -> None:
+    failures = EngineFailure.__subclasses__()
+    assert len(failures) >= 9
+    assert all(failure.__doc__ for failure in failures)
+    assert isinstance(find_engine(), Engine)

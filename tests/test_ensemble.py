@@ -1,0 +1,95 @@
+"""Replicates: walkers in one deck are independent, perturbed, and bitwise repeatable."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inputs import load_case
+from inputs.case import WalkerCase
+from postprocess.gait import walk
+from postprocess.trajectory import Trajectory
+from runner import find_engine, launch
+from runner.directory import write_deck
+from templates import render_deck
+from walkers import run_case
+
+
+@pytest.fixture(scope="module")
+def ensemble() -> WalkerCase:
+    """The shipped walker of Fig. 1b, six replicates, a third of its length."""
+    case = load_case("fig1b")
+    return replace(case, run=replace(case.run, cycles=20, settling_cycles=5))
+
+
+def test_walkers_of_an_ensemble_move_as_they_do_alone(
+    trajectory: Callable[..., Trajectory], ensemble: WalkerCase
+) -> None:
+    together = trajectory(ensemble)
+    alone = trajectory(replace(ensemble, start=replace(ensemble.start, replicates=1)))
+    way_together = together.position[:, 0] - together.position[0, 0].mean(axis=0)
+    way_alone = alone.position[:, 0] - alone.position[0, 0].mean(axis=0)
+    assert np.abs(way_together - way_alone).max() < 1e-6 * np.abs(way_alone).max()
+    assert walk(together).velocity[0] == pytest.approx(walk(alone).velocity[0], rel=1e-6)
+
+
+def test_replicates_are_perturbed_and_face_both_ways(
+    trajectory: Callable[..., Trajectory], ensemble: WalkerCase
+) -> None:
+    moved = trajectory(ensemble)
+    assert [walker.facing for walker in moved.layout.walkers] == [1, -1, 1, -1, 1, -1]
+    angles = [walker.start_angle for walker in moved.layout.walkers]
+    assert len(set(angles)) == 6
+    assert max(map(abs, angles)) <= np.radians(1.0)
+    np.testing.assert_allclose(moved.orientation[0], angles, atol=1e-12)
+    overlaps = moved.radii[0] - moved.position[0, :, 0, 2]
+    assert len(set(overlaps)) == 6
+    assert np.all(overlaps > 0.0)
+
+
+def test_another_seed_starts_otherwise_and_the_same_seed_alike(ensemble: WalkerCase) -> None:
+    def start(seed: int) -> tuple[float, ...]:
+        changed = replace(ensemble, start=replace(ensemble.start, seed=seed))
+        return tuple(walker.start_angle for walker in render_deck(changed).layout.walkers)
+
+    assert start(1) == start(1)
+    assert not set(start(1)) & set(start(2))
+
+
+def test_walkers_keep_their_distance(trajectory: Callable[..., Trajectory], ensemble: WalkerCase) -> None:
+    moved = trajectory(ensemble)
+    centre = moved.mass_centre[..., :2]
+    first, second = np.triu_indices(6, 1)
+    assert np.linalg.norm(centre[:, first] - centre[:, second], axis=-1).min() > 0.5 * ensemble.start.spacing
+
+
+def test_a_rerun_is_bitwise_the_same(tmp_path: Path, ensemble: WalkerCase) -> None:
+    dumps = []
+    for number in range(2):
+        directory = run_case(ensemble, tmp_path / str(number)).run.directory
+        dumps.append((directory / "beads.bin").read_bytes())
+    assert dumps[0] == dumps[1]
+
+
+def test_reporting_bridges_does_not_disturb_the_walkers(tmp_path: Path, ensemble: WalkerCase) -> None:
+    """The engine evaluates contacts once more to report them; that must leave no trace in the motion."""
+    deck = render_deck(ensemble)
+    silent = [
+        line
+        for line in deck.text.splitlines()
+        if not line.startswith(("compute         pair_", "compute         wall_"))
+        and line.split()[:2][-1:] not in (["pairs"], ["walls"])
+    ]
+    dumps = []
+    for name, text in (("reporting", deck.text), ("silent", "\n".join(silent) + "\n")):
+        directory = tmp_path / name
+        directory.mkdir()
+        changed = replace(deck, text=text)
+        write_deck(changed, directory)
+        launch(changed, directory, find_engine())
+        dumps.append((directory / "beads.bin").read_bytes())
+    assert (tmp_path / "reporting" / "bridges.pairs.txt").exists()
+    assert not (tmp_path / "silent" / "bridges.pairs.txt").exists()
+    assert dumps[0] == dumps[1]

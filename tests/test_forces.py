@@ -1,0 +1,115 @@
+"""Forces, limits of the time step and the paper's numbers against published formulas."""
+
+from dataclasses import replace
+from math import pi
+
+import pytest
+
+from inputs import forces, load_case, resolve_case
+from inputs.dimer import Dimer, contact_loads, dimer_of
+from inputs.timestep import AUTO_FRACTIONS, fit_into_cycle, time_step_limits
+from tests.conftest import document, make_case
+
+GAMMA = 0.0192
+
+
+def test_wall_force_of_one_per_cent_liquid() -> None:
+    """Twice the 1.74 πγR that the engine gives per wall; the sphere-plane limit is 4πγR."""
+    radius = 3e-4
+    volume = forces.bridge_volume_at_wall(radius, 0.01)
+    force = forces.capillary_force_at_wall(GAMMA, radius, volume, 0.0)
+    assert force / (pi * GAMMA * radius) == pytest.approx(3.48, abs=0.005)
+    assert force < forces.capillary_force_limit_at_wall(GAMMA, radius)
+
+
+def test_capillary_force_of_equal_spheres_tends_to_two_pi_gamma_r() -> None:
+    """Soulié's fit at small volume stays within some per cent of the exact 2πγR."""
+    force = forces.capillary_force(GAMMA, 3e-4, 3e-4, 1e-4 * (3e-4) ** 3, 0.0)
+    assert force == pytest.approx(2 * pi * GAMMA * 3e-4, rel=0.12)
+
+
+def test_capillary_force_falls_with_the_gap_and_ends_small_at_rupture() -> None:
+    volume = forces.bridge_volume_between_beads(3e-4, 2e-4, 0.01)
+    rupture = forces.rupture_distance(volume, 0.0)
+    touching, half, last = (
+        forces.capillary_force(GAMMA, 3e-4, 2e-4, volume, 0.0, gap) for gap in (0.0, rupture / 2, rupture)
+    )
+    assert touching > half > last > 0.0
+    assert forces.capillary_force(GAMMA, 3e-4, 2e-4, volume, 0.0, -1e-6) == touching
+    assert forces.rupture_distance(volume, 1.0) == pytest.approx(1.5 * rupture)
+
+
+def test_hertz_overlap_carries_the_load() -> None:
+    modulus = forces.reduced_modulus(5e7, 0.3)
+    overlap = forces.hertz_overlap(3e-5, 2e-4, modulus)
+    assert 4.0 / 3.0 * modulus * (2e-4) ** 0.5 * overlap**1.5 == pytest.approx(3e-5)
+
+
+@pytest.mark.parametrize(
+    ("acceleration", "gamma0"), [("2 g", 0.191), ("3 g", 0.286), ("4 g", 0.381), ("5 g", 0.476), ("6 g", 0.572)]
+)
+def test_published_gamma0_of_the_walker_of_fig_2(acceleration: str, gamma0: float) -> None:
+    case = make_case(drive={"peak_acceleration": acceleration})
+    assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(gamma0, abs=6e-4)
+
+
+@pytest.mark.parametrize(("name", "gamma0"), [("fig4a", 0.74), ("fig4b", 3.5)])
+def test_published_gamma0_of_fig_4(name: str, gamma0: float) -> None:
+    case = load_case(name)
+    assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(gamma0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("radii", "sin_delta"),
+    [((0.25, 0.2), 0.111), ((0.4, 0.3), 0.143), ((0.3, 0.2), 0.2), ((0.35, 0.2), 0.273), ((0.4, 0.2), 0.333)],
+)
+def test_asymmetry_of_the_pairs_of_fig_3(radii: tuple[float, float], sin_delta: float) -> None:
+    assert Dimer(radii, 4000.0, GAMMA).sin_delta == pytest.approx(sin_delta, abs=5e-4)
+
+
+def test_drive_given_as_gamma0() -> None:
+    values = document(drive={"gamma0": 0.5})
+    del values["drive"]["peak_acceleration"]
+    case = resolve_case(values)
+    assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(0.5)
+
+
+def test_time_step_limits_of_the_walker() -> None:
+    """By hand for R 0.2 mm, ρ 4000, E 50 MPa, ν 0.3: π R √(ρ/G)/(0.1631 ν + 0.8766) = 9.79 µs."""
+    case = make_case()
+    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive)
+    assert limits.rayleigh == pytest.approx(9.79e-6, rel=1e-3)
+    assert limits.rayleigh < limits.hertz < limits.viscous
+
+
+def test_viscous_limit_rules_in_glycerol() -> None:
+    """The glycerol climber is wrong at 6 µs and converged at 2 µs: the limit lies between, auto below 2.1 µs."""
+    case = make_case(
+        beads={"radii": ["0.545 mm", "0.3075 mm"], "material": "glass"},
+        liquid={"name": "glycerol 87 %"},
+        drive={"frequency": "170 Hz", "peak_acceleration": "16.2 g"},
+    )
+    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive)
+    assert 2e-6 < limits.viscous < 6e-6
+    assert limits.exceeded_by(6e-6) == ["viscous"]
+    assert case.run.time_step < 2.1e-6
+
+
+@pytest.mark.parametrize("name", ["fig1b", "fig4a", "fig4b", "symmetric"])
+def test_auto_respects_every_limit_with_margin(name: str) -> None:
+    case = load_case(name)
+    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive).as_dict()
+    for limit, share in AUTO_FRACTIONS.items():
+        assert case.run.time_step <= share * limits[limit]
+
+
+def test_a_step_that_divides_the_cycle_is_taken_as_it_is() -> None:
+    assert fit_into_cycle(2e-6, 80.0, 10) == (2e-6, 6250)
+    assert fit_into_cycle(2e-6, 80.0, 20)[1] == 6260
+
+
+def test_overlap_at_rest_is_a_thousandth_of_a_radius() -> None:
+    case = make_case()
+    assert all(1e-4 < overlap / 2e-4 < 2e-3 for overlap in contact_loads(case).overlaps)
+    stiffer = replace(case, contact=replace(case.contact, youngs_modulus=5e8))
+    assert max(contact_loads(stiffer).overlaps) < min(contact_loads(case).overlaps)

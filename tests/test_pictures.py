@@ -1,0 +1,117 @@
+"""Figures, renderings and files for ParaView, read back."""
+
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+import pyvista as pv
+
+from postprocess import read_table, read_trajectory
+from postprocess.figures import plot_run
+from postprocess.paraview import write_vtk
+from postprocess.rendering import render_run
+
+
+@pytest.fixture(scope="module")
+def directory(run_directory: Callable[..., Path]) -> Path:
+    return run_directory(
+        start={"replicates": 2, "angle_spread": "1 deg"},
+        run={"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 10, "bridge_samples_per_cycle": 2},
+    )
+
+
+@pytest.fixture(scope="module")
+def collection(directory: Path) -> Path:
+    return write_vtk(directory, every_sample=True, vtu=True)
+
+
+def test_the_collection_is_in_seconds(directory: Path, collection: Path) -> None:
+    sets = ElementTree.parse(collection).getroot().findall("Collection/DataSet")
+    beads = [entry for entry in sets if entry.get("part") == "0"]
+    seconds = [float(entry.get("timestep", "nan")) for entry in beads]
+    np.testing.assert_allclose(seconds, read_trajectory(directory).time)
+    assert all((collection.parent / str(entry.get("file"))).is_file() for entry in sets)
+    assert {entry.get("part") for entry in sets} == {"0", "1", "2"}
+
+
+def test_pyvista_reads_the_collection(directory: Path, collection: Path) -> None:
+    reader = pv.get_reader(collection)
+    moved = read_trajectory(directory)
+    np.testing.assert_allclose(reader.time_values, moved.time)
+    reader.set_active_time_value(reader.time_values[-1])
+    assert len(reader.read()) == 3
+
+
+def test_beads_are_where_the_engine_put_them(directory: Path, collection: Path) -> None:
+    moved = read_trajectory(directory)
+    frame = 13
+    beads = pv.read(collection.parent / f"beads_{frame:06d}.vtp")
+    laboratory = moved.position[frame] + moved.substrate[frame]
+    np.testing.assert_allclose(beads.points, laboratory.reshape(-1, 3), rtol=1e-12)
+    np.testing.assert_array_equal(beads["radius"], [3e-4, 2e-4, 3e-4, 2e-4])
+    np.testing.assert_array_equal(beads["walker"], [0, 0, 1, 1])
+    np.testing.assert_array_equal(beads["bead"], [1, 2, 1, 2])
+    np.testing.assert_allclose(beads["velocity"], moved.velocity[frame].reshape(-1, 3))
+    np.testing.assert_allclose(beads["omega"], moved.spin[frame].reshape(-1, 3))
+
+
+def test_the_substrate_moves(directory: Path, collection: Path) -> None:
+    moved = read_trajectory(directory)
+    places = [pv.read(collection.parent / f"substrate_{frame:06d}.vtp").points[0] for frame in (0, 3)]
+    np.testing.assert_allclose(places[1] - places[0], moved.substrate[3], atol=1e-12)
+    assert np.linalg.norm(moved.substrate[3]) > 1e-5
+
+
+def test_bridges_are_lines_with_force_and_gap(directory: Path, collection: Path) -> None:
+    bridges = pv.read(collection.parent / "bridges_000010.vtp")
+    assert bridges.n_lines == 6
+    table = read_table(directory, "bridges")
+    rows = table[np.isclose(table["time"], read_trajectory(directory).time[10])]
+    np.testing.assert_allclose(bridges.cell_data["gap"], rows["gap"])
+    np.testing.assert_allclose(bridges.cell_data["normal_force"], rows["normal_force"])
+    ends = bridges.points[bridges.lines.reshape(-1, 3)[:, 1:]]
+    length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+    reach = np.array([3e-4, 2e-4, 5e-4] * 2)
+    np.testing.assert_allclose(length - reach, rows["gap"], atol=1e-10)
+    # The engine reported bridges twice a cycle, beads ten times.
+    assert len(list(collection.parent.glob("bridges_*.vtp"))) == 17
+    assert len(list(collection.parent.glob("beads_*.vtp"))) == 81
+
+
+def test_meshio_reads_the_vtu(directory: Path, collection: Path) -> None:
+    mesh = meshio.read(collection.parent / "beads_000080.vtu")
+    moved = read_trajectory(directory)
+    np.testing.assert_allclose(mesh.points, (moved.position[80] + moved.substrate[80]).reshape(-1, 3))
+    np.testing.assert_array_equal(mesh.point_data["radius"], [3e-4, 2e-4, 3e-4, 2e-4])
+
+
+def test_one_frame_a_cycle_is_the_default(directory: Path, tmp_path: Path) -> None:
+    collection = write_vtk(directory, destination=tmp_path / "strobed")
+    reader = pv.get_reader(collection)
+    np.testing.assert_allclose(reader.time_values, np.arange(9) / 80.0)
+    assert not list(tmp_path.glob("*.new"))
+
+
+def test_figures_are_pictures(directory: Path, tmp_path: Path) -> None:
+    paths = plot_run(directory, tmp_path)
+    assert [path.name for path in paths] == ["walk.png", "gait.png"]
+    for path in paths:
+        picture = np.asarray(pv.read(path).point_data.active_scalars)
+        assert len(np.unique(picture, axis=0)) > 20
+
+
+def test_a_strobed_run_has_no_gait(run_directory: Callable[..., Path], tmp_path: Path) -> None:
+    strobed = run_directory(run={"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 1})
+    assert [path.name for path in plot_run(strobed, tmp_path)] == ["walk.png"]
+
+
+def test_rendering_shows_ruby_beads_on_a_grey_floor(directory: Path, tmp_path: Path) -> None:
+    path = render_run(directory, tmp_path / "walker.png", images=2)
+    pixels = np.asarray(pv.read(path).point_data.active_scalars)[:, :3].astype(int)
+    red = np.mean((pixels[:, 0] > 1.8 * pixels[:, 1]) & (pixels[:, 0] > 60))
+    grey = np.mean(np.ptp(pixels, axis=1) < 25)
+    assert 0.02 < red < 0.5
+    assert grey > 0.4

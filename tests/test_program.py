@@ -1,0 +1,109 @@
+"""The program and the Makefile, as a user meets them."""
+
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import SHORT, document, to_toml
+
+ROOT = Path(__file__).parent.parent
+
+
+def _walkers(*arguments: str, folder: Path | None = None) -> str:
+    return subprocess.run(["walkers", *arguments], cwd=folder, capture_output=True, text=True, check=True).stdout
+
+
+def test_help_names_every_command() -> None:
+    shown = _walkers("--help")
+    for command in ("show", "deck", "run", "result", "plot", "vtk", "render"):
+        assert command in shown
+        assert _walkers(command, "--help").strip()
+
+
+def test_show_tells_what_follows_from_a_case() -> None:
+    shown = _walkers("show", "fig1b")
+    for part in (
+        "Γ0 = 0.3811",
+        "sin δ = 0.2",
+        "μ = 0.5429",
+        "4πγR limit",
+        "rayleigh",
+        "hertz",
+        "viscous",
+        "µs, 6400 a cycle",
+    ):
+        assert part in shown
+    summary = json.loads(_walkers("show", "fig1b", "--json"))
+    assert summary["dimer"]["gamma0"] == pytest.approx(0.3811, abs=1e-4)
+    assert summary["case"]["beads"]["radii"] == [3e-4, 2e-4]
+    assert summary["time_step"]["share"]["rayleigh"] < 0.2
+    assert summary["run"]["predicted_seconds"] > 0
+    walls = summary["contacts"][:2]
+    assert all(0.8 < contact["capillary_force"] / contact["capillary_force_limit"] < 0.9 for contact in walls)
+
+
+def test_deck_is_printed_or_written(tmp_path: Path) -> None:
+    printed = _walkers("deck", "fig1b")
+    _walkers("deck", "fig1b", "--to", str(tmp_path / "deck"))
+    assert (tmp_path / "deck" / "walker.lig").read_text() == printed
+    assert (tmp_path / "deck" / "substrate.stl").exists()
+    again = subprocess.run(
+        ["walkers", "deck", "fig1b", "--to", str(tmp_path / "deck")], capture_output=True, check=False
+    )
+    assert again.returncode == 2
+
+
+def test_from_a_case_file_to_pictures(in_folder: Path) -> None:
+    (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
+    assert "toward the large bead" in _walkers("run", "mine.toml")
+    assert "(already run)" in _walkers("run", "mine.toml")
+    for command, last in (("plot", "gait.png"), ("vtk", "walkers.pvd"), ("render", "walker.png")):
+        path = Path(_walkers(command, "mine.toml").split()[-1])
+        assert path.name == last
+        assert path.exists()
+
+
+def test_progress_is_plain_lines_without_a_terminal(in_folder: Path) -> None:
+    (in_folder / "mine.toml").write_text(
+        to_toml(document(run={"cycles": 120, "settling_cycles": 2, "samples_per_cycle": 1}))
+    )
+    done = subprocess.run(["walkers", "run", "mine.toml"], capture_output=True, text=True, check=True)
+    lines = [line for line in done.stderr.splitlines() if line]
+    assert lines
+    assert all("s simulated" in line and "steps/s" in line and "left" in line for line in lines)
+    assert "\x1b" not in done.stderr
+
+
+def test_make_help_lists_the_targets() -> None:
+    shown = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert all(f"make {target}" in shown for target in ("walker", "test", "help", "clean"))
+    assert shown == subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
+def test_without_root_and_engine_the_administrators_command_is_told() -> None:
+    """As nobody, with a PATH that holds neither liggghts nor sudo."""
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        place.chmod(0o755)
+        for tool in ("bash", "make", "id", "awk"):
+            (place / tool).symlink_to(str(shutil.which(tool)))
+        shutil.copy(ROOT / "Makefile", place)
+        done = subprocess.run(
+            ["make", "--no-print-directory", "engine"],
+            cwd=place,
+            env={"PATH": folder},
+            user=65534,
+            capture_output=True,
+            text=True,
+            check=False,
+            stdin=subprocess.DEVNULL,
+        )
+    assert done.returncode != 0
+    assert "apt-get install liggghts" in done.stderr
+    assert "administrator" in done.stderr

@@ -1,0 +1,158 @@
+"""Velocities, rotation, orientation and the aggregates over replicates."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inputs import load_case
+from postprocess import read_result, read_table, read_trajectory
+from postprocess.gait import distance_walked, fit_slopes, gait, settled_samples, walk
+from postprocess.report import describe_result
+from postprocess.tables import TABLES
+from postprocess.trajectory import Trajectory
+
+
+@pytest.fixture(scope="module")
+def directory(run_directory: Callable[..., Path]) -> Path:
+    """The shipped walker of Fig. 1b: six replicates, 60 cycles."""
+    return run_directory(load_case("fig1b"))
+
+
+@pytest.fixture(scope="module")
+def moved(directory: Path) -> Trajectory:
+    return read_trajectory(directory)
+
+
+def test_slopes_and_their_errors_are_those_of_least_squares() -> None:
+    rng = np.random.default_rng(5)
+    time = np.linspace(3.0, 4.0, 30)
+    values = np.outer(time, [2.0, -1.0]) + 0.1 * rng.standard_normal((30, 2)) + 1e3
+    slope, error = fit_slopes(time, values)
+    for column in range(2):
+        (expected, _), covariance = np.polyfit(time - 3.5, values[:, column] - 1e3, 1, cov=True)
+        assert slope[column] == pytest.approx(expected, rel=1e-9)
+        assert error[column] == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-6)
+
+
+def test_two_points_give_a_slope_without_an_error() -> None:
+    slope, error = fit_slopes(np.array([0.0, 2.0]), np.array([[1.0], [5.0]]))
+    assert slope[0] == 2.0
+    assert np.isnan(error[0])
+
+
+def test_velocity_is_the_strobed_displacement_over_time(moved: Trajectory) -> None:
+    run = moved.case.run
+    strobed = moved.mass_centre[:: run.samples_per_cycle][run.settling_cycles :]
+    seconds = (run.cycles - run.settling_cycles) / moved.case.drive.frequency
+    facing = np.array([walker.facing for walker in moved.layout.walkers])
+    crude = facing * (strobed[-1, :, 0] - strobed[0, :, 0]) / seconds
+    walked = walk(moved)
+    np.testing.assert_allclose(facing * walked.axial, crude, rtol=1e-3)
+    np.testing.assert_allclose(walked.velocity, crude, rtol=0.01)
+    assert np.all(walked.steady)
+    assert np.all(walked.standard_error < 1e-3 * walked.velocity)
+
+
+def test_mean_velocity_through_the_cycle_is_the_strobed_one(moved: Trajectory) -> None:
+    """Twenty samples a cycle represent the gait: their mean velocity is the displacement a cycle."""
+    through = gait(moved).velocity[settled_samples(moved)].mean(axis=0)
+    np.testing.assert_allclose(through, walk(moved).velocity, rtol=0.01)
+
+
+def test_sliding_is_velocity_less_rotation(moved: Trajectory) -> None:
+    motion = gait(moved)
+    # The mass centre moves as its beads do, weighted by their masses.
+    weights = moved.radii**3 / np.sum(moved.radii**3)
+    carried = (motion.sliding[..., :2] + motion.rotation) @ weights
+    np.testing.assert_allclose(carried, motion.velocity, atol=1e-12)
+    np.testing.assert_allclose(motion.sliding[..., 2], -motion.rotation.sum(axis=-1), atol=1e-15)
+
+
+def test_velocities_follow_from_positions(moved: Trajectory) -> None:
+    """Central differences of the sampled positions reproduce the dumped velocities of a smooth phase of the cycle."""
+    step = moved.time[1] - moved.time[0]
+    differences = (moved.position[2:] - moved.position[:-2]) / (2 * step)
+    scale = np.abs(moved.velocity).max()
+    assert np.median(np.abs(differences - moved.velocity[1:-1])) < 0.02 * scale
+
+
+def test_orientation_starts_at_the_start_angle_for_both_facings(moved: Trajectory) -> None:
+    np.testing.assert_allclose(
+        moved.orientation[0], [walker.start_angle for walker in moved.layout.walkers], atol=1e-12
+    )
+
+
+def test_distance_is_walked_toward_the_large_bead_by_both_facings(moved: Trajectory) -> None:
+    time, distance = distance_walked(moved)
+    assert len(time) == 61
+    assert np.all(distance[-1] > distance[20])
+    assert np.all(np.diff(distance[20:], axis=0) > 0)
+
+
+def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
+    result, walkers = read_result(directory), read_table(directory, "walkers")
+    velocity = result["velocity"]
+    assert velocity["n"] == 6
+    assert velocity["mean"] == pytest.approx(walkers["velocity"].mean())
+    assert velocity["smallest"] == walkers["velocity"].min()
+    assert velocity["largest"] == walkers["velocity"].max()
+    assert velocity["standard_error"] == pytest.approx(walkers["velocity"].sem())
+    assert (result["right_facing"]["n"], result["left_facing"]["n"]) == (3, 3)
+    right = walkers[walkers["facing"] == 1]["velocity"]
+    assert result["right_facing"]["mean"] == pytest.approx(right.mean())
+    assert result["axial_velocity"]["left_facing"] < 0 < result["axial_velocity"]["right_facing"]
+    assert result["steady"] == 6
+    assert not result["walkers_met"]
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_have_units_and_meanings(directory: Path, name: str) -> None:
+    import pyarrow.parquet as pq
+
+    schema = pq.read_schema(directory / f"{name}.parquet")
+    assert schema.names == list(TABLES[name])
+    for field in schema:
+        unit, meaning = TABLES[name][field.name]
+        assert field.metadata[b"unit"].decode() == unit
+        assert field.metadata[b"meaning"].decode() == meaning
+    assert pq.ParquetFile(directory / f"{name}.parquet").metadata.row_group(0).column(0).compression == "ZSTD"
+
+
+def test_rows_of_the_tables(directory: Path) -> None:
+    series, bridges = read_table(directory, "trajectory"), read_table(directory, "bridges")
+    assert len(series) == 6 * 1201
+    assert list(series.groupby("walker").size()) == [1201] * 6
+    assert len(bridges) == 61 * 6 * 3
+    assert bridges["touching"].dtype == bool
+    assert not series.isna().any().any()
+
+
+def test_a_single_walker_has_the_error_of_its_fit(run_directory: Callable[..., Path]) -> None:
+    directory = run_directory()
+    result, walkers = read_result(directory), read_table(directory, "walkers")
+    assert result["velocity"]["standard_error"] == walkers["standard_error"][0]
+    assert result["left_facing"] == {"n": 0, "mean": None, "smallest": None, "largest": None, "standard_error": None}
+    assert "facing left none" in describe_result(directory, result)
+
+
+def test_walkers_that_have_not_settled_are_reported(run_directory: Callable[..., Path]) -> None:
+    directory = run_directory(run={"cycles": 6, "settling_cycles": 0})
+    result = read_result(directory)
+    assert result["steady"] == 0
+    assert "not steady" in describe_result(directory, result)
+
+
+def test_walkers_that_come_close_are_reported(run_directory: Callable[..., Path]) -> None:
+    """Four walkers on a narrow grid walk toward each other and end within one and a half lengths."""
+    directory = run_directory(
+        start={"replicates": 4, "spacing": "1.6 mm", "facing": "both"},
+        drive={"peak_acceleration": "8 g"},
+        run={"cycles": 40, "settling_cycles": 10},
+    )
+    moved = read_trajectory(directory)
+    centre = moved.mass_centre[..., :2]
+    first, second = np.triu_indices(4, 1)
+    nearest = np.linalg.norm(centre[:, first] - centre[:, second], axis=-1).min()
+    assert read_result(directory)["walkers_met"] == (nearest < 1.5 * 0.99e-3)

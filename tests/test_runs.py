@@ -1,0 +1,182 @@
+"""Run directories: named by what determines them, finished by their manifest only."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from runner import find_engine, finished_run, open_run, run_name
+from runner.failures import RunBusy
+from templates import render_deck
+from tests.conftest import SHORT, document, engines_in, make_case, to_toml
+from walkers import find_run, run_case
+
+
+def _name(**changes: object) -> str:
+    case = make_case(**changes)
+    return run_name(case, render_deck(case), find_engine())
+
+
+def test_a_finished_run_is_not_run_again(tmp_path: Path) -> None:
+    case = make_case(run=SHORT)
+    first = run_case(case, tmp_path)
+    stamp = (first.run.directory / "manifest.json").stat().st_mtime_ns
+    again = run_case(case, tmp_path)
+    assert (first.found, again.found) == (False, True)
+    assert again.result == first.result
+    assert (first.run.directory / "manifest.json").stat().st_mtime_ns == stamp
+
+
+def test_force_runs_again(tmp_path: Path) -> None:
+    case = make_case(run=SHORT)
+    first = run_case(case, tmp_path).run.manifest["finished"]
+    time.sleep(1.1)
+    again = run_case(case, tmp_path, force=True)
+    assert not again.found
+    assert again.run.manifest["finished"] > first
+    assert [path.name for path in tmp_path.iterdir()] == [again.run.directory.name]
+
+
+def test_a_forced_run_that_fails_leaves_the_old_one(tmp_path: Path) -> None:
+    case = make_case(run=SHORT)
+    old = run_case(case, tmp_path).run
+    with pytest.raises(KeyboardInterrupt):
+        run_case(case, tmp_path, force=True, on_progress=_interrupt)
+    assert finished_run(old.directory) is not None
+    assert run_case(case, tmp_path).found
+
+
+def _interrupt(_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def test_an_unfinished_run_is_redone(tmp_path: Path) -> None:
+    case = make_case(run=SHORT)
+    with pytest.raises(KeyboardInterrupt):
+        run_case(case, tmp_path, on_progress=_interrupt)
+    (part,) = tmp_path.glob("*.part")
+    (part / "leftover").touch()
+    outcome = run_case(case, tmp_path)
+    assert not outcome.found
+    assert not part.exists()
+    assert not (outcome.run.directory / "leftover").exists()
+
+
+def test_a_replacement_cut_short_is_put_back(tmp_path: Path) -> None:
+    case = make_case(run=SHORT)
+    place = run_case(case, tmp_path).run.directory
+    place.rename(place.with_name(place.name + ".replaced"))
+    with open_run(case, render_deck(case), find_engine(), tmp_path):
+        assert finished_run(place) is not None
+
+
+def test_the_name_depends_on_what_determines_the_run() -> None:
+    names = {
+        _name(),
+        _name(drive={"peak_acceleration": "4.01 g"}),
+        _name(start={"seed": 2}),
+        _name(contact={"rolling_friction": 0.001}),
+        _name(run={"cycles": 61}),
+        _name(drive={"frame": "container"}),
+    }
+    assert len(names) == 6
+    assert _name(title="another title") == _name()
+
+
+def test_the_name_depends_on_the_engine() -> None:
+    case = make_case()
+    deck, engine = render_deck(case), find_engine()
+    assert run_name(case, deck, engine) != run_name(case, deck, replace(engine, sha256="0" * 64))
+
+
+def test_contents_of_a_run_directory(tmp_path: Path) -> None:
+    case = make_case(run=SHORT)
+    run = run_case(case, tmp_path).run
+    names = {path.name for path in run.directory.iterdir()}
+    assert names == {
+        *("case.json", "layout.json", "walker.lig", "substrate.stl", "engine.log", "manifest.json", "result.json"),
+        *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
+        *("trajectory.parquet", "walkers.parquet", "bridges.parquet"),
+    }
+    assert run.case == case
+    assert run.layout == render_deck(case).layout
+    manifest = run.manifest
+    assert manifest["status"] == "finished"
+    assert manifest["steps"] == case.run.steps
+    assert manifest["steps_per_second"] > 0
+    assert manifest["engine"]["sha256"] == find_engine().sha256
+    assert {"host", "started", "finished", "seconds"} <= set(manifest)
+
+
+def test_the_deck_of_a_run_can_be_run_by_hand(tmp_path: Path) -> None:
+    run = run_case(make_case(run=SHORT), tmp_path / "runs").run
+    subprocess.run(["walkers", "deck", _toml(tmp_path), "--to", str(tmp_path / "byhand")], check=True, stdout=-3)
+    by_hand = tmp_path / "byhand"
+    with (by_hand / "engine.log").open("wb") as log:
+        subprocess.run(["liggghts", "-in", "walker.lig"], cwd=by_hand, stdout=log, check=True)
+    assert (by_hand / "beads.bin").read_bytes() == (run.directory / "beads.bin").read_bytes()
+
+
+def _toml(folder: Path) -> str:
+    file = folder / "test.toml"
+    file.write_text(to_toml(document(run=SHORT)))
+    return str(file)
+
+
+def test_two_at_once_do_not_share_a_directory(tmp_path: Path) -> None:
+    case = make_case(run=SHORT)
+    deck, engine = render_deck(case), find_engine()
+    with open_run(case, deck, engine, tmp_path), pytest.raises(RunBusy), open_run(case, deck, engine, tmp_path):
+        pass
+    assert not list(tmp_path.glob("*.lock"))
+
+
+def test_an_engine_that_outlives_its_launcher_keeps_others_away(in_folder: Path) -> None:
+    long = {"cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
+    (in_folder / "test.toml").write_text(to_toml(document(run=long)))
+    program = subprocess.Popen(["walkers", "run", "test.toml"], stderr=subprocess.DEVNULL)
+    while not list(in_folder.glob("runs/*.part/beads.bin")):
+        assert program.poll() is None
+        time.sleep(0.02)
+    program.kill()
+    program.wait()
+    (engine,) = engines_in(in_folder)
+    case = make_case(run=long).renamed("test")
+    try:
+        with pytest.raises(RunBusy):
+            run_case(case, in_folder / "runs")
+    finally:
+        os.kill(engine, signal.SIGKILL)
+    for _ in range(100):  # a dying process lets go of its files a moment after it has left the process table
+        try:
+            with open_run(case, render_deck(case), find_engine(), in_folder / "runs"):
+                return
+        except RunBusy:
+            time.sleep(0.05)
+    pytest.fail("the lock outlived the engine")
+
+
+def test_a_run_is_found_by_its_directory_or_its_case(tmp_path: Path) -> None:
+    case_file = _toml(tmp_path)
+    outcome = run_case(make_case(run=SHORT), tmp_path / "runs")
+    assert find_run(outcome.run.directory).directory == outcome.run.directory
+    assert find_run(case_file, tmp_path / "runs").directory == outcome.run.directory
+
+
+def test_json_result_of_the_program(in_folder: Path) -> None:
+    _toml(in_folder)
+    first, second = (
+        json.loads(subprocess.run(["walkers", "run", "test.toml", "--json"], capture_output=True, check=True).stdout)
+        for _ in range(2)
+    )
+    assert (first["found"], second["found"]) == (False, True)
+    assert first["velocity"] == second["velocity"]
+    shown = subprocess.run(["walkers", "result", first["run"]], capture_output=True, text=True, check=True).stdout
+    assert f"{first['velocity']['mean'] * 1e3:.3f}" in shown
