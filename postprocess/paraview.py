@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
+from inputs.dimer import dimer_of
 from postprocess.dump import FloatArray
 from postprocess.tables import read_table
 from postprocess.trajectory import Trajectory, read_trajectory
@@ -25,7 +26,12 @@ COLLECTION_NAME = "walkers.pvd"
 
 
 def write_vtk(
-    directory: Path, *, every_sample: bool = False, vtu: bool = False, destination: Path | None = None
+    directory: Path,
+    *,
+    every_sample: bool = False,
+    vtu: bool = False,
+    as_placed: bool = False,
+    destination: Path | None = None,
 ) -> Path:
     """Write a run for ParaView.
 
@@ -37,6 +43,8 @@ def write_vtk(
         All samples instead of one frame a cycle. Bridges are in the frames in which the engine reported them.
     vtu
         Also write the beads as ``.vtu`` (through meshio).
+    as_placed
+        Leave the walkers where the deck has them, centimetres apart, instead of drawing them side by side.
     destination
         Folder to write, replaced if it exists; ``vtk`` in the run directory if None.
 
@@ -46,6 +54,8 @@ def write_vtk(
         The ``.pvd`` file: its times are seconds; part 0 the beads, part 1 the substrate, part 2 the bridges.
     """
     trajectory = read_trajectory(directory)
+    if not as_placed:
+        trajectory = gathered(trajectory)
     bridges = read_table(directory, "bridges")
     place = destination or directory / FOLDER_NAME
     beside = place.with_name(place.name + ".new")
@@ -59,6 +69,17 @@ def write_vtk(
     shutil.rmtree(place, ignore_errors=True)
     beside.rename(place)
     return place / COLLECTION_NAME
+
+
+def gathered(trajectory: Trajectory) -> Trajectory:
+    """The same walkers on parallel lanes two lengths apart; as independent replicates they may stand anywhere."""
+    walkers = trajectory.layout.walkers
+    lane = 2.0 * dimer_of(trajectory.case).length
+    axis = trajectory.drive_axis
+    across = np.cross([0.0, 0.0, 1.0], axis)
+    origins = np.array([[*walker.origin, 0.0] for walker in walkers])
+    shift = -np.outer(np.arange(len(walkers)) * lane, across) - origins
+    return replace(trajectory, position=trajectory.position + shift[:, None])
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ def directory(run_directory: Callable[..., Path]) -> Path:
 
 @pytest.fixture(scope="module")
 def collection(directory: Path) -> Path:
-    return write_vtk(directory, every_sample=True, vtu=True)
+    return write_vtk(directory, every_sample=True, vtu=True, as_placed=True)
 
 
 def test_the_collection_is_in_seconds(directory: Path, collection: Path) -> None:
@@ -93,6 +93,15 @@ def test_one_frame_a_cycle_is_the_default(directory: Path, tmp_path: Path) -> No
     reader = pv.get_reader(collection)
     np.testing.assert_allclose(reader.time_values, np.arange(9) / 80.0)
     assert not list(tmp_path.glob("*.new"))
+
+
+def test_walkers_are_drawn_side_by_side(directory: Path, tmp_path: Path) -> None:
+    collection = write_vtk(directory, destination=tmp_path / "gathered")
+    points = [pv.read(collection.parent / f"beads_{frame:06d}.vtp").points for frame in (0, 80)]
+    as_placed = read_trajectory(directory).position
+    moved = (points[1] - points[0]).reshape(2, 2, 3)
+    np.testing.assert_allclose(moved, as_placed[80] - as_placed[0], atol=1e-12)
+    assert np.ptp(points[0][:, 1]) < 4e-3 < np.ptp(as_placed[0, ..., 1])
 
 
 def test_figures_are_pictures(directory: Path, tmp_path: Path) -> None:
