@@ -134,14 +134,14 @@ def _gait_figure(trajectory: Trajectory) -> Figure:
     figure, axes = _figure(figsize=(6.4, 3.8))
     figure.suptitle(_title(trajectory.case), fontsize=10)
     series = [
-        ("velocity of the walker", motion.velocity[last, 0], "s", "#c4473a"),
-        (r"$-R\,\mathrm{d}\varphi/\mathrm{d}t$, bead 1", motion.rotation[last, 0, 0], "o", "0.1"),
-        (r"$-R\,\mathrm{d}\varphi/\mathrm{d}t$, bead 2", motion.rotation[last, 0, 1], "^", "#1f3b73"),
+        ("walker", motion.velocity[last, 0], "s", "#c4473a"),
+        ("bead 1", motion.rotation[last, 0, 0], "o", "0.1"),
+        ("bead 2", motion.rotation[last, 0, 1], "^", "#1f3b73"),
     ]
     for label, values, marker, colour in series:
         mean = values[:-1].mean() * 1e3
         axes.plot(phase, values * 1e3, marker=marker, color=colour, label=f"{label} (mean {mean:.2f} mm/s)")
     axes.axhline(0.0, color="0.4", lw=0.6)
-    axes.set(xlabel="time (cycles of the drive)", ylabel="mm/s")
+    axes.set(xlabel="time (cycles of the drive)", ylabel=r"velocity of the walker, $-R\,\mathrm{d}\varphi/\mathrm{d}t$ of the beads (mm/s)")
     figure.legend(fontsize=7, ncols=3, loc="outside lower center")
     return figure

@@ -83,7 +83,7 @@ def _scene(trajectory: Trajectory, walker: int, images: int, size: tuple[int, in
         for bead in range(2):
             sphere = pv.Sphere(radius=radii[bead], center=centres[bead], theta_resolution=80, phi_resolution=80)
             plotter.add_mesh(sphere, color=_RUBY[bead], smooth_shading=True, specular=0.6, specular_power=40)
-        place = [high[0] - 2.2 * radii.max(), float(centres[:, 1].mean()), 0.02]
+        place = [high[0] - 2.2 * radii.max(), float(centres[:, 1].mean()), float(radii.mean())]
         _add_label(plotter, place, f"{trajectory.time[frame]:.2f} s")
     _add_scale_bar(plotter, [low[0] + 0.6 * radii.max(), low[1] + 0.5 * radii.max(), 0.02])
     _aim(plotter, (low + high) / 2.0, high - low, size)
