@@ -142,6 +142,9 @@ def _gait_figure(trajectory: Trajectory) -> Figure:
         mean = values[:-1].mean() * 1e3
         axes.plot(phase, values * 1e3, marker=marker, color=colour, label=f"{label} (mean {mean:.2f} mm/s)")
     axes.axhline(0.0, color="0.4", lw=0.6)
-    axes.set(xlabel="time (cycles of the drive)", ylabel=r"velocity of the walker, $-R\,\mathrm{d}\varphi/\mathrm{d}t$ of the beads (mm/s)")
+    axes.set(
+        xlabel="time (cycles of the drive)",
+        ylabel=r"walker: velocity; beads: $-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)",
+    )
     figure.legend(fontsize=7, ncols=3, loc="outside lower center")
     return figure
