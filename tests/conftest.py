@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -33,6 +34,7 @@ REFERENCE: dict[str, Any] = {
     "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
     "start": {"replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
 }
+PROGRAM = str(Path(sys.executable).with_name("walkers"))
 SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
 
 

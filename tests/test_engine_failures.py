@@ -32,7 +32,7 @@ from runner.failures import (
     TimeLimitExceeded,
 )
 from templates import Deck, render_deck
-from tests.conftest import SHORT, document, engines_in, make_case, to_toml
+from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml
 from walkers import run_case
 
 LONG = {"cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
@@ -203,9 +203,7 @@ def test_a_disk_that_fills_up_during_the_run(small_disk: Path) -> None:
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_interrupts_stop_the_engine_and_leave_no_run(number: signal.Signals, status: int, in_folder: Path) -> None:
     (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
-    program = subprocess.Popen(
-        ["walkers", "run", "long.toml"], stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+    program = subprocess.Popen([PROGRAM, "run", "long.toml"], stderr=subprocess.PIPE, text=True, start_new_session=True)
     while not engines_in(in_folder):
         assert program.poll() is None
         time.sleep(0.02)
@@ -228,7 +226,7 @@ def test_a_failed_run_is_reported_and_the_next_one_goes_on(in_folder: Path) -> N
     )
     (in_folder / "good.toml").write_text(to_toml(document(run=SHORT)))
     done = subprocess.run(
-        ["walkers", "run", "hot.toml", "good.toml", "--json"], capture_output=True, text=True, check=False
+        [PROGRAM, "run", "hot.toml", "good.toml", "--json"], capture_output=True, text=True, check=False
     )
     assert done.returncode == 1
     assert "walkers: hot: blow-up" in done.stderr

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import SHORT, document, to_toml
+from tests.conftest import PROGRAM, SHORT, document, to_toml
 
 ROOT = Path(__file__).parent.parent
 
 
 def _walkers(*arguments: str, folder: Path | None = None) -> str:
-    return subprocess.run(["walkers", *arguments], cwd=folder, capture_output=True, text=True, check=True).stdout
+    return subprocess.run([PROGRAM, *arguments], cwd=folder, capture_output=True, text=True, check=True).stdout
 
 
 def test_help_names_every_command() -> None:
@@ -52,9 +52,7 @@ def test_deck_is_printed_or_written(tmp_path: Path) -> None:
     _walkers("deck", "fig1b", "--to", str(tmp_path / "deck"))
     assert (tmp_path / "deck" / "walker.lig").read_text() == printed
     assert (tmp_path / "deck" / "substrate.stl").exists()
-    again = subprocess.run(
-        ["walkers", "deck", "fig1b", "--to", str(tmp_path / "deck")], capture_output=True, check=False
-    )
+    again = subprocess.run([PROGRAM, "deck", "fig1b", "--to", str(tmp_path / "deck")], capture_output=True, check=False)
     assert again.returncode == 2
 
 
@@ -72,7 +70,7 @@ def test_progress_is_plain_lines_without_a_terminal(in_folder: Path) -> None:
     (in_folder / "mine.toml").write_text(
         to_toml(document(run={"cycles": 120, "settling_cycles": 2, "samples_per_cycle": 1}))
     )
-    done = subprocess.run(["walkers", "run", "mine.toml"], capture_output=True, text=True, check=True)
+    done = subprocess.run([PROGRAM, "run", "mine.toml"], capture_output=True, text=True, check=True)
     lines = [line for line in done.stderr.splitlines() if line]
     assert lines
     assert all("s simulated" in line and "steps/s" in line and "left" in line for line in lines)

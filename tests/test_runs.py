@@ -15,7 +15,7 @@ import pytest
 from runner import find_engine, finished_run, open_run, run_name
 from runner.failures import RunBusy
 from templates import render_deck
-from tests.conftest import SHORT, document, engines_in, make_case, to_toml
+from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml
 from walkers import find_run, run_case
 
 
@@ -117,7 +117,7 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
 
 def test_the_deck_of_a_run_can_be_run_by_hand(tmp_path: Path) -> None:
     run = run_case(make_case(run=SHORT), tmp_path / "runs").run
-    subprocess.run(["walkers", "deck", _toml(tmp_path), "--to", str(tmp_path / "byhand")], check=True, stdout=-3)
+    subprocess.run([PROGRAM, "deck", _toml(tmp_path), "--to", str(tmp_path / "byhand")], check=True, stdout=-3)
     by_hand = tmp_path / "byhand"
     with (by_hand / "engine.log").open("wb") as log:
         subprocess.run(["liggghts", "-in", "walker.lig"], cwd=by_hand, stdout=log, check=True)
@@ -141,7 +141,7 @@ def test_two_at_once_do_not_share_a_directory(tmp_path: Path) -> None:
 def test_an_engine_that_outlives_its_launcher_keeps_others_away(in_folder: Path) -> None:
     long = {"cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
     (in_folder / "test.toml").write_text(to_toml(document(run=long)))
-    program = subprocess.Popen(["walkers", "run", "test.toml"], stderr=subprocess.DEVNULL)
+    program = subprocess.Popen([PROGRAM, "run", "test.toml"], stderr=subprocess.DEVNULL)
     while not list(in_folder.glob("runs/*.part/beads.bin")):
         assert program.poll() is None
         time.sleep(0.02)
@@ -173,10 +173,10 @@ def test_a_run_is_found_by_its_directory_or_its_case(tmp_path: Path) -> None:
 def test_json_result_of_the_program(in_folder: Path) -> None:
     _toml(in_folder)
     first, second = (
-        json.loads(subprocess.run(["walkers", "run", "test.toml", "--json"], capture_output=True, check=True).stdout)
+        json.loads(subprocess.run([PROGRAM, "run", "test.toml", "--json"], capture_output=True, check=True).stdout)
         for _ in range(2)
     )
     assert (first["found"], second["found"]) == (False, True)
     assert first["velocity"] == second["velocity"]
-    shown = subprocess.run(["walkers", "result", first["run"]], capture_output=True, text=True, check=True).stdout
+    shown = subprocess.run([PROGRAM, "result", first["run"]], capture_output=True, text=True, check=True).stdout
     assert f"{first['velocity']['mean'] * 1e3:.3f}" in shown
