@@ -8,9 +8,11 @@ import re
 import shutil
 import signal
 import subprocess
+import threading
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -91,18 +93,11 @@ def launch(
     if free < deck.layout.bead_dump_bytes + _SPARE_BYTES:
         raise DiskFull(deck.layout.bead_dump_bytes, free, directory)
     begin = time.perf_counter()
-    with (directory / OUTPUT_NAME).open("wb") as output:
-        process = subprocess.Popen(
-            [str(engine.path), "-log", "none", "-in", DECK_NAME],
-            cwd=directory,
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            pass_fds=tuple(keep_open),
-        )
     watch = _Watch(deck, directory, begin)
+    process = None
     try:
+        with postponed_interrupts():
+            process = _start(directory, engine, keep_open)
         while process.poll() is None:
             try:
                 process.wait(_POLL_SECONDS)
@@ -112,11 +107,49 @@ def launch(
                 if on_progress:
                     on_progress(watch.progress)
     finally:
-        _end(process)
+        if process is not None:
+            _end(process)
     wall_seconds = time.perf_counter() - begin
     watch.look()
     watch.check(None)
     return _verdict(watch, process.returncode, wall_seconds)
+
+
+def _start(directory: Path, engine: Engine, keep_open: Sequence[int]) -> subprocess.Popen[bytes]:
+    with (directory / OUTPUT_NAME).open("wb") as output:
+        return subprocess.Popen(
+            [str(engine.path), "-log", "none", "-in", DECK_NAME],
+            cwd=directory,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            pass_fds=tuple(keep_open),
+        )
+
+
+@contextmanager
+def postponed_interrupts() -> Iterator[None]:
+    """Let SIGINT and SIGTERM take effect at the end of the block only.
+
+    An exception out of `subprocess.Popen` would leave an engine behind that nobody knows of. Handlers are not inherited
+    by the engine, as a mask of blocked signals would be.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    caught: list[int] = []
+    kept = {
+        number: signal.signal(number, lambda number, _frame: caught.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)
+        for interrupt in caught:
+            signal.raise_signal(interrupt)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -31,6 +31,7 @@ from runner.failures import (
     MissingFrames,
     TimeLimitExceeded,
 )
+from runner.launch import postponed_interrupts
 from templates import Deck, render_deck
 from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml
 from walkers import run_case
@@ -198,6 +199,15 @@ def test_a_disk_that_fills_up_during_the_run(small_disk: Path) -> None:
     filler.join()
     assert not list(small_disk.glob("runs/*/manifest.json"))
     assert not engines_in(small_disk)
+
+
+def test_an_interrupt_while_the_engine_is_being_started_comes_after() -> None:
+    started = False
+    with pytest.raises(KeyboardInterrupt), postponed_interrupts():
+        signal.raise_signal(signal.SIGINT)
+        time.sleep(0.01)
+        started = True
+    assert started
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
