@@ -104,7 +104,8 @@ def _draw_strobe(axes: Axes, trajectory: Trajectory) -> None:
     from matplotlib.patches import Circle
 
     strobe = trajectory.case.run.samples_per_cycle
-    position = trajectory.position[::strobe, 0, :, :2] * 1e3
+    ground = np.stack([trajectory.drive_axis, trajectory.across_axis], axis=-1)
+    position = trajectory.position[::strobe, 0] @ ground * 1e3
     radii = trajectory.radii * 1e3
     shown = np.unique(np.linspace(0, len(position) - 1, 8).round().astype(int))
     pitch = 2.6 * float(radii.max())
@@ -122,7 +123,7 @@ def _draw_strobe(axes: Axes, trajectory: Trajectory) -> None:
     low, high = position[..., 0].min() - origin[0], position[..., 0].max() - origin[0]
     axes.set(xlim=(low - 2 * radii.max(), high + 2 * radii.max()), ylim=(-pitch * (len(shown) - 0.4), 0.6 * pitch))
     axes.set_aspect("equal")
-    axes.set(xlabel="x relative to the substrate (mm)", yticks=[], title="walker 0 from above")
+    axes.set(xlabel="along the drive axis (mm)", yticks=[], title="walker 0 from above")
     axes.grid(visible=False)
 
 

@@ -133,16 +133,14 @@ def walk(trajectory: Trajectory) -> Walk:
         first = second = velocity
     strobe = trajectory.case.run.samples_per_cycle
     centre = trajectory.mass_centre[::strobe][settled:]
-    axis = trajectory.drive_axis
-    across = np.cross([0.0, 0.0, 1.0], axis)
     allowed = np.maximum(STEADY_DIFFERENCE * np.abs(velocity), STEADY_SPEED)
     return Walk(
         velocity=velocity,
         standard_error=error,
         first_half=first,
         second_half=second,
-        axial=fit_slopes(time, centre @ axis)[0],
-        lateral=fit_slopes(time, centre @ across)[0],
+        axial=fit_slopes(time, centre @ trajectory.drive_axis)[0],
+        lateral=fit_slopes(time, centre @ trajectory.across_axis)[0],
         steady=np.abs(first - second) <= allowed,
     )
 

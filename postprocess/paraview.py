@@ -75,10 +75,8 @@ def gathered(trajectory: Trajectory) -> Trajectory:
     """The same walkers on parallel lanes two lengths apart; as independent replicates they may stand anywhere."""
     walkers = trajectory.layout.walkers
     lane = 2.0 * dimer_of(trajectory.case).length
-    axis = trajectory.drive_axis
-    across = np.cross([0.0, 0.0, 1.0], axis)
     origins = np.array([[*walker.origin, 0.0] for walker in walkers])
-    shift = -np.outer(np.arange(len(walkers)) * lane, across) - origins
+    shift = -np.outer(np.arange(len(walkers)) * lane, trajectory.across_axis) - origins
     return replace(trajectory, position=trajectory.position + shift[:, None])
 
 

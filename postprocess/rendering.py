@@ -71,7 +71,8 @@ def _scene(trajectory: Trajectory, walker: int, images: int, size: tuple[int, in
     frames = np.linspace(0, (len(trajectory.time) - 1) // strobe, images).round().astype(int) * strobe
     radii = trajectory.radii * 1e3
     pitch = 2.4 * float(radii.max())
-    position = trajectory.position[frames, walker] * 1e3
+    turned = np.stack([trajectory.drive_axis, trajectory.across_axis, np.array([0.0, 0.0, 1.0])], axis=-1)
+    position = trajectory.position[frames, walker] @ turned * 1e3
     position = position - np.array([*position[0].mean(axis=0)[:2], 0.0])
     position[:, :, 1] -= pitch * np.arange(images)[:, None]
     low = position.min(axis=(0, 1)) - 2.2 * radii.max()

@@ -67,6 +67,12 @@ class Trajectory:
         return axis if axis[2] == 0.0 else np.array([1.0, 0.0, 0.0])
 
     @property
+    def across_axis(self) -> FloatArray:
+        """Direction in the plane of the substrate, a quarter turn to the left of `drive_axis`."""
+        across: FloatArray = np.cross([0.0, 0.0, 1.0], self.drive_axis)
+        return across
+
+    @property
     def heading(self) -> FloatArray:
         """Unit vectors in the plane of the substrate from the small bead to the large one, shape (F, W, 3).
 
@@ -84,9 +90,7 @@ class Trajectory:
         """ψ, rad, shape (F, W): angle of bead 2 → bead 1 from the direction that the walker was to face, unwrapped."""
         arm = self.position[:, :, 0] - self.position[:, :, 1]
         facing = np.array([walker.facing for walker in self.layout.walkers])
-        axis = self.drive_axis
-        across = np.cross([0.0, 0.0, 1.0], axis)
-        angle = np.arctan2(facing * (arm @ across), facing * (arm @ axis))
+        angle = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis))
         unwrapped: FloatArray = np.unwrap(angle, axis=0)
         return unwrapped
 
