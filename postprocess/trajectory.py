@@ -13,7 +13,7 @@ from postprocess.dump import BinaryDump, FloatArray
 from runner.directory import CASE_NAME, read_json
 from templates.deck import LAYOUT_NAME
 from templates.layout import Layout
-from templates.placement import axis_vector
+from templates.scene import vector_along
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Trajectory:
     @property
     def drive_axis(self) -> FloatArray:
         """Direction from which orientations are measured, in the plane of the substrate: the drive's, or x."""
-        axis = np.array(axis_vector(self.case.drive.axis))
+        axis = np.array(vector_along(self.case.drive.axis))
         return axis if axis[2] == 0.0 else np.array([1.0, 0.0, 0.0])
 
     @property

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from math import sqrt
+from math import degrees, sqrt
 from typing import TYPE_CHECKING
 
 from inputs.case import WalkerCase
 from inputs.dimer import contact_loads, dimer_of, hop_height
-from templates.engine import WALL_COPIES, contact_angle_setting, separation_cap, substrate_triangle
+from templates.engine import ALL_REMEDIES, Remedies, contact_angle_setting, separation_cap, wall_mesh
 from templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
-from templates.placement import Point, Scene, axis_vector, place_walkers
+from templates.placement import place_walkers
+from templates.scene import Point, Scene, vector_along, without_riders
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
-SUBSTRATE_NAME = "substrate.stl"
+WALL_NAME = "walls.stl"
 STATUS_LINES_PER_CYCLE = 4
 
 __all__ = ["DECK_NAME", "LAYOUT_NAME", "OUTPUT_NAME", "Deck", "Layout", "PlacedWalker", "render_deck"]
@@ -51,51 +52,121 @@ class Deck:
     fastest: float
 
 
-def render_deck(case: WalkerCase) -> Deck:
+@dataclass(frozen=True)
+class Checkpoint:
+    """Restart files of a deck: one to write at its end, one to go on from."""
+
+    write: str | None = None
+    read: str | None = None
+
+
+NO_CHECKPOINT = Checkpoint()
+
+
+@dataclass(frozen=True)
+class Recording:
+    """How long a deck runs and how often it records, in steps."""
+
+    steps: int
+    sample_every: int
+    bridge_every: int
+    status_every: int
+    bead_columns: tuple[str, ...] = BEAD_COLUMNS
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a deck is put together from.
+
+    Attributes
+    ----------
+    case
+        Materials, liquid, contacts, drive, gravity and time step.
+    scene
+        What stands in the box.
+    recording
+        Length and sampling.
+    walkers
+        Which beads are whose.
+    remedies
+        Which remedies the deck carries; without riders those of the scene are left out.
+    prescribed
+        Beads keep their velocities instead of following the forces.
+    ranks
+        Number of MPI processes; the scene must have riders for each.
+    checkpoint
+        Restart file to write or to go on from.
+    """
+
+    case: WalkerCase
+    scene: Scene
+    recording: Recording
+    walkers: tuple[PlacedWalker, ...] = ()
+    remedies: Remedies = ALL_REMEDIES
+    prescribed: bool = False
+    ranks: int = 1
+    checkpoint: Checkpoint = NO_CHECKPOINT
+
+
+def render_deck(case: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Deck:
     """Render a walker case.
 
     Parameters
     ----------
     case
         A resolved case.
+    remedies
+        Which remedies for the engine's defects the deck carries.
 
     Returns
     -------
     Deck
         Numbers in full precision (the shortest text that reads back as the same double).
     """
-    scene = place_walkers(case)
-    loads = contact_loads(case)
-    drive = case.drive
-    axis = axis_vector(drive.axis)
-    layout = _layout(case, scene)
-    text = (
-        _environment()
-        .get_template("walker.lig.j2")
-        .render(
-            case=case,
-            scene=scene,
-            layout=layout,
-            deck_name=DECK_NAME,
-            output_name=OUTPUT_NAME,
-            layout_name=LAYOUT_NAME,
-            substrate_file=SUBSTRATE_NAME,
-            copies=[f"substrate_{number}" for number in range(1, WALL_COPIES + 1)],
-            contact_model=_contact_model(case),
-            contact_angle_setting=contact_angle_setting(case.liquid.contact_angle),
-            separation_cap=separation_cap(case.beads.radii, loads.rupture[:2], loads.rupture[2]),
-            bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
-            status_every=-(-case.run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
-            axis=axis,
-            amplitude=[drive.amplitude * component for component in axis],
-            peak_velocity=[drive.peak_velocity * component for component in axis],
-            pair_bridge_terms=[f"c_pair_bridges[{number + 1}]" for number in range(len(layout.pair_bridge_columns))],
-            wall_bridge_terms=[f"c_wall_bridges[{number + 1}]" for number in range(len(layout.wall_bridge_columns))],
-            skin=min(case.beads.radii),
-            bin_size=_bin_size(case, scene),
-        )
+    scene, walkers = place_walkers(case)
+    run = case.run
+    recording = Recording(
+        steps=run.steps,
+        sample_every=run.steps_per_cycle // run.samples_per_cycle,
+        bridge_every=run.steps_per_cycle // run.bridge_samples_per_cycle,
+        status_every=-(-run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
     )
-    files = {SUBSTRATE_NAME: substrate_triangle(max(scene.upper[:2]))}
+    return compose(Plan(case, scene, recording, walkers, remedies))
+
+
+def compose(plan: Plan) -> Deck:
+    """Put a deck together from its blocks."""
+    case, remedies = plan.case, plan.remedies
+    scene = plan.scene if remedies.riders else without_riders(plan.scene)
+    drive, axis = case.drive, vector_along(case.drive.axis)
+    layout = _layout(case, scene, plan.recording, plan.walkers)
+    angle = case.liquid.contact_angle
+    text = _environment().get_template("walker.lig.j2").render(
+        case=case,
+        scene=scene,
+        layout=layout,
+        recording=plan.recording,
+        deck_name=DECK_NAME,
+        output_name=OUTPUT_NAME,
+        layout_name=LAYOUT_NAME,
+        wall_file=WALL_NAME,
+        copies=[f"walls_{number}" for number in range(1, remedies.wall_copies + 1)],
+        contact_model=_contact_model(case),
+        contact_angle_setting=contact_angle_setting(angle) if remedies.contact_angle else degrees(angle),
+        separation_cap=separation_cap((bead.radius for bead in scene.beads), case.liquid.volume_fraction, angle),
+        bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
+        axis=axis,
+        amplitude=[drive.amplitude * component for component in axis],
+        peak_velocity=[drive.peak_velocity * component for component in axis],
+        prescribed=plan.prescribed,
+        ranks=plan.ranks,
+        checkpoint=plan.checkpoint,
+        pair_bridge_terms=[f"c_pair_bridges[{number + 1}]" for number in range(len(layout.pair_bridge_columns))],
+        wall_bridge_terms=[f"c_wall_bridges[{number + 1}]" for number in range(len(layout.wall_bridge_columns))],
+        skin=min(case.beads.radii),
+        bin_size=_bin_size(case, scene),
+    )  # fmt: skip
+    files = {WALL_NAME: wall_mesh(scene.faces, max(scene.upper))}
     return Deck(text, files, layout, (scene.lower, scene.upper), _fastest(case))
 
 
@@ -118,24 +189,23 @@ def _fastest(case: WalkerCase) -> float:
     return 10.0 * case.drive.peak_velocity + fall + pull
 
 
-def _layout(case: WalkerCase, scene: Scene) -> Layout:
-    run = case.run
+def _layout(case: WalkerCase, scene: Scene, recording: Recording, walkers: tuple[PlacedWalker, ...]) -> Layout:
     return Layout(
         bead_dump="beads.bin",
-        bead_columns=BEAD_COLUMNS,
-        sample_every=run.steps_per_cycle // run.samples_per_cycle,
-        frames=run.cycles * run.samples_per_cycle + 1,
+        bead_columns=recording.bead_columns,
+        sample_every=recording.sample_every,
+        frames=recording.steps // recording.sample_every + 1,
         pair_bridge_dump="bridges.pairs.txt",
         pair_bridge_columns=PAIR_BRIDGE_COLUMNS,
         wall_bridge_dump="bridges.walls.txt",
         wall_bridge_columns=WALL_BRIDGE_COLUMNS,
-        bridge_every=run.steps_per_cycle // run.bridge_samples_per_cycle,
-        bridge_frames=run.cycles * run.bridge_samples_per_cycle + 1,
-        atoms=1 + len(scene.beads),
-        steps=run.steps,
-        time_step=run.time_step,
+        bridge_every=recording.bridge_every,
+        bridge_frames=recording.steps // recording.bridge_every + 1,
+        atoms=len(scene.riders) + len(scene.beads),
+        steps=recording.steps,
+        time_step=case.run.time_step,
         rider=1,
-        walkers=scene.walkers,
+        walkers=walkers,
     )
 
 
@@ -157,6 +227,5 @@ def _environment() -> Environment:
     def numbers(values: Iterable[float]) -> str:
         return " ".join(number(value) for value in values)
 
-    environment.filters["number"] = number
-    environment.filters["numbers"] = numbers
+    environment.filters.update(number=number, numbers=numbers, any=any, zip=zip)
     return environment

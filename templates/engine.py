@@ -7,8 +7,8 @@ Walls pull half as hard
     The capillary models take a wall for an equal sphere: 1.74 πγR at 1 % liquid, where a sphere on a plane is pulled
     by 4πγR (3.5 πγR at finite volume). ``easo/capillary/viscous`` at least pulls on touching walls; in
     ``washino/capillary/viscous`` the effective radius there is zero. Remedy: easo, and every wall stands in the deck
-    twice (`WALL_COPIES`), which gives 3.48 πγR and the sphere–plane lubrication forces. Friction stays at μ times the
-    total normal force; the contact gets twice as stiff.
+    twice (`Remedies.wall_copies`), which gives 3.48 πγR and the sphere–plane lubrication forces. Friction stays at μ
+    times the total normal force; the contact gets twice as stiff.
 
 Bridges to a wall that do not touch read a stranger's velocity
     The viscous force of an open wall bridge uses the velocity of the local atom whose number is that of the wall's
@@ -19,7 +19,7 @@ Bridges to a wall that do not touch read a stranger's velocity
 
 A triangle is kept by its centroid
     Nodes far outside the simulation box are harmless (a warning), a centroid outside loses the triangle. One triangle
-    far larger than the box leaves no edge inside it. See `substrate_triangle`.
+    far larger than the box leaves no edge inside it. See `wall_mesh`.
 
 The contact angle enters as ½ θi θj
     in radians, though given in degrees. Remedy: `contact_angle_setting`.
@@ -62,15 +62,40 @@ Splitting a run changes the trajectory
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
 from math import degrees, sqrt
+
+from inputs import forces
+from templates.scene import AXES, Face
 
 AUDITED_VERSION = "LIGGGHTS-PUBLIC 3.8.0"
 """The version that all of this was measured on."""
 
-WALL_COPIES = 2
-"""How often a wall stands in the deck."""
-
 SMALLEST_SEPARATION_CAP = 1.2
+
+
+@dataclass(frozen=True)
+class Remedies:
+    """Which of the remedies a deck carries: all of them, but for decks that show what happens without one.
+
+    Attributes
+    ----------
+    riders
+        Atoms that carry the walls' velocity, created first.
+    wall_copies
+        How often every wall stands in the deck.
+    contact_angle
+        Whether the contact angle is translated.
+    """
+
+    riders: bool = True
+    wall_copies: int = 2
+    contact_angle: bool = True
+
+
+ALL_REMEDIES = Remedies()
 
 
 def contact_angle_setting(effective_angle: float) -> float:
@@ -81,32 +106,60 @@ def contact_angle_setting(effective_angle: float) -> float:
     return degrees(sqrt(2.0 * effective_angle))
 
 
-def separation_cap(
-    radii: tuple[float, float], rupture_at_wall: tuple[float, float], rupture_between_beads: float
-) -> float:
+def separation_cap(radii: Iterable[float], volume_fraction: float, contact_angle: float) -> float:
     """``maxSeparationDistanceRatio`` beyond the rupture distance of every bridge, but not below 1.2.
 
     Parameters
     ----------
     radii
         Radii of the beads, m.
-    rupture_at_wall, rupture_between_beads
-        Rupture distances, m.
+    volume_fraction
+        Liquid on a bead over the bead's volume.
+    contact_angle
+        Effective contact angle, rad.
     """
-    ratios = [rupture / (2.0 * radius) for radius, rupture in zip(radii, rupture_at_wall, strict=True)]
-    ratios.append(rupture_between_beads / sum(radii))
+    sizes = sorted(set(radii))
+    ratios = [
+        forces.rupture_distance(forces.bridge_volume_at_wall(radius, volume_fraction), contact_angle) / (2.0 * radius)
+        for radius in sizes
+    ]
+    for first, second in combinations_with_replacement(sizes, 2):
+        volume = forces.bridge_volume_between_beads(first, second, volume_fraction)
+        ratios.append(forces.rupture_distance(volume, contact_angle) / (first + second))
     return max(SMALLEST_SEPARATION_CAP, 1.0 + 1.05 * max(ratios))
 
 
-def substrate_triangle(half_width: float) -> str:
-    """STL text of the plane z = 0 as one triangle, centroid in the origin, ten times wider than the box.
+def face_triangle(face: Face, size: float) -> str:
+    """STL facet of a face: one triangle about the face's centroid, its normal toward the beads.
 
     Parameters
     ----------
-    half_width
-        Half of the simulation box's larger side, m.
+    face
+        The wall.
+    size
+        Half of the triangle's width, m; far larger than the box.
     """
-    size = 20.0 * half_width
-    corners = ((-size, -0.6 * size), (size, -0.6 * size), (0.0, 1.2 * size))
-    vertices = "".join(f"      vertex {x!r} {y!r} 0.0\n" for x, y in corners)
-    return f"solid substrate\n  facet normal 0.0 0.0 1.0\n    outer loop\n{vertices}    endloop\n  endfacet\nendsolid\n"
+    index = AXES.index(face.axis)
+    # Two axes in the plane of the wall, in the order that makes the corners run counter-clockwise about the normal.
+    first, second = ((index + 1) % 3, (index + 2) % 3)[:: face.side]
+    corners = []
+    for along, up in ((-1.0, -0.6), (1.0, -0.6), (0.0, 1.2)):
+        corner = list(face.centroid)
+        corner[first] += along * size
+        corner[second] += up * size
+        corners.append("      vertex " + " ".join(repr(float(value)) for value in corner) + "\n")
+    normal = " ".join(repr(value) for value in face.normal)
+    return f"  facet normal {normal}\n    outer loop\n{''.join(corners)}    endloop\n  endfacet\n"
+
+
+def wall_mesh(faces: Iterable[Face], half_width: float) -> str:
+    """STL text of walls, one triangle a face, ten times wider than the box.
+
+    Parameters
+    ----------
+    faces
+        The walls.
+    half_width
+        Half of the simulation box's largest side, m.
+    """
+    return f"solid walls\n{''.join(face_triangle(face, 20.0 * half_width) for face in faces)}endsolid walls\n"

@@ -2,41 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import ceil, cos, pi, sin, sqrt
 
 from inputs.case import WalkerCase
 from inputs.dimer import contact_loads, hop_height, horizontal_distance, reach
 from templates.layout import PlacedWalker
+from templates.scene import Bead, Face, Scene
 
-Point = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class PlacedBead:
-    """A bead at its start: id, centre and radius in m."""
-
-    id: int
-    centre: Point
-    radius: float
+_FIRST_BEAD = 2  # atom 1 is the rider of the substrate
 
 
-@dataclass(frozen=True)
-class Scene:
-    """Walkers, beads, the rider's place and the simulation box (lower and upper corner), all in m."""
-
-    walkers: tuple[PlacedWalker, ...]
-    beads: tuple[PlacedBead, ...]
-    rider: Point
-    lower: Point
-    upper: Point
-
-
-FIRST_BEAD = 2
-"""Id of the first bead; the rider is atom 1."""
-
-
-def place_walkers(case: WalkerCase) -> Scene:
+def place_walkers(case: WalkerCase) -> tuple[Scene, tuple[PlacedWalker, ...]]:
     """Place a case's replicates and size the simulation box so that none can leave it unnoticed.
 
     Replicates alternate between facing right and left where the case says both. Each draws its start angle and the
@@ -47,7 +23,7 @@ def place_walkers(case: WalkerCase) -> Scene:
     columns = ceil(sqrt(start.replicates))
     rows = ceil(start.replicates / columns)
     walkers: list[PlacedWalker] = []
-    beads: list[PlacedBead] = []
+    beads: list[Bead] = []
     for number in range(start.replicates):
         row, column = divmod(number, columns)
         origin = ((row - (rows - 1) / 2.0) * start.spacing, (column - (columns - 1) / 2.0) * start.spacing)
@@ -60,19 +36,15 @@ def place_walkers(case: WalkerCase) -> Scene:
     largest = max(case.beads.radii)
     margin = 4.0 * largest + 2.0 * case.drive.amplitude
     height = 10.0 * largest + hop_height(case) + 2.0 * case.drive.amplitude
-    return Scene(
-        walkers=tuple(walkers),
+    scene = Scene(
         beads=tuple(beads),
+        faces=(Face("z", 1, (0.0, 0.0, 0.0)),),
         # In the corner, beyond the walkers' reach and above it.
-        rider=(half_x + margin, half_y + margin, height + margin),
+        riders=((half_x + margin, half_y + margin, height + margin),),
         lower=(-half_x - 2.0 * margin, -half_y - 2.0 * margin, -margin),
         upper=(half_x + 2.0 * margin, half_y + 2.0 * margin, height + 2.0 * margin),
     )
-
-
-def axis_vector(axis: str) -> Point:
-    """Unit vector of a drive axis."""
-    return (float(axis == "x"), float(axis == "y"), float(axis == "z"))
+    return scene, tuple(walkers)
 
 
 def _facing(case: WalkerCase, number: int) -> int:
@@ -90,9 +62,7 @@ def _perturbation(case: WalkerCase, number: int) -> tuple[float, float]:
     return start.angle + start.angle_spread * float(turn), 1.0 + start.gap_spread * float(press)
 
 
-def _place(
-    case: WalkerCase, number: int, origin: tuple[float, float]
-) -> tuple[PlacedWalker, tuple[PlacedBead, PlacedBead]]:
+def _place(case: WalkerCase, number: int, origin: tuple[float, float]) -> tuple[PlacedWalker, tuple[Bead, Bead]]:
     radii, facing = case.beads.radii, _facing(case, number)
     angle, factor = _perturbation(case, number)
     at_rest = contact_loads(case).overlaps if case.start.gap is None else (-case.start.gap,) * 3
@@ -102,9 +72,9 @@ def _place(
     # The point of contact of the two beads lies over the origin.
     lever = distance * radii[0] / sum(radii)
     arms = (lever, lever - distance)
-    ids = (FIRST_BEAD + 2 * number, FIRST_BEAD + 2 * number + 1)
+    ids = (_FIRST_BEAD + 2 * number, _FIRST_BEAD + 2 * number + 1)
     first, second = (
-        PlacedBead(
+        Bead(
             identifier,
             (origin[0] + arm * cos(heading), origin[1] + arm * sin(heading), radius - overlap),
             radius,

@@ -2,13 +2,16 @@
 
 import re
 from math import radians
+from typing import Literal
 
+import numpy as np
 import pytest
 
-from inputs import load_case, shipped_cases
+from inputs import forces, load_case, shipped_cases
 from templates import render_deck
-from templates.engine import contact_angle_setting, separation_cap
+from templates.engine import contact_angle_setting, face_triangle, separation_cap
 from templates.placement import place_walkers
+from templates.scene import Face
 from tests.conftest import make_case
 
 
@@ -24,8 +27,8 @@ def _lines(deck: str, start: str) -> list[list[str]]:
 def test_the_rider_is_created_first_and_atoms_are_not_sorted(deck: str) -> None:
     case = load_case("fig1b")
     first = _lines(deck, "create_atoms")[0]
-    assert tuple(map(float, first[3:6])) == place_walkers(case).rider
-    assert _lines(deck, "group           rider") == [["group", "rider", "id", "1"]]
+    assert tuple(map(float, first[3:6])) == place_walkers(case)[0].riders[0]
+    assert _lines(deck, "group           rider") == [["group", "rider", "id", "<=", "1"]]
     assert ["atom_modify", "map", "array", "sort", "0", "0"] in _lines(deck, "atom_modify")
 
 
@@ -42,7 +45,7 @@ def test_the_triangle_is_far_larger_than_the_box_and_its_centroid_in_it() -> Non
     case = load_case("fig4b")
     (stl,) = render_deck(case).files.values()
     corners = [tuple(map(float, match)) for match in re.findall(r"vertex (\S+) (\S+) (\S+)", stl)]
-    scene = place_walkers(case)
+    scene, _ = place_walkers(case)
     centroid = [sum(corner[axis] for corner in corners) / 3 for axis in range(3)]
     assert all(low < middle < high for low, middle, high in zip(scene.lower, centroid, scene.upper, strict=True))
     assert min(abs(corner[1]) for corner in corners) > 10 * scene.upper[1]
@@ -76,10 +79,25 @@ def test_contact_angle_is_translated(degrees: float) -> None:
 
 def test_no_bridge_is_cut_before_it_ruptures() -> None:
     radii = (3e-4, 2e-4)
-    assert separation_cap(radii, (1e-5, 1e-5), 1e-5) == 1.2
-    cap = separation_cap(radii, (3e-4, 2e-4), 2e-4)
-    assert (cap - 1) * 2 * radii[0] > 3e-4
-    assert (cap - 1) * sum(radii) > 2e-4
+    assert separation_cap(radii, 0.01, 0.0) == 1.2
+    for fraction, angle in ((0.2, 0.0), (0.05, 1.0), (0.5, 1.5)):
+        cap = separation_cap(radii, fraction, angle)
+        for radius in radii:
+            at_wall = forces.bridge_volume_at_wall(radius, fraction)
+            assert (cap - 1) * 2 * radius > forces.rupture_distance(at_wall, angle)
+        between = forces.bridge_volume_between_beads(*radii, fraction)
+        assert (cap - 1) * sum(radii) > forces.rupture_distance(between, angle)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_face_is_wound_about_its_normal(axis: Literal["x", "y", "z"], side: Literal[1, -1]) -> None:
+    face = Face(axis, side, (1e-3, 2e-3, 3e-3))
+    text = face_triangle(face, 0.1)
+    corners = np.array([list(map(float, match)) for match in re.findall(r"vertex (\S+) (\S+) (\S+)", text)])
+    np.testing.assert_allclose(corners.mean(axis=0), face.centroid, atol=1e-15)
+    wound = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    np.testing.assert_allclose(wound / np.linalg.norm(wound), face.normal, atol=1e-15)
 
 
 def test_rolling_friction_is_left_out_where_there_is_none() -> None:
@@ -93,7 +111,7 @@ def test_numbers_are_rendered_in_full_precision(name: str) -> None:
     deck = render_deck(case).text
     assert f"timestep        {case.run.time_step!r}\n" in deck
     starts = [tuple(map(float, line[3:6])) for line in _lines(deck, "create_atoms")[1:]]
-    assert starts == [bead.centre for bead in place_walkers(case).beads]
+    assert starts == [bead.centre for bead in place_walkers(case)[0].beads]
     assert contact_angle_setting(0.0) == 0.0
 
 

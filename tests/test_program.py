@@ -51,7 +51,7 @@ def test_deck_is_printed_or_written(tmp_path: Path) -> None:
     printed = _walkers("deck", "fig1b")
     _walkers("deck", "fig1b", "--to", str(tmp_path / "deck"))
     assert (tmp_path / "deck" / "walker.lig").read_text() == printed
-    assert (tmp_path / "deck" / "substrate.stl").exists()
+    assert (tmp_path / "deck" / "walls.stl").exists()
     again = subprocess.run([PROGRAM, "deck", "fig1b", "--to", str(tmp_path / "deck")], capture_output=True, check=False)
     assert again.returncode == 2
 

@@ -101,7 +101,7 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     run = run_case(case, tmp_path).run
     names = {path.name for path in run.directory.iterdir()}
     assert names == {
-        *("case.json", "layout.json", "walker.lig", "substrate.stl", "engine.log", "manifest.json", "result.json"),
+        *("case.json", "layout.json", "walker.lig", "walls.stl", "engine.log", "manifest.json", "result.json"),
         *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
         *("trajectory.parquet", "walkers.parquet", "bridges.parquet"),
     }

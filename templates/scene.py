@@ -1,0 +1,62 @@
+"""What stands in the simulation box: beads, the faces of walls, and the riders that move with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+Point = tuple[float, float, float]
+Axis = Literal["x", "y", "z"]
+AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Bead:
+    """A bead at the start: id, centre (m), radius (m), velocity (m/s) and angular velocity (rad/s)."""
+
+    id: int
+    centre: Point
+    radius: float
+    velocity: Point = (0.0, 0.0, 0.0)
+    spin: Point = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Face:
+    """A flat wall: the axis that it is normal to, the side to which its normal points, its centroid (m)."""
+
+    axis: Axis
+    side: Literal[1, -1]
+    centroid: Point
+
+    @property
+    def normal(self) -> Point:
+        """Unit vector into the space where the beads are."""
+        return vector_along(self.axis, float(self.side))
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Beads, faces, the riders' places (one a face, in the order of the faces) and the box's corners, all in m."""
+
+    beads: tuple[Bead, ...]
+    faces: tuple[Face, ...]
+    riders: tuple[Point, ...]
+    lower: Point
+    upper: Point
+
+    @property
+    def first_bead(self) -> int:
+        """Id of the first bead: the riders are created before the beads."""
+        return len(self.riders) + 1
+
+
+def without_riders(scene: Scene) -> Scene:
+    """The scene with its riders left out, the beads numbered from 1."""
+    gone = len(scene.riders)
+    return replace(scene, riders=(), beads=tuple(replace(bead, id=bead.id - gone) for bead in scene.beads))
+
+
+def vector_along(axis: Axis, length: float = 1.0) -> Point:
+    """A vector along an axis."""
+    return (length * (axis == "x"), length * (axis == "y"), length * (axis == "z"))
