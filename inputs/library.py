@@ -69,6 +69,11 @@ def surface_pair(first: str | None, second: str | None) -> dict[str, float] | No
     return None
 
 
+def surface_pairs() -> list[tuple[str, str]]:
+    """The pairs of materials whose friction the library has."""
+    return [(entry["materials"][0], entry["materials"][1]) for entry in _contents()["surface_pairs"]]
+
+
 def sources(table: str, name: str) -> dict[str, str]:
     """Source of each number of a material (``table="materials"``) or liquid (``"liquids"``)."""
     return {key: entry["source"] for key, entry in _contents()[table][name].items()}

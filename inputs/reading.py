@@ -46,7 +46,11 @@ def load_case(case: str | Path) -> WalkerCase:
         If there is no such file or anything in it cannot be used.
     """
     path = Path(case)
-    if not path.exists():
+    try:
+        found = path.exists()
+    except OSError as error:
+        raise InputError(str(case)[:80], [Problem("", None, f"cannot be read: {error.strerror}")]) from error
+    if not found:
         shipped = shipped_cases()
         if str(case) not in shipped:
             known = ", ".join(shipped)
@@ -62,7 +66,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         found = f"byte {error.object[error.start]:#04x} at offset {error.start}"
         raise InputError(str(path), [Problem("", None, f"expected UTF-8 text, found {found}")]) from error
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # TOML's own errors, integers of 5000 digits, brackets without end
         raise InputError(str(path), [Problem("", None, f"not TOML: {error}")]) from error
     except OSError as error:
         raise InputError(str(path), [Problem("", None, f"cannot be read: {error.strerror}")]) from error
@@ -92,6 +96,8 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
         raise InputError(source, problems) from error
     try:
         return resolve(file, name)
+    except ArithmeticError as error:
+        raise InputError(source, [Problem("", None, f"the numbers do not go together ({error})")]) from error
     except UnusableKeyError as unusable:
         value = quoted(document, unusable.key.split("."))
         raise InputError(source, [Problem(unusable.key, value, unusable.expected)]) from unusable

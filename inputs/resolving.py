@@ -11,6 +11,8 @@ from inputs.library import suggestion
 from inputs.schema import LiquidTable, WalkerFile
 from inputs.timestep import fit_into_cycle, time_step_limits
 
+MOST_STEPS = 2**31 - 1
+
 
 class UnusableKeyError(Exception):
     """A problem found between keys; `inputs.reading` adds the file and the value."""
@@ -51,17 +53,27 @@ def resolve(file: WalkerFile, name: str) -> WalkerCase:
     return _placed(case, table.spacing)
 
 
-def _known(key: str, name: str, names: tuple[str, ...]) -> str:
-    if name not in names:
-        raise UnusableKeyError(key, f"not in the library; expected one of {', '.join(names)}{suggestion(name, names)}")
+def _known(key: str, name: str, names: tuple[str, ...], *, described: bool = False) -> str:
+    """A name of the library; another one only if the case itself says all about it and it is no misspelling."""
+    hint = suggestion(name, names)
+    if name not in names and (hint or not described):
+        raise UnusableKeyError(key, f"not in the library; expected one of {', '.join(names)}{hint}")
     return name
+
+
+def _describes_contacts(file: WalkerFile) -> bool:
+    friction = file.contact.friction
+    return None not in (friction.bead_bead, friction.bead_wall, file.contact.rolling_friction)
 
 
 def _beads(file: WalkerFile) -> Beads:
     table = file.beads
-    density = table.density
     if table.material is not None:
-        density = density or library.material(_known("beads.material", table.material, library.materials()))["density"]
+        described = table.density is not None and _describes_contacts(file)
+        _known("beads.material", table.material, library.materials(), described=described)
+    density = table.density
+    if density is None and table.material is not None:
+        density = library.material(table.material)["density"]
     if density is None:
         raise UnusableKeyError("beads.material", "missing; expected a material of the library, or a density")
     return Beads(radii=table.radii, density=density, material=table.material)
@@ -91,31 +103,36 @@ def _liquid(table: LiquidTable) -> Liquid:
 
 def _contact(file: WalkerFile) -> Contact:
     table, bead, wall = file.contact, file.beads.material, file.substrate.material
-    _known("substrate.material", wall, library.materials())
-    pairs = {"bead_bead": library.surface_pair(bead, bead), "bead_wall": library.surface_pair(bead, wall)}
-
-    def friction(which: str, given: float | None) -> float:
-        pair = pairs[which]
-        if given is None and pair is None:
-            raise UnusableKeyError(
-                f"contact.friction.{which}", "missing; the library has no friction for these two materials"
-            )
-        return given if given is not None else pair["friction"]  # type: ignore[index]
-
-    rolling, pair = table.rolling_friction, pairs["bead_wall"]
-    if rolling is None:
-        if pair is None:
-            raise UnusableKeyError("contact.rolling_friction", "missing; the library has none for these two materials")
-        rolling = pair["rolling_friction"]
+    _known("substrate.material", wall, library.materials(), described=_describes_contacts(file))
+    on_bead, on_wall = library.surface_pair(bead, bead), library.surface_pair(bead, wall)
+    known = {
+        "friction.bead_bead": _first(table.friction.bead_bead, on_bead, "friction"),
+        "friction.bead_wall": _first(table.friction.bead_wall, on_wall, "friction"),
+        "rolling_friction": _first(table.rolling_friction, on_wall, "rolling_friction"),
+    }
+    lacking = [key for key, value in known.items() if value is None]
+    if lacking:
+        pairs = "; ".join(" on ".join(pair) for pair in library.surface_pairs())
+        others = f", and so are {', '.join(lacking[1:])}" if lacking[1:] else ""
+        raise UnusableKeyError(
+            f"contact.{lacking[0]}",
+            f"missing{others}; the library has them for {pairs} only, not for {bead or 'these beads'} on {wall}",
+        )
     return Contact(
         youngs_modulus=table.youngs_modulus,
         poissons_ratio=table.poissons_ratio,
         restitution=table.restitution,
-        friction_bead_bead=friction("bead_bead", table.friction.bead_bead),
-        friction_bead_wall=friction("bead_wall", table.friction.bead_wall),
-        rolling_friction=rolling,
+        friction_bead_bead=known["friction.bead_bead"] or 0.0,
+        friction_bead_wall=known["friction.bead_wall"] or 0.0,
+        rolling_friction=known["rolling_friction"] or 0.0,
         minimum_separation_ratio=table.minimum_separation_ratio,
     )
+
+
+def _first(given: float | None, pair: dict[str, float] | None, key: str) -> float | None:
+    if given is not None:
+        return given
+    return pair[key] if pair is not None else None
 
 
 def _drive(file: WalkerFile, dimer: Dimer) -> Drive:
@@ -149,6 +166,9 @@ def _run(file: WalkerFile, dimer: Dimer, contact: Contact, liquid: Liquid, drive
         )
     largest = table.time_step if table.time_step is not None else limits.recommended()
     time_step, steps = fit_into_cycle(largest, drive.frequency, table.samples_per_cycle)
+    if steps * table.cycles > MOST_STEPS:
+        most = MOST_STEPS // steps
+        raise UnusableKeyError("run.cycles", f"expected at most {most}: the engine counts steps up to 2^31")
     return Run(
         time_step, steps, table.cycles, table.settling_cycles, table.samples_per_cycle, table.bridge_samples_per_cycle
     )

@@ -21,6 +21,7 @@ from inputs.units import (
     Length,
     Modulus,
     NonNegativeAngle,
+    Radius,
     SignedLength,
     SurfaceTension,
     Time,
@@ -48,7 +49,7 @@ def _whole_number(value: object) -> object:
 
 Number = Annotated[float, BeforeValidator(_plain_number), Field(allow_inf_nan=False)]
 Whole = Annotated[int, BeforeValidator(_whole_number)]
-Coefficient = Annotated[Number, Field(ge=0)]
+Coefficient = Annotated[Number, Field(ge=0, le=1e3)]
 
 
 class _Table(BaseModel):
@@ -58,7 +59,7 @@ class _Table(BaseModel):
 class BeadsTable(_Table):
     """``[beads]``: the radii, first the bead that leads (the large one, as in the paper), and what they are made of."""
 
-    radii: Annotated[tuple[Length, Length], Field(description="radii of the two beads")]
+    radii: Annotated[tuple[Radius, Radius], Field(description="radii of the two beads")]
     material: str | None = None
     density: Density | None = None
 
@@ -71,8 +72,8 @@ class LiquidTable(_Table):
     density: Density | None = None
     kinematic_viscosity: KinematicViscosity | None = None
     dynamic_viscosity: DynamicViscosity | None = None
-    volume_fraction: Annotated[Number, Field(gt=0, le=0.5)] = 0.01
-    contact_angle: Annotated[NonNegativeAngle, Field(le=1.5707963267948966)] = 0.0
+    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] = 0.01
+    contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] = 0.0
 
 
 class SubstrateTable(_Table):
@@ -93,10 +94,10 @@ class ContactTable(_Table):
 
     friction: FrictionTable = FrictionTable()
     rolling_friction: Coefficient | None = None
-    restitution: Annotated[Number, Field(gt=0, le=1)] = 0.3
+    restitution: Annotated[Number, Field(ge=1e-3, le=1)] = 0.3
     youngs_modulus: Annotated[Modulus, Field(ge=5e6)] = 5e7
     poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = 0.3
-    minimum_separation_ratio: Annotated[Number, Field(gt=0, le=1)] = 0.01
+    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] = 0.01
 
 
 class DriveTable(_Table):
@@ -119,7 +120,7 @@ class StartTable(_Table):
     gap: Annotated[SignedLength | None, BeforeValidator(_auto)] = None
     gap_spread: Annotated[Number, Field(ge=0, lt=1)] = 0.2
     spacing: Annotated[Length | None, BeforeValidator(_auto)] = None
-    seed: Annotated[Whole, Field(ge=0)] = 1
+    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 1
 
 
 class RunTable(_Table):
@@ -127,8 +128,8 @@ class RunTable(_Table):
 
     time_step: Annotated[Time | None, BeforeValidator(_auto)] = None
     allow_unstable: bool = False
-    cycles: Annotated[Whole, Field(ge=2)] = 60
-    settling_cycles: Annotated[Whole, Field(ge=0)] = 20
+    cycles: Annotated[Whole, Field(ge=2, le=1_000_000)] = 60
+    settling_cycles: Annotated[Whole, Field(ge=0, le=1_000_000)] = 20
     samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] = 20
     bridge_samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] = 1
 

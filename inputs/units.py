@@ -7,7 +7,6 @@ numbers, so that "500 rad/s" would pass for 500 Hz.
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from functools import cache
@@ -30,11 +29,16 @@ _ANGLE_UNITS = frozenset({"degree", "radian", "milliradian", "arcminute", "arcse
 
 @dataclass(frozen=True)
 class Kind:
-    """What a quantity is: its name, its SI unit and an example to show to a user who got it wrong."""
+    """What a quantity is: its name, its SI unit, an example to show to a user who got it wrong, and physical bounds.
+
+    The bounds are generous; they keep slips of the exponent out of formulas that would overflow.
+    """
 
     name: str
     unit: str
     example: str
+    largest: float
+    smallest: float = 0.0
 
     @property
     def expectation(self) -> str:
@@ -92,8 +96,8 @@ def parse_quantity(text: str, kind: Kind) -> float:
         raise ValueError(kind.expectation)
     if kind is FREQUENCY and "radian" in str(units.Quantity(1.0, unit).to_root_units().units):
         raise ValueError(kind.expectation + " (cycles a second, not an angular frequency)")
-    if not math.isfinite(value):
-        raise ValueError(kind.expectation + "; it must be finite")
+    if value != 0.0 and not kind.smallest <= abs(value) <= kind.largest:
+        raise ValueError(f"{kind.expectation}; it must lie within {kind.smallest:g} and {kind.largest:g} {kind.unit}")
     return value
 
 
@@ -113,18 +117,20 @@ def _validator(kind: Kind, *, positive: bool, zero: bool) -> Any:
     return BeforeValidator(validate)
 
 
-LENGTH = Kind("length", "m", "0.3 mm")
-FREQUENCY = Kind("frequency", "Hz", "80 Hz")
-ACCELERATION = Kind("acceleration", "m/s^2", "4 g")
-TIME = Kind("time", "s", "2 us")
-ANGLE = Kind("angle", "rad", "10 deg")
-DENSITY = Kind("density", "kg/m^3", "4.0 g/cm^3")
-SURFACE_TENSION = Kind("surface tension", "N/m", "19.2 mN/m")
-KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s")
-DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s")
-MODULUS = Kind("modulus", "Pa", "50 MPa")
+LENGTH = Kind("length", "m", "0.3 mm", 1.0, 1e-9)
+RADIUS = Kind("length", "m", "0.3 mm", 0.02, 1e-6)
+FREQUENCY = Kind("frequency", "Hz", "80 Hz", 1e6, 1e-2)
+ACCELERATION = Kind("acceleration", "m/s^2", "4 g", 1e6, 1e-9)
+TIME = Kind("time", "s", "2 us", 1.0, 1e-12)
+ANGLE = Kind("angle", "rad", "10 deg", 1e3)
+DENSITY = Kind("density", "kg/m^3", "4.0 g/cm^3", 1e5, 1.0)
+SURFACE_TENSION = Kind("surface tension", "N/m", "19.2 mN/m", 10.0, 1e-9)
+KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0)
+DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4)
+MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3)
 
 Length = Annotated[float, _validator(LENGTH, positive=True, zero=False)]
+Radius = Annotated[float, _validator(RADIUS, positive=True, zero=False)]
 SignedLength = Annotated[float, _validator(LENGTH, positive=False, zero=True)]
 Frequency = Annotated[float, _validator(FREQUENCY, positive=True, zero=False)]
 Acceleration = Annotated[float, _validator(ACCELERATION, positive=True, zero=True)]

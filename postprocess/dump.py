@@ -13,13 +13,15 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from inputs.errors import WalkersError
+
 FloatArray = npt.NDArray[np.float64]
 
 _HEADER = struct.Struct("=qqi6i6dii")
 _COUNT = struct.Struct("=i")
 
 
-class DumpError(ValueError):
+class DumpError(WalkersError):
     """A file that is no binary dump, or one of other columns than expected."""
 
 

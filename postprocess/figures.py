@@ -11,6 +11,7 @@ from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
 from postprocess.gait import distance_walked, fit_slopes, gait
 from postprocess.trajectory import Trajectory, read_trajectory
+from templates.scene import vector_along
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +45,8 @@ def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
     destination = destination or directory
     destination.mkdir(parents=True, exist_ok=True)
     written = [_save(_walk_figure(trajectory), destination / WALK_NAME, directory)]
-    if trajectory.case.run.samples_per_cycle >= _FEWEST_SAMPLES:
+    samples = trajectory.case.run.samples_per_cycle
+    if samples >= _FEWEST_SAMPLES and len(trajectory.time) > 2 * samples:
         written.append(_save(_gait_figure(trajectory), destination / GAIT_NAME, directory))
     return written
 
@@ -88,50 +90,54 @@ def _walk_figure(trajectory: Trajectory) -> Figure:
     slope, _ = fit_slopes(time[settled:], distance[settled:])
     strobe = trajectory.case.run.samples_per_cycle
     for number, walker in enumerate(trajectory.layout.walkers):
-        label = f"{'right' if walker.facing > 0 else 'left'}, {slope[number] * 1e3:.3g} mm/s"
+        label = f"{number}: {'right' if walker.facing > 0 else 'left'}, {slope[number] * 1e3:.3g} mm/s"
         middle.plot(time, distance[:, number] * 1e3, "o" if number % 2 == 0 else "s", mfc="none", label=label)
         bottom.plot(time, np.degrees(trajectory.orientation[::strobe, number]))
-    middle.axvspan(0.0, time[settled], color="0.93", zorder=0)
+    middle.axvspan(0.0, time[settled], color="0.93", zorder=0, label="settling")
     middle.set(ylabel="distance walked (mm)", xlabel="time (s)")
     if len(trajectory.layout.walkers) <= 12:
-        middle.legend(fontsize=7, ncols=2, title="facing, velocity", title_fontsize=7)
+        middle.legend(fontsize=7, ncols=2, title="walker: facing at the start, velocity", title_fontsize=7)
     bottom.set(ylabel=r"orientation $\psi$ (°)", xlabel="time (s)")
     return figure
 
 
 def _draw_strobe(axes: Axes, trajectory: Trajectory) -> None:
-    """The first walker from above, both beads to scale, at eight times (as in Fig. 1b of the paper)."""
+    """The first walker from above, both beads to scale, at eight times (as in Fig. 1b of the paper).
+
+    Rows are even: the way along the drive axis and the orientation are shown, not the drift across the axis.
+    """
     from matplotlib.patches import Circle
 
     strobe = trajectory.case.run.samples_per_cycle
     ground = np.stack([trajectory.drive_axis, trajectory.across_axis], axis=-1)
     position = trajectory.position[::strobe, 0] @ ground * 1e3
     radii = trajectory.radii * 1e3
+    middle = position.mean(axis=1)
     shown = np.unique(np.linspace(0, len(position) - 1, 8).round().astype(int))
     pitch = 2.6 * float(radii.max())
-    origin = position[0].mean(axis=0)
+    ends = []
     for row, frame in enumerate(shown):
         for bead in range(2):
-            x, y = position[frame, bead] - origin
-            axes.add_patch(
-                Circle((x, y - row * pitch), float(radii[bead]), fc="0.75" if bead else "0.45", ec="0.2", lw=0.6)
-            )
-        seconds = trajectory.time[frame * strobe]
-        axes.annotate(
-            f"{seconds:.2f} s", (1.01, -row * pitch), xycoords=("axes fraction", "data"), fontsize=7, va="center"
-        )
-    low, high = position[..., 0].min() - origin[0], position[..., 0].max() - origin[0]
-    axes.set(xlim=(low - 2 * radii.max(), high + 2 * radii.max()), ylim=(-pitch * (len(shown) - 0.4), 0.6 * pitch))
+            along = float(position[frame, bead, 0] - middle[0, 0])
+            across = float(position[frame, bead, 1] - middle[frame, 1]) - row * pitch
+            size = float(radii[bead])
+            axes.add_patch(Circle((along, across), size, fc="0.75" if bead else "0.45", ec="0.2", lw=0.6))
+            ends += [along - size, along + size]
+        seconds = f"{trajectory.time[frame * strobe]:.2f} s"
+        place = (1.01, -row * pitch)
+        axes.annotate(seconds, place, xycoords=("axes fraction", "data"), fontsize=7, va="center")
+    axes.set(xlim=(min(ends) - radii.max(), max(ends) + radii.max()), ylim=(-pitch * (len(shown) - 0.4), 0.6 * pitch))
     axes.set_aspect("equal")
-    axes.set(xlabel="along the drive axis (mm)", yticks=[], title="walker 0 from above")
+    axes.set(xlabel="along the drive axis (mm)", yticks=[], title="walker 0, time downward")
     axes.grid(visible=False)
 
 
 def _gait_figure(trajectory: Trajectory) -> Figure:
     run = trajectory.case.run
     motion = gait(trajectory)
-    last = slice((run.cycles - 2) * run.samples_per_cycle, run.cycles * run.samples_per_cycle + 1)
-    phase = trajectory.time[last] * trajectory.case.drive.frequency - (run.cycles - 2)
+    cycles = (len(trajectory.time) - 1) // run.samples_per_cycle
+    last = slice((cycles - 2) * run.samples_per_cycle, cycles * run.samples_per_cycle + 1)
+    phase = trajectory.time[last] * trajectory.case.drive.frequency - (cycles - 2)
     figure, axes = _figure(figsize=(6.4, 3.8))
     figure.suptitle(_title(trajectory.case), fontsize=10)
     series = [
@@ -142,10 +148,14 @@ def _gait_figure(trajectory: Trajectory) -> Figure:
     for label, values, marker, colour in series:
         mean = values[:-1].mean() * 1e3
         axes.plot(phase, values * 1e3, marker=marker, color=colour, label=f"{label} (mean {mean:.2f} mm/s)")
+    shaken = trajectory.substrate_velocity[last] @ np.array(vector_along(trajectory.case.drive.axis))
+    if np.any(shaken):
+        facing = trajectory.layout.walkers[0].facing
+        axes.plot(phase, facing * shaken * 1e3, color="0.6", ls=":", label="substrate")
     axes.axhline(0.0, color="0.4", lw=0.6)
     axes.set(
-        xlabel="time (cycles of the drive)",
+        xlabel="time (cycles of the drive), the last two of walker 0",
         ylabel=r"walker: velocity; beads: $-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)",
     )
-    figure.legend(fontsize=7, ncols=3, loc="outside lower center")
+    figure.legend(fontsize=7, ncols=4, loc="outside lower center")
     return figure

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from postprocess.dump import FloatArray
+from postprocess.dump import DumpError, FloatArray
 from postprocess.trajectory import Trajectory
 
 STEADY_DIFFERENCE = 0.05
@@ -120,9 +120,17 @@ def fit_slopes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def walk(trajectory: Trajectory) -> Walk:
-    """Fit the velocities of a run's walkers."""
+    """Fit the velocities of a run's walkers.
+
+    Raises
+    ------
+    postprocess.dump.DumpError
+        If the dump was cut short within the settling cycles.
+    """
     settled = trajectory.case.run.settling_cycles
     time, distance = distance_walked(trajectory)
+    if len(time) < settled + 2:
+        raise DumpError(f"the dump holds {len(time) - 1} cycles, no more than the {settled} settling ones")
     time, distance = time[settled:], distance[settled:]
     velocity, error = fit_slopes(time, distance)
     middle = (len(time) + 1) // 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from inputs.dimer import dimer_of
+from inputs.errors import InputError, Problem
 from postprocess.dump import FloatArray
 from postprocess.tables import read_table
 from postprocess.trajectory import Trajectory, read_trajectory
@@ -46,29 +48,49 @@ def write_vtk(
     as_placed
         Leave the walkers where the deck has them, centimetres apart, instead of drawing them side by side.
     destination
-        Folder to write, replaced if it exists; ``vtk`` in the run directory if None.
+        Folder to write, replaced if it holds nothing but files of this function; ``vtk`` in the run directory if None.
 
     Returns
     -------
     Path
         The ``.pvd`` file: its times are seconds; part 0 the beads, part 1 the substrate, part 2 the bridges.
+
+    Raises
+    ------
+    InputError
+        If the folder holds anything else than such files.
     """
     trajectory = read_trajectory(directory)
     if not as_placed:
         trajectory = gathered(trajectory)
     bridges = read_table(directory, "bridges")
-    place = destination or directory / FOLDER_NAME
-    beside = place.with_name(place.name + ".new")
-    shutil.rmtree(beside, ignore_errors=True)
-    beside.mkdir(parents=True)
+    place = (destination or directory / FOLDER_NAME).resolve()
+    _check_replaceable(place)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    beside = Path(tempfile.mkdtemp(prefix=f".{place.name}-", dir=place.parent))
+    beside.chmod(0o755)
     stride = 1 if every_sample else trajectory.case.run.samples_per_cycle
     entries: list[_Entry] = []
     for frame in range(0, len(trajectory.time), stride):
         entries += _write_frame(beside, trajectory, bridges, frame, vtu)
     _write_collection(beside / COLLECTION_NAME, entries)
-    shutil.rmtree(place, ignore_errors=True)
+    if place.exists():
+        shutil.rmtree(place)
     beside.rename(place)
-    return place / COLLECTION_NAME
+    return (destination or directory / FOLDER_NAME) / COLLECTION_NAME
+
+
+def _check_replaceable(place: Path) -> None:
+    """Only a folder that this module wrote, or an empty one, may be replaced."""
+    if not place.exists():
+        return
+    expected = "expected a new or empty folder, or one that an earlier walkers vtk wrote"
+    if not place.is_dir():
+        raise InputError(str(place), [Problem("", None, f"{expected}; it is a file")])
+    ours = (".vtp", ".vtu", Path(COLLECTION_NAME).suffix)
+    for path in place.iterdir():
+        if path.suffix not in ours:
+            raise InputError(str(place), [Problem("", None, f"{expected}; it holds {path.name}")])
 
 
 def gathered(trajectory: Trajectory) -> Trajectory:
@@ -114,9 +136,10 @@ def _in_frame_of_run(trajectory: Trajectory, frame: int) -> FloatArray:
 
 
 def beads_at(trajectory: Trajectory, frame: int) -> pv.PolyData:
-    """Beads of a frame as points with ``id``, ``walker``, ``bead`` (1 or 2), ``radius``, ``velocity``, ``omega``.
+    """Beads of a frame as points, positions in the frame of the run, SI units.
 
-    Positions are in the frame of the run, velocities relative to the substrate; SI units.
+    Point data: ``id``, ``type`` (the engine's), ``walker``, ``bead`` (1 or 2), ``radius``, ``omega``, and ``velocity``
+    relative to the substrate.
     """
     import pyvista as pv
 
@@ -127,6 +150,7 @@ def beads_at(trajectory: Trajectory, frame: int) -> pv.PolyData:
         "id": np.array([bead for walker in walkers for bead in walker.beads]),
         "walker": np.repeat([walker.walker for walker in walkers], 2),
         "bead": np.tile([1, 2], count),
+        "type": np.ones(2 * count, dtype=np.int64),
         "radius": np.tile(trajectory.radii, count),
         "velocity": trajectory.velocity[frame].reshape(-1, 3),
         "omega": trajectory.spin[frame].reshape(-1, 3),

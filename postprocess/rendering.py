@@ -73,7 +73,9 @@ def _scene(trajectory: Trajectory, walker: int, images: int, size: tuple[int, in
     pitch = 2.4 * float(radii.max())
     turned = np.stack([trajectory.drive_axis, trajectory.across_axis, np.array([0.0, 0.0, 1.0])], axis=-1)
     position = trajectory.position[frames, walker] @ turned * 1e3
-    position = position - np.array([*position[0].mean(axis=0)[:2], 0.0])
+    middle = position.mean(axis=1)
+    position[:, :, 0] -= middle[0, 0]
+    position[:, :, 1] -= middle[:, 1, None]  # rows are even: the drift across the axis is left out
     position[:, :, 1] -= pitch * np.arange(images)[:, None]
     low = position.min(axis=(0, 1)) - 2.2 * radii.max()
     high = position.max(axis=(0, 1)) + np.array([4.5, 3.0, 0.0]) * radii.max()
@@ -117,7 +119,7 @@ def _add_scale_bar(plotter: pv.Plotter, start: list[float], length: float = 0.5)
     import pyvista as pv
 
     plotter.add_mesh(pv.Line(start, [start[0] + length, *start[1:]]), color="black", line_width=5)
-    _add_label(plotter, [start[0] + length + 0.3, *start[1:]], f"{length:g} mm")
+    _add_label(plotter, [start[0] + length / 2.0, start[1] + 0.5 * length, start[2]], f"{length:g} mm")
 
 
 def _aim(plotter: pv.Plotter, middle: FloatArray, extent: FloatArray, size: tuple[int, int]) -> None:

@@ -23,15 +23,18 @@ def describe_result(directory: Path, result: dict[str, Any], *, found: bool = Fa
     """
     velocity, rotation, turned = result["velocity"], result["rotation"], result["orientation_end"]
     error = velocity["standard_error"]
-    spread = f" ± {_speed(error)} mm/s" if error is not None else " mm/s"
+    count = velocity["n"]
+    of_what = f"over {count} walkers" if count > 1 else "of the fit"
+    doubt = f" (standard error {_speed(error)} {of_what})" if error is not None else ""
+    toward = "toward the large bead" if result["sin_delta"] else "toward bead 1"
     steady = f"{result['steady']} of {result['walkers']} steady"
     sliding = ", ".join(f"{name} {_speed(result['sliding'][contact])}" for contact, name in _CONTACTS.items())
     lines = [
         f"{result['case']}: {result['frequency']:g} Hz, a0 = {result['peak_acceleration']:.4g} m/s², "
         f"Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}" + (" (already run)" if found else ""),
-        f"  velocity   {_speed(velocity['mean'])}{spread} toward the large bead; "
-        f"{velocity['n']} walkers, {_speed(velocity['smallest'])} to {_speed(velocity['largest'])}, {steady}",
-        f"    facing right {_side(result['right_facing'])}, facing left {_side(result['left_facing'])}",
+        f"  velocity   {_speed(velocity['mean'])} mm/s, positive {toward}{doubt}",
+        f"    smallest {_speed(velocity['smallest'])}, largest {_speed(velocity['largest'])}; {steady}",
+        f"    started facing right {_side(result['right_facing'])}, left {_side(result['left_facing'])}",
         f"  rotation   bead 1 {_speed(rotation['bead_1'])}, bead 2 {_speed(rotation['bead_2'])} mm/s",
         f"  sliding    {sliding} mm/s",
         f"  orientation at the end {degrees(turned['smallest']):.2f}° to {degrees(turned['largest']):.2f}°",
@@ -59,6 +62,11 @@ def _warnings(result: dict[str, Any]) -> list[str]:
     warnings = []
     if result["steady"] < result["walkers"]:
         warnings.append("some walkers are not steady: the velocity depends on the length of the run")
+    if result["turned_round"]:
+        warnings.append(
+            f"{result['turned_round']} of {result['walkers']} walkers turned by more than 90°: "
+            "their velocity follows the heading, not the drive axis"
+        )
     if result["walkers_met"]:
         warnings.append("walkers came close to each other and are not independent: give them more start.spacing")
     if result["truncated"]:

@@ -24,7 +24,7 @@ from runner.directory import read_json, write_json
 RESULT_NAME = "result.json"
 
 
-def tabulate(directory: Path) -> dict[str, Any]:
+def tabulate(directory: str | Path) -> dict[str, Any]:
     """Write the tables and ``result.json`` of a run directory.
 
     Parameters
@@ -42,6 +42,7 @@ def tabulate(directory: Path) -> dict[str, Any]:
     postprocess.dump.DumpError
         If a dump cannot be read.
     """
+    directory = Path(directory)
     trajectory = read_trajectory(directory)
     motion, walked = gait(trajectory), walk(trajectory)
     walkers = _walker_columns(trajectory, motion, walked)
@@ -53,9 +54,9 @@ def tabulate(directory: Path) -> dict[str, Any]:
     return outcome
 
 
-def read_result(directory: Path) -> dict[str, Any]:
+def read_result(directory: str | Path) -> dict[str, Any]:
     """The result of a run, as `tabulate` wrote it."""
-    return read_json(directory / RESULT_NAME)
+    return read_json(Path(directory) / RESULT_NAME)
 
 
 def _trajectory_columns(trajectory: Trajectory, motion: Gait) -> Columns:
@@ -138,6 +139,7 @@ def _result(trajectory: Trajectory, walkers: Columns) -> dict[str, Any]:
         "open": {f"contact_{contact}": _mean(walkers[f"open_{contact}"]) for contact in (1, 2, 3)},
         "orientation_end": _spread(walkers["orientation_end"]),
         "steady": int(np.sum(walkers["steady"])),
+        "turned_round": int(np.sum(np.abs(trajectory.orientation).max(axis=0) > np.pi / 2.0)),
         "walkers": len(velocity),
         "walkers_met": walkers_met(trajectory),
         "truncated": trajectory.truncated,
@@ -162,9 +164,13 @@ def _drive(case: WalkerCase) -> dict[str, Any]:
 def walkers_met(trajectory: Trajectory) -> bool:
     """Whether two walkers came so near each other that they are no longer independent replicates."""
     centre = trajectory.mass_centre[:: trajectory.case.run.samples_per_cycle, :, :2]
-    count = centre.shape[1]
-    if count < 2:
-        return False
-    first, second = np.triu_indices(count, 1)
-    nearest = np.linalg.norm(centre[:, first] - centre[:, second], axis=-1).min()
-    return bool(nearest < 1.5 * dimer_of(trajectory.case).length)
+    near = 1.5 * dimer_of(trajectory.case).length
+    # Only walkers whose ranges overlap can have met: of a thousand, a few pairs are left to be followed.
+    middle = (centre.max(axis=0) + centre.min(axis=0)) / 2.0
+    reach = np.linalg.norm(centre - middle, axis=-1).max(axis=0)
+    for number in range(len(middle) - 1):
+        apart = np.linalg.norm(middle[number + 1 :] - middle[number], axis=-1)
+        within = number + 1 + np.flatnonzero(apart < reach[number + 1 :] + reach[number] + near)
+        if np.any(np.linalg.norm(centre[:, within] - centre[:, number, None], axis=-1) < near):
+            return True
+    return False

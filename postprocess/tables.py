@@ -114,6 +114,20 @@ def write_table(directory: Path, name: str, columns: Mapping[str, npt.NDArray[An
     beside.replace(directory / f"{name}.parquet")
 
 
+def intact(directory: Path) -> bool:
+    """Whether all tables of a run directory are there and whole: parquet begins and ends with the same four bytes."""
+    for name in TABLES:
+        path = directory / f"{name}.parquet"
+        if not path.is_file() or path.stat().st_size < 12:
+            return False
+        with path.open("rb") as file:
+            head = file.read(4)
+            file.seek(-4, 2)
+            if not head == file.read(4) == b"PAR1":
+                return False
+    return True
+
+
 def _arrow(values: npt.NDArray[Any]) -> Any:
     """An arrow array on numpy's memory; ``pyarrow.array`` would import pandas to see whether it was given a series."""
     import pyarrow as pa
@@ -126,9 +140,32 @@ def _arrow(values: npt.NDArray[Any]) -> Any:
     return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(np.ascontiguousarray(values))])
 
 
-def read_table(directory: Path, name: str) -> pd.DataFrame:
-    """Read a table of a run directory (``trajectory``, ``walkers`` or ``bridges``) into pandas, SI units."""
+def read_table(directory: str | Path, name: str) -> pd.DataFrame:
+    """Read a table of a run directory into pandas, SI units.
+
+    Parameters
+    ----------
+    directory
+        The run directory.
+    name
+        ``trajectory``, ``walkers`` or ``bridges``; their columns are described in `TABLES`.
+
+    Returns
+    -------
+    DataFrame
+        Its ``attrs["units"]`` maps columns to units.
+
+    Raises
+    ------
+    KeyError
+        If there is no table of that name.
+    FileNotFoundError
+        If the directory has none.
+    """
     import pyarrow.parquet as pq
 
-    frame: pd.DataFrame = pq.read_table(directory / f"{name}.parquet").to_pandas()
+    if name not in TABLES:
+        raise KeyError(f"no table {name!r}; expected one of {', '.join(TABLES)}")
+    frame: pd.DataFrame = pq.read_table(Path(directory) / f"{name}.parquet").to_pandas()
+    frame.attrs["units"] = {column: unit for column, (unit, _) in TABLES[name].items()}
     return frame

@@ -9,7 +9,7 @@ import numpy as np
 
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
-from postprocess.dump import BinaryDump, FloatArray
+from postprocess.dump import BinaryDump, DumpError, FloatArray
 from runner.directory import CASE_NAME, read_json
 from templates.deck import LAYOUT_NAME
 from templates.layout import Layout
@@ -32,8 +32,8 @@ class Trajectory:
         Angular velocity, rad/s.
     force : ndarray, shape (F, W, 2, 3)
         Total force as dumped by the engine, N.
-    substrate : ndarray, shape (F, 3)
-        Displacement of the substrate in the frame of the run, m.
+    substrate, substrate_velocity : ndarray, shape (F, 3)
+        Displacement and velocity of the substrate in the frame of the run, m and m/s.
     truncated : bool
         Whether the dump ends within a frame.
     """
@@ -46,6 +46,7 @@ class Trajectory:
     spin: FloatArray
     force: FloatArray
     substrate: FloatArray
+    substrate_velocity: FloatArray
     truncated: bool
 
     @property
@@ -95,7 +96,7 @@ class Trajectory:
         return unwrapped
 
 
-def read_trajectory(directory: Path) -> Trajectory:
+def read_trajectory(directory: str | Path) -> Trajectory:
     """Read the bead dump of a run directory.
 
     Parameters
@@ -110,10 +111,13 @@ def read_trajectory(directory: Path) -> Trajectory:
     FileNotFoundError
         If a file is not there.
     """
+    directory = Path(directory)
     case = WalkerCase.from_dict(read_json(directory / CASE_NAME))
     layout = Layout.from_dict(read_json(directory / LAYOUT_NAME))
     dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
     frames = dump.stack()
+    if len(frames) < 2:
+        raise DumpError(f"{dump.path}: {len(frames)} complete frames, too few for a motion")
     rows_of_beads = np.array([walker.beads for walker in layout.walkers]) - 1  # sorted by id, which begins at 1
 
     def vectors(prefix: str) -> FloatArray:
@@ -134,5 +138,6 @@ def read_trajectory(directory: Path) -> Trajectory:
         spin=of_beads(vectors("omega")),
         force=of_beads(vectors("f")),
         substrate=shift,
+        substrate_velocity=velocity[:, rider],
         truncated=dump.truncated,
     )

@@ -13,6 +13,7 @@ import hashlib
 import json
 import os
 import platform
+import re
 import shutil
 import time
 from collections.abc import Iterator, Mapping
@@ -33,6 +34,7 @@ MANIFEST_NAME = "manifest.json"
 CASE_NAME = "case.json"
 FAILURE_NAME = "failure.json"
 _FORMAT = 1
+_LONGEST_NAME = 80
 
 
 def run_name(case: WalkerCase, deck: Deck, engine: Engine) -> str:
@@ -45,7 +47,8 @@ def run_name(case: WalkerCase, deck: Deck, engine: Engine) -> str:
         "format": _FORMAT,
     }
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
-    return f"{case.name}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
+    name = re.sub(r"[^\w.+-]+", "_", case.name)[:_LONGEST_NAME]
+    return f"{name}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
 
 
 @dataclass(frozen=True)
@@ -76,8 +79,16 @@ def finished_run(directory: Path) -> FinishedRun | None:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object."""
-    contents: dict[str, Any] = json.loads(path.read_text("utf-8"))
+    """Read a JSON object.
+
+    Raises
+    ------
+    OSError, ValueError
+        If the file cannot be read or holds something else.
+    """
+    contents = json.loads(path.read_text("utf-8"))
+    if not isinstance(contents, dict):
+        raise ValueError(f"{path}: expected a JSON object")
     return contents
 
 
@@ -103,6 +114,10 @@ class OpenRun:
     place: Path
     lock: int
     started: float
+
+    def discard(self) -> None:
+        """Give the run up without a trace."""
+        shutil.rmtree(self.directory, ignore_errors=True)
 
     def finish(self, report: EngineReport) -> FinishedRun:
         """Write the manifest, last, and move the directory to its place."""

@@ -7,6 +7,7 @@ each failure is recognised by what it leaves behind. `runner.launch` raises them
 from __future__ import annotations
 
 import signal
+from math import isfinite
 from pathlib import Path
 
 from inputs.errors import WalkersError
@@ -68,15 +69,20 @@ class BeadsLost(EngineFailure):
 
     def __init__(self, lost: int, step: int, directory: Path) -> None:
         self.lost = lost
-        super().__init__(f"{lost} bead(s) left the simulation box before step {step}", directory)
+        super().__init__(
+            f"{lost} bead(s) left the simulation box before step {step}: walkers went further than the box is wide; "
+            "a larger start.spacing or a shorter run keeps them in",
+            directory,
+        )
 
 
 class BlowUp(EngineFailure):
     """A bead is faster than the drive can make it, or its speed is no number: most often too large a time step."""
 
     def __init__(self, speed: float, fastest: float, step: int, directory: Path) -> None:
+        seen = f"moves at {speed:.3g} m/s" if isfinite(speed) else "has a speed or position that is no number"
         super().__init__(
-            f"blow-up: a bead moves at {speed:.3g} m/s at step {step}, "
+            f"blow-up: a bead {seen} after step {step}, "
             f"the drive cannot give more than {fastest:.3g} m/s; most often the time step is too large",
             directory,
         )

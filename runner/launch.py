@@ -12,7 +12,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,9 +28,11 @@ from runner.failures import (
     TimeLimitExceeded,
 )
 from templates.deck import DECK_NAME, OUTPUT_NAME, Deck
-from templates.engine import AUDITED_VERSION
+from templates.engine import AUDITED_VERSION, POSITION_IS_NO_NUMBER
 
 _POLL_SECONDS = 0.05
+# See templates.engine: without this the message of an abort is lost.
+_LINE_BUFFERED = ("stdbuf", "-oL")
 _GRACE_SECONDS = 2.0
 _SPARE_BYTES = 64 * 1024
 _STATUS_LINE = re.compile(rb"^ *(\d+) +(\d+) +(\S+)((?: +[-+.\w]+){6}) *$", re.MULTILINE)
@@ -97,7 +99,7 @@ def launch(
     process = None
     try:
         with postponed_interrupts():
-            process = _start(directory, engine, keep_open)
+            process = _start(directory, engine, deck.ranks, keep_open)
         while process.poll() is None:
             try:
                 process.wait(_POLL_SECONDS)
@@ -115,10 +117,12 @@ def launch(
     return _verdict(watch, process.returncode, wall_seconds)
 
 
-def _start(directory: Path, engine: Engine, keep_open: Sequence[int]) -> subprocess.Popen[bytes]:
+def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]) -> subprocess.Popen[bytes]:
+    # Debian's mpirun refuses root and more ranks than cores unless told otherwise.
+    parallel = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
     with (directory / OUTPUT_NAME).open("wb") as output:
         return subprocess.Popen(
-            [str(engine.path), "-log", "none", "-in", DECK_NAME],
+            [*parallel, *_LINE_BUFFERED, str(engine.path), "-log", "none", "-in", DECK_NAME],
             cwd=directory,
             stdin=subprocess.DEVNULL,
             stdout=output,
@@ -153,17 +157,14 @@ def postponed_interrupts() -> Iterator[None]:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End the engine and its children: politely, then not."""
+    """End the engine and all of its children: politely, then not."""
     if process.poll() is None:
-        for number in (signal.SIGTERM, signal.SIGKILL):
-            try:
-                os.killpg(process.pid, number)
-                process.wait(_GRACE_SECONDS)
-                break
-            except ProcessLookupError:
-                break
-            except subprocess.TimeoutExpired:
-                continue
+        with suppress(ProcessLookupError, subprocess.TimeoutExpired):
+            os.killpg(process.pid, signal.SIGTERM)
+            process.wait(_GRACE_SECONDS)
+    # Children may outlive their parent, or not care for SIGTERM.
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
@@ -181,6 +182,16 @@ class _Status:
         lower, upper = box
         sides = zip(lower, upper, self.bounds[::2], self.bounds[1::2], strict=True)
         return min(min(low - floor, ceiling - high) for floor, ceiling, low, high in sides)
+
+
+def complete_local_frames(path: Path) -> int:
+    """Number of complete frames of a local dump: the last one counts only with all of its rows."""
+    text = path.read_bytes() if path.exists() else b""
+    frames = text.count(b"ITEM: TIMESTEP")
+    last = text[text.rfind(b"ITEM: TIMESTEP") :].split(b"\n")
+    # Nine lines of header, the fourth being the number of rows, then the rows, each ended by a newline.
+    whole = len(last) > 9 and last[3].isdigit() and len(last) - 10 == int(last[3])
+    return frames if whole or not frames else frames - 1
 
 
 class _Watch:
@@ -254,7 +265,10 @@ def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
     layout, directory = watch.deck.layout, watch.directory
     errors = _ERROR_LINE.findall(watch.output)
     if errors:
-        raise EngineError(errors[0].decode("utf-8", "backslashreplace").strip(), directory)
+        line = errors[0].decode("utf-8", "backslashreplace").strip()
+        if POSITION_IS_NO_NUMBER in line:
+            raise BlowUp(math.nan, watch.deck.fastest, watch.step, directory)
+        raise EngineError(line, directory)
     if status < 0:
         raise EngineKilled(-status, directory)
     if status > 0:
@@ -262,6 +276,10 @@ def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
         raise EngineError(f"exit status {status}, last words: {last}", directory)
     if watch.written != layout.bead_dump_bytes:
         raise MissingFrames(watch.written / layout.bead_dump_bytes * layout.frames, layout.frames, directory)
+    for name in (layout.pair_bridge_dump, layout.wall_bridge_dump):
+        found = complete_local_frames(directory / name)
+        if found != layout.bridge_frames:
+            raise MissingFrames(found, layout.bridge_frames, directory)
     version = version_in(watch.output) or "unknown"
     if version != AUDITED_VERSION:
         message = f"the engine is {version}; the decks' remedies were measured on {AUDITED_VERSION}"

@@ -9,7 +9,8 @@ from inputs import library
 from inputs.case import WalkerCase
 from inputs.dimer import contact_loads, dimer_of
 from inputs.forces import capillary_force_limit_at_wall
-from inputs.timestep import time_step_limits
+from inputs.timestep import AUTO_FRACTIONS, time_step_limits
+from inputs.units import ACCELERATION_OF_ONE_G
 from runner.cost import predicted_seconds
 
 _CONTACTS = ("bead 1 on substrate", "bead 2 on substrate", "bead on bead")
@@ -68,7 +69,7 @@ def summarise(case: WalkerCase) -> dict[str, Any]:
 
 def _stiffness_ratio(case: WalkerCase) -> float | None:
     """Young's modulus of the simulation over that of the beads' material."""
-    if case.beads.material is None:
+    if case.beads.material not in library.materials():
         return None
     return case.contact.youngs_modulus / library.material(case.beads.material)["youngs_modulus"]
 
@@ -107,11 +108,13 @@ def _text_of_dimer(summary: dict[str, Any]) -> str:
     dimer = summary["dimer"]
     ratio = dimer["stiffness_ratio"]
     softened = f"; beads {1 / ratio:.3g} times softer than their material" if ratio else ""
+    order = "" if dimer["sin_delta"] >= 0 else "\n           bead 1 is the smaller one"
     return (
         f"dimer      M = {dimer['total_mass'] * 1e6:.4g} mg, mean radius {dimer['mean_radius'] * 1e3:.4g} mm, "
         f"sin δ = {dimer['sin_delta']:.4g}, μ = {dimer['mass_asymmetry']:.4g}{softened}\n"
-        f"drive      Γ0 = {dimer['gamma0']:.4g}, amplitude {dimer['amplitude'] * 1e3:.4g} mm, "
-        f"peak velocity {dimer['peak_velocity'] * 1e3:.4g} mm/s"
+        f"drive      a0 = {summary['case']['drive']['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g, "
+        f"Γ0 = {dimer['gamma0']:.4g}, amplitude {dimer['amplitude'] * 1e3:.4g} mm, "
+        f"peak velocity {dimer['peak_velocity'] * 1e3:.4g} mm/s{order}"
     )
 
 
@@ -132,7 +135,8 @@ def _text_of_step(summary: dict[str, Any]) -> str:
     lines = [f"time step  {step['step'] * 1e6:.5g} µs, {run['steps_per_cycle']} a cycle"]
     for name, limit in step["limits"].items():
         shown = f"{limit * 1e6:.4g} µs" if limit is not None else "none"
-        lines.append(f"  {name:10} limit {shown:>10}, the step is {step['share'][name]:.3f} of it")
+        share = f"{step['share'][name]:.3f} of it (auto: up to {AUTO_FRACTIONS[name]:g})"
+        lines.append(f"  {name:10} limit {shown:>10}, the step is {share}")
     lines.append(
         f"run        {run['steps']} steps, {run['simulated_seconds']:.4g} s simulated, {run['samples']} samples, "
         f"about {run['predicted_seconds']:.1f} s on one core"

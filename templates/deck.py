@@ -43,6 +43,8 @@ class Deck:
         Lower and upper corner of the simulation box, m.
     fastest
         A speed that no bead can reach by the drive, gravity and the capillary forces alone, m/s.
+    ranks
+        Number of MPI processes.
     """
 
     text: str
@@ -50,6 +52,7 @@ class Deck:
     layout: Layout
     box: tuple[Point, Point]
     fastest: float
+    ranks: int = 1
 
 
 @dataclass(frozen=True)
@@ -167,7 +170,7 @@ def compose(plan: Plan) -> Deck:
         bin_size=_bin_size(case, scene),
     )  # fmt: skip
     files = {WALL_NAME: wall_mesh(scene.faces, max(scene.upper))}
-    return Deck(text, files, layout, (scene.lower, scene.upper), _fastest(case))
+    return Deck(text, files, layout, (scene.lower, scene.upper), _fastest(case), plan.ranks)
 
 
 def _contact_model(case: WalkerCase) -> str:

@@ -38,6 +38,13 @@ Gravity dies where its vector vanishes
 ``-screen none`` crashes as soon as a mesh is read
     The engine's output is redirected instead.
 
+An abort swallows its message
+    when the output is a file: the buffer is not flushed. The engine is run through ``stdbuf -oL``.
+
+A position that is no number
+    ends in "Internal error (./src/tri_mesh_I.h:109)": no number lies on any side of a triangle's edges. See
+    `POSITION_IS_NO_NUMBER`.
+
 A lost bead is no error
     Neither exit status nor an ERROR line tells: the deck prints the number of atoms every cycle.
 
@@ -72,6 +79,9 @@ from templates.scene import AXES, Face
 
 AUDITED_VERSION = "LIGGGHTS-PUBLIC 3.8.0"
 """The version that all of this was measured on."""
+
+POSITION_IS_NO_NUMBER = "tri_mesh_I.h:109"
+"""In the ERROR line of an engine that has met a bead whose position is no number."""
 
 SMALLEST_SEPARATION_CAP = 1.2
 

@@ -30,7 +30,7 @@ def place_walkers(case: WalkerCase) -> tuple[Scene, tuple[PlacedWalker, ...]]:
         walker, pair = _place(case, number, origin)
         walkers.append(walker)
         beads += pair
-    far = reach(case)
+    far = max(reach(case), start.spacing / 2.0)
     half_x = (rows - 1) / 2.0 * start.spacing + far
     half_y = (columns - 1) / 2.0 * start.spacing + far
     largest = max(case.beads.radii)

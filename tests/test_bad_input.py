@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from inputs import InputError, resolve_case
 from tests.conftest import document, make_case, to_toml
 from walkers.main import main
 
@@ -30,7 +31,7 @@ BAD: dict[str, tuple[dict[str, Any], str, str, str]] = {
     "density as number": ({"beads": {"density": 4000}}, "beads.density", "4000", "density with its unit"),
     "unknown liquid": ({"liquid": {"name": "Si AK 5"}}, "liquid.name", '"Si AK 5"', 'did you mean "Si AK5"'),
     "fraction in per cent": ({"liquid": {"volume_fraction": "1 %"}}, "liquid.volume_fraction", '"1 %"', "plain number"),
-    "fraction zero": ({"liquid": {"volume_fraction": 0}}, "liquid.volume_fraction", "0", "more than 0"),
+    "fraction zero": ({"liquid": {"volume_fraction": 0}}, "liquid.volume_fraction", "0", "at least "),
     "fraction too large": ({"liquid": {"volume_fraction": 1.0}}, "liquid.volume_fraction", "1.0", "at most 0.5"),
     "angle without unit": ({"liquid": {"contact_angle": "0.5"}}, "liquid.contact_angle", '"0.5"', "angle"),
     "angle too large": ({"liquid": {"contact_angle": "120 deg"}}, "liquid.contact_angle", '"120 deg"', "at most"),
@@ -49,7 +50,7 @@ BAD: dict[str, tuple[dict[str, Any], str, str, str]] = {
     "unknown key": ({"liquid": {"volume_fracton": 0.01}}, "liquid.volume_fracton", "0.01", '"volume_fraction"?'),
     "unknown table": ({"substrat": {"material": "glass"}}, "substrat", "glass", 'did you mean "substrate"'),
     "key in the wrong table": ({"frequency": "80 Hz"}, "frequency", '"80 Hz"', 'did you mean "drive.frequency"'),
-    "unknown substrate": ({"substrate": {"material": "teflon"}}, "substrate.material", '"teflon"', "one of"),
+    "unknown substrate": ({"substrate": {"material": "glas"}}, "substrate.material", '"glas"', "glass"),
     "negative friction": (
         {"contact": {"friction": {"bead_wall": -0.1}}},
         "contact.friction.bead_wall",
@@ -64,7 +65,7 @@ BAD: dict[str, tuple[dict[str, Any], str, str, str]] = {
     ),
     "friction not a table": ({"contact": {"friction": 0.1}}, "contact.friction", "0.1", "table"),
     "restitution above one": ({"contact": {"restitution": 1.2}}, "contact.restitution", "1.2", "at most 1"),
-    "restitution zero": ({"contact": {"restitution": 0}}, "contact.restitution", "0", "more than 0"),
+    "restitution zero": ({"contact": {"restitution": 0}}, "contact.restitution", "0", "at least "),
     "modulus as density": (
         {"contact": {"youngs_modulus": "50 kg/m^3"}},
         "contact.youngs_modulus",
@@ -81,7 +82,7 @@ BAD: dict[str, tuple[dict[str, Any], str, str, str]] = {
         {"contact": {"minimum_separation_ratio": 0}},
         "contact.minimum_separation_ratio",
         "0",
-        "more than 0",
+        "at least ",
     ),
     "mass for an acceleration": (
         {"drive": {"peak_acceleration": "4 kg"}},
@@ -149,6 +150,49 @@ def test_bad_value(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
         assert part in message
 
 
+EXTREME: dict[str, dict[str, Any]] = {
+    "beads.radii[0]": {"beads": {"radii": ["1e200 m", "0.2 mm"]}},
+    "beads.radii[1]": {"beads": {"radii": ["0.3 mm", "1e-120 mm"]}},
+    "beads.density": {"beads": {"density": "1e300 g/cm^3"}},
+    "liquid.volume_fraction": {"liquid": {"volume_fraction": 1e-320}},
+    "liquid.dynamic_viscosity": {"liquid": {"dynamic_viscosity": "1e305 Pa*s"}},
+    "contact.youngs_modulus": {"contact": {"youngs_modulus": "1e200 Pa"}},
+    "contact.minimum_separation_ratio": {"contact": {"minimum_separation_ratio": 1e-310}},
+    "drive.peak_acceleration": {"drive": {"peak_acceleration": "1e300 g"}},
+    "drive.frequency": {"drive": {"frequency": "1e-200 Hz"}},
+    "run.time_step": {"run": {"time_step": "1e-320 s"}},
+    "run.cycles": {"run": {"cycles": 10**30}},
+    "start.spacing": {"start": {"spacing": "1e300 m"}},
+}
+
+
+@pytest.mark.parametrize("key", EXTREME)
+def test_numbers_beyond_anything_physical(key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "bad.toml"
+    file.write_text(to_toml(document(**EXTREME[key])), encoding="utf-8")
+    message = _message(capsys, "show", str(file))
+    assert f"{key} = " in message
+    assert message.count("\n") == 1
+
+
+def test_more_steps_than_the_engine_can_count(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "bad.toml"
+    file.write_text(to_toml(document(run={"cycles": 999_999})))
+    assert "run.cycles = 999999: expected at most 335" in _message(capsys, "show", str(file))
+
+
+def test_a_right_angle_is_a_contact_angle() -> None:
+    assert make_case(liquid={"contact_angle": "90 deg"}).liquid.contact_angle == pytest.approx(1.5707963)
+
+
+def test_a_substrate_of_ones_own_needs_its_friction() -> None:
+    values = document(substrate={"material": "teflon"})
+    assert resolve_case(values).substrate_material == "teflon"
+    del values["contact"]["rolling_friction"]
+    with pytest.raises(InputError, match=r'substrate\.material = "teflon": not in the library'):
+        resolve_case(values)
+
+
 MISSING = {
     "beads": "beads: missing",
     "liquid": "liquid: missing",
@@ -192,6 +236,8 @@ def test_friction_that_the_library_does_not_know(tmp_path: Path, capsys: pytest.
         (b"[beads]\nradii = 1\nradii = 2", "not TOML"),
         (b"", "beads: missing"),
         (b"\x00\x01\x02", "not TOML"),
+        (b"a = " + b"9" * 5000, "not TOML"),
+        (b"a = " + b"[" * 5000, "not TOML"),
     ],
 )
 def test_files_that_are_no_cases(
@@ -208,6 +254,7 @@ def test_files_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "no such file" in _message(capsys, "show", str(tmp_path / "nothing.toml"))
     assert 'did you mean "fig1b"' in _message(capsys, "show", "fig1")
     assert "cannot be read" in _message(capsys, "show", str(tmp_path))
+    assert "cannot be read" in _message(capsys, "show", "x" * 300)
 
 
 def test_several_mistakes_are_told_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -152,6 +152,33 @@ def test_too_large_a_time_step_blows_up(tmp_path: Path) -> None:
     assert _remains(tmp_path)["reason"] == "BlowUp"
 
 
+def test_a_position_that_is_no_number(tmp_path: Path) -> None:
+    """A force that becomes infinity minus infinity a few hundred steps on."""
+    bad = "variable        bad equal (step>300)*(1e308*100-1e308*100)\nfix             bad beads addforce v_bad 0 0\n"
+    with pytest.raises(BlowUp, match="no number"):
+        _launch(make_case(run=SHORT), tmp_path, lambda text: text.replace("fix             motion", f"{bad}fix motion"))
+    assert _remains(tmp_path)["reason"] == "BlowUp"
+
+
+@pytest.mark.parametrize("dump", ["bridges.pairs.txt", "bridges.walls.txt"])
+@pytest.mark.parametrize("cut", ["0", "-5", "-100"])
+def test_dumps_of_bridges_that_are_cut_short(tmp_path: Path, dump: str, cut: str) -> None:
+    front = tmp_path / "front"
+    front.write_text(f'#!/bin/sh\nliggghts "$@" && truncate -s {cut} {dump}\n')
+    front.chmod(0o755)
+    with pytest.raises(MissingFrames):
+        run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front))
+
+
+def test_children_that_do_not_care_for_sigterm_are_ended_too(tmp_path: Path) -> None:
+    front = tmp_path / "front"
+    front.write_text('#!/bin/sh\n(trap "" TERM; exec sleep 4711) &\nexec sleep 100\n')
+    front.chmod(0o755)
+    with pytest.raises(TimeLimitExceeded):
+        run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front), time_limit=0.3)
+    assert subprocess.run(["pgrep", "-f", "sleep 4711"], capture_output=True, check=False).returncode == 1
+
+
 def test_time_limit(tmp_path: Path) -> None:
     begin = time.monotonic()
     with pytest.raises(TimeLimitExceeded, match=r"0\.6 s"):
@@ -220,6 +247,7 @@ def test_interrupts_stop_the_engine_and_leave_no_run(number: signal.Signals, sta
     program.send_signal(number)
     _, errors = program.communicate(timeout=10)
     assert program.returncode == status
+    assert errors.splitlines()[-1] == {130: "walkers: interrupted", 143: "walkers: terminated"}[status]
     assert "Traceback" not in errors
     assert not engines_in(in_folder)
     assert not list(in_folder.glob("runs/*/manifest.json"))

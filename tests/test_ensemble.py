@@ -84,7 +84,8 @@ def test_reporting_bridges_does_not_disturb_the_walkers(tmp_path: Path, ensemble
     for name, text in (("reporting", deck.text), ("silent", "\n".join(silent) + "\n")):
         directory = tmp_path / name
         directory.mkdir()
-        changed = replace(deck, text=text)
+        frames = deck.layout.bridge_frames if name == "reporting" else 0
+        changed = replace(deck, text=text, layout=replace(deck.layout, bridge_frames=frames))
         write_deck(changed, directory)
         launch(changed, directory, find_engine())
         dumps.append((directory / "beads.bin").read_bytes())

@@ -99,6 +99,16 @@ def test_substrate_moves_as_prescribed(trajectory: Moved, axis: str) -> None:
     assert not np.any(np.delete(moved.substrate, along, axis=1))
 
 
+@pytest.mark.parametrize("frame", ["lab", "container"])
+def test_walkers_start_at_rest_on_the_substrate(trajectory: Moved, frame: str) -> None:
+    moved = trajectory(drive={"frame": frame}, run={"cycles": 4, "settling_cycles": 1})
+    assert np.abs(moved.velocity[0]).max() < 1e-12
+    expected = moved.case.drive.peak_velocity * np.cos(moved.case.drive.angular_frequency * moved.time)
+    if frame == "lab":
+        dumped = moved.substrate_velocity[:, 0]
+        np.testing.assert_allclose(dumped, expected, atol=1e-9 * moved.case.drive.peak_velocity)
+
+
 def test_bead_on_a_still_substrate_stays_where_it_is(trajectory: Moved) -> None:
     """Started in the equilibrium of capillary, elastic and gravity forces: nothing moves by more than a nanometre."""
     moved = trajectory(drive={"peak_acceleration": "0 g"}, run={"cycles": 4, "settling_cycles": 1})

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from inputs import InputError
 from postprocess import read_table, read_trajectory
 from postprocess.figures import plot_run
 from postprocess.paraview import write_vtk
@@ -54,6 +55,7 @@ def test_beads_are_where_the_engine_put_them(directory: Path, collection: Path) 
     np.testing.assert_array_equal(beads["radius"], [3e-4, 2e-4, 3e-4, 2e-4])
     np.testing.assert_array_equal(beads["walker"], [0, 0, 1, 1])
     np.testing.assert_array_equal(beads["bead"], [1, 2, 1, 2])
+    np.testing.assert_array_equal(beads["type"], [1, 1, 1, 1])
     np.testing.assert_allclose(beads["velocity"], moved.velocity[frame].reshape(-1, 3))
     np.testing.assert_allclose(beads["omega"], moved.spin[frame].reshape(-1, 3))
 
@@ -102,6 +104,17 @@ def test_walkers_are_drawn_side_by_side(directory: Path, tmp_path: Path) -> None
     moved = (points[1] - points[0]).reshape(2, 2, 3)
     np.testing.assert_allclose(moved, as_placed[80] - as_placed[0], atol=1e-12)
     assert np.ptp(points[0][:, 1]) < 4e-3 < np.ptp(as_placed[0, ..., 1])
+
+
+def test_a_folder_with_other_files_is_not_replaced(directory: Path, tmp_path: Path) -> None:
+    mine = tmp_path / "thesis.txt"
+    mine.write_text("years of work")
+    for place in (tmp_path, mine):
+        with pytest.raises(InputError, match="expected a new or empty folder"):
+            write_vtk(directory, destination=place)
+    assert mine.read_text() == "years of work"
+    again = [write_vtk(directory, destination=tmp_path / "mine") for _ in range(2)]
+    assert again[0] == again[1]
 
 
 def test_figures_are_pictures(directory: Path, tmp_path: Path) -> None:

@@ -136,7 +136,7 @@ def test_a_single_walker_has_the_error_of_its_fit(run_directory: Callable[..., P
     result, walkers = read_result(directory), read_table(directory, "walkers")
     assert result["velocity"]["standard_error"] == walkers["standard_error"][0]
     assert result["left_facing"] == {"n": 0, "mean": None, "smallest": None, "largest": None, "standard_error": None}
-    assert "facing left none" in describe_result(directory, result)
+    assert "left none" in describe_result(directory, result)
 
 
 def test_walkers_that_have_not_settled_are_reported(run_directory: Callable[..., Path]) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from inputs import InputError
 from runner import find_engine, finished_run, open_run, run_name
 from runner.failures import RunBusy
 from templates import render_deck
@@ -180,3 +181,70 @@ def test_json_result_of_the_program(in_folder: Path) -> None:
     assert first["velocity"] == second["velocity"]
     shown = subprocess.run([PROGRAM, "result", first["run"]], capture_output=True, text=True, check=True).stdout
     assert f"{first['velocity']['mean'] * 1e3:.3f}" in shown
+
+
+def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    case = make_case(run=SHORT)
+    stamp = run_case(case, tmp_path).run.manifest["finished"]
+    answers = iter([None])
+    monkeypatch.setattr("runner.directory.finished_run", lambda place: next(answers, finished_run(place)))
+    outcome = run_case(case, tmp_path)
+    assert outcome.found
+    assert outcome.run.manifest["finished"] == stamp
+    assert not list(tmp_path.glob("*.part"))
+
+
+@pytest.mark.parametrize("damage", ["result.json", "walkers.parquet", "bridges.parquet", "trajectory.parquet"])
+@pytest.mark.parametrize("contents", [None, b"", b"{", b"[]"])
+def test_damaged_tables_are_made_anew(tmp_path: Path, damage: str, contents: bytes | None) -> None:
+    case = make_case(run=SHORT)
+    outcome = run_case(case, tmp_path)
+    path = outcome.run.directory / damage
+    if contents is None:
+        path.unlink()
+    else:
+        path.write_bytes(contents)
+    assert run_case(case, tmp_path).result == outcome.result
+    find_run(outcome.run.directory)
+    assert path.stat().st_size > 100
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "case.json", "layout.json", "beads.bin"])
+def test_a_run_without_its_description_is_told(tmp_path: Path, name: str) -> None:
+    directory = run_case(make_case(run=SHORT), tmp_path / "runs").run.directory
+    (directory / name).unlink()
+    with pytest.raises(InputError, match=name if name != "manifest.json" else "not a finished run"):
+        find_run(directory)
+
+
+def test_a_cut_dump_is_drawn_as_far_as_it_goes(tmp_path: Path) -> None:
+    directory = run_case(make_case(run={"cycles": 8, "settling_cycles": 2}), tmp_path / "runs").run.directory
+    dump = directory / "beads.bin"
+    dump.write_bytes(dump.read_bytes()[: dump.stat().st_size // 2])
+    for command in ("plot", "vtk", "result"):
+        done = subprocess.run([PROGRAM, command, str(directory)], capture_output=True, text=True, check=True)
+        assert "walkers: warning:" in done.stderr
+        assert "is incomplete" in done.stderr
+    dump.write_bytes(dump.read_bytes()[:1000])
+    (directory / "result.json").unlink()
+    done = subprocess.run([PROGRAM, "plot", str(directory)], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments", [["run", "test.toml", "--out", "test.toml/x"], ["run", "test.toml", "--out", "/proc/x"]]
+)
+def test_places_that_cannot_be_written(in_folder: Path, arguments: list[str]) -> None:
+    _toml(in_folder)
+    done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert done.stderr.startswith("walkers: ")
+
+
+def test_a_long_name_is_cut() -> None:
+    case = make_case().renamed("a b/" * 100)
+    name = run_name(case, render_deck(case), find_engine())
+    assert len(name) < 100
+    assert "/" not in name

@@ -40,7 +40,7 @@ def test_quantities_in_si(text: str, kind: units.Kind, value: float) -> None:
 
 def test_g_is_the_acceleration_where_one_is_meant_and_the_gram_elsewhere() -> None:
     assert parse_quantity("1 g", units.ACCELERATION) == 9.8  # "1 g = 9.8 m/s²", the paper's Fig. 1
-    assert parse_quantity("1 g/mm^3", units.DENSITY) == 1e6
+    assert parse_quantity("1 g/cm^3", units.DENSITY) == 1e3
 
 
 @pytest.mark.parametrize(

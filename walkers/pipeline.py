@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -75,6 +76,10 @@ def run_case(
     loading = threading.Thread(target=_load_postprocess, daemon=True)
     loading.start()
     with open_run(case, deck, binary, out) as run:
+        old = finished_run(run.place)
+        if old is not None and not force:  # somebody else has finished it since
+            run.discard()
+            return Outcome(old, _result_of(old), found=True)
         report = launch(
             deck, run.directory, binary, on_progress=on_progress, time_limit=time_limit, keep_open=[run.lock]
         )
@@ -92,12 +97,17 @@ def _load_postprocess() -> None:
 
 
 def _result_of(run: FinishedRun) -> dict[str, Any]:
+    """The result of a finished run; tabulated anew if it or a table is gone or damaged."""
     from postprocess.result import read_result, tabulate
+    from postprocess.tables import intact
 
     try:
-        return read_result(run.directory)
-    except FileNotFoundError:
-        return tabulate(run.directory)
+        result = read_result(run.directory)
+        if "velocity" in result and intact(run.directory):
+            return result
+    except (OSError, ValueError):
+        pass
+    return tabulate(run.directory)
 
 
 def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
@@ -140,10 +150,22 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
 
 
 def _readable(run: FinishedRun) -> FinishedRun:
+    """The run, if its description can be read; its tables are made anew if need be."""
     for name in ("manifest", "case", "layout"):
         try:
             getattr(run, name)
         except (OSError, ValueError, KeyError, TypeError) as error:
             problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
             raise InputError(str(run.directory), [problem]) from error
+    layout = run.layout
+    dump = run.directory / layout.bead_dump
+    if not dump.is_file():
+        raise InputError(str(run.directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
+    if dump.stat().st_size < layout.bead_dump_bytes:
+        warnings.warn(f"{dump} is incomplete: what is drawn or written ends early", IncompleteRunWarning, stacklevel=3)
+    _result_of(run)
     return run
+
+
+class IncompleteRunWarning(UserWarning):
+    """The dump of a finished run is shorter than its layout says: somebody cut it since."""

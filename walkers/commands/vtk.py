@@ -11,7 +11,7 @@ from walkers.commands.arguments import Out, Run
 from walkers.pipeline import DEFAULT_OUT
 
 Folder = Annotated[
-    Path | None, typer.Option("--to", help="Folder to write, replaced if it is one of these; RUN/vtk if left out.")
+    Path | None, typer.Option("--to", help="Folder to write, replaced if it holds nothing else; RUN/vtk if left out.")
 ]
 EverySample = Annotated[bool, typer.Option("--every-sample", help="All samples instead of one frame a cycle.")]
 AsPlaced = Annotated[bool, typer.Option("--as-placed", help="Walkers where the deck has them, not side by side.")]
