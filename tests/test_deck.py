@@ -87,6 +87,7 @@ def test_no_bridge_is_cut_before_it_ruptures() -> None:
         for radius in radii:
             at_wall = forces.bridge_volume_at_wall(radius, fraction)
             assert (cap - 1) * 2 * radius > forces.rupture_distance(at_wall, angle)
+            assert (1.1 * cap - 1) * radius > forces.rupture_distance(at_wall, angle)
         between = forces.bridge_volume_between_beads(*radii, fraction)
         assert (cap - 1) * sum(radii) > forces.rupture_distance(between, angle)
 
