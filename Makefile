@@ -8,7 +8,7 @@ CASE ?= fig1b
 
 .PHONY: help
 help: ## List the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 .PHONY: walker
 walker: setup ## Run the walker of Fig. 1b (or CASE=...): velocity, pictures, ParaView files
@@ -25,7 +25,16 @@ test: setup ## Lint, check types, run the tests (a 2-bead smoke test first)
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	.venv/bin/pytest -q -m smoke
+	.venv/bin/walkers audit --quick
 	.venv/bin/pytest -q -n 2 -m "not smoke"
+
+.PHONY: audit
+audit: setup ## Prove what the installed engine does, against published formulas
+	@$(WALKERS) audit
+
+.PHONY: docs-audit
+docs-audit: setup ## Write docs/engine.md from an audit of the installed engine
+	@$(WALKERS) audit --markdown docs/engine.md
 
 .PHONY: bench
 bench: setup ## Measure what docs/performance.md states

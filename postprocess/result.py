@@ -19,7 +19,7 @@ from postprocess.dump import FloatArray
 from postprocess.gait import Gait, Walk, gait, settled_samples, walk
 from postprocess.tables import write_table
 from postprocess.trajectory import Trajectory, read_trajectory
-from runner.directory import read_json, write_json
+from runner.files import read_json, write_json
 
 RESULT_NAME = "result.json"
 

@@ -10,7 +10,8 @@ import numpy as np
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
 from postprocess.dump import BinaryDump, DumpError, FloatArray
-from runner.directory import CASE_NAME, read_json
+from runner.directory import CASE_NAME
+from runner.files import read_json
 from templates.deck import LAYOUT_NAME
 from templates.layout import Layout
 from templates.scene import vector_along
@@ -127,17 +128,31 @@ def read_trajectory(directory: str | Path) -> Trajectory:
     def of_beads(values: FloatArray) -> FloatArray:
         return values[:, rows_of_beads]
 
-    position, velocity, rider = vectors(""), vectors("v"), layout.rider - 1
-    shift = position[:, rider] - position[:1, rider]
+    position, velocity = vectors(""), vectors("v")
+    time = dump.steps.astype(np.float64) * layout.time_step
+    shift, speed = _substrate(case, layout, time, position, velocity)
     return Trajectory(
         case=case,
         layout=layout,
-        time=dump.steps.astype(np.float64) * layout.time_step,
+        time=time,
         position=of_beads(position) - shift[:, None, None],
-        velocity=of_beads(velocity) - velocity[:, rider][:, None, None],
+        velocity=of_beads(velocity) - speed[:, None, None],
         spin=of_beads(vectors("omega")),
         force=of_beads(vectors("f")),
         substrate=shift,
-        substrate_velocity=velocity[:, rider],
+        substrate_velocity=speed,
         truncated=dump.truncated,
     )
+
+
+def _substrate(
+    case: WalkerCase, layout: Layout, time: FloatArray, position: FloatArray, velocity: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Displacement and velocity of the substrate: those of its rider, or the prescribed ones where it has none."""
+    if layout.rider:
+        row = layout.rider - 1
+        return position[:, row] - position[:1, row], velocity[:, row]
+    drive = case.drive
+    along = np.array(vector_along(drive.axis)) * (drive.frame == "lab")
+    displacement = np.outer(drive.amplitude * np.sin(drive.angular_frequency * time), along)
+    return displacement, np.outer(drive.peak_velocity * np.cos(drive.angular_frequency * time), along)

@@ -16,7 +16,7 @@ import platform
 import re
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -24,8 +24,10 @@ from pathlib import Path
 from typing import Any
 
 from inputs.case import WalkerCase
+from runner.audits import read_audit
 from runner.binary import Engine
 from runner.failures import DiskFull, EngineFailure, RunBusy
+from runner.files import read_json, write_json
 from runner.launch import EngineReport
 from templates.deck import DECK_NAME, LAYOUT_NAME, Deck
 from templates.layout import Layout
@@ -76,31 +78,6 @@ class FinishedRun:
 def finished_run(directory: Path) -> FinishedRun | None:
     """The run in a directory, or None if it has no manifest."""
     return FinishedRun(directory) if (directory / MANIFEST_NAME).is_file() else None
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object.
-
-    Raises
-    ------
-    OSError, ValueError
-        If the file cannot be read or holds something else.
-    """
-    contents = json.loads(path.read_text("utf-8"))
-    if not isinstance(contents, dict):
-        raise ValueError(f"{path}: expected a JSON object")
-    return contents
-
-
-def write_json(path: Path, contents: Mapping[str, Any]) -> None:
-    """Write a JSON object beside its place, then rename: readers see the old file or the new one, never a part."""
-    beside = path.with_name(path.name + ".new")
-    with beside.open("w", encoding="utf-8") as file:
-        json.dump(contents, file, indent=2, ensure_ascii=False)
-        file.write("\n")
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(path)
 
 
 @dataclass
@@ -239,12 +216,18 @@ def _manifest(run: OpenRun, report: EngineReport) -> dict[str, Any]:
         own_version = version("granular-walkers")
     except PackageNotFoundError:
         own_version = "not installed"
+    audit = read_audit(run.engine.sha256)
     return {
         "format": _FORMAT,
         "status": "finished",
         "name": run.case.name,
         "run": run.place.name,
-        "engine": {"path": str(run.engine.path), "version": report.version, "sha256": run.engine.sha256},
+        "engine": {
+            "path": str(run.engine.path),
+            "version": report.version,
+            "sha256": run.engine.sha256,
+            "audit": audit.summary() if audit else None,
+        },
         "granular_walkers": own_version,
         "host": platform.node(),
         "platform": platform.platform(),

@@ -7,6 +7,7 @@ each failure is recognised by what it leaves behind. `runner.launch` raises them
 from __future__ import annotations
 
 import signal
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 
@@ -109,6 +110,20 @@ class RunBusy(EngineFailure):
 
     def __init__(self, directory: Path) -> None:
         super().__init__("another process is still running this case", directory)
+
+
+class AuditFailed(EngineFailure):
+    """The engine's binary failed its audit: what it computes cannot be trusted."""
+
+    def __init__(self, failures: Sequence[str]) -> None:
+        super().__init__(
+            f"this engine failed its audit in {len(failures)} line(s), first: {failures[0]}; "
+            "see it with: walkers audit (--despite-audit runs all the same)"
+        )
+
+
+class UnauditedEngineWarning(UserWarning):
+    """The engine's binary was never audited."""
 
 
 class EngineVersionWarning(UserWarning):

@@ -99,7 +99,7 @@ def launch(
     process = None
     try:
         with postponed_interrupts():
-            process = _start(directory, engine, deck.ranks, keep_open)
+            process = _start(directory, engine, deck.layout.ranks, keep_open)
         while process.poll() is None:
             try:
                 process.wait(_POLL_SECONDS)

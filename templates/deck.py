@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from math import degrees, sqrt
 from typing import TYPE_CHECKING
@@ -43,8 +43,6 @@ class Deck:
         Lower and upper corner of the simulation box, m.
     fastest
         A speed that no bead can reach by the drive, gravity and the capillary forces alone, m/s.
-    ranks
-        Number of MPI processes.
     """
 
     text: str
@@ -52,7 +50,6 @@ class Deck:
     layout: Layout
     box: tuple[Point, Point]
     fastest: float
-    ranks: int = 1
 
 
 @dataclass(frozen=True)
@@ -140,9 +137,13 @@ def render_deck(case: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Deck:
 def compose(plan: Plan) -> Deck:
     """Put a deck together from its blocks."""
     case, remedies = plan.case, plan.remedies
-    scene = plan.scene if remedies.riders else without_riders(plan.scene)
+    scene, walkers = plan.scene, plan.walkers
+    if not remedies.riders:
+        gone = len(scene.riders)
+        scene = without_riders(scene)
+        walkers = tuple(replace(one, beads=(one.beads[0] - gone, one.beads[1] - gone)) for one in walkers)
     drive, axis = case.drive, vector_along(case.drive.axis)
-    layout = _layout(case, scene, plan.recording, plan.walkers)
+    layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
     angle = case.liquid.contact_angle
     text = _environment().get_template("walker.lig.j2").render(
         case=case,
@@ -170,7 +171,7 @@ def compose(plan: Plan) -> Deck:
         bin_size=_bin_size(case, scene),
     )  # fmt: skip
     files = {WALL_NAME: wall_mesh(scene.faces, max(scene.upper))}
-    return Deck(text, files, layout, (scene.lower, scene.upper), _fastest(case), plan.ranks)
+    return Deck(text, files, layout, (scene.lower, scene.upper), _fastest(case))
 
 
 def _contact_model(case: WalkerCase) -> str:
@@ -207,7 +208,7 @@ def _layout(case: WalkerCase, scene: Scene, recording: Recording, walkers: tuple
         atoms=len(scene.riders) + len(scene.beads),
         steps=recording.steps,
         time_step=case.run.time_step,
-        rider=1,
+        rider=1 if scene.riders else 0,
         walkers=walkers,
     )
 

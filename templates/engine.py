@@ -1,72 +1,7 @@
 """What LIGGGHTS-PUBLIC 3.8.0 (as Debian packages it) does wrong or unlike its manual, and what the decks do about it.
 
-This is the only place that knows. Each entry names the defect, how it shows, and the remedy; the functions below are
+This is the only place that knows; docs/engine.md is generated from `DEFECTS` and from an audit. The functions below are
 the remedies that need arithmetic, the rest stands in the deck's blocks (``templates/blocks``).
-
-Walls pull half as hard
-    The capillary models take a wall for an equal sphere: 1.74 πγR at 1 % liquid, where a sphere on a plane is pulled
-    by 4πγR (3.5 πγR at finite volume). ``easo/capillary/viscous`` at least pulls on touching walls; in
-    ``washino/capillary/viscous`` the effective radius there is zero. Remedy: easo, and every wall stands in the deck
-    twice (`Remedies.wall_copies`), which gives 3.48 πγR and the sphere–plane lubrication forces. Friction stays at μ
-    times the total normal force; the contact gets twice as stiff.
-
-Bridges to a wall that do not touch read a stranger's velocity
-    The viscous force of an open wall bridge uses the velocity of the local atom whose number is that of the wall's
-    triangle: it vanishes for bead 0 and is 80–90 % off for others; with a primitive wall it reads in front of the
-    array, and crashes or not. Remedy: walls are meshes with one large triangle a face, and the first atoms of the
-    deck, one a triangle, are *riders* that move with the walls and touch nothing, so that the velocity read is the
-    wall's own. Spatial sorting is switched off, for it would renumber them.
-
-A triangle is kept by its centroid
-    Nodes far outside the simulation box are harmless (a warning), a centroid outside loses the triangle. One triangle
-    far larger than the box leaves no edge inside it. See `wall_mesh`.
-
-The contact angle enters as ½ θi θj
-    in radians, though given in degrees. Remedy: `contact_angle_setting`.
-
-The liquid content is a fraction
-    of the bead's volume; the manual says per cent. The deck gives the fraction.
-
-Bridges are cut at a given separation
-    ``maxSeparationDistanceRatio`` breaks a bridge at (ratio − 1)(Ri + Rj), at a wall at (ratio − 1) 2R, however much
-    liquid it holds; and a wall loses sight of a bead, bridge and all, at (1.1 ratio − 1) R, which is nearer: at 1.2 a
-    bridge with a contact angle of 30° broke at 0.32 R instead of 0.35 R. Remedy: `separation_cap`, always beyond the
-    rupture distance.
-
-Gravity dies where its vector vanishes
-    A time-dependent ``fix gravity`` normalises its vector and stays dead once that was exactly zero. Remedy: in the
-    container frame the drive is a gravity of signed magnitude along a fixed unit vector, beside the constant one.
-
-``-screen none`` crashes as soon as a mesh is read
-    The engine's output is redirected instead.
-
-An abort swallows its message
-    when the output is a file: the buffer is not flushed. The engine is run through ``stdbuf -oL``.
-
-A position that is no number
-    ends in "Internal error (./src/tri_mesh_I.h:109)": no number lies on any side of a triangle's edges. See
-    `POSITION_IS_NO_NUMBER`.
-
-A lost bead is no error
-    Neither exit status nor an ERROR line tells: the deck prints the number of atoms every cycle.
-
-Too large a time step is no error
-    See `inputs.timestep`.
-
-Reported forces of sliding contacts are wrong
-    ``compute pair/gran/local`` and ``wall/gran/local`` evaluate the contact once more. The friction spring has been cut
-    back to the Coulomb limit by then, so that rounding lets the contact pass for a sticking one, and a tangential
-    damping force is added that never acted: 2.2e-4 N was seen where friction was 5e-6 N (the dumped total forces of
-    the beads are right, and so is the trajectory). Remedy: only the normal part of these outputs is used.
-
-Only one mesh wall fix is allowed
-    ``mesh n_meshes N meshes m1 m2 …`` lists all of them.
-
-A second ``thermo_style`` resets ``thermo_modify``
-    Each deck has one.
-
-Splitting a run changes the trajectory
-    of chaotic systems, by rounding: each deck has one ``run``.
 """
 
 from __future__ import annotations
@@ -78,6 +13,142 @@ from math import degrees, sqrt
 
 from inputs import forces
 from templates.scene import AXES, Face
+
+
+@dataclass(frozen=True)
+class Defect:
+    """Something that the engine does wrong, or unlike its manual.
+
+    Attributes
+    ----------
+    name
+        What it is.
+    shows
+        How it shows.
+    remedy
+        What is done about it.
+    watched_by
+        Names of the audit's checks that would notice a change.
+    """
+
+    name: str
+    shows: str
+    remedy: str
+    watched_by: tuple[str, ...] = ()
+
+
+DEFECTS = (
+    Defect(
+        "Walls pull half as hard",
+        "The capillary models take a wall for an equal sphere: 1.74 πγR at 1 % liquid, where a sphere on a plane "
+        "is pulled by 4πγR (3.9 πγR at finite volume). `easo/capillary/viscous` at least pulls on touching walls;"
+        " in `washino/capillary/viscous` the effective radius there is zero.",
+        "easo, and every wall stands in the deck twice, which gives 3.48 πγR and the lubrication forces of a "
+        "sphere on a plane. All of the contact is doubled: stiffness, damping (hence less restitution), the "
+        "friction spring; the friction limit stays at μ times the total normal force.",
+        (
+            "capillary-wall",
+            "restitution",
+            "hertz",
+        ),
+    ),
+    Defect(
+        "Open bridges to a wall read a stranger's velocity",
+        "The viscous force of a wall bridge that does not touch uses the velocity of the local atom whose number "
+        "is that of the wall's triangle: it vanishes for bead 0 and is 80-90 % off for others. With a primitive "
+        "wall it reads in front of the array, and crashes or not.",
+        "Walls are meshes with one large triangle a face, and the first atoms of every deck, one a triangle and "
+        "MPI rank, are riders that move with the walls and touch nothing, so that the velocity read is the wall's"
+        " own. Spatial sorting is off, for it would renumber them.",
+        (
+            "viscous-walls",
+            "viscous-riders",
+            "ranks",
+        ),
+    ),
+    Defect(
+        "The contact angle enters as ½ θi θj",
+        "in radians, though given in degrees: 30° acts as 7.9°.",
+        "Both types are given √(2θ) for an effective angle θ.",
+        ("contact-angle",),
+    ),
+    Defect(
+        "Bridges are cut at a given separation",
+        "`maxSeparationDistanceRatio` breaks a bridge at (ratio - 1)(Ri + Rj), at a wall at (ratio - 1) 2R, "
+        "however much liquid it holds; and a wall loses sight of a bead, bridge and all, at (1.1 ratio - 1) R, "
+        "which is nearer: at 1.2 a bridge with a contact angle of 30° broke at 0.32 R instead of 0.35 R.",
+        "The ratio is computed so that it lies beyond the rupture distance of every bridge.",
+        (
+            "capillary-beads",
+            "capillary-wall",
+            "contact-angle",
+        ),
+    ),
+    Defect(
+        "Reported forces of sliding contacts are wrong",
+        "`compute pair/gran/local` and `wall/gran/local` evaluate the contact once more. The friction spring has "
+        "been cut back to the Coulomb limit by then, so that rounding lets the contact pass for a sticking one, "
+        "and a tangential damping force is added that never acted: 2.2e-4 N was seen where friction was 5e-6 N. "
+        "The beads' total forces and the trajectory are right.",
+        "Only the normal part of these outputs is used.",
+        ("energy",),
+    ),
+    Defect(
+        "The liquid content is a fraction",
+        "of the bead's volume; the manual says per cent.",
+        "The deck gives the fraction.",
+        ("capillary-beads",),
+    ),
+    Defect(
+        "Gravity dies where its vector vanishes",
+        "A time-dependent `fix gravity` normalises its vector and stays dead once that was exactly zero.",
+        "In the container frame the drive is a gravity of signed magnitude along a fixed vector, beside the "
+        "constant one.",
+        ("frames",),
+    ),
+    Defect(
+        "A restart moves on a little differently",
+        "A run that goes on from `read_restart` is not bit for bit the uninterrupted one.",
+        "It is used for statistics; each deck of a walker has one `run`.",
+        ("restart",),
+    ),
+    Defect(
+        "Too large a time step is no error",
+        "The lubrication force is stiff: past its limit beads heat up, and at several times the limit are lost, "
+        "in silence.",
+        "The time step respects a viscous limit beside Rayleigh's and Hertz's (`inputs.timestep`).",
+        (
+            "step-walker",
+            "step-pile",
+        ),
+    ),
+    Defect(
+        "A lost bead is no error",
+        "Neither exit status nor an ERROR line tells.",
+        "The deck prints the number of atoms, their speed and extent a few times a cycle; the runner reads them.",
+    ),
+    Defect(
+        "A triangle is kept by its centroid",
+        "Nodes far outside the simulation box are harmless (a warning); a centroid outside loses the triangle.",
+        "A face is one triangle far larger than the box, its centroid inside: no edge is ever met.",
+        ("viscous-walls",),
+    ),
+    Defect(
+        "Only one mesh wall fix is allowed",
+        "A second `fix wall/gran ... mesh` is refused.",
+        "`mesh n_meshes N meshes m1 m2 ...` lists all of them.",
+    ),
+    Defect(
+        "An abort swallows its message",
+        "when the output is a file, for the buffer is not flushed. `-screen none` crashes as soon as a mesh is read.",
+        "The engine is run through `stdbuf -oL`, its output redirected.",
+    ),
+    Defect(
+        "A position that is no number",
+        'ends in "Internal error (./src/tri_mesh_I.h:109)": no number lies on any side of a triangle\'s edges.',
+        "The runner tells it as a blow-up.",
+    ),
+)
 
 AUDITED_VERSION = "LIGGGHTS-PUBLIC 3.8.0"
 """The version that all of this was measured on."""

@@ -36,7 +36,10 @@ class PlacedWalker:
 
 @dataclass(frozen=True)
 class Layout:
-    """Dumps of a deck (file names, columns, steps between frames, frames expected) and its walkers."""
+    """Dumps of a deck (file names, columns, steps between frames, frames expected) and its walkers.
+
+    ``rider`` is the id of the atom that moves with the substrate, 0 in a deck without one.
+    """
 
     bead_dump: str
     bead_columns: tuple[str, ...]
@@ -53,11 +56,12 @@ class Layout:
     time_step: float
     rider: int
     walkers: tuple[PlacedWalker, ...]
+    ranks: int = 1
 
     @property
     def bead_dump_bytes(self) -> int:
         """Size of the complete bead dump."""
-        header = 8 + 8 + 4 + 6 * 4 + 6 * 8 + 4 + 4 + 4
+        header = 8 + 8 + 4 + 6 * 4 + 6 * 8 + 4 + 4 + 4 * self.ranks
         return self.frames * (header + 8 * self.atoms * len(self.bead_columns))
 
     def as_dict(self) -> dict[str, Any]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import copy
 import json
+import os
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -34,6 +36,9 @@ REFERENCE: dict[str, Any] = {
     "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
     "start": {"replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
 }
+# The user's cache is not ours to read or write: audits of the engine are kept there.
+os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="walkers-tests-")
+
 PROGRAM = str(Path(sys.executable).with_name("walkers"))
 SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
 

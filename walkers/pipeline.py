@@ -13,6 +13,7 @@ from inputs.errors import InputError, Problem
 
 if TYPE_CHECKING:
     from inputs.case import WalkerCase
+    from runner.binary import Engine
     from runner.directory import FinishedRun
     from runner.launch import Progress
 
@@ -36,6 +37,7 @@ def run_case(
     force: bool = False,
     on_progress: Callable[[Progress], None] | None = None,
     time_limit: float | None = None,
+    despite_audit: bool = False,
 ) -> Outcome:
     """Run a case, unless its run is there already, and tabulate it.
 
@@ -53,6 +55,8 @@ def run_case(
         Called a few times a second while the engine runs.
     time_limit
         Wall time in s that the engine may take.
+    despite_audit
+        Run on an engine that failed its audit.
 
     Returns
     -------
@@ -72,6 +76,7 @@ def run_case(
     old = finished_run(out / run_name(case, deck, binary))
     if old is not None and not force:
         return Outcome(old, _result_of(old), found=True)
+    _check_audit(binary, despite_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
     loading = threading.Thread(target=_load_postprocess, daemon=True)
     loading.start()
@@ -88,6 +93,18 @@ def run_case(
 
         result = tabulate(run.directory)
         return Outcome(run.finish(report), result, found=False)
+
+
+def _check_audit(engine: Engine, despite_audit: bool) -> None:
+    from runner.audits import read_audit
+    from runner.failures import AuditFailed, UnauditedEngineWarning
+
+    audit = read_audit(engine.sha256)
+    if audit is None:
+        message = "this engine was never audited; prove what it computes with: walkers audit"
+        warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
+    elif not audit.passed and not despite_audit:
+        raise AuditFailed(audit.failures)
 
 
 def _load_postprocess() -> None:

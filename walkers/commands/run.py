@@ -16,6 +16,8 @@ Force = Annotated[bool, typer.Option("--force", help="Run again even if the run 
 Limit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Stop a run after this many seconds.")]
 EngineOption = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
 
+DespiteAudit = Annotated[bool, typer.Option("--despite-audit", help="Run on an engine that failed its audit.")]
+
 
 def command(
     cases: Cases,
@@ -24,6 +26,7 @@ def command(
     as_json: Json = False,
     limit: Limit = None,
     engine: EngineOption = None,
+    despite_audit: DespiteAudit = False,
 ) -> int:
     """Run cases, unless they have been run, and print their results (with --json an object a line)."""
     from inputs.errors import InputError, Problem
@@ -40,7 +43,15 @@ def command(
     for case in loaded:
         try:
             with progress_of(case) as advance:
-                outcome = run_case(case, out, engine=engine, force=force, on_progress=advance, time_limit=limit)
+                outcome = run_case(
+                    case,
+                    out,
+                    engine=engine,
+                    force=force,
+                    on_progress=advance,
+                    time_limit=limit,
+                    despite_audit=despite_audit,
+                )
         except EngineFailure as failure:
             print(f"walkers: {case.name}: {failure}", file=sys.stderr)
             failed += 1

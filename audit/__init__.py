@@ -1,0 +1,9 @@
+"""Proof of what the engine does: small decks, made of the blocks of the real ones, against published formulas.
+
+Knows all rooms before it. A check is an entry in one of the modules of ``audit/checks``.
+"""
+
+from audit.check import Check, Line, Verdict
+from audit.run import AuditReport, run_audit
+
+__all__ = ["AuditReport", "Check", "Line", "Verdict", "run_audit"]

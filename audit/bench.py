@@ -1,0 +1,160 @@
+"""The bench: scenes of a few beads, run by the engine, read back as arrays."""
+
+from __future__ import annotations
+
+import itertools
+import shutil
+import threading
+from dataclasses import dataclass, field, replace
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from inputs import resolve_case
+from inputs.case import WalkerCase
+from postprocess.dump import BinaryDump, FloatArray
+from runner.binary import Engine
+from runner.directory import write_deck
+from runner.launch import launch
+from templates.deck import Deck, Plan, Recording, compose
+from templates.engine import ALL_REMEDIES, Remedies
+from templates.layout import BEAD_COLUMNS
+from templates.scene import Bead, Face, Point, Scene
+
+TORQUE_COLUMNS = ("tqx", "tqy", "tqz")
+FLOOR = Face("z", 1, (0.0, 0.0, 0.0))
+
+
+def bench_case(**changes: dict[str, Any]) -> WalkerCase:
+    """A case without friction, damping, viscosity, gravity and drive, to which a check adds what it measures."""
+    tables: dict[str, dict[str, Any]] = {
+        "beads": {"radii": ["0.3 mm", "0.2 mm"], "density": "4.0 g/cm^3"},
+        "liquid": {"surface_tension": "19.2 mN/m", "dynamic_viscosity": "0 Pa*s"},
+        "substrate": {"material": "glass"},
+        "contact": {"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": 0.0, "restitution": 1.0},
+        "drive": {"frequency": "80 Hz", "peak_acceleration": "0 g", "frame": "container"},
+        "run": {"time_step": "1 us", "samples_per_cycle": 1},
+        "environment": {"gravity": "0 m/s^2"},
+    }
+    for table, values in changes.items():
+        tables[table] = {**tables.get(table, {}), **values}
+    return resolve_case(tables, source="<audit>", name="audit")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Series of a deck: F frames of N atoms.
+
+    Attributes
+    ----------
+    steps : ndarray, shape (F,)
+    position, velocity, spin, force, torque : ndarray, shape (F, N, 3)
+        SI units, by atom id.
+    directory
+        Of the run.
+    missing
+        How many riders of the scene the deck was run without.
+    """
+
+    steps: npt.NDArray[np.int64]
+    position: FloatArray
+    velocity: FloatArray
+    spin: FloatArray
+    force: FloatArray
+    torque: FloatArray
+    directory: Path
+    missing: int = 0
+
+    def row(self, bead: int) -> int:
+        """Row of a bead, by the id that it has in the scene."""
+        return bead - 1 - self.missing
+
+
+@dataclass
+class Bench:
+    """Runs decks of an engine in a folder of its own.
+
+    Attributes
+    ----------
+    engine
+        The binary on trial.
+    folder
+        Where decks are run.
+    remedies
+        Those of the decks on trial; tests take some away to see the audit fail.
+    pile_time_steps
+        Steps in s at which the small pile is run, the last but one being what ``auto`` allows.
+    """
+
+    engine: Engine
+    folder: Path
+    remedies: Remedies = ALL_REMEDIES
+    pile_time_steps: tuple[float, ...] = (0.5e-6, 1e-6, 2e-6, 4e-6)
+    version: str = "unknown"
+    _numbers: itertools.count[int] = field(default_factory=itertools.count)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def new_directory(self) -> Path:
+        """A fresh directory for a deck."""
+        with self._lock:
+            directory = self.folder / f"deck-{next(self._numbers):03d}"
+        directory.mkdir(parents=True)
+        return directory
+
+    def run(self, plan: Plan, carry: Path | None = None) -> Measured:
+        """Run a plan and read its series.
+
+        Parameters
+        ----------
+        plan
+            Its recording should have `TORQUE_COLUMNS`; see `bench_recording`.
+        carry
+            A file to put into the deck's directory, such as a restart file.
+        """
+        deck = replace(compose(plan), fastest=inf)
+        missing = 0 if plan.remedies.riders else len(plan.scene.riders)
+        return replace(self.run_deck(deck, carry), missing=missing)
+
+    def run_deck(self, deck: Deck, carry: Path | None = None) -> Measured:
+        """Run a deck and read its series."""
+        directory = self.new_directory()
+        write_deck(deck, directory)
+        if carry is not None:
+            shutil.copy(carry, directory)
+        self.version = launch(deck, directory, self.engine).version
+        return read_series(deck, directory)
+
+
+def read_series(deck: Deck, directory: Path) -> Measured:
+    """Read the bead dump of a deck as `Measured`."""
+    dump = BinaryDump(directory / deck.layout.bead_dump, deck.layout.bead_columns)
+    frames = dump.stack()
+
+    def vectors(name: str) -> FloatArray:
+        start = dump.column(name)
+        return frames[:, :, start : start + 3]
+
+    torque = vectors("tqx") if "tqx" in dump.columns else np.zeros_like(vectors("x"))
+    return Measured(dump.steps, vectors("x"), vectors("vx"), vectors("omegax"), vectors("fx"), torque, directory)
+
+
+def bench_recording(steps: int, sample_every: int) -> Recording:
+    """Record beads with their torques; bridges at the start and the end only."""
+    return Recording(
+        steps=steps,
+        sample_every=sample_every,
+        bridge_every=steps,
+        status_every=steps,
+        bead_columns=(*BEAD_COLUMNS, *TORQUE_COLUMNS),
+    )
+
+
+def scene_on_floor(beads: list[Bead], half_width: float = 0.02, height: float = 0.02) -> Scene:
+    """Beads over the floor z = 0 with its rider in the corner; ids are given here, from 2."""
+    numbered = tuple(replace(bead, id=2 + number) for number, bead in enumerate(beads))
+    edge = half_width + 2e-3
+    rider: Point = (half_width + 1e-3, half_width + 1e-3, height + 1e-3)
+    return Scene(numbered, (FLOOR,), (rider,), (-edge, -edge, -2e-3), (edge, edge, height + 2e-3))

@@ -1,0 +1,171 @@
+"""Group 5: friction, rolling resistance, restitution, Hertz contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import exp, log, pi, sqrt
+
+import numpy as np
+
+from audit.bench import Bench, Measured, bench_case, bench_recording, scene_on_floor
+from audit.check import Check, Line
+from audit.laws import Partner, hertz_law, largest_error
+from inputs.case import WalkerCase
+from inputs.dimer import contact_loads
+from templates.deck import Plan
+from templates.engine import Remedies
+from templates.scene import Bead
+
+_WALL = frozenset({"walls"})
+_HERTZ = "4/3 E* √R* δ^(3/2)"
+
+
+def _row(bench: Bench) -> int:
+    return 1 if bench.remedies.riders else 0
+
+
+def _pressed_bead(case: WalkerCase) -> tuple[Bead, float]:
+    """A bead at the overlap at which the elastic repulsion carries its capillary load, and that load."""
+    loads = contact_loads(case)
+    radius = case.beads.radii[0]
+    return Bead(0, (0.0, 0.0, radius - loads.overlaps[0]), radius), loads.capillary[0]
+
+
+def friction(bench: Bench) -> Iterator[Line]:
+    """A bead under its capillary load, drawn slowly along the wall: a spring at first, then μ F_N."""
+    speed, coefficient = 1e-4, 0.3
+    case = bench_case(contact={"friction": {"bead_bead": 0.0, "bead_wall": coefficient}})
+    bead, load = _pressed_bead(case)
+    bead = Bead(0, bead.centre, bead.radius, velocity=(speed, 0.0, 0.0))
+    recording = bench_recording(1500, 10)
+    series = bench.run(Plan(case, scene_on_floor([bead]), recording, remedies=bench.remedies, prescribed=True))
+    drag = -series.force[:, _row(bench), 0]
+    yield Line(
+        "sliding friction under the capillary load",
+        "μ F_N, F_N = capillary load",
+        coefficient * load,
+        float(drag[-1]),
+        "N",
+        1e-3,
+        None,
+        _WALL,
+    )
+    overlap = contact_loads(case).overlaps[0]
+    shear = case.contact.youngs_modulus / (2.0 * (1.0 + case.contact.poissons_ratio))
+    reduced_shear = shear / (2.0 * (2.0 - case.contact.poissons_ratio))
+    spring = 2.0 * 8.0 * reduced_shear * sqrt(bead.radius * overlap)
+    moved = speed * case.run.time_step * series.steps.astype(np.float64)
+    held = spring * moved < 0.9 * coefficient * load
+    yield Line(
+        "at rest below μ F_N: tangential spring of a doubled wall", "2 · 8 G* √(Rδ) s (Mindlin)",
+        float(spring * moved[held][-1]), float(drag[held][-1]), "N", 1e-3,
+        largest_error(drag[held, None], spring * moved[held, None]), _WALL,
+    )  # fmt: skip
+
+
+def rolling(bench: Bench) -> Iterator[Line]:
+    """The torque on a bead that spins under its capillary load."""
+    coefficient = 0.05
+    case = bench_case(contact={"rolling_friction": coefficient, "friction": {"bead_bead": 0.0, "bead_wall": 0.0}})
+    bead, load = _pressed_bead(case)
+    bead = Bead(0, bead.centre, bead.radius, spin=(0.0, 20.0, 0.0))
+    series = bench.run(
+        Plan(case, scene_on_floor([bead]), bench_recording(20, 10), remedies=bench.remedies, prescribed=True)
+    )
+    torque = series.torque[-1, _row(bench), 1]
+    yield Line(
+        "rolling resistance torque",
+        "μ_r R F_N",
+        coefficient * bead.radius * load,
+        float(-torque),
+        "N m",
+        1e-3,
+        None,
+        _WALL,
+    )
+
+
+def hertz(bench: Bench) -> Iterator[Line]:
+    """Dry beads pressed onto the wall and onto each other."""
+    case = bench_case(liquid={"volume_fraction": 1e-9})
+    radius, small = case.beads.radii
+    sink = -0.001
+    beads = [
+        Bead(0, (0.0, 0.0, radius), radius, velocity=(0.0, 0.0, sink)),
+        Bead(0, (6e-3, 0.0, 5e-3), radius),
+        Bead(0, (6e-3, 0.0, 5e-3 + radius + small), small, velocity=(0.0, 0.0, sink)),
+    ]
+    series = bench.run(
+        Plan(case, scene_on_floor(beads), bench_recording(500, 25), remedies=bench.remedies, prescribed=True)
+    )
+    row = _row(bench)
+    at_wall = series.position[:, row, 2] - radius
+    between = series.position[:, row + 2, 2] - series.position[:, row + 1, 2] - radius - small
+    for what, gap, measured, size, partner, needs in (
+        ("doubled wall", at_wall, series.force[:, row, 2], radius, Partner(radius, wall=True), _WALL),
+        ("beads", between, series.force[:, row + 2, 2], small, Partner(radius), frozenset[str]()),
+    ):
+        law = hertz_law(case, size, partner, gap)
+        error = largest_error(measured[:, None], law[:, None])
+        yield Line(
+            f"Hertz force against overlap, {what}", _HERTZ, float(law[-1]), float(measured[-1]), "N", 1e-4, error, needs
+        )
+
+
+def _rebound(series: Measured, row: int, speed: float) -> float:
+    return float(series.velocity[-1, row, 2] / speed)
+
+
+def doubled_restitution(coefficient: float) -> float:
+    """Restitution at a wall that stands twice: stiffness and damping double, the damping ratio grows by √2."""
+    ratio = sqrt(2.0) * -log(coefficient) / sqrt(log(coefficient) ** 2 + pi**2)
+    return exp(-pi * ratio / sqrt(1.0 - ratio**2)) if ratio < 1.0 else 0.0
+
+
+def restitution(bench: Bench) -> Iterator[Line]:
+    """Dry impacts: on a single wall, on the doubled wall, between beads."""
+    speed = 0.05
+    for coefficient in (0.3, 0.6, 0.9):
+        case = bench_case(
+            liquid={"volume_fraction": 1e-9}, contact={"restitution": coefficient}, run={"time_step": "0.2 us"}
+        )
+        radius = case.beads.radii[0]
+        beads = [
+            Bead(0, (0.0, 0.0, radius + 1e-7), radius, velocity=(0.0, 0.0, -speed)),
+            Bead(0, (6e-3, 0.0, 5e-3), radius, velocity=(0.0, 0.0, speed)),
+            Bead(0, (6e-3, 0.0, 5e-3 + 2.0 * radius + 1e-7), radius, velocity=(0.0, 0.0, -speed)),
+        ]
+        recording = bench_recording(2000, 2000)
+        walls = {"single": Remedies(wall_copies=1), "doubled": bench.remedies}
+        found = {
+            name: bench.run(Plan(case, scene_on_floor(beads), recording, remedies=remedies))
+            for name, remedies in walls.items()
+        }
+        row = _row(bench)
+        yield Line(
+            f"restitution {coefficient:g} on a single wall",
+            "given coefficient",
+            coefficient,
+            _rebound(found["single"], 1, speed),
+            "",
+            0.02,
+        )
+        twice, rebound = doubled_restitution(coefficient), _rebound(found["doubled"], row, speed)
+        what = f"restitution {coefficient:g} on the doubled wall"
+        yield Line(what, "e of √2 times the damping ratio", twice, rebound, "", 0.02, None, _WALL)
+        yield Line(
+            f"restitution {coefficient:g} between beads",
+            "given coefficient",
+            coefficient,
+            _rebound(found["doubled"], row + 2, speed),
+            "",
+            0.02,
+        )
+
+
+CHECKS = (
+    Check("friction", 5, "sliding friction and rest under the capillary load", True, friction),
+    Check("rolling-friction", 5, "rolling resistance torque", True, rolling),
+    Check("hertz", 5, "Hertz force against overlap", True, hertz),
+    Check("restitution", 5, "restitution of dry impacts", True, restitution),
+)

@@ -1,0 +1,100 @@
+"""Group 7: independence of replicates, reruns, restarts, MPI ranks."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from audit.bench import Bench
+from audit.check import Check, Line
+from audit.checks.drive import reference_walker
+from audit.checks.viscous import box_lines, run_box, viscous_case
+from inputs.case import WalkerCase
+from templates.deck import Checkpoint, Plan, Recording, compose, render_deck
+from templates.placement import place_walkers
+
+_RESTART_FILE = "half.restart"
+
+
+def _ensemble(replicates: int, frame: str = "lab") -> WalkerCase:
+    return reference_walker(
+        start={"replicates": replicates, "spacing": "30 mm"},
+        drive={"frequency": "80 Hz", "peak_acceleration": "4 g", "frame": frame},
+        run={"cycles": 10, "settling_cycles": 2},
+    )
+
+
+def independence(bench: Bench) -> Iterator[Line]:
+    """A walker among four against the same one alone; a rerun against the run."""
+    together, alone, again = (bench.run_deck(render_deck(_ensemble(count), bench.remedies)) for count in (4, 1, 4))
+    row = 1 if bench.remedies.riders else 0
+    ways = [series.position[:, row] - series.position[0, row] for series in (together, alone)]
+    error = float(np.abs(ways[0] - ways[1]).max() / np.abs(ways[1]).max())
+    yield Line(
+        "a walker among four against the same one alone", "independent replicates", 0.0, error, "rel.", 1e-6, error
+    )
+    dumps = [(series.directory / "beads.bin").read_bytes() for series in (together, again)]
+    yield Line("bytes of the dump that differ in a rerun", "deterministic", 0.0, float(dumps[0] != dumps[1]), "", 0.0)
+
+
+def restart(bench: Bench) -> Iterator[Line]:
+    """Ten cycles at a stretch against five, a restart file, and five more (container frame)."""
+    case = _ensemble(2, "container")
+    scene, walkers = place_walkers(case)
+    run = case.run
+    every = run.steps_per_cycle // run.samples_per_cycle
+    half = run.steps // 2
+    whole = bench.run_deck(render_deck(case, bench.remedies))
+    plan = Plan(
+        case, scene, Recording(half, every, run.steps_per_cycle, run.steps_per_cycle), walkers, bench.remedies,
+        checkpoint=Checkpoint(write=_RESTART_FILE),
+    )  # fmt: skip
+    first = bench.run(plan)
+    rest = Recording(run.steps, every, run.steps_per_cycle, run.steps_per_cycle)
+    deck = compose(replace(plan, recording=rest, checkpoint=Checkpoint(read=_RESTART_FILE)))
+    # The dump begins at the restart: it holds the second half and the frame between.
+    short = replace(deck.layout, frames=deck.layout.frames // 2 + 1, bridge_frames=deck.layout.bridge_frames // 2 + 1)
+    second = bench.run_deck(replace(deck, layout=short), first.directory / _RESTART_FILE)
+    way = float(np.abs(whole.position[-1] - whole.position[0]).max())
+    apart = float(np.abs(second.position[-1] - whole.position[-1]).max())
+    yield Line(
+        "restarted against uninterrupted run, over the way gone",
+        "read_restart",
+        0.0,
+        apart / way,
+        "rel.",
+        0.01,
+        apart / way,
+    )
+    back = 3 * run.samples_per_cycle
+    speeds = [
+        float((series.position[-1, 1, 0] - series.position[-1 - back, 1, 0]) * case.drive.frequency / 3.0)
+        for series in (whole, second)
+    ]
+    yield Line(
+        "speed in the last three cycles, restarted against uninterrupted",
+        "read_restart",
+        speeds[0],
+        speeds[1],
+        "m/s",
+        1e-3,
+    )
+
+
+def ranks(bench: Bench) -> Iterator[Line]:
+    """The box of beads on two MPI ranks, each with its own riders."""
+    if shutil.which("mpirun") is None:
+        yield Line("SKIPPED: two MPI ranks (no mpirun on this machine)", "", float("nan"), float("nan"))
+        return
+    needs = frozenset({"riders", "walls"})
+    yield from box_lines("two MPI ranks", run_box(bench, viscous_case(), bench.remedies, ranks=2), needs)
+
+
+CHECKS = (
+    Check("independence", 7, "replicates independent, reruns bitwise the same", True, independence),
+    Check("restart", 7, "restarted against uninterrupted run", True, restart),
+    Check("ranks", 7, "two MPI ranks against the law", True, ranks),
+)

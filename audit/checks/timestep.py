@@ -1,0 +1,109 @@
+"""Group 8: convergence in the time step, of the walker and of a small glycerol pile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from audit.bench import Bench, bench_case, bench_recording
+from audit.check import Check, Line
+from audit.checks.drive import reference_walker, walking_speed
+from inputs.case import WalkerCase
+from inputs.timestep import AUTO_FRACTIONS
+from templates.deck import Plan
+from templates.scene import Bead, Face, Scene
+
+_SIDE = 5.3e-3
+_LARGE, _SMALL = 5.45e-4, 3.075e-4
+_CYCLES, _SETTLING = 10, 4
+
+
+def walker_convergence(bench: Bench) -> Iterator[Line]:
+    """The AK5 walker at 0.5, 1, 2 and 4 µs, and at the step that ``auto`` takes."""
+    speeds = {step: walking_speed(bench, reference_walker(run={"cycles": 30, "settling_cycles": 10, "time_step": step}))
+              for step in ("0.5 us", "1 us", "2 us", "4 us", "auto")}  # fmt: skip
+    for step, speed in speeds.items():
+        tolerance = 0.005 if step in ("auto", "1 us", "2 us") else None
+        yield Line(
+            f"walker's speed at a step of {step}", "converged at 0.5 us", speeds["0.5 us"], speed, "m/s", tolerance
+        )
+
+
+def pile_case(time_step: float) -> WalkerCase:
+    """The paper's glass beads in glycerol, shaken vertically, container frame."""
+    case = bench_case(
+        beads={"radii": [f"{_LARGE} m", f"{_SMALL} m"], "density": "2.5 g/cm^3"},
+        liquid={"name": "glycerol 87 %", "surface_tension": "61 mN/m", "dynamic_viscosity": "120.54 mPa*s"},
+        contact={"friction": {"bead_bead": 0.3, "bead_wall": 0.3}, "restitution": 0.3, "rolling_friction": 0.0},
+        drive={"axis": "z", "frequency": "170 Hz", "peak_acceleration": "16.2 g", "frame": "container"},
+        run={"time_step": "auto", "samples_per_cycle": 1},
+        environment={"gravity": "9.81 m/s^2"},
+    )
+    return replace(case, run=replace(case.run, time_step=time_step))
+
+
+def pile_scene() -> Scene:
+    """200 beads in layers, small ones below, in an open box of five faces; jittered by a fixed seed."""
+    half = _SIDE / 2.0
+    faces = (
+        Face("z", 1, (1e-4, 0.0, 0.0)),
+        Face("x", 1, (-half, 0.0, 0.01)), Face("x", -1, (half, 0.0, 0.01)),
+        Face("y", 1, (1e-4, -half, 0.01)), Face("y", -1, (1e-4, half, 0.01)),
+    )  # fmt: skip
+    riders = tuple((x, 0.0, -1.5e-3) for x in (-2e-3, -1e-3, 0.0, 1e-3, 2e-3))
+    jitter = np.random.default_rng(7)
+    beads: list[Bead] = []
+    height = 0.0
+    for radius, count in ((_SMALL, 170), (_LARGE, 30)):
+        across = int(_SIDE / (2.02 * radius))
+        pitch = _SIDE / across
+        for number in range(count):
+            layer, place = divmod(number, across * across)
+            row, column = divmod(place, across)
+            z = height + (1.02 + 2.04 * layer) * radius
+            shift = jitter.uniform(-1.0, 1.0, 2) * 0.4 * (pitch - 2.0 * radius)
+            x, y = ((index + 0.5) * pitch - half for index in (row, column))
+            beads.append(Bead(len(riders) + len(beads) + 1, (x + shift[0], y + shift[1], z), radius))
+        height += (2.04 * (1 + (count - 1) // (across * across)) + 0.02) * radius
+    edge = half + 3e-4
+    return Scene(tuple(beads), faces, riders, (-edge, -edge, -2.5e-3), (edge, edge, 0.02))
+
+
+def agitation(bench: Bench, time_step: float) -> float:
+    """Mean square velocity of the pile's beads over the last cycles, m²/s²; infinite if beads were lost."""
+    from inputs.errors import WalkersError
+
+    case, scene = pile_case(time_step), pile_scene()
+    period = 1.0 / case.drive.frequency
+    every = max(1, round(period / 20.0 / time_step))
+    steps = every * 20 * _CYCLES
+    try:
+        series = bench.run(Plan(case, scene, bench_recording(steps, every), remedies=bench.remedies))
+    except WalkersError:
+        return float("inf")
+    first = len(scene.riders) if bench.remedies.riders else 0
+    return float(np.mean(np.sum(series.velocity[20 * _SETTLING :, first:] ** 2, axis=-1)))
+
+
+def pile_convergence(bench: Bench) -> Iterator[Line]:
+    """The pile's agitation at each step, and the limit that ``auto`` uses."""
+    found = {step: agitation(bench, step) for step in bench.pile_time_steps}
+    finest = bench.pile_time_steps[0]
+    trusted = bench.pile_time_steps[-2]
+    for step, value in found.items():
+        tolerance = 0.15 if step == trusted else None
+        needs = frozenset({"time step"}) if step == trusted else frozenset[str]()
+        what = f"glycerol pile, mean square velocity at {step * 1e6:g} µs"
+        source = f"converged at {finest * 1e6:g} µs"
+        yield Line(what, source, found[finest], value, "m²/s²", tolerance, None, needs)
+    last, share = bench.pile_time_steps[-1], AUTO_FRACTIONS["viscous"]
+    what = f"glycerol pile heated at {last * 1e6:g} µs, beyond auto's {share:g} of the viscous limit"
+    yield Line(what, "ratio to the finest step", 1.0, found[last] / found[finest])
+
+
+CHECKS = (
+    Check("step-walker", 8, "walker's speed against the time step", False, walker_convergence),
+    Check("step-pile", 8, "a glycerol pile's agitation against the time step", False, pile_convergence),
+)

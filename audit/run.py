@@ -1,0 +1,134 @@
+"""Run the checks on an engine, two decks at a time, and collect the table."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+from typing import Any
+
+from audit.bench import Bench
+from audit.check import Check, Line, Verdict
+from audit.checks import capillary, contact, drive, energy, repeatability, timestep, viscous
+from inputs.errors import InputError, Problem, WalkersError
+from inputs.library import suggestion
+from runner.audits import AuditRecord, write_audit
+from runner.binary import Engine, find_engine
+from templates.engine import ALL_REMEDIES, Remedies
+
+CHECKS: tuple[Check, ...] = (
+    *capillary.CHECKS,
+    *viscous.CHECKS,
+    *contact.CHECKS,
+    *drive.CHECKS,
+    *repeatability.CHECKS,
+    *timestep.CHECKS,
+    *energy.CHECKS,
+)
+
+
+@dataclass(frozen=True)
+class CheckedLines:
+    """A check with its lines and the seconds that it took."""
+
+    check: Check
+    lines: tuple[Line, ...]
+    seconds: float
+
+
+@dataclass(frozen=True)
+class AuditReport:
+    """What an audit found."""
+
+    engine: Engine
+    version: str
+    checked: tuple[CheckedLines, ...]
+
+    @property
+    def lines(self) -> list[Line]:
+        """All lines."""
+        return [line for checked in self.checked for line in checked.lines]
+
+    @property
+    def failures(self) -> list[Line]:
+        """The lines that fail."""
+        return [line for line in self.lines if line.verdict is Verdict.FAIL]
+
+
+def selected(only: Sequence[str] = (), *, quick: bool = False) -> tuple[Check, ...]:
+    """The checks to run.
+
+    Raises
+    ------
+    InputError
+        If a name is not that of a check.
+    """
+    names = [check.name for check in CHECKS]
+    for name in only:
+        if name not in names:
+            hint = suggestion(name, names)
+            raise InputError(
+                "--only", [Problem("", None, f"no check {name!r}; expected one of {', '.join(names)}{hint}")]
+            )
+    return tuple(check for check in CHECKS if (not only or check.name in only) and (check.quick or not quick))
+
+
+def run_audit(
+    checks: Sequence[Check] = CHECKS,
+    *,
+    engine: Engine | None = None,
+    remedies: Remedies = ALL_REMEDIES,
+    on_done: Callable[[CheckedLines], None] | None = None,
+    **bench_options: Any,
+) -> AuditReport:
+    """Run checks on an engine.
+
+    Parameters
+    ----------
+    checks
+        Which ones.
+    engine
+        The binary; the installed one if None.
+    remedies
+        Those of the decks on trial.
+    on_done
+        Called with each check as it is done.
+    bench_options
+        Further attributes of the `Bench`.
+    """
+    binary = engine or find_engine()
+    with tempfile.TemporaryDirectory(prefix="walkers-audit-") as folder:
+        bench = Bench(binary, Path(folder), remedies, **bench_options)
+
+        def measure(check: Check) -> CheckedLines:
+            begin = time.perf_counter()
+            try:
+                lines = tuple(check.measure(bench))
+            except WalkersError as failure:
+                lines = (Line(f"{check.title}: {failure}", "the engine failed", nan, nan, tolerance=0.0),)
+            checked = CheckedLines(check, lines, time.perf_counter() - begin)
+            if on_done:
+                on_done(checked)
+            return checked
+
+        with ThreadPoolExecutor(2) as pool:
+            checked = tuple(pool.map(measure, checks))
+        return AuditReport(binary, bench.version, checked)
+
+
+def record(report: AuditReport, *, quick: bool) -> AuditRecord:
+    """Keep a report for the user: runs on this binary name it, and are refused if it failed."""
+    kept = AuditRecord(
+        engine=report.engine.sha256,
+        version=report.version,
+        scope="quick" if quick else "full",
+        lines=len(report.lines),
+        failures=tuple(line.what for line in report.failures),
+        date=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+    )
+    write_audit(kept)
+    return kept

@@ -1,0 +1,41 @@
+"""JSON files, written beside their place and renamed."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a JSON object.
+
+    Raises
+    ------
+    OSError, ValueError
+        If the file cannot be read or holds something else.
+    """
+    contents = json.loads(path.read_text("utf-8"))
+    if not isinstance(contents, dict):
+        raise ValueError(f"{path}: expected a JSON object")
+    return contents
+
+
+def write_json(path: Path, contents: Mapping[str, Any]) -> None:
+    """Write a JSON object beside its place, then rename: readers see the old file or the new one, never a part."""
+    beside = path.with_name(path.name + ".new")
+    with beside.open("w", encoding="utf-8") as file:
+        json.dump(contents, file, indent=2, ensure_ascii=False)
+        file.write("\n")
+        file.flush()
+        os.fsync(file.fileno())
+    beside.replace(path)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file beside its place, then rename."""
+    beside = path.with_name(path.name + ".new")
+    beside.write_text(text, encoding="utf-8")
+    beside.replace(path)

@@ -1,0 +1,207 @@
+"""The audit: passes on the installed engine, fails at exactly the lines whose remedy is missing."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from audit import AuditReport, Check, Line, Verdict, run_audit
+from audit.run import CHECKS, record, selected
+from audit.table import GROUPS, as_dict, as_markdown, as_text
+from inputs import InputError
+from runner.audits import AuditRecord, read_audit, write_audit
+from runner.binary import find_engine
+from runner.failures import AuditFailed, UnauditedEngineWarning
+from templates.engine import DEFECTS, Remedies
+from tests.conftest import PROGRAM, SHORT, document, make_case, to_toml
+from walkers import run_case
+
+
+@pytest.fixture(scope="module")
+def report() -> AuditReport:
+    """The quick audit of the installed engine."""
+    return run_audit(selected(quick=True))
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path
+
+
+def _failing(report: AuditReport) -> set[str]:
+    return {line.what for line in report.failures}
+
+
+def _standing_on(report: AuditReport, remedy: str) -> set[str]:
+    return {line.what for line in report.lines if remedy in line.needs}
+
+
+def test_the_installed_engine_passes(report: AuditReport) -> None:
+    assert not _failing(report)
+    assert len(report.lines) > 60
+    assert report.version == "LIGGGHTS-PUBLIC 3.8.0"
+
+
+def test_all_nine_groups_are_measured() -> None:
+    assert {check.group for check in CHECKS} == set(GROUPS) == set(range(1, 10))
+    assert {checked.group for checked in selected(quick=True)} >= {1, 2, 3, 4, 5, 6, 7, 9}
+
+
+def test_the_surprises_are_there_in_the_raw_engine(report: AuditReport) -> None:
+    found = {line.what: line for line in report.lines}
+    angle = found["defect: contactAngle of 30° acts as"]
+    assert angle.measured == pytest.approx(7.85, abs=0.05)
+    assert found["defect: without riders open wall bridges read a stranger's velocity (1: yes)"].measured == 1.0
+    assert found["defect: a single wall pulls half as hard, over πγR"].measured == pytest.approx(1.7, abs=0.05)
+
+
+def test_without_riders_exactly_the_viscous_wall_lines_fail(report: AuditReport) -> None:
+    broken = run_audit(selected(quick=True), remedies=Remedies(riders=False))
+    assert _failing(broken) == _standing_on(report, "riders")
+    assert len(_failing(broken)) >= 9
+
+
+def test_with_a_single_wall_exactly_the_wall_lines_fail(report: AuditReport) -> None:
+    broken = run_audit(selected(quick=True), remedies=Remedies(wall_copies=1))
+    assert _failing(broken) == _standing_on(report, "walls")
+
+
+def test_without_the_translation_exactly_the_angle_lines_fail(report: AuditReport) -> None:
+    broken = run_audit(selected(["contact-angle"]), remedies=Remedies(contact_angle=False))
+    assert _failing(broken) == _standing_on(report, "angle")
+
+
+def test_glycerol_at_eight_microseconds_fails_at_the_pile_alone() -> None:
+    broken = run_audit(selected(["step-pile"]), pile_time_steps=(2e-6, 8e-6, 8e-6))
+    assert _failing(broken) == _standing_on(broken, "time step")
+    assert len(_failing(broken)) == 1
+
+
+def test_a_line_that_is_no_number_fails() -> None:
+    line = Line("x", "y", 1.0, float("nan"), tolerance=0.1)
+    assert line.verdict is Verdict.FAIL
+    assert replace(line, tolerance=None).verdict is Verdict.REPORT
+    assert replace(line, measured=1.05).verdict is Verdict.PASS
+
+
+def test_an_engine_that_fails_in_a_check_fails_the_check(tmp_path: Path) -> None:
+    front = tmp_path / "liggghts-broken"
+    front.write_text("#!/bin/sh\necho ERROR: out of order\nexit 1\n")
+    front.chmod(0o755)
+    report = run_audit(selected(["hertz"]), engine=find_engine(str(front)))
+    assert len(report.failures) == 1
+    assert "out of order" in report.failures[0].what
+
+
+def test_every_defect_is_watched_by_checks_that_exist() -> None:
+    names = {check.name for check in CHECKS}
+    assert len(names) == len(CHECKS)
+    for defect in DEFECTS:
+        assert set(defect.watched_by) <= names
+
+
+def test_unknown_checks_are_refused() -> None:
+    with pytest.raises(InputError, match='did you mean "friction"'):
+        selected(["fricton"])
+
+
+def test_tables(report: AuditReport) -> None:
+    text, markdown, values = as_text(report), as_markdown(report), as_dict(report)
+    for line in report.lines:
+        assert line.what in text
+        assert line.what in markdown
+    assert values["passed"]
+    json.dumps(values, allow_nan=False)
+    for defect in DEFECTS:
+        assert defect.name in markdown
+
+
+def test_docs_engine_is_what_the_audit_writes(report: AuditReport) -> None:
+    """docs/engine.md is generated: all defects and all lines of the quick audit are in it, by their names."""
+    written = (Path(__file__).parent.parent / "docs" / "engine.md").read_text("utf-8")
+    for defect in DEFECTS:
+        assert f"### {defect.name}\n\n{defect.shows}\n\n*Remedy.* {defect.remedy}\n" in written
+    for checked in report.checked:
+        for line in checked.lines:
+            assert f"| `{checked.check.name}` | {line.what} |" in written
+
+
+def test_runs_name_the_audit_of_their_engine(own_cache: Path) -> None:
+    case = make_case(run=SHORT)
+    with pytest.warns(UnauditedEngineWarning, match="walkers audit"):
+        unaudited = run_case(case, own_cache / "a")
+    assert unaudited.run.manifest["engine"]["audit"] is None
+    kept = record(run_audit(selected(["hertz"])), quick=True)
+    audited = run_case(case, own_cache / "b")
+    assert audited.run.manifest["engine"]["audit"] == {
+        "scope": "quick", "passed": True, "lines": kept.lines, "date": kept.date
+    }  # fmt: skip
+
+
+def test_a_binary_that_failed_is_refused_unless_told_otherwise(own_cache: Path) -> None:
+    engine = find_engine()
+    write_audit(
+        AuditRecord(engine.sha256, "LIGGGHTS-PUBLIC 3.8.0", "full", 80, ("Hertz force",), "2026-01-01T00:00:00Z")
+    )
+    case = make_case(run=SHORT)
+    with pytest.raises(AuditFailed, match="Hertz force"):
+        run_case(case, own_cache / "runs")
+    assert not (own_cache / "runs").exists()
+    assert not run_case(case, own_cache / "runs", despite_audit=True).run.manifest["engine"]["audit"]["passed"]
+
+
+def test_a_quick_audit_does_not_displace_a_full_one(own_cache: Path) -> None:
+    full = AuditRecord("f" * 64, "3.8.0", "full", 90, (), "2026-01-01T00:00:00Z")
+    write_audit(full)
+    write_audit(replace(full, scope="quick", lines=70))
+    assert read_audit("f" * 64) == full
+    write_audit(replace(full, scope="quick", failures=("something",)))
+    found = read_audit("f" * 64)
+    assert found is not None
+    assert not found.passed
+
+
+def test_a_damaged_record_is_no_record(own_cache: Path) -> None:
+    write_audit(AuditRecord("e" * 64, "3.8.0", "full", 90, (), "2026-01-01T00:00:00Z"))
+    (path,) = own_cache.rglob("*.json")
+    for contents in ("", "{", "[]", '{"engine": 1}'):
+        path.write_text(contents)
+        assert read_audit("e" * 64) is None
+
+
+def test_the_program(own_cache: Path, in_folder: Path) -> None:
+    done = subprocess.run(
+        [PROGRAM, "audit", "--only", "hertz", "--only", "friction", "--json", "--markdown", "engine.md"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert [check["name"] for check in json.loads(done.stdout)["checks"]] == ["friction", "hertz"]
+    assert "Hertz force against overlap" in (in_folder / "engine.md").read_text()
+    assert not list(own_cache.rglob("audits/*.json")), "a part of the audit is no audit"
+    refused = subprocess.run([PROGRAM, "audit", "--only", "nothing"], capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
+    (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
+    told = subprocess.run([PROGRAM, "run", "mine.toml"], capture_output=True, text=True, check=True).stderr
+    assert told.count("walkers audit") == 1
+
+
+def test_exit_status_of_a_failing_audit(own_cache: Path) -> None:
+    front = own_cache / "liggghts-broken"
+    front.write_text("#!/bin/sh\necho ERROR: out of order\nexit 1\n")
+    front.chmod(0o755)
+    done = subprocess.run(
+        [PROGRAM, "audit", "--only", "hertz", "--engine", str(front)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "FAIL" in done.stdout
+
+
+def test_a_check_is_one_entry() -> None:
+    check = Check(
+        "mine", 5, "a check of my own", True, lambda bench: [Line("1 + 1", "arithmetic", 2.0, 1.0 + 1.0, tolerance=0.0)]
+    )
+    assert run_audit([check]).lines[0].verdict is Verdict.PASS
