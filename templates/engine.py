@@ -41,7 +41,7 @@ DEFECTS = (
     Defect(
         "Walls pull half as hard",
         "The capillary models take a wall for an equal sphere: 1.74 πγR at 1 % liquid, where a sphere on a plane "
-        "is pulled by 4πγR (3.9 πγR at finite volume). `easo/capillary/viscous` at least pulls on touching walls;"
+        "is pulled by 4πγR (less at finite volume). `easo/capillary/viscous` at least pulls on touching walls;"
         " in `washino/capillary/viscous` the effective radius there is zero.",
         "easo, and every wall stands in the deck twice, which gives 3.48 πγR and the lubrication forces of a "
         "sphere on a plane. All of the contact is doubled: stiffness, damping (hence less restitution), the "

@@ -75,7 +75,7 @@ def test_another_version_of_the_engine_is_a_warning(tmp_path: Path) -> None:
 
 def test_the_audited_version_gives_no_warning(tmp_path: Path) -> None:
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error", EngineVersionWarning)
         run_case(make_case(run=SHORT), tmp_path)
 
 
