@@ -15,10 +15,11 @@ import numpy.typing as npt
 
 from inputs import resolve_case
 from inputs.case import WalkerCase
+from inputs.errors import WalkersError
 from postprocess.dump import BinaryDump, FloatArray
 from runner.binary import Engine
 from runner.directory import write_deck
-from runner.launch import launch
+from runner.launch import Progress, launch
 from templates.deck import Deck, Plan, Recording, compose
 from templates.engine import ALL_REMEDIES, Remedies
 from templates.layout import BEAD_COLUMNS
@@ -73,6 +74,10 @@ class Measured:
         return bead - 1 - self.missing
 
 
+class AuditStopped(WalkersError):
+    """Somebody stopped the audit while an engine ran."""
+
+
 @dataclass
 class Bench:
     """Runs decks of an engine in a folder of its own.
@@ -85,14 +90,17 @@ class Bench:
         Where decks are run.
     remedies
         Those of the decks on trial; tests take some away to see the audit fail.
-    pile_time_steps
-        Steps in s at which the small pile is run, the last but one being what ``auto`` allows.
+    pile_time_step
+        Step in s at which the small pile is tried instead of the one that ``auto`` takes; tests set it too large.
+    stop
+        Set to end the engines that run.
     """
 
     engine: Engine
     folder: Path
     remedies: Remedies = ALL_REMEDIES
-    pile_time_steps: tuple[float, ...] = (0.5e-6, 1e-6, 2e-6, 4e-6)
+    pile_time_step: float | None = None
+    stop: threading.Event = field(default_factory=threading.Event)
     version: str = "unknown"
     _numbers: itertools.count[int] = field(default_factory=itertools.count)
     _lock: threading.Lock = field(default_factory=threading.Lock)
@@ -103,6 +111,10 @@ class Bench:
             directory = self.folder / f"deck-{next(self._numbers):03d}"
         directory.mkdir(parents=True)
         return directory
+
+    def _look(self, _: Progress) -> None:
+        if self.stop.is_set():
+            raise AuditStopped("the audit was stopped")
 
     def run(self, plan: Plan, carry: Path | None = None) -> Measured:
         """Run a plan and read its series.
@@ -124,7 +136,7 @@ class Bench:
         write_deck(deck, directory)
         if carry is not None:
             shutil.copy(carry, directory)
-        self.version = launch(deck, directory, self.engine).version
+        self.version = launch(deck, directory, self.engine, on_progress=self._look).version
         return read_series(deck, directory)
 
 

@@ -11,11 +11,18 @@ from audit.bench import Bench
 
 
 class Verdict(StrEnum):
-    """Outcome of a line: pass, fail, or only reported."""
+    """Outcome of a line.
+
+    A defect of the raw engine is present or gone, which is no failure; a check that could not be run is an error.
+    """
 
     PASS = "pass"
     FAIL = "FAIL"
+    ERROR = "ERROR"
     REPORT = "report"
+    PRESENT = "present"
+    GONE = "gone"
+    SKIPPED = "skipped"
 
 
 @dataclass(frozen=True)
@@ -38,6 +45,10 @@ class Line:
         Relative error where it is not that of the two numbers: the largest over a series.
     needs
         Remedies that this line stands on (``riders``, ``walls``, ``angle``, ``time step``): without one it fails.
+    defect
+        The line measures a defect of the raw engine, expected as it was when the remedies were made.
+    unmeasured
+        Why nothing was measured, as a verdict: ``ERROR`` or ``SKIPPED``.
     """
 
     what: str
@@ -48,6 +59,8 @@ class Line:
     tolerance: float | None = None
     error: float | None = None
     needs: frozenset[str] = frozenset()
+    defect: bool = False
+    unmeasured: Verdict | None = None
 
     @property
     def relative_error(self) -> float:
@@ -61,6 +74,10 @@ class Line:
     @property
     def verdict(self) -> Verdict:
         """Pass or fail by the tolerance; an error that is no number fails."""
+        if self.unmeasured is not None:
+            return self.unmeasured
+        if self.defect:
+            return Verdict.PRESENT if self.relative_error <= (self.tolerance or 0.0) else Verdict.GONE
         if self.tolerance is None:
             return Verdict.REPORT
         passed = isfinite(self.relative_error) and self.relative_error <= self.tolerance

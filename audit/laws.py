@@ -49,37 +49,74 @@ def hertz_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray
     return law
 
 
-def bridge_law(
+@dataclass(frozen=True)
+class Exerted:
+    """What a contact exerts on a bead, arrays of shape (F, 3): elastic and capillary force, viscous force, torque.
+
+    N and N m; ``normal`` is the unit vector toward the bead.
+    """
+
+    normal: FloatArray
+    steady: FloatArray
+    viscous: FloatArray
+    torque: FloatArray
+
+    @property
+    def force(self) -> FloatArray:
+        """All of the force."""
+        return self.steady + self.viscous
+
+
+def bridge_law(  # noqa: PLR0913, PLR0917, the kinematics of a contact
     case: WalkerCase,
     radius: float,
     partner: Partner,
     normal: FloatArray,
     gap: FloatArray,
     velocity: FloatArray,
-    turning: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Force on a bead and torque about its centre by capillarity, viscosity and elasticity, N and N m, shape (F, 3).
+    spin: FloatArray,
+    partner_spin: FloatArray | None = None,
+) -> Exerted:
+    """Force on a bead and torque about its centre by capillarity, viscosity and elasticity, without friction.
 
     Viscous forces after Nase et al. as in Shi and McCarthy, Powder Technology 184 (2008) 65, Eqs. 40, 41: normal
-    6πηR* v_n/max(ε, h/R*), tangential (8/15 ln(1/max(ε, h/R*)) + 0.9588) 6πηR* v_t. At a wall R* = R/2, twice.
+    6πηR* v_n/max(ε, h/R*), tangential (8/15 ln(1/max(ε, h/R*)) + 0.9588) 6πηR* v_t. At a wall R* = R/2, twice. The arms
+    of overlapping surfaces end half way into the overlap.
 
     Parameters
     ----------
     velocity
-        Relative velocity of the centres.
-    turning
-        R1 ω1 + R2 ω2 (at a wall R ω), m/s.
+        Relative velocity of the centres, m/s.
+    spin, partner_spin
+        Angular velocities, rad/s.
     """
     reduced = radius / 2.0 if partner.wall else radius * partner.radius / (radius + partner.radius)
     copies = 2.0 if partner.wall else 1.0
+    inside = np.minimum(gap, 0.0) * 0.5
+    arm, other_arm = radius + inside, partner.radius + inside
+    turning = arm[:, None] * spin + (0.0 if partner_spin is None else other_arm[:, None] * partner_spin)
     bound = capillary_law(case, radius, partner, gap)
     stokes = 6.0 * np.pi * case.liquid.dynamic_viscosity * reduced * copies * (bound > 0.0)
     nearness = np.maximum(case.contact.minimum_separation_ratio, gap / reduced)
     normal_speed = np.einsum("fx,fx->f", velocity, normal)
     sliding = velocity - normal_speed[:, None] * normal - np.cross(turning, normal)
     tangential = -(stokes * (8.0 / 15.0 * np.log(1.0 / nearness) + 0.9588))[:, None] * sliding
-    along = hertz_law(case, radius, partner, gap) - bound - stokes * normal_speed / nearness
-    return along[:, None] * normal + tangential, -radius * np.cross(normal, tangential)
+    return Exerted(
+        normal=normal,
+        steady=(hertz_law(case, radius, partner, gap) - bound)[:, None] * normal,
+        viscous=-(stokes * normal_speed / nearness)[:, None] * normal + tangential,
+        torque=-arm[:, None] * np.cross(normal, tangential),
+    )
+
+
+def frame_by_frame_error(measured: FloatArray, expected: FloatArray) -> float:
+    """Largest over the frames of |measured − expected|/|expected|; infinite where something is measured for nothing."""
+    scale = np.linalg.norm(expected, axis=-1)
+    deviation = np.linalg.norm(measured - expected, axis=-1)
+    nothing = scale == 0.0
+    if np.any(deviation[nothing] > 0.0):
+        return float("inf")
+    return float((deviation[~nothing] / scale[~nothing]).max()) if np.any(~nothing) else 0.0
 
 
 def largest_error(measured: FloatArray, expected: FloatArray) -> float:

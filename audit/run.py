@@ -14,7 +14,7 @@ from typing import Any
 from audit.bench import Bench
 from audit.check import Check, Line, Verdict
 from audit.checks import capillary, contact, drive, energy, repeatability, timestep, viscous
-from inputs.errors import InputError, Problem, WalkersError
+from inputs.errors import InputError, Problem
 from inputs.library import suggestion
 from runner.audits import AuditRecord, write_audit
 from runner.binary import Engine, find_engine
@@ -55,12 +55,16 @@ class AuditReport:
 
     @property
     def failures(self) -> list[Line]:
-        """The lines that fail."""
-        return [line for line in self.lines if line.verdict is Verdict.FAIL]
+        """The lines that fail, or could not be measured."""
+        return [line for line in self.lines if line.verdict in (Verdict.FAIL, Verdict.ERROR)]
+
+    def count(self, verdict: Verdict) -> int:
+        """How many lines have a verdict."""
+        return sum(line.verdict is verdict for line in self.lines)
 
 
 def selected(only: Sequence[str] = (), *, quick: bool = False) -> tuple[Check, ...]:
-    """The checks to run.
+    """The checks to run: those named, or all, or all quick ones.
 
     Raises
     ------
@@ -74,7 +78,7 @@ def selected(only: Sequence[str] = (), *, quick: bool = False) -> tuple[Check, .
             raise InputError(
                 "--only", [Problem("", None, f"no check {name!r}; expected one of {', '.join(names)}{hint}")]
             )
-    return tuple(check for check in CHECKS if (not only or check.name in only) and (check.quick or not quick))
+    return tuple(check for check in CHECKS if (check.name in only if only else check.quick or not quick))
 
 
 def run_audit(
@@ -108,26 +112,37 @@ def run_audit(
             begin = time.perf_counter()
             try:
                 lines = tuple(check.measure(bench))
-            except WalkersError as failure:
-                lines = (Line(f"{check.title}: {failure}", "the engine failed", nan, nan, tolerance=0.0),)
+            except Exception as failure:  # whatever another build of the engine does, the table must come
+                reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
+                lines = (Line(f"{check.title}: {reason}", "", nan, nan, unmeasured=Verdict.ERROR),)
             checked = CheckedLines(check, lines, time.perf_counter() - begin)
             if on_done:
                 on_done(checked)
             return checked
 
-        with ThreadPoolExecutor(2) as pool:
+        pool = ThreadPoolExecutor(2)
+        try:
             checked = tuple(pool.map(measure, checks))
+        finally:
+            bench.stop.set()
+            pool.shutdown(cancel_futures=True)
         return AuditReport(binary, bench.version, checked)
 
 
-def record(report: AuditReport, *, quick: bool) -> AuditRecord:
-    """Keep a report for the user: runs on this binary name it, and are refused if it failed."""
+def record(report: AuditReport, *, quick: bool) -> AuditRecord | None:
+    """Keep a report for the user: runs on this binary name it, and are refused if it failed.
+
+    A report with a line that could not be measured says something of the machine, not of the binary: it is not kept.
+    """
+    if report.count(Verdict.ERROR):
+        return None
     kept = AuditRecord(
         engine=report.engine.sha256,
         version=report.version,
         scope="quick" if quick else "full",
         lines=len(report.lines),
         failures=tuple(line.what for line in report.failures),
+        skipped=report.count(Verdict.SKIPPED),
         date=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
     )
     write_audit(kept)

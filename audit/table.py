@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from audit.check import Line
+from audit.check import Line, Verdict
 from audit.run import AuditReport
 from templates.engine import DEFECTS
 
@@ -51,7 +51,7 @@ def as_text(report: AuditReport) -> str:
             continue
         rows.append(f"\n{group}. {title}")
         rows += [
-            f"{line.verdict:6} {line.what:80} {_number(line.expected):>11} {_number(line.measured):>11} {line.unit:5} "
+            f"{line.verdict:7} {line.what:80} {_number(line.expected):>11} {_number(line.measured):>11} {line.unit:5} "
             f"error {_error(line):>7}" + (f" of {line.tolerance:.1e}" if line.tolerance is not None else "")
             for line in lines
         ]
@@ -60,8 +60,14 @@ def as_text(report: AuditReport) -> str:
 
 def verdict(report: AuditReport) -> str:
     """One sentence on the whole."""
-    judged = sum(line.tolerance is not None for line in report.lines)
-    outcome = f"{len(report.failures)} of {judged} lines fail" if report.failures else f"all {judged} lines pass"
+    passed, failed = report.count(Verdict.PASS), report.count(Verdict.FAIL)
+    outcome = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
+    if not passed + failed:
+        outcome = "no line was judged"
+    for other, words in ((Verdict.ERROR, "could not be measured"), (Verdict.SKIPPED, "skipped")):
+        outcome += f", {report.count(other)} {words}" if report.count(other) else ""
+    present, gone = report.count(Verdict.PRESENT), report.count(Verdict.GONE)
+    outcome += f"; known defects: {present} present, {gone} gone" if present + gone else ""
     return f"{report.version}, binary {report.engine.sha256[:12]}: {outcome}"
 
 

@@ -49,14 +49,14 @@ class Kind:
 
 @cache
 def registry() -> UnitRegistry[float]:
-    """Pint's registry with the ``gee`` (9.8 m/s²) added; pint keeps the parsed definitions in the user's cache."""
+    """Pint's registry with the ``gee`` (9.8 m/s²) added.
+
+    Pint could keep the parsed definitions in the user's cache, a tenth of a second faster; two programs that fill that
+    cache at once leave it broken for good.
+    """
     import pint
 
-    units: UnitRegistry[float]
-    try:
-        units = pint.UnitRegistry(cache_folder=":auto:")
-    except OSError:  # a home directory that cannot be written: parse the definitions anew
-        units = pint.UnitRegistry()
+    units: UnitRegistry[float] = pint.UnitRegistry()
     units.define(f"gee = {ACCELERATION_OF_ONE_G} * meter / second ** 2")
     return units
 

@@ -26,6 +26,8 @@ class AuditRecord:
         How many lines the audit had.
     failures
         Those that failed.
+    skipped
+        How many could not be measured for want of a program, such as mpirun.
     date
         UTC, ISO 8601.
     """
@@ -35,6 +37,7 @@ class AuditRecord:
     scope: str
     lines: int
     failures: tuple[str, ...]
+    skipped: int
     date: str
 
     @property
@@ -44,35 +47,48 @@ class AuditRecord:
 
     def summary(self) -> Mapping[str, Any]:
         """What a run's manifest says of it."""
-        return {"scope": self.scope, "passed": self.passed, "lines": self.lines, "date": self.date}
+        return {
+            "scope": self.scope,
+            "passed": self.passed,
+            "lines": self.lines,
+            "skipped": self.skipped,
+            "date": self.date,
+        }
 
 
-def _place(engine: str) -> Path:
+def _place(engine: str, scope: str) -> Path:
     from platformdirs import user_cache_path
 
-    return user_cache_path("granular-walkers") / "audits" / f"{engine}.json"
+    return user_cache_path("granular-walkers") / "audits" / f"{engine}.{scope}.json"
 
 
-def read_audit(engine: str) -> AuditRecord | None:
-    """The record of a binary, by its hash; None if it was never audited or the record cannot be read."""
+def _read(engine: str, scope: str) -> AuditRecord | None:
     try:
-        values = read_json(_place(engine))
+        values = read_json(_place(engine, scope))
         return AuditRecord(**{**values, "failures": tuple(values["failures"])})
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
+def read_audit(engine: str) -> AuditRecord | None:
+    """The record of a binary, by its hash: one that failed if there is one, else the full one, else the quick one.
+
+    None if the binary was never audited or its records cannot be read.
+    """
+    known = [record for scope in ("full", "quick") if (record := _read(engine, scope)) is not None]
+    return next((record for record in known if not record.passed), known[0] if known else None)
+
+
 def write_audit(record: AuditRecord) -> None:
-    """Keep a record. A quick audit that passes does not displace a full one that did.
+    """Keep a record. A full audit replaces a quick one, for it holds all of its lines; a quick one stands beside it.
 
     Raises
     ------
     OSError
         If the user's cache cannot be written.
     """
-    known = read_audit(record.engine)
-    if known and known.passed and known.scope == "full" and record.scope == "quick" and record.passed:
-        return
-    place = _place(record.engine)
+    place = _place(record.engine, record.scope)
     place.parent.mkdir(parents=True, exist_ok=True)
     write_json(place, asdict(record))
+    if record.scope == "full":
+        _place(record.engine, "quick").unlink(missing_ok=True)

@@ -91,7 +91,7 @@ DEFECTS = (
         "and a tangential damping force is added that never acted: 2.2e-4 N was seen where friction was 5e-6 N. "
         "The beads' total forces and the trajectory are right.",
         "Only the normal part of these outputs is used.",
-        ("energy",),
+        ("reported-forces",),
     ),
     Defect(
         "The liquid content is a fraction",

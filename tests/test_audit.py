@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +20,7 @@ from runner.audits import AuditRecord, read_audit, write_audit
 from runner.binary import find_engine
 from runner.failures import AuditFailed, UnauditedEngineWarning
 from templates.engine import DEFECTS, Remedies
-from tests.conftest import PROGRAM, SHORT, document, make_case, to_toml
+from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml
 from walkers import run_case
 
 
@@ -54,10 +57,11 @@ def test_all_nine_groups_are_measured() -> None:
 
 def test_the_surprises_are_there_in_the_raw_engine(report: AuditReport) -> None:
     found = {line.what: line for line in report.lines}
-    angle = found["defect: contactAngle of 30° acts as"]
+    angle = found["contactAngle of 30° acts as"]
     assert angle.measured == pytest.approx(7.85, abs=0.05)
-    assert found["defect: without riders open wall bridges read a stranger's velocity (1: yes)"].measured == 1.0
-    assert found["defect: a single wall pulls half as hard, over πγR"].measured == pytest.approx(1.7, abs=0.05)
+    assert found["a single wall pulls half as hard, over πγR"].measured == pytest.approx(1.7, abs=0.05)
+    assert {line.verdict for line in report.lines if line.defect} == {Verdict.PRESENT}
+    assert report.count(Verdict.PRESENT) >= 3
 
 
 def test_without_riders_exactly_the_viscous_wall_lines_fail(report: AuditReport) -> None:
@@ -77,7 +81,7 @@ def test_without_the_translation_exactly_the_angle_lines_fail(report: AuditRepor
 
 
 def test_glycerol_at_eight_microseconds_fails_at_the_pile_alone() -> None:
-    broken = run_audit(selected(["step-pile"]), pile_time_steps=(2e-6, 8e-6, 8e-6))
+    broken = run_audit(selected(["step-pile"]), pile_time_step=8e-6)
     assert _failing(broken) == _standing_on(broken, "time step")
     assert len(_failing(broken)) == 1
 
@@ -96,6 +100,8 @@ def test_an_engine_that_fails_in_a_check_fails_the_check(tmp_path: Path) -> None
     report = run_audit(selected(["hertz"]), engine=find_engine(str(front)))
     assert len(report.failures) == 1
     assert "out of order" in report.failures[0].what
+    assert report.failures[0].verdict is Verdict.ERROR
+    assert record(report, quick=True) is None
 
 
 def test_every_defect_is_watched_by_checks_that_exist() -> None:
@@ -137,16 +143,17 @@ def test_runs_name_the_audit_of_their_engine(own_cache: Path) -> None:
         unaudited = run_case(case, own_cache / "a")
     assert unaudited.run.manifest["engine"]["audit"] is None
     kept = record(run_audit(selected(["hertz"])), quick=True)
+    assert kept is not None
     audited = run_case(case, own_cache / "b")
     assert audited.run.manifest["engine"]["audit"] == {
-        "scope": "quick", "passed": True, "lines": kept.lines, "date": kept.date
+        "scope": "quick", "passed": True, "lines": kept.lines, "skipped": 0, "date": kept.date
     }  # fmt: skip
 
 
 def test_a_binary_that_failed_is_refused_unless_told_otherwise(own_cache: Path) -> None:
     engine = find_engine()
     write_audit(
-        AuditRecord(engine.sha256, "LIGGGHTS-PUBLIC 3.8.0", "full", 80, ("Hertz force",), "2026-01-01T00:00:00Z")
+        AuditRecord(engine.sha256, "LIGGGHTS-PUBLIC 3.8.0", "full", 80, ("Hertz force",), 0, "2026-01-01T00:00:00Z")
     )
     case = make_case(run=SHORT)
     with pytest.raises(AuditFailed, match="Hertz force"):
@@ -156,18 +163,86 @@ def test_a_binary_that_failed_is_refused_unless_told_otherwise(own_cache: Path) 
 
 
 def test_a_quick_audit_does_not_displace_a_full_one(own_cache: Path) -> None:
-    full = AuditRecord("f" * 64, "3.8.0", "full", 90, (), "2026-01-01T00:00:00Z")
+    full = AuditRecord("f" * 64, "3.8.0", "full", 90, (), 0, "2026-01-01T00:00:00Z")
+    failed = replace(full, failures=("something",))
     write_audit(full)
     write_audit(replace(full, scope="quick", lines=70))
     assert read_audit("f" * 64) == full
-    write_audit(replace(full, scope="quick", failures=("something",)))
-    found = read_audit("f" * 64)
-    assert found is not None
-    assert not found.passed
+    write_audit(replace(failed, scope="quick"))
+    assert read_audit("f" * 64) == replace(failed, scope="quick")
+    write_audit(full)
+    assert read_audit("f" * 64) == full
+    write_audit(failed)
+    write_audit(replace(full, scope="quick"))
+    assert read_audit("f" * 64) == failed, "what only a full audit measures is not mended by a quick one"
+
+
+def test_a_gone_defect_is_no_failure() -> None:
+    line = Line("x", "y", 1.0, 0.0, defect=True)
+    assert line.verdict is Verdict.GONE
+    assert replace(line, measured=1.0).verdict is Verdict.PRESENT
+
+
+def test_without_mpirun_the_ranks_are_skipped_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.which", lambda name: None if name == "mpirun" else f"/usr/bin/{name}")
+    report = run_audit(selected(["ranks"]))
+    assert report.count(Verdict.SKIPPED) == 1
+    assert "1 skipped" in as_text(report)
+
+
+def test_an_engine_without_bridges_fails_line_by_line(tmp_path: Path) -> None:
+    """The real engine behind a front that takes the surface tension out of the deck."""
+    front = tmp_path / "liggghts-dry"
+    front.write_text(
+        "#!/bin/sh\nsed -i 's/^\\(fix.*surfaceTension.* \\)[-0-9.e]*$/\\10.0/' walker.lig\nexec liggghts \"$@\"\n"
+    )
+    front.chmod(0o755)
+    report = run_audit(selected(["capillary-wall", "capillary-beads"]), engine=find_engine(str(front)))
+    assert not report.count(Verdict.ERROR)
+    assert report.count(Verdict.FAIL) >= 19
+
+
+def test_only_wins_over_quick() -> None:
+    assert [check.name for check in selected(["step-pile"], quick=True)] == ["step-pile"]
+
+
+def test_an_audit_whose_outcome_cannot_be_kept_is_printed(in_folder: Path) -> None:
+    environment = {**os.environ, "XDG_CACHE_HOME": "/proc/nowhere"}
+    done = subprocess.run(
+        [PROGRAM, "audit", "--quick", "--json"], capture_output=True, text=True, check=True, env=environment
+    )
+    assert json.loads(done.stdout)["passed"]
+    assert "cannot be kept" in done.stderr
+
+
+@pytest.mark.parametrize("option", [["--markdown", "/proc/nowhere/x.md"], ["--engine", "no-such-engine"]])
+def test_bad_use(option: list[str]) -> None:
+    done = subprocess.run([PROGRAM, "audit", *option], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+
+
+def test_an_interrupt_ends_the_audit_and_its_engines(own_cache: Path) -> None:
+    environment = {**os.environ, "TMPDIR": str(own_cache)}
+    program = subprocess.Popen(
+        [PROGRAM, "audit", "--only", "step-pile"],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+        start_new_session=True,
+    )
+    while not engines_in(own_cache):
+        assert program.poll() is None
+        time.sleep(0.02)
+    program.send_signal(signal.SIGINT)
+    program.communicate(timeout=5.0)
+    assert program.returncode == 130
+    assert not engines_in(own_cache)
+    assert not list(own_cache.glob("walkers-audit-*"))
 
 
 def test_a_damaged_record_is_no_record(own_cache: Path) -> None:
-    write_audit(AuditRecord("e" * 64, "3.8.0", "full", 90, (), "2026-01-01T00:00:00Z"))
+    write_audit(AuditRecord("e" * 64, "3.8.0", "full", 90, (), 0, "2026-01-01T00:00:00Z"))
     (path,) = own_cache.rglob("*.json")
     for contents in ("", "{", "[]", '{"engine": 1}'):
         path.write_text(contents)
@@ -197,7 +272,7 @@ def test_exit_status_of_a_failing_audit(own_cache: Path) -> None:
         [PROGRAM, "audit", "--only", "hertz", "--engine", str(front)], capture_output=True, text=True, check=False
     )
     assert done.returncode == 1
-    assert "FAIL" in done.stdout
+    assert "1 could not be measured" in done.stdout
 
 
 def test_a_check_is_one_entry() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from audit.bench import Bench, Measured, bench_case, bench_recording, scene_on_floor
 from audit.check import Check, Line
-from audit.laws import Partner, bridge_law, capillary_law, largest_error
+from audit.laws import Partner, bridge_law, capillary_law, hertz_law, largest_error
 from inputs import forces
 from inputs.case import WalkerCase
 from postprocess.dump import FloatArray
@@ -46,6 +46,13 @@ def _gap(series: Measured, first: int, second: int, sizes: float) -> FloatArray:
     return gap
 
 
+def _rupture(gap: FloatArray, pull: FloatArray) -> float:
+    """Middle between the last gap with a pull and the first without; not a number if it never ends or never was."""
+    held = pull > 0.0
+    broken = ~held & (gap > 0.0)
+    return float(0.5 * (gap[held].max() + gap[broken].min())) if held.any() and broken.any() else float("nan")
+
+
 def bead_on_bead(bench: Bench) -> Iterator[Line]:
     """Force against gap from touching to past rupture, for three size ratios and three liquid fractions."""
     for fraction in (0.005, 0.01, 0.03):
@@ -62,7 +69,7 @@ def bead_on_bead(bench: Bench) -> Iterator[Line]:
             partner = Partner(large)
             still = np.zeros_like(series.force[:, 0])
             normal = still + np.array([0.0, 0.0, 1.0])
-            law = -bridge_law(case, _SMALL, partner, normal, gap, still, still)[0][:, 2]
+            law = -bridge_law(case, _SMALL, partner, normal, gap, still, still).force[:, 2]
             opened = int(np.argmax(gap > 0.0))
             where = f"R1/R2 = {ratio:g}, {100 * fraction:g} % liquid"
             yield Line(
@@ -74,8 +81,7 @@ def bead_on_bead(bench: Bench) -> Iterator[Line]:
                 1e-4,
                 largest_error(pull[:, None], law[:, None]),
             )
-            held = pull > 0.0
-            measured = 0.5 * (gap[held].max() + gap[~held & (gap > 0)].min())
+            measured = _rupture(gap, pull)
             resolution = (gap[1] - gap[0]) / ruptures[number]
             yield Line(
                 f"rupture distance between beads, {where}", "(1 + θ/2) V^(1/3), Lian et al. 1993", ruptures[number],
@@ -84,7 +90,7 @@ def bead_on_bead(bench: Bench) -> Iterator[Line]:
 
 
 def before_contact(bench: Bench) -> Iterator[Line]:
-    """A bead brought within a tenth of a micrometre of another, and of the wall, without touching: no force."""
+    """A bead brought within a fifth of a micrometre of another, and of the wall, without touching: no force."""
     case = bench_case()
     beads = [
         Bead(0, (0.0, 0.0, 5e-3), _SMALL),
@@ -124,17 +130,15 @@ def at_wall(bench: Bench) -> Iterator[Line]:
     gap, pull = _retract_from_wall(bench, case, bench.remedies)
     still = np.zeros((len(gap), 3))
     normal = still + np.array([0.0, 0.0, 1.0])
-    law = -bridge_law(case, radius, Partner(radius, wall=True), normal, gap, still, still)[0][:, 2]
+    law = -bridge_law(case, radius, Partner(radius, wall=True), normal, gap, still, still).force[:, 2]
     volume = forces.bridge_volume_at_wall(radius, case.liquid.volume_fraction)
-    doubled = forces.capillary_force_at_wall(tension, radius, volume, 0.0)
     first_open = int(np.argmax(gap > 0))
     yield Line(
         "doubled wall, force against gap, over πγR", f"2 × equal spheres, {_SOULIE}", float(law[first_open] / scale),
         float(pull[first_open] / scale), "", 1e-4, largest_error(pull[:, None], law[:, None]), _WALL,
     )  # fmt: skip
-    held = pull > 0.0
     rupture = forces.rupture_distance(volume, 0.0)
-    measured = 0.5 * (gap[held].max() + gap[~held & (gap > 0)].min())
+    measured = _rupture(gap, pull)
     resolution = float((gap[1] - gap[0]) / rupture)
     yield Line(
         "rupture distance at a wall", "(1 + θ/2) V^(1/3), Lian et al. 1993", rupture, float(measured), "m", resolution
@@ -143,11 +147,12 @@ def at_wall(bench: Bench) -> Iterator[Line]:
     first_open = int(np.argmax(raw_gap > 0))
     raw = forces.capillary_force(tension, radius, radius, volume, 0.0, float(raw_gap[first_open])) / scale
     yield Line(
-        "defect: a single wall pulls half as hard, over πγR", f"equal spheres, {_SOULIE}", raw,
-        float(raw_pull[first_open] / scale), "", 1e-4,
+        "a single wall pulls half as hard, over πγR", f"equal spheres, {_SOULIE}", raw,
+        float(raw_pull[first_open] / scale), "", 1e-4, defect=True,
     )  # fmt: skip
     first_open = int(np.argmax(gap > 0))
-    yield Line("doubled wall against the sphere-plane limit", "4πγR cos θ", 4.0 * cos(0.0), doubled / scale)
+    what = "doubled wall, first open gap, against the sphere-plane limit"
+    yield Line(what, "4πγR cos θ", 4.0 * cos(0.0), float(pull[first_open] / scale))
     for share in (0.0, 0.25, 0.5):
         number = max(first_open, int(np.argmin(np.abs(gap - share * rupture))))
         h = float(gap[number])
@@ -162,14 +167,13 @@ def contact_angle(bench: Bench) -> Iterator[Line]:
     """Force at effective contact angles through the deck's translation, and what the raw engine makes of them."""
     for angle in (0.0, 10.0, 30.0, 60.0):
         case = bench_case(liquid={"contact_angle": f"{angle} deg"})
+        needs = frozenset({"angle"}) if angle else frozenset[str]()
         gap, pull = _retract_from_wall(bench, case, bench.remedies)
-        law = capillary_law(case, case.beads.radii[0], Partner(case.beads.radii[0], wall=True), gap)
-        opened = gap > 0
-        needs = _WALL | {"angle"} if angle else _WALL
-        yield Line(
-            f"contact angle {angle:g}°, open bridges to a wall", f"{_SOULIE}, θ effective", float(law[opened][0]),
-            float(pull[opened][0]), "N", 1e-3, largest_error(pull[opened, None], law[opened, None]), needs,
-        )  # fmt: skip
+        law = _pull_law(case, case.beads.radii[0], Partner(case.beads.radii[0], wall=True), gap)
+        yield _angle_line(f"contact angle {angle:g}°, bead on wall", gap, pull, law, needs | _WALL)
+        gap, pull = _part_beads(bench, case)
+        law = _pull_law(case, _SMALL, Partner(_SMALL), gap)
+        yield _angle_line(f"contact angle {angle:g}°, bead on bead", gap, pull, law, needs)
     case = bench_case(liquid={"contact_angle": "30 deg"})
     gap, pull = _retract_from_wall(bench, case, Remedies(contact_angle=False))
     # The raw engine takes ½ θi θj: solve its force at the first open gap for the angle that it used.
@@ -181,14 +185,31 @@ def contact_angle(bench: Bench) -> Iterator[Line]:
         forces.capillary_force_at_wall(tension, radius, volume, float(angle), float(gap[number])) for angle in angles
     ]
     used = degrees(angles[int(np.argmin(np.abs(np.array(candidates) - pull[number])))])
-    yield Line(
-        "defect: contactAngle of 30° acts as",
-        "½ θi θj in radians (a defect)",
-        degrees(0.5 * radians(30.0) ** 2),
-        used,
-        "°",
-        0.01,
+    acting = degrees(0.5 * radians(30.0) ** 2)
+    yield Line("contactAngle of 30° acts as", "½ θi θj in radians", acting, used, "°", 0.01, defect=True)
+
+
+def _pull_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
+    """Net pull at each gap, touching ones included, N."""
+    pull: FloatArray = capillary_law(case, radius, partner, gap) - hertz_law(case, radius, partner, gap)
+    return pull
+
+
+def _angle_line(what: str, gap: FloatArray, pull: FloatArray, law: FloatArray, needs: frozenset[str]) -> Line:
+    opened = int(np.argmax(gap > 0))
+    error = largest_error(pull[:, None], law[:, None])
+    source = f"{_SOULIE}, θ effective"
+    return Line(
+        f"{what}, touching to rupture", source, float(law[opened]), float(pull[opened]), "N", 1e-3, error, needs
     )
+
+
+def _part_beads(bench: Bench, case: WalkerCase) -> tuple[FloatArray, FloatArray]:
+    volume = forces.bridge_volume_between_beads(_SMALL, _SMALL, case.liquid.volume_fraction)
+    steps, every = _steps_to(1.1 * forces.rupture_distance(volume, case.liquid.contact_angle), case)
+    scene = scene_on_floor(_pairs((1.0,), -_OVERLAP, _SPEED))
+    series = bench.run(Plan(case, scene, bench_recording(steps, every), remedies=bench.remedies, prescribed=True))
+    return _gap(series, 3, 2, 2.0 * _SMALL), -series.force[:, series.row(3), 2]
 
 
 CHECKS = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import exp, log, pi, sqrt
 
 import numpy as np
@@ -12,8 +13,10 @@ from audit.check import Check, Line
 from audit.laws import Partner, hertz_law, largest_error
 from inputs.case import WalkerCase
 from inputs.dimer import contact_loads
+from postprocess.local_dump import read_local_dump
 from templates.deck import Plan
 from templates.engine import Remedies
+from templates.layout import WALL_BRIDGE_COLUMNS
 from templates.scene import Bead
 
 _WALL = frozenset({"walls"})
@@ -83,6 +86,52 @@ def rolling(bench: Bench) -> Iterator[Line]:
         None,
         _WALL,
     )
+
+
+def _pressed_pair(case: WalkerCase) -> tuple[list[Bead], float]:
+    """Two beads at the overlap that carries the capillary load between them, one above the other, and that load."""
+    loads = contact_loads(case)
+    large, small = case.beads.radii
+    lower = Bead(0, (0.0, 0.0, 5e-3), large)
+    return [lower, Bead(0, (0.0, 0.0, 5e-3 + large + small - loads.overlaps[2]), small)], loads.capillary[2]
+
+
+def between_beads(bench: Bench) -> Iterator[Line]:
+    """Sliding friction and rolling resistance of two beads under their capillary load."""
+    sliding, rolling_coefficient = 0.3, 0.05
+    case = bench_case(contact={"friction": {"bead_bead": sliding, "bead_wall": 0.0}})
+    (lower, upper), load = _pressed_pair(case)
+    moving = replace(upper, velocity=(1e-4, 0.0, 0.0))
+    plan = Plan(
+        case, scene_on_floor([lower, moving]), bench_recording(1500, 100), remedies=bench.remedies, prescribed=True
+    )
+    drag = -bench.run(plan).force[-1, _row(bench) + 1, 0]
+    yield Line("sliding friction between beads", "μ F_N, F_N = capillary load", sliding * load, float(drag), "N", 1e-3)
+    case = bench_case(
+        contact={"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": rolling_coefficient}
+    )
+    spinning = replace(upper, spin=(0.0, 20.0, 0.0))
+    plan = Plan(
+        case, scene_on_floor([lower, spinning]), bench_recording(20, 10), remedies=bench.remedies, prescribed=True
+    )
+    torque = -bench.run(plan).torque[-1, _row(bench) + 1, 1]
+    reduced = lower.radius * upper.radius / (lower.radius + upper.radius)
+    expected = rolling_coefficient * reduced * load
+    yield Line("rolling resistance torque between beads", "μ_r R* F_N", expected, float(torque), "N m", 1e-3)
+
+
+def reported_forces(bench: Bench) -> Iterator[Line]:
+    """What ``compute wall/gran/local`` says of a sliding, damped contact, against the bead's own total force."""
+    case = bench_case(contact={"friction": {"bead_bead": 0.3, "bead_wall": 0.3}, "restitution": 0.3})
+    bead, _ = _pressed_bead(case)
+    sliding = replace(bead, velocity=(0.05, 0.0, 0.0))
+    plan = Plan(case, scene_on_floor([sliding]), bench_recording(200, 200), remedies=bench.remedies, prescribed=True)
+    series = bench.run(plan)
+    steps, rows = read_local_dump(series.directory / "bridges.walls.txt", WALL_BRIDGE_COLUMNS)
+    reported = rows[steps == series.steps[-1], WALL_BRIDGE_COLUMNS.index("fx")].sum()
+    off = float(abs(reported / series.force[-1, _row(bench), 0] - 1.0) > 0.1)
+    what = "the reported friction of a sliding contact is not what acts"
+    yield Line(what, "off by more than 10 %: 1", 1.0, off, defect=True)
 
 
 def hertz(bench: Bench) -> Iterator[Line]:
@@ -166,6 +215,8 @@ def restitution(bench: Bench) -> Iterator[Line]:
 CHECKS = (
     Check("friction", 5, "sliding friction and rest under the capillary load", True, friction),
     Check("rolling-friction", 5, "rolling resistance torque", True, rolling),
+    Check("friction-beads", 5, "sliding friction and rolling resistance between beads", True, between_beads),
+    Check("reported-forces", 5, "reported forces of a sliding contact", True, reported_forces),
     Check("hertz", 5, "Hertz force against overlap", True, hertz),
     Check("restitution", 5, "restitution of dry impacts", True, restitution),
 )

@@ -5,13 +5,15 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 
 from audit.bench import Bench
-from audit.check import Check, Line
+from audit.check import Check, Line, Verdict
 from audit.checks.drive import reference_walker
-from audit.checks.viscous import box_lines, run_box, viscous_case
+from audit.checks.viscous import box_errors, box_lines, run_box, viscous_case
+from audit.laws import largest_error
 from inputs.case import WalkerCase
 from templates.deck import Checkpoint, Plan, Recording, compose, render_deck
 from templates.placement import place_walkers
@@ -85,12 +87,21 @@ def restart(bench: Bench) -> Iterator[Line]:
 
 
 def ranks(bench: Bench) -> Iterator[Line]:
-    """The box of beads on two MPI ranks, each with its own riders."""
+    """The box of beads on two MPI ranks, each with its own riders, against the law and against one rank."""
     if shutil.which("mpirun") is None:
-        yield Line("SKIPPED: two MPI ranks (no mpirun on this machine)", "", float("nan"), float("nan"))
+        yield Line("two MPI ranks: no mpirun on this machine", "", nan, nan, unmeasured=Verdict.SKIPPED)
         return
-    needs = frozenset({"riders", "walls"})
-    yield from box_lines("two MPI ranks", run_box(bench, viscous_case(), bench.remedies, ranks=2), needs)
+    case, needs = viscous_case(), frozenset({"riders", "walls"})
+    (scene, one), (split, two) = (run_box(bench, case, bench.remedies, ranks=count) for count in (1, 2))
+    yield from box_lines("two MPI ranks", box_errors(case, split, two), needs)
+    pairs = [
+        (one.force[:, one.row(a.id)], two.force[:, two.row(b.id)])
+        for a, b in zip(scene.beads, split.beads, strict=True)
+    ]
+    error = max(largest_error(force, single) for single, force in pairs)
+    yield Line(
+        "forces on two MPI ranks against one", "the same", 0.0, error, "rel.", 1e-6, error, frozenset({"riders"})
+    )
 
 
 CHECKS = (

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+import warnings
 from pathlib import Path
 from typing import Annotated
 
@@ -27,17 +29,32 @@ def command(
     """Measure the engine's forces and our remedies against published formulas; exit status 1 if a line fails."""
     from audit.run import CheckedLines, record, run_audit, selected
     from audit.table import as_dict, as_markdown, as_text
+    from inputs.errors import InputError, Problem
     from runner.binary import find_engine
+    from runner.failures import EngineMissing
     from runner.files import write_text
 
     def tell(checked: CheckedLines) -> None:
         print(f"walkers: {checked.check.name} ({checked.seconds:.1f} s)", file=sys.stderr, flush=True)
 
     checks = selected(only or (), quick=quick)
-    report = run_audit(checks, engine=find_engine(engine), on_done=tell)
-    if not only:
-        record(report, quick=quick)
+    if markdown is not None and not (markdown.parent.is_dir() and os.access(markdown.parent, os.W_OK)):
+        raise InputError(
+            "--markdown", [Problem("", None, f"expected a file in a folder that can be written, not {markdown}")]
+        )
+    try:
+        binary = find_engine(engine)
+    except EngineMissing as missing:
+        if engine is None:
+            raise
+        raise InputError("--engine", [Problem("", None, str(missing))]) from missing
+    report = run_audit(checks, engine=binary, on_done=tell)
+    print(json.dumps(as_dict(report), indent=2, ensure_ascii=False) if as_json else as_text(report))
     if markdown is not None:
         write_text(markdown, as_markdown(report))
-    print(json.dumps(as_dict(report), indent=2, ensure_ascii=False) if as_json else as_text(report))
+    if not only:
+        try:
+            record(report, quick=quick)
+        except OSError as error:
+            warnings.warn(f"the outcome cannot be kept: {error}", stacklevel=1)
     return 1 if report.failures else 0
