@@ -45,11 +45,6 @@ class Scene:
     lower: Point
     upper: Point
 
-    @property
-    def first_bead(self) -> int:
-        """Id of the first bead: the riders are created before the beads."""
-        return len(self.riders) + 1
-
 
 def without_riders(scene: Scene) -> Scene:
     """The scene with its riders left out, the beads numbered from 1."""
