@@ -17,15 +17,18 @@ from inputs import resolve_case
 from inputs.case import WalkerCase
 from inputs.errors import WalkersError
 from postprocess.dump import BinaryDump, FloatArray
+from postprocess.local_dump import read_local_dump
 from runner.binary import Engine
 from runner.directory import write_deck
 from runner.launch import Progress, launch
 from templates.deck import Deck, Plan, Recording, compose
 from templates.engine import ALL_REMEDIES, Remedies
-from templates.layout import BEAD_COLUMNS
+from templates.layout import BEAD_COLUMNS, Layout
 from templates.scene import Bead, Face, Point, Scene
 
 TORQUE_COLUMNS = ("tqx", "tqy", "tqz")
+FIRST_BEAD = 2
+"""Id of the first bead of a scene with one rider."""
 FLOOR = Face("z", 1, (0.0, 0.0, 0.0))
 
 
@@ -40,9 +43,13 @@ def bench_case(**changes: dict[str, Any]) -> WalkerCase:
         "run": {"time_step": "1 us", "samples_per_cycle": 1},
         "environment": {"gravity": "0 m/s^2"},
     }
-    for table, values in changes.items():
-        tables[table] = {**tables.get(table, {}), **values}
-    return resolve_case(tables, source="<audit>", name="audit")
+    return changed_case(tables, changes)
+
+
+def changed_case(tables: dict[str, dict[str, Any]], changes: dict[str, dict[str, Any]]) -> WalkerCase:
+    """A case from its tables with those of a check merged in."""
+    merged = {table: {**tables.get(table, {}), **changes.get(table, {})} for table in {**tables, **changes}}
+    return resolve_case(merged, source="<audit>", name="audit")
 
 
 @dataclass(frozen=True)
@@ -54,7 +61,7 @@ class Measured:
     steps : ndarray, shape (F,)
     position, velocity, spin, force, torque : ndarray, shape (F, N, 3)
         SI units, by atom id.
-    directory
+    directory, layout
         Of the run.
     missing
         How many riders of the scene the deck was run without.
@@ -67,11 +74,18 @@ class Measured:
     force: FloatArray
     torque: FloatArray
     directory: Path
+    layout: Layout
     missing: int = 0
 
     def row(self, bead: int) -> int:
         """Row of a bead, by the id that it has in the scene."""
         return bead - 1 - self.missing
+
+    def wall_bridges(self, column: str) -> tuple[npt.NDArray[np.int64], FloatArray]:
+        """Steps and one column of what the engine reported of the bridges to walls, both of shape (rows,)."""
+        columns = self.layout.wall_bridge_columns
+        steps, rows = read_local_dump(self.directory / self.layout.wall_bridge_dump, columns)
+        return steps, rows[:, columns.index(column)]
 
 
 class AuditStopped(WalkersError):
@@ -122,22 +136,20 @@ class Bench:
         Parameters
         ----------
         plan
-            Its recording should have `TORQUE_COLUMNS`; see `bench_recording`.
+            Torques are read where its recording has `TORQUE_COLUMNS`; see `bench_recording`.
         carry
             A file to put into the deck's directory, such as a restart file.
         """
-        deck = replace(compose(plan), fastest=inf)
-        missing = 0 if plan.remedies.riders else len(plan.scene.riders)
-        return replace(self.run_deck(deck, carry), missing=missing)
-
-    def run_deck(self, deck: Deck, carry: Path | None = None) -> Measured:
-        """Run a deck and read its series."""
+        deck = compose(plan)
+        if not plan.walkers:  # what is driven by a check may move faster than what is driven by the walls
+            deck = replace(deck, fastest=inf)
         directory = self.new_directory()
         write_deck(deck, directory)
         if carry is not None:
             shutil.copy(carry, directory)
         self.version = launch(deck, directory, self.engine, on_progress=self._look).version
-        return read_series(deck, directory)
+        missing = 0 if plan.remedies.riders else len(plan.scene.riders)
+        return replace(read_series(deck, directory), missing=missing)
 
 
 def read_series(deck: Deck, directory: Path) -> Measured:
@@ -150,7 +162,9 @@ def read_series(deck: Deck, directory: Path) -> Measured:
         return frames[:, :, start : start + 3]
 
     torque = vectors("tqx") if "tqx" in dump.columns else np.zeros_like(vectors("x"))
-    return Measured(dump.steps, vectors("x"), vectors("vx"), vectors("omegax"), vectors("fx"), torque, directory)
+    return Measured(
+        dump.steps, vectors("x"), vectors("vx"), vectors("omegax"), vectors("fx"), torque, directory, deck.layout
+    )
 
 
 def bench_recording(steps: int, sample_every: int) -> Recording:
@@ -165,8 +179,8 @@ def bench_recording(steps: int, sample_every: int) -> Recording:
 
 
 def scene_on_floor(beads: list[Bead], half_width: float = 0.02, height: float = 0.02) -> Scene:
-    """Beads over the floor z = 0 with its rider in the corner; ids are given here, from 2."""
-    numbered = tuple(replace(bead, id=2 + number) for number, bead in enumerate(beads))
+    """Beads over the floor z = 0 with its rider in the corner; ids are given here, from 2 (`FIRST_BEAD`)."""
+    numbered = tuple(replace(bead, id=FIRST_BEAD + number) for number, bead in enumerate(beads))
     edge = half_width + 2e-3
     rider: Point = (half_width + 1e-3, half_width + 1e-3, height + 1e-3)
     return Scene(numbered, (FLOOR,), (rider,), (-edge, -edge, -2e-3), (edge, edge, height + 2e-3))

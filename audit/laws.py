@@ -22,6 +22,19 @@ class Partner:
     radius: float
     wall: bool = False
 
+    @property
+    def copies(self) -> float:
+        """How often it stands in the deck."""
+        return 2.0 if self.wall else 1.0
+
+    def reduced_radius(self, radius: float) -> float:
+        """R* of the elastic contact with a bead, m."""
+        return radius if self.wall else radius * self.radius / (radius + self.radius)
+
+    def viscous_radius(self, radius: float) -> float:
+        """R* of the lubrication forces, m: a wall counts as an equal sphere."""
+        return radius / 2.0 if self.wall else self.reduced_radius(radius)
+
 
 def capillary_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
     """Attraction at each gap, N: Soulié et al. (2006); at a wall twice that of equal spheres; zero past rupture."""
@@ -31,10 +44,10 @@ def capillary_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatA
     else:
         volume = forces.bridge_volume_between_beads(radius, partner.radius, liquid.volume_fraction)
     rupture = forces.rupture_distance(volume, liquid.contact_angle)
-    copies = 2.0 if partner.wall else 1.0
     other = radius if partner.wall else partner.radius
     values = [
-        copies * forces.capillary_force(liquid.surface_tension, radius, other, volume, liquid.contact_angle, float(h))
+        partner.copies
+        * forces.capillary_force(liquid.surface_tension, radius, other, volume, liquid.contact_angle, float(h))
         for h in gap
     ]
     return np.where(gap < rupture, values, 0.0)
@@ -43,10 +56,20 @@ def capillary_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatA
 def hertz_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
     """Repulsion 4/3 E* √R* δ^(3/2), N; a wall stands twice."""
     modulus = forces.reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
-    reduced = radius if partner.wall else radius * partner.radius / (radius + partner.radius)
-    copies = 2.0 if partner.wall else 1.0
-    law: FloatArray = copies * 4.0 / 3.0 * modulus * np.sqrt(reduced) * np.maximum(-gap, 0.0) ** 1.5
+    root = np.sqrt(partner.reduced_radius(radius))
+    law: FloatArray = partner.copies * 4.0 / 3.0 * modulus * root * np.maximum(-gap, 0.0) ** 1.5
     return law
+
+
+def lubrication_drags(case: WalkerCase, reduced: float, gap: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Coefficients of the normal and the tangential viscous force of one bridge, N s/m, at each gap.
+
+    6πηR*/max(ε, h/R*) and (8/15 ln(1/max(ε, h/R*)) + 0.9588) 6πηR*, after Nase et al. as in Shi and McCarthy, Powder
+    Technology 184 (2008) 65, Eqs. 40, 41.
+    """
+    stokes = 6.0 * np.pi * case.liquid.dynamic_viscosity * reduced
+    nearness = np.maximum(case.contact.minimum_separation_ratio, gap / reduced)
+    return stokes / nearness, stokes * (8.0 / 15.0 * np.log(1.0 / nearness) + 0.9588)
 
 
 @dataclass(frozen=True)
@@ -79,9 +102,8 @@ def bridge_law(  # noqa: PLR0913, PLR0917, the kinematics of a contact
 ) -> Exerted:
     """Force on a bead and torque about its centre by capillarity, viscosity and elasticity, without friction.
 
-    Viscous forces after Nase et al. as in Shi and McCarthy, Powder Technology 184 (2008) 65, Eqs. 40, 41: normal
-    6πηR* v_n/max(ε, h/R*), tangential (8/15 ln(1/max(ε, h/R*)) + 0.9588) 6πηR* v_t. At a wall R* = R/2, twice. The arms
-    of overlapping surfaces end half way into the overlap.
+    The viscous forces are those of `lubrication_drags`, at a wall twice. The arms of overlapping surfaces end half way
+    into the overlap.
 
     Parameters
     ----------
@@ -90,21 +112,19 @@ def bridge_law(  # noqa: PLR0913, PLR0917, the kinematics of a contact
     spin, partner_spin
         Angular velocities, rad/s.
     """
-    reduced = radius / 2.0 if partner.wall else radius * partner.radius / (radius + partner.radius)
-    copies = 2.0 if partner.wall else 1.0
     inside = np.minimum(gap, 0.0) * 0.5
     arm, other_arm = radius + inside, partner.radius + inside
     turning = arm[:, None] * spin + (0.0 if partner_spin is None else other_arm[:, None] * partner_spin)
     bound = capillary_law(case, radius, partner, gap)
-    stokes = 6.0 * np.pi * case.liquid.dynamic_viscosity * reduced * copies * (bound > 0.0)
-    nearness = np.maximum(case.contact.minimum_separation_ratio, gap / reduced)
+    drags = lubrication_drags(case, partner.viscous_radius(radius), gap)
+    normal_drag, tangential_drag = (partner.copies * drag * (bound > 0.0) for drag in drags)
     normal_speed = np.einsum("fx,fx->f", velocity, normal)
     sliding = velocity - normal_speed[:, None] * normal - np.cross(turning, normal)
-    tangential = -(stokes * (8.0 / 15.0 * np.log(1.0 / nearness) + 0.9588))[:, None] * sliding
+    tangential = -tangential_drag[:, None] * sliding
     return Exerted(
         normal=normal,
         steady=(hertz_law(case, radius, partner, gap) - bound)[:, None] * normal,
-        viscous=-(stokes * normal_speed / nearness)[:, None] * normal + tangential,
+        viscous=-(normal_drag * normal_speed)[:, None] * normal + tangential,
         torque=-arm[:, None] * np.cross(normal, tangential),
     )
 

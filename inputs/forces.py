@@ -112,6 +112,16 @@ def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -
     return float((3.0 * force / (4.0 * reduced_modulus * sqrt(reduced_radius))) ** (2.0 / 3.0))
 
 
+def reduced_shear_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
+    """G* of two bodies of the same modulus, E/(4(1 + ν)(2 − ν)), Pa (Mindlin)."""
+    return youngs_modulus / (4.0 * (1.0 + poissons_ratio) * (2.0 - poissons_ratio))
+
+
+def damping_ratio(restitution: float) -> float:
+    """β of the damped Hertz contact that rebounds with a coefficient e, −ln e/√(ln²e + π²)."""
+    return -log(restitution) / sqrt(log(restitution) ** 2 + pi**2)
+
+
 def reduced_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
     """E* of two bodies of the same modulus, E/(2(1 − ν²)), Pa."""
     return youngs_modulus / (2.0 * (1.0 - poissons_ratio**2))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from inputs.case import WalkerCase
+from inputs.case import Drive, WalkerCase
 from inputs.dimer import dimer_of
 from postprocess.dump import BinaryDump, DumpError, FloatArray
 from runner.directory import CASE_NAME
@@ -152,7 +154,11 @@ def _substrate(
     if layout.rider:
         row = layout.rider - 1
         return position[:, row] - position[:1, row], velocity[:, row]
-    drive = case.drive
+    return prescribed_motion(case.drive, time)
+
+
+def prescribed_motion(drive: Drive, time: npt.NDArray[np.floating[Any]]) -> tuple[FloatArray, FloatArray]:
+    """Displacement A sin ωt and velocity of the walls in the frame of the run, m and m/s, each of shape (F, 3)."""
     along = np.array(vector_along(drive.axis)) * (drive.frame == "lab")
     displacement = np.outer(drive.amplitude * np.sin(drive.angular_frequency * time), along)
     return displacement, np.outer(drive.peak_velocity * np.cos(drive.angular_frequency * time), along)

@@ -1,4 +1,4 @@
-"""JSON files, written beside their place and renamed."""
+"""Files written beside their place and renamed: readers see the old file or the new one, never a part."""
 
 from __future__ import annotations
 
@@ -24,18 +24,15 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_json(path: Path, contents: Mapping[str, Any]) -> None:
-    """Write a JSON object beside its place, then rename: readers see the old file or the new one, never a part."""
-    beside = path.with_name(path.name + ".new")
-    with beside.open("w", encoding="utf-8") as file:
-        json.dump(contents, file, indent=2, ensure_ascii=False)
-        file.write("\n")
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(path)
+    """Write a JSON object."""
+    write_text(path, json.dumps(contents, indent=2, ensure_ascii=False) + "\n")
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file beside its place, then rename."""
+    """Write a text file."""
     beside = path.with_name(path.name + ".new")
-    beside.write_text(text, encoding="utf-8")
+    with beside.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
     beside.replace(path)

@@ -65,13 +65,14 @@ NO_CHECKPOINT = Checkpoint()
 
 @dataclass(frozen=True)
 class Recording:
-    """How long a deck runs and how often it records, in steps."""
+    """Until which step a deck runs and how often it records, in steps; ``begin`` is where a restart goes on."""
 
     steps: int
     sample_every: int
     bridge_every: int
     status_every: int
     bead_columns: tuple[str, ...] = BEAD_COLUMNS
+    begin: int = 0
 
 
 @dataclass(frozen=True)
@@ -123,6 +124,11 @@ def render_deck(case: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Deck:
     Deck
         Numbers in full precision (the shortest text that reads back as the same double).
     """
+    return compose(walker_plan(case, remedies))
+
+
+def walker_plan(case: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Plan:
+    """The plan of a walker case: its replicates on their substrate, recorded as the case says."""
     scene, walkers = place_walkers(case)
     run = case.run
     recording = Recording(
@@ -131,7 +137,7 @@ def render_deck(case: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Deck:
         bridge_every=run.steps_per_cycle // run.bridge_samples_per_cycle,
         status_every=-(-run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
     )
-    return compose(Plan(case, scene, recording, walkers, remedies))
+    return Plan(case, scene, recording, walkers, remedies)
 
 
 def compose(plan: Plan) -> Deck:
@@ -198,13 +204,13 @@ def _layout(case: WalkerCase, scene: Scene, recording: Recording, walkers: tuple
         bead_dump="beads.bin",
         bead_columns=recording.bead_columns,
         sample_every=recording.sample_every,
-        frames=recording.steps // recording.sample_every + 1,
+        frames=(recording.steps - recording.begin) // recording.sample_every + 1,
         pair_bridge_dump="bridges.pairs.txt",
         pair_bridge_columns=PAIR_BRIDGE_COLUMNS,
         wall_bridge_dump="bridges.walls.txt",
         wall_bridge_columns=WALL_BRIDGE_COLUMNS,
         bridge_every=recording.bridge_every,
-        bridge_frames=recording.steps // recording.bridge_every + 1,
+        bridge_frames=(recording.steps - recording.begin) // recording.bridge_every + 1,
         atoms=len(scene.riders) + len(scene.beads),
         steps=recording.steps,
         time_step=case.run.time_step,

@@ -7,7 +7,7 @@ from math import cos, degrees, pi, radians, sqrt
 
 import numpy as np
 
-from audit.bench import Bench, Measured, bench_case, bench_recording, scene_on_floor
+from audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
 from audit.check import Check, Line
 from audit.laws import Partner, bridge_law, capillary_law, hertz_law, largest_error
 from inputs import forces
@@ -118,7 +118,7 @@ def _retract_from_wall(bench: Bench, case: WalkerCase, remedies: Remedies) -> tu
     steps, every = _steps_to(1.1 * forces.rupture_distance(volume, case.liquid.contact_angle), case)
     plan = Plan(case, scene_on_floor([bead]), bench_recording(steps, every), remedies=remedies, prescribed=True)
     series = bench.run(plan)
-    row = 1 if remedies.riders else 0
+    row = series.row(FIRST_BEAD)
     return series.position[:, row, 2] - radius, -series.force[:, row, 2]
 
 

@@ -4,27 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import exp, log, pi, sqrt
+from math import exp, pi, sqrt
 
 import numpy as np
 
-from audit.bench import Bench, Measured, bench_case, bench_recording, scene_on_floor
+from audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
 from audit.check import Check, Line
 from audit.laws import Partner, hertz_law, largest_error
+from inputs import forces
 from inputs.case import WalkerCase
 from inputs.dimer import contact_loads
-from postprocess.local_dump import read_local_dump
 from templates.deck import Plan
 from templates.engine import Remedies
-from templates.layout import WALL_BRIDGE_COLUMNS
 from templates.scene import Bead
 
 _WALL = frozenset({"walls"})
 _HERTZ = "4/3 E* √R* δ^(3/2)"
-
-
-def _row(bench: Bench) -> int:
-    return 1 if bench.remedies.riders else 0
 
 
 def _pressed_bead(case: WalkerCase) -> tuple[Bead, float]:
@@ -39,10 +34,10 @@ def friction(bench: Bench) -> Iterator[Line]:
     speed, coefficient = 1e-4, 0.3
     case = bench_case(contact={"friction": {"bead_bead": 0.0, "bead_wall": coefficient}})
     bead, load = _pressed_bead(case)
-    bead = Bead(0, bead.centre, bead.radius, velocity=(speed, 0.0, 0.0))
+    bead = replace(bead, velocity=(speed, 0.0, 0.0))
     recording = bench_recording(1500, 10)
     series = bench.run(Plan(case, scene_on_floor([bead]), recording, remedies=bench.remedies, prescribed=True))
-    drag = -series.force[:, _row(bench), 0]
+    drag = -series.force[:, series.row(FIRST_BEAD), 0]
     yield Line(
         "sliding friction under the capillary load",
         "μ F_N, F_N = capillary load",
@@ -54,8 +49,7 @@ def friction(bench: Bench) -> Iterator[Line]:
         _WALL,
     )
     overlap = contact_loads(case).overlaps[0]
-    shear = case.contact.youngs_modulus / (2.0 * (1.0 + case.contact.poissons_ratio))
-    reduced_shear = shear / (2.0 * (2.0 - case.contact.poissons_ratio))
+    reduced_shear = forces.reduced_shear_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     spring = 2.0 * 8.0 * reduced_shear * sqrt(bead.radius * overlap)
     moved = speed * case.run.time_step * series.steps.astype(np.float64)
     held = spring * moved < 0.9 * coefficient * load
@@ -71,11 +65,11 @@ def rolling(bench: Bench) -> Iterator[Line]:
     coefficient = 0.05
     case = bench_case(contact={"rolling_friction": coefficient, "friction": {"bead_bead": 0.0, "bead_wall": 0.0}})
     bead, load = _pressed_bead(case)
-    bead = Bead(0, bead.centre, bead.radius, spin=(0.0, 20.0, 0.0))
+    bead = replace(bead, spin=(0.0, 20.0, 0.0))
     series = bench.run(
         Plan(case, scene_on_floor([bead]), bench_recording(20, 10), remedies=bench.remedies, prescribed=True)
     )
-    torque = series.torque[-1, _row(bench), 1]
+    torque = series.torque[-1, series.row(FIRST_BEAD), 1]
     yield Line(
         "rolling resistance torque",
         "μ_r R F_N",
@@ -105,7 +99,8 @@ def between_beads(bench: Bench) -> Iterator[Line]:
     plan = Plan(
         case, scene_on_floor([lower, moving]), bench_recording(1500, 100), remedies=bench.remedies, prescribed=True
     )
-    drag = -bench.run(plan).force[-1, _row(bench) + 1, 0]
+    series = bench.run(plan)
+    drag = -series.force[-1, series.row(FIRST_BEAD + 1), 0]
     yield Line("sliding friction between beads", "μ F_N, F_N = capillary load", sliding * load, float(drag), "N", 1e-3)
     case = bench_case(
         contact={"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": rolling_coefficient}
@@ -114,7 +109,8 @@ def between_beads(bench: Bench) -> Iterator[Line]:
     plan = Plan(
         case, scene_on_floor([lower, spinning]), bench_recording(20, 10), remedies=bench.remedies, prescribed=True
     )
-    torque = -bench.run(plan).torque[-1, _row(bench) + 1, 1]
+    series = bench.run(plan)
+    torque = -series.torque[-1, series.row(FIRST_BEAD + 1), 1]
     reduced = lower.radius * upper.radius / (lower.radius + upper.radius)
     expected = rolling_coefficient * reduced * load
     yield Line("rolling resistance torque between beads", "μ_r R* F_N", expected, float(torque), "N m", 1e-3)
@@ -127,9 +123,9 @@ def reported_forces(bench: Bench) -> Iterator[Line]:
     sliding = replace(bead, velocity=(0.05, 0.0, 0.0))
     plan = Plan(case, scene_on_floor([sliding]), bench_recording(200, 200), remedies=bench.remedies, prescribed=True)
     series = bench.run(plan)
-    steps, rows = read_local_dump(series.directory / "bridges.walls.txt", WALL_BRIDGE_COLUMNS)
-    reported = rows[steps == series.steps[-1], WALL_BRIDGE_COLUMNS.index("fx")].sum()
-    off = float(abs(reported / series.force[-1, _row(bench), 0] - 1.0) > 0.1)
+    steps, drag = series.wall_bridges("fx")
+    reported = drag[steps == series.steps[-1]].sum()
+    off = float(abs(reported / series.force[-1, series.row(FIRST_BEAD), 0] - 1.0) > 0.1)
     what = "the reported friction of a sliding contact is not what acts"
     yield Line(what, "off by more than 10 %: 1", 1.0, off, defect=True)
 
@@ -147,7 +143,7 @@ def hertz(bench: Bench) -> Iterator[Line]:
     series = bench.run(
         Plan(case, scene_on_floor(beads), bench_recording(500, 25), remedies=bench.remedies, prescribed=True)
     )
-    row = _row(bench)
+    row = series.row(FIRST_BEAD)
     at_wall = series.position[:, row, 2] - radius
     between = series.position[:, row + 2, 2] - series.position[:, row + 1, 2] - radius - small
     for what, gap, measured, size, partner, needs in (
@@ -161,13 +157,13 @@ def hertz(bench: Bench) -> Iterator[Line]:
         )
 
 
-def _rebound(series: Measured, row: int, speed: float) -> float:
-    return float(series.velocity[-1, row, 2] / speed)
+def _rebound(series: Measured, bead: int, speed: float) -> float:
+    return float(series.velocity[-1, series.row(bead), 2] / speed)
 
 
 def doubled_restitution(coefficient: float) -> float:
     """Restitution at a wall that stands twice: stiffness and damping double, the damping ratio grows by √2."""
-    ratio = sqrt(2.0) * -log(coefficient) / sqrt(log(coefficient) ** 2 + pi**2)
+    ratio = sqrt(2.0) * forces.damping_ratio(coefficient)
     return exp(-pi * ratio / sqrt(1.0 - ratio**2)) if ratio < 1.0 else 0.0
 
 
@@ -190,23 +186,22 @@ def restitution(bench: Bench) -> Iterator[Line]:
             name: bench.run(Plan(case, scene_on_floor(beads), recording, remedies=remedies))
             for name, remedies in walls.items()
         }
-        row = _row(bench)
         yield Line(
             f"restitution {coefficient:g} on a single wall",
             "given coefficient",
             coefficient,
-            _rebound(found["single"], 1, speed),
+            _rebound(found["single"], FIRST_BEAD, speed),
             "",
             0.02,
         )
-        twice, rebound = doubled_restitution(coefficient), _rebound(found["doubled"], row, speed)
+        twice, rebound = doubled_restitution(coefficient), _rebound(found["doubled"], FIRST_BEAD, speed)
         what = f"restitution {coefficient:g} on the doubled wall"
         yield Line(what, "e of √2 times the damping ratio", twice, rebound, "", 0.02, None, _WALL)
         yield Line(
             f"restitution {coefficient:g} between beads",
             "given coefficient",
             coefficient,
-            _rebound(found["doubled"], row + 2, speed),
+            _rebound(found["doubled"], FIRST_BEAD + 2, speed),
             "",
             0.02,
         )

@@ -4,27 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from audit.bench import Bench, bench_case
+from audit.bench import FIRST_BEAD, Bench, bench_case, changed_case
 from audit.check import Check, Line
-from inputs import resolve_case
 from inputs.case import WalkerCase
+from inputs.dimer import dimer_of
 from postprocess.gait import walk
-from postprocess.local_dump import read_local_dump
-from postprocess.trajectory import read_trajectory
+from postprocess.trajectory import prescribed_motion, read_trajectory
 from runner.directory import CASE_NAME
 from runner.files import write_json
-from templates.deck import render_deck
+from templates.deck import walker_plan
 
 _SINE = "A sin ωt, A = a0/ω²"
 
 
-def reference_walker(**changes: dict[str, object]) -> WalkerCase:
+def reference_walker(**changes: dict[str, Any]) -> WalkerCase:
     """The walker of Fig. 2 at 4 g, friction 0.1, alone and on the axis: its speed is known from other engines."""
-    tables: dict[str, dict[str, object]] = {
+    tables: dict[str, dict[str, Any]] = {
         "beads": {"radii": ["0.3 mm", "0.2 mm"], "material": "ruby"},
         "liquid": {"name": "Si AK5"},
         "substrate": {"material": "chromium-coated glass"},
@@ -33,20 +32,14 @@ def reference_walker(**changes: dict[str, object]) -> WalkerCase:
         "start": {"replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
         "run": {"cycles": 30, "settling_cycles": 10},
     }
-    for table, values in changes.items():
-        tables[table] = {**tables.get(table, {}), **values}
-    return resolve_case(tables, source="<audit>", name="audit")
+    return changed_case(tables, changes)
 
 
 def walking_speed(bench: Bench, case: WalkerCase) -> float:
     """Velocity of the first walker of a case, m/s."""
-    return float(walk(read_trajectory(_walker_directory(bench, case))).velocity[0])
-
-
-def _walker_directory(bench: Bench, case: WalkerCase) -> Path:
-    series = bench.run_deck(render_deck(case, bench.remedies))
+    series = bench.run(walker_plan(case, bench.remedies))
     write_json(series.directory / CASE_NAME, case.as_dict())
-    return series.directory
+    return float(walk(read_trajectory(series.directory)).velocity[0])
 
 
 def wall_motion(bench: Bench) -> Iterator[Line]:
@@ -64,15 +57,14 @@ def wall_motion(bench: Bench) -> Iterator[Line]:
         },
         environment={"gravity": "9.81 m/s^2"},
     )
-    deck = render_deck(case, bench.remedies)
-    series = bench.run_deck(deck)
+    series = bench.run(walker_plan(case, bench.remedies))
     drive, time = case.drive, series.steps * case.run.time_step
-    sine, cosine = np.sin(drive.angular_frequency * time), np.cos(drive.angular_frequency * time)
+    expected, speed = (motion[:, 2] for motion in prescribed_motion(drive, time))
     if bench.remedies.riders:
         displacement = series.position[:, 0, 2] - series.position[0, 0, 2]
-        error = float(np.abs(displacement - drive.amplitude * sine).max() / drive.amplitude)
+        error = float(np.abs(displacement - expected).max() / drive.amplitude)
         yield Line("position of the rider", _SINE, drive.amplitude, float(displacement.max()), "m", 1e-3, error)
-        error = float(np.abs(series.velocity[:, 0, 2] - drive.peak_velocity * cosine).max() / drive.peak_velocity)
+        error = float(np.abs(series.velocity[:, 0, 2] - speed).max() / drive.peak_velocity)
         yield Line(
             "velocity of the rider",
             "Aω cos ωt",
@@ -82,19 +74,15 @@ def wall_motion(bench: Bench) -> Iterator[Line]:
             1e-3,
             error,
         )
-    columns = deck.layout.wall_bridge_columns
-    steps, rows = read_local_dump(series.directory / deck.layout.wall_bridge_dump, columns)
-    wall = rows[:, columns.index("z")]
-    expected = drive.amplitude * np.sin(drive.angular_frequency * steps * case.run.time_step)
+    steps, wall = series.wall_bridges("z")
+    expected = prescribed_motion(drive, steps * case.run.time_step)[0][:, 2]
     error = float(np.abs(wall - expected).max() / drive.amplitude)
     # The reported point is a step old: 2π/6000 of the amplitude.
     yield Line(
         "position of the wall, where beads touch it", _SINE, drive.amplitude, float(wall.max()), "m", 2e-3, error
     )
-    row = 1 if bench.remedies.riders else 0
-    mass = case.beads.density * 4.0 / 3.0 * np.pi * case.beads.radii[0] ** 3
     last = slice(4 * case.run.samples_per_cycle, 6 * case.run.samples_per_cycle)
-    felt = float(np.abs(series.force[last, row, 2] / mass).max())
+    felt = float(np.abs(series.force[last, series.row(FIRST_BEAD), 2]).max() / dimer_of(case).masses[0])
     yield Line("peak acceleration of a bead held to the wall", "a0", drive.peak_acceleration, felt, "m/s²", 5e-3)
 
 

@@ -10,20 +10,21 @@ damping and viscosity alone, what each contact takes out. Forces enter the first
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from math import log, pi, sqrt
+from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 
 from audit.bench import Bench
 from audit.check import Check, Line
 from audit.checks.drive import reference_walker
+from audit.laws import lubrication_drags
 from inputs import forces
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
 from postprocess.dump import FloatArray
-from templates.deck import Plan, Recording, compose
-from templates.placement import place_walkers
+from postprocess.trajectory import prescribed_motion
+from templates.deck import walker_plan
 
 _CYCLES = 14
 _LEAD = 2
@@ -71,17 +72,15 @@ def dissipation(case: WalkerCase, touch: Touch, begin: int) -> Dissipated:
     overlap = np.maximum(-touch.gap, 0.0)
     root = np.sqrt(touch.reduced_radius * overlap)
     modulus = forces.reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
-    shear_modulus = contact.youngs_modulus / (4.0 * (1.0 + contact.poissons_ratio) * (2.0 - contact.poissons_ratio))
-    damping = -log(contact.restitution) / sqrt(log(contact.restitution) ** 2 + pi**2)
+    shear_modulus = forces.reduced_shear_modulus(contact.youngs_modulus, contact.poissons_ratio)
+    damping = forces.damping_ratio(contact.restitution)
     normal_damping = 2.0 * sqrt(5.0 / 6.0) * damping * np.sqrt(2.0 * modulus * root * touch.mass)
     stiffness = 8.0 * shear_modulus * root
     tangential_damping = 2.0 * sqrt(5.0 / 6.0) * damping * np.sqrt(stiffness * touch.mass)
     limit = touch.friction * np.abs(4.0 / 3.0 * modulus * root * overlap - normal_damping * touch.normal_speed)
     power = _friction_power(touch.sliding_speed, stiffness, tangential_damping, limit, step)
-    nearness = np.maximum(contact.minimum_separation_ratio, touch.gap / touch.viscous_radius)
-    stokes = 6.0 * pi * case.liquid.dynamic_viscosity * touch.viscous_radius
-    viscous = stokes * touch.normal_speed**2 / nearness
-    viscous += stokes * (8.0 / 15.0 * np.log(1.0 / nearness) + 0.9588) * touch.sliding_speed**2
+    normal_drag, tangential_drag = lubrication_drags(case, touch.viscous_radius, touch.gap)
+    viscous = normal_drag * touch.normal_speed**2 + tangential_drag * touch.sliding_speed**2
     total = (
         touch.copies
         * step
@@ -114,16 +113,16 @@ def _friction_power(
 def balance(bench: Bench) -> Iterator[Line]:
     """The reference walker, recorded every step, its last cycle balanced."""
     case = reference_walker(run={"cycles": _CYCLES, "settling_cycles": 2, "time_step": "auto"})
-    scene, walkers = place_walkers(case)
     cycle = case.run.steps_per_cycle
-    plan = Plan(case, scene, Recording(case.run.steps, 1, cycle, cycle), walkers, bench.remedies)
-    series = bench.run_deck(compose(plan))
+    plan = walker_plan(case, bench.remedies)
+    every_step = replace(plan.recording, sample_every=1, bridge_every=cycle, status_every=cycle)
+    series = bench.run(replace(plan, recording=every_step))
     kept = slice((_CYCLES - 1 - _LEAD) * cycle, _CYCLES * cycle)
-    first = 1 if bench.remedies.riders else 0
+    pair = slice(series.row(2), series.row(4))
     time = series.steps[kept] * case.run.time_step
-    wall_speed = case.drive.peak_velocity * np.cos(case.drive.angular_frequency * time)
+    wall_speed = prescribed_motion(case.drive, time)[1][:, 0]
     position, velocity, spin, force = (
-        values[kept, first : first + 2] for values in (series.position, series.velocity, series.spin, series.force)
+        values[kept, pair] for values in (series.position, series.velocity, series.spin, series.force)
     )
     begin = _LEAD * cycle
     # Gravity has no part along the drive: the sum of the beads' forces there is what the substrate exerts.

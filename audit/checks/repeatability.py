@@ -9,14 +9,13 @@ from math import nan
 
 import numpy as np
 
-from audit.bench import Bench
+from audit.bench import FIRST_BEAD, Bench
 from audit.check import Check, Line, Verdict
 from audit.checks.drive import reference_walker
 from audit.checks.viscous import box_errors, box_lines, run_box, viscous_case
 from audit.laws import largest_error
 from inputs.case import WalkerCase
-from templates.deck import Checkpoint, Plan, Recording, compose, render_deck
-from templates.placement import place_walkers
+from templates.deck import Checkpoint, walker_plan
 
 _RESTART_FILE = "half.restart"
 
@@ -31,9 +30,9 @@ def _ensemble(replicates: int, frame: str = "lab") -> WalkerCase:
 
 def independence(bench: Bench) -> Iterator[Line]:
     """A walker among four against the same one alone; a rerun against the run."""
-    together, alone, again = (bench.run_deck(render_deck(_ensemble(count), bench.remedies)) for count in (4, 1, 4))
-    row = 1 if bench.remedies.riders else 0
-    ways = [series.position[:, row] - series.position[0, row] for series in (together, alone)]
+    together, alone, again = (bench.run(walker_plan(_ensemble(count), bench.remedies)) for count in (4, 1, 4))
+    tracks = [series.position[:, series.row(FIRST_BEAD)] for series in (together, alone)]
+    ways = [track - track[0] for track in tracks]
     error = float(np.abs(ways[0] - ways[1]).max() / np.abs(ways[1]).max())
     yield Line(
         "a walker among four against the same one alone", "independent replicates", 0.0, error, "rel.", 1e-6, error
@@ -45,21 +44,13 @@ def independence(bench: Bench) -> Iterator[Line]:
 def restart(bench: Bench) -> Iterator[Line]:
     """Ten cycles at a stretch against five, a restart file, and five more (container frame)."""
     case = _ensemble(2, "container")
-    scene, walkers = place_walkers(case)
-    run = case.run
-    every = run.steps_per_cycle // run.samples_per_cycle
-    half = run.steps // 2
-    whole = bench.run_deck(render_deck(case, bench.remedies))
-    plan = Plan(
-        case, scene, Recording(half, every, run.steps_per_cycle, run.steps_per_cycle), walkers, bench.remedies,
-        checkpoint=Checkpoint(write=_RESTART_FILE),
-    )  # fmt: skip
-    first = bench.run(plan)
-    rest = Recording(run.steps, every, run.steps_per_cycle, run.steps_per_cycle)
-    deck = compose(replace(plan, recording=rest, checkpoint=Checkpoint(read=_RESTART_FILE)))
-    # The dump begins at the restart: it holds the second half and the frame between.
-    short = replace(deck.layout, frames=deck.layout.frames // 2 + 1, bridge_frames=deck.layout.bridge_frames // 2 + 1)
-    second = bench.run_deck(replace(deck, layout=short), first.directory / _RESTART_FILE)
+    run, plan = case.run, walker_plan(case, bench.remedies)
+    whole = bench.run(plan)
+    half = replace(plan.recording, steps=run.steps // 2)
+    first = bench.run(replace(plan, recording=half, checkpoint=Checkpoint(write=_RESTART_FILE)))
+    rest = replace(plan.recording, begin=half.steps)
+    going_on = replace(plan, recording=rest, checkpoint=Checkpoint(read=_RESTART_FILE))
+    second = bench.run(going_on, first.directory / _RESTART_FILE)
     way = float(np.abs(whole.position[-1] - whole.position[0]).max())
     apart = float(np.abs(second.position[-1] - whole.position[-1]).max())
     yield Line(
@@ -71,9 +62,9 @@ def restart(bench: Bench) -> Iterator[Line]:
         0.01,
         apart / way,
     )
-    back = 3 * run.samples_per_cycle
+    back, row = 3 * run.samples_per_cycle, whole.row(FIRST_BEAD)
     speeds = [
-        float((series.position[-1, 1, 0] - series.position[-1 - back, 1, 0]) * case.drive.frequency / 3.0)
+        float((series.position[-1, row, 0] - series.position[-1 - back, row, 0]) * case.drive.frequency / 3.0)
         for series in (whole, second)
     ]
     yield Line(

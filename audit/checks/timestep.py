@@ -83,7 +83,7 @@ def agitation(bench: Bench, time_step: float) -> float:
         series = bench.run(Plan(case, scene, bench_recording(steps, every), remedies=bench.remedies))
     except WalkersError:
         return float("inf")
-    first = len(scene.riders) if bench.remedies.riders else 0
+    first = series.row(scene.beads[0].id)
     return float(np.mean(np.sum(series.velocity[20 * _SETTLING :, first:] ** 2, axis=-1)))
 
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 
 from audit.bench import Bench, Measured, bench_case, bench_recording, scene_on_floor
 from audit.check import Check, Line
@@ -14,6 +13,7 @@ from audit.laws import Partner, bridge_law, frame_by_frame_error
 from inputs import forces
 from inputs.case import WalkerCase
 from postprocess.dump import FloatArray
+from postprocess.trajectory import prescribed_motion
 from templates.deck import Plan
 from templates.engine import ALL_REMEDIES, Remedies
 from templates.scene import AXES, Bead, Face, Point, Scene, vector_along
@@ -62,20 +62,11 @@ def box_scene(radius: float, ranks: int = 1) -> Scene:
     return Scene(tuple(beads), tuple(faces), tuple(riders), (-edge,) * 3, (edge,) * 3)
 
 
-def wall_motion(case: WalkerCase, steps: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
-    """Displacement (m) and velocity (m/s) of the walls at each step, shape (F, 3)."""
-    drive = case.drive
-    time = steps.astype(np.float64) * case.run.time_step
-    along = np.array(vector_along(drive.axis)) * (drive.frame == "lab")
-    displacement = np.outer(drive.amplitude * np.sin(drive.angular_frequency * time), along)
-    return displacement, np.outer(drive.peak_velocity * np.cos(drive.angular_frequency * time), along)
-
-
 def box_errors(case: WalkerCase, scene: Scene, series: Measured) -> dict[int, FloatArray]:
     """Largest errors of viscous force and of torque, frame by frame, by the number of walls that a bead is bound to."""
     radius = scene.beads[0].radius
     errors: dict[int, FloatArray] = {}
-    displacement, speed = wall_motion(case, series.steps)
+    displacement, speed = prescribed_motion(case.drive, series.steps * case.run.time_step)
     # The first frame of moving walls is left out: they move from the first step on.
     judged = slice(int(case.drive.frame == "lab"), None)
     for bead in scene.beads:
