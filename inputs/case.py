@@ -5,7 +5,7 @@ This is what the deck is rendered from, what a run directory stores as ``case.js
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from math import pi
 from typing import Any, Literal
 
@@ -123,8 +123,12 @@ class WalkerCase:
 
     def determinants(self) -> dict[str, Any]:
         """Everything that the run's outcome depends on, as plain JSON types."""
-        values = asdict(self)
-        del values["name"], values["title"]
+        # Not dataclasses.asdict: it copies every number, and a sweep asks this of thousands of cases.
+        values = {
+            key: dict(vars(value)) if is_dataclass(value) else value
+            for key, value in vars(self).items()
+            if key not in ("name", "title")
+        }
         values["kind"] = "walker"
         values["beads"]["radii"] = list(self.beads.radii)
         return values

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import asin, cos, pi, sqrt
 
 from inputs import forces
@@ -89,6 +90,7 @@ class ContactLoads:
     overlaps: tuple[float, float, float]
 
 
+@lru_cache(maxsize=16)  # asked for at every stage of a deck
 def contact_loads(case: WalkerCase) -> ContactLoads:
     """Capillary load of each contact and the overlap at which the Hertz force carries it."""
     liquid, radii = case.liquid, case.beads.radii

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any, get_args
 
 from pydantic import BaseModel
@@ -21,6 +22,11 @@ _EXAMPLES = {
     "substrate.material": 'such as "chromium-coated glass"',
     "drive": "a [drive] table with a frequency and a peak_acceleration or gamma0",
     "drive.frequency": 'such as "80 Hz"',
+    "case": 'a case file, or the name of a shipped case, such as "fig1b"',
+    "descend.from": 'where the descent begins, such as "4 g"',
+    "descend.to": 'where it ends at the latest, such as "0.5 g"',
+    "descend.step": 'such as "0.1 g"',
+    "descend.until_below": 'the speed below which walkers count as at rest, such as "0.02 mm/s"',
 }
 
 
@@ -51,15 +57,17 @@ def quoted(document: Mapping[str, Any], location: Sequence[str | int]) -> str | 
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def problem_of(details: ErrorDetails, document: Mapping[str, Any]) -> Problem:
-    """One of pydantic's errors as a `Problem`."""
+def problem_of(
+    details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel] = WalkerFile, whole: str = "a case"
+) -> Problem:
+    """One of pydantic's errors about a kind of file as a `Problem`; ``whole`` is what messages call such a file."""
     location = details["loc"]
     key = _dotted(location)
     if details["type"] == "missing":
         if isinstance(location[-1], int):
             return Problem(_dotted(location[:-1]), quoted(document, location[:-1]), "expected two radii")
         return Problem(key, None, f"missing; expected {_EXAMPLES.get(key, 'a value')}")
-    return Problem(key, quoted(document, location), _expectation(details, key))
+    return Problem(key, quoted(document, location), _expectation(details, key, file, whole))
 
 
 def _dotted(location: Sequence[str | int]) -> str:
@@ -69,12 +77,12 @@ def _dotted(location: Sequence[str | int]) -> str:
     return key
 
 
-def _expectation(details: ErrorDetails, key: str) -> str:
+def _expectation(details: ErrorDetails, key: str, file: type[BaseModel], whole: str) -> str:
     kind, context = details["type"], details.get("ctx", {})
     if kind in _PLAIN:
         return _PLAIN[kind]
     if kind == "extra_forbidden":
-        return _unknown_key([str(part) for part in details["loc"]])
+        return _unknown_key([str(part) for part in details["loc"] if isinstance(part, str)], file, whole)
     if kind == "literal_error":
         choices = str(context["expected"]).replace(" or ", ", ").replace("'", "").split(", ")
         return f"expected {context['expected']}{suggestion(str(details['input']), choices)}"
@@ -84,8 +92,8 @@ def _expectation(details: ErrorDetails, key: str) -> str:
     return f"expected {bounds}{_BOUND_UNITS.get(key, '')}" if bounds else details["msg"]
 
 
-def _table_at(location: Sequence[str]) -> type[BaseModel] | None:
-    table: type[BaseModel] = WalkerFile
+def _table_at(location: Sequence[str], file: type[BaseModel]) -> type[BaseModel] | None:
+    table = file
     for part in location:
         field = table.model_fields.get(part)
         if field is None:
@@ -98,22 +106,36 @@ def _table_at(location: Sequence[str]) -> type[BaseModel] | None:
     return table
 
 
-def _all_keys(table: type[BaseModel], prefix: str = "") -> list[str]:
+def _all_keys(file: type[BaseModel], prefix: str = "") -> list[str]:
     keys: list[str] = []
-    for name in table.model_fields:
-        nested = _table_at([*prefix.split("."), name] if prefix else [name])
+    table = _table_at(prefix.split("."), file) if prefix else file
+    for name in table.model_fields if table else ():
         dotted = f"{prefix}.{name}" if prefix else name
-        keys += _all_keys(nested, dotted) if nested else [dotted]
+        keys += _all_keys(file, dotted) if _table_at(dotted.split("."), file) else [dotted]
     return keys
 
 
-def _unknown_key(location: list[str]) -> str:
+@cache
+def _case_keys() -> frozenset[str]:
+    return frozenset(_all_keys(WalkerFile))
+
+
+def suggested_key(key: str) -> str | None:
+    """What to say of a dotted key of a case if there is no such key; None if there is."""
+    if key in _case_keys():
+        return None
+    if _table_at(key.split("."), WalkerFile):
+        return "is a table of a case; expected one of its keys"
+    return _unknown_key(key.split("."), WalkerFile, "a case")
+
+
+def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     word = location[-1]
-    table = _table_at(location[:-1])
-    siblings = list(table.model_fields) if table else []
+    table = _table_at(location[:-1], file)
+    siblings = [field.alias or name for name, field in table.model_fields.items()] if table else []
     hint = suggestion(word, siblings)
-    elsewhere = [key for key in _all_keys(WalkerFile) if key.split(".")[-1] == word]
+    elsewhere = [key for key in _all_keys(file) if key.split(".")[-1] == word]
     if not hint and elsewhere:
         hint = f'; did you mean "{elsewhere[0]}"?'
-    place = f"[{'.'.join(location[:-1])}]" if location[:-1] else "a case"
+    place = f"[{'.'.join(location[:-1])}]" if location[:-1] else whole
     return f"unknown key; {place} takes {', '.join(siblings)}{hint}"

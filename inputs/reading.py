@@ -45,22 +45,38 @@ def load_case(case: str | Path) -> WalkerCase:
     InputError
         If there is no such file or anything in it cannot be used.
     """
-    path = Path(case)
+    path = find_input(case, shipped_cases(), "case")
+    return resolve_case(read_toml(path), source=str(case), name=path.stem)
+
+
+def find_input(name: str | Path, shipped: Mapping[str, Path], kind: str) -> Path:
+    """A file by its path, or a shipped one by its name.
+
+    Raises
+    ------
+    InputError
+        If there is neither; ``kind`` is what the message calls it.
+    """
+    path = Path(name)
     try:
-        found = path.exists()
+        if path.exists():
+            return path
     except OSError as error:
-        raise InputError(str(case)[:80], [Problem("", None, f"cannot be read: {error.strerror}")]) from error
-    if not found:
-        shipped = shipped_cases()
-        if str(case) not in shipped:
-            known = ", ".join(shipped)
-            hint = suggestion(str(case), shipped)
-            raise InputError(str(case), [Problem("", None, f"no such file, nor a shipped case ({known}){hint}")])
-        path = shipped[str(case)]
-    return resolve_case(_read_toml(path), source=str(case), name=path.stem)
+        raise InputError(str(name)[:80], [Problem("", None, f"cannot be read: {error.strerror}")]) from error
+    if str(name) in shipped:
+        return shipped[str(name)]
+    told = f"no such file, nor a shipped {kind} ({', '.join(shipped)}){suggestion(str(name), shipped)}"
+    raise InputError(str(name), [Problem("", None, told)])
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or is no TOML.
+    """
     try:
         return tomllib.loads(path.read_bytes().decode("utf-8"))
     except UnicodeDecodeError as error:

@@ -8,7 +8,7 @@ from inputs import library
 from inputs.case import Beads, Contact, Drive, Liquid, Run, Start, WalkerCase
 from inputs.dimer import Dimer, contact_loads, horizontal_distance, reach
 from inputs.library import suggestion
-from inputs.schema import LiquidTable, WalkerFile
+from inputs.schema import BeadsTable, LiquidTable, WalkerFile
 from inputs.timestep import fit_into_cycle, time_step_limits
 
 MOST_STEPS = 2**31 - 1
@@ -55,8 +55,10 @@ def resolve(file: WalkerFile, name: str) -> WalkerCase:
 
 def _known(key: str, name: str, names: tuple[str, ...], *, described: bool = False) -> str:
     """A name of the library; another one only if the case itself says all about it and it is no misspelling."""
+    if name in names:
+        return name
     hint = suggestion(name, names)
-    if name not in names and (hint or not described):
+    if hint or not described:
         raise UnusableKeyError(key, f"not in the library; expected one of {', '.join(names)}{hint}")
     return name
 
@@ -76,7 +78,22 @@ def _beads(file: WalkerFile) -> Beads:
         density = library.material(table.material)["density"]
     if density is None:
         raise UnusableKeyError("beads.material", "missing; expected a material of the library, or a density")
-    return Beads(radii=table.radii, density=density, material=table.material)
+    return Beads(radii=_radii(table), density=density, material=table.material)
+
+
+def _radii(table: BeadsTable) -> tuple[float, float]:
+    if table.radii is not None:
+        other = "mean_radius" if table.mean_radius is not None else "sin_delta"
+        if table.mean_radius is not None or table.sin_delta is not None:
+            raise UnusableKeyError(f"beads.{other}", "expected either the radii or mean_radius and sin_delta, not both")
+        return table.radii
+    if table.mean_radius is None and table.sin_delta is None:
+        raise UnusableKeyError("beads.radii", 'missing; expected such as ["0.3 mm", "0.2 mm"]')
+    if table.mean_radius is None or table.sin_delta is None:
+        lacking, example = ("mean_radius", '"0.25 mm"') if table.mean_radius is None else ("sin_delta", "0.2")
+        raise UnusableKeyError(f"beads.{lacking}", f"missing; expected such as {example}")
+    first, second = (float(f"{table.mean_radius * share:.15g}") for share in (1 + table.sin_delta, 1 - table.sin_delta))
+    return first, second
 
 
 def _liquid(table: LiquidTable) -> Liquid:

@@ -47,6 +47,17 @@ def _whole_number(value: object) -> object:
     return value
 
 
+ALTERNATIVES: dict[str, tuple[str, ...]] = {
+    "drive.peak_acceleration": ("drive.gamma0",),
+    "drive.gamma0": ("drive.peak_acceleration",),
+    "liquid.kinematic_viscosity": ("liquid.dynamic_viscosity",),
+    "liquid.dynamic_viscosity": ("liquid.kinematic_viscosity",),
+    "beads.radii": ("beads.mean_radius", "beads.sin_delta"),
+    "beads.mean_radius": ("beads.radii",),
+    "beads.sin_delta": ("beads.radii",),
+}
+"""Keys that say the same in other words: a change of one puts the others out of force."""
+
 Number = Annotated[float, BeforeValidator(_plain_number), Field(allow_inf_nan=False)]
 Whole = Annotated[int, BeforeValidator(_whole_number)]
 Coefficient = Annotated[Number, Field(ge=0, le=1e3)]
@@ -57,9 +68,14 @@ class _Table(BaseModel):
 
 
 class BeadsTable(_Table):
-    """``[beads]``: the radii, first the bead that leads (the large one, as in the paper), and what they are made of."""
+    """``[beads]``: the radii, first the bead that leads (the large one, as in the paper), and what they are made of.
 
-    radii: Annotated[tuple[Radius, Radius], Field(description="radii of the two beads")]
+    The radii may also be given by their mean and the asymmetry parameter sin δ = (R1 - R2)/(R1 + R2).
+    """
+
+    radii: tuple[Radius, Radius] | None = None
+    mean_radius: Radius | None = None
+    sin_delta: Annotated[Number, Field(gt=-0.9, lt=0.9)] | None = None
     material: str | None = None
     density: Density | None = None
 

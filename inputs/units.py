@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator
@@ -61,6 +61,7 @@ def registry() -> UnitRegistry[float]:
     return units
 
 
+@lru_cache(maxsize=4096)  # a sweep reads the same few texts for thousands of points
 def parse_quantity(text: str, kind: Kind) -> float:
     """Read a quantity.
 
@@ -101,6 +102,20 @@ def parse_quantity(text: str, kind: Kind) -> float:
     return value
 
 
+def split_quantity(text: str) -> tuple[float, str]:
+    """The number and the unit of a quantity, whatever the unit is.
+
+    Raises
+    ------
+    ValueError
+        If the text is no number with a unit.
+    """
+    match = _NUMBER_AND_UNIT.fullmatch(text.strip())
+    if match is None:
+        raise ValueError(f"no quantity: {text!r}")
+    return float(match["number"]), match["unit"].strip()
+
+
 def _validator(kind: Kind, *, positive: bool, zero: bool) -> Any:
     def validate(value: object) -> float:
         if not isinstance(value, str):
@@ -121,6 +136,7 @@ LENGTH = Kind("length", "m", "0.3 mm", 1.0, 1e-9)
 RADIUS = Kind("length", "m", "0.3 mm", 0.02, 1e-6)
 FREQUENCY = Kind("frequency", "Hz", "80 Hz", 1e6, 1e-2)
 ACCELERATION = Kind("acceleration", "m/s^2", "4 g", 1e6, 1e-9)
+SPEED = Kind("speed", "m/s", "0.02 mm/s", 1e4, 1e-12)
 TIME = Kind("time", "s", "2 us", 1.0, 1e-12)
 ANGLE = Kind("angle", "rad", "10 deg", 1e3)
 DENSITY = Kind("density", "kg/m^3", "4.0 g/cm^3", 1e5, 1.0)
@@ -134,6 +150,7 @@ Radius = Annotated[float, _validator(RADIUS, positive=True, zero=False)]
 SignedLength = Annotated[float, _validator(LENGTH, positive=False, zero=True)]
 Frequency = Annotated[float, _validator(FREQUENCY, positive=True, zero=False)]
 Acceleration = Annotated[float, _validator(ACCELERATION, positive=True, zero=True)]
+Speed = Annotated[float, _validator(SPEED, positive=True, zero=False)]
 Time = Annotated[float, _validator(TIME, positive=True, zero=False)]
 Angle = Annotated[float, _validator(ANGLE, positive=False, zero=True)]
 NonNegativeAngle = Annotated[float, _validator(ANGLE, positive=True, zero=True)]

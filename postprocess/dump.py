@@ -27,6 +27,7 @@ class DumpError(WalkersError):
 
 @dataclass(frozen=True)
 class _Frame:
+    start: int
     step: int
     rows: int
     columns: int
@@ -83,7 +84,8 @@ class BinaryDump:
         if offset + _HEADER.size > size:
             return None
         values = _HEADER.unpack(self._bytes[offset : offset + _HEADER.size].tobytes())
-        step, rows, columns, processes = values[0], values[1], values[15], values[16]
+        start, step = offset, values[0]
+        rows, columns, processes = values[1], values[15], values[16]
         if columns != len(self.columns) or rows < 0 or not 1 <= processes < 1_000_000 or step < 0:
             raise DumpError(f"{self.path}: no dump of {len(self.columns)} columns (byte {offset})")
         offset += _HEADER.size
@@ -99,7 +101,7 @@ class BinaryDump:
             offset += 8 * count
         if sum(count for _, count in blocks) != rows * columns:
             raise DumpError(f"{self.path}: the parts of the frame of step {step} do not add up")
-        return _Frame(step, rows, columns, tuple(blocks)), offset
+        return _Frame(start, step, rows, columns, tuple(blocks)), offset
 
     def frame(self, number: int) -> FloatArray:
         """One frame, shape (rows, columns)."""
@@ -120,6 +122,24 @@ class BinaryDump:
         if len({frame.rows for frame in self._frames}) > 1:
             raise DumpError(f"{self.path}: the number of beads changes")
         return np.stack([self.frame(number) for number in range(len(self))])
+
+    def write_like(self, data: FloatArray, path: Path) -> None:
+        """Write a dump with the frames' heads of this one and other rows.
+
+        Parameters
+        ----------
+        data : ndarray, shape (frames, rows, columns)
+        path
+            The file; the parts of several processes become one.
+        """
+        count = data.shape[1] * data.shape[2]
+        heads = []
+        for frame in self._frames:
+            head = list(_HEADER.unpack(self._bytes[frame.start : frame.start + _HEADER.size].tobytes()))
+            head[1], head[-1] = data.shape[1], 1
+            heads.append(np.frombuffer(_HEADER.pack(*head) + _COUNT.pack(count), dtype=np.uint8))
+        body = np.ascontiguousarray(data).reshape(len(data), -1).view(np.uint8)
+        np.concatenate([np.stack(heads), body], axis=1).tofile(path)
 
     def column(self, name: str) -> int:
         """Number of a column."""

@@ -17,11 +17,13 @@ from inputs.dimer import dimer_of
 from postprocess.bridges import Columns, bridge_columns
 from postprocess.dump import FloatArray
 from postprocess.gait import Gait, Walk, gait, settled_samples, walk
-from postprocess.tables import write_table
+from postprocess.tables import intact, write_table
 from postprocess.trajectory import Trajectory, read_trajectory
 from runner.files import read_json, write_json
 
 RESULT_NAME = "result.json"
+NEAR = 1.5
+"""Walkers whose mass centres come within this many lengths of a dimer have met."""
 
 
 def tabulate(directory: str | Path) -> dict[str, Any]:
@@ -57,6 +59,18 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
 def read_result(directory: str | Path) -> dict[str, Any]:
     """The result of a run, as `tabulate` wrote it."""
     return read_json(Path(directory) / RESULT_NAME)
+
+
+def current_result(directory: str | Path) -> dict[str, Any]:
+    """The result of a finished run; tabulated anew if it or a table is gone or damaged."""
+    directory = Path(directory)
+    try:
+        result = read_result(directory)
+        if "velocity" in result and intact(directory):
+            return result
+    except (OSError, ValueError):
+        pass
+    return tabulate(directory)
 
 
 def _trajectory_columns(trajectory: Trajectory, motion: Gait) -> Columns:
@@ -164,7 +178,19 @@ def _drive(case: WalkerCase) -> dict[str, Any]:
 def walkers_met(trajectory: Trajectory) -> bool:
     """Whether two walkers came so near each other that they are no longer independent replicates."""
     centre = trajectory.mass_centre[:: trajectory.case.run.samples_per_cycle, :, :2]
-    near = 1.5 * dimer_of(trajectory.case).length
+    return came_near(centre, NEAR * dimer_of(trajectory.case).length)
+
+
+def came_near(centre: FloatArray, near: float) -> bool:
+    """Whether two of several points ever came within a distance of each other.
+
+    Parameters
+    ----------
+    centre : ndarray, shape (F, W, 2)
+        Their places in F frames, m.
+    near
+        The distance, m.
+    """
     # Only walkers whose ranges overlap can have met: of a thousand, a few pairs are left to be followed.
     middle = (centre.max(axis=0) + centre.min(axis=0)) / 2.0
     reach = np.linalg.norm(centre - middle, axis=-1).max(axis=0)

@@ -7,12 +7,20 @@ from __future__ import annotations
 
 from inputs.case import WalkerCase
 
-_START_UP_SECONDS = 0.33
+START_UP_SECONDS = 0.33
 _STEP_MICROSECONDS = 2.2
 _WALKER_MICROSECONDS = 0.54
 
 
-def predicted_seconds(case: WalkerCase) -> float:
-    """Wall time in s of a case's run on one core."""
-    microseconds = _STEP_MICROSECONDS + _WALKER_MICROSECONDS * case.start.replicates
-    return _START_UP_SECONDS + case.run.steps * microseconds * 1e-6
+def predicted_seconds(case: WalkerCase, walkers: int | None = None) -> float:
+    """Wall time in s of a deck on one core.
+
+    Parameters
+    ----------
+    case
+        A case of the deck, for the number of its steps.
+    walkers
+        In the deck; the case's own replicates if left out.
+    """
+    count = case.start.replicates if walkers is None else walkers
+    return START_UP_SECONDS + case.run.steps * (_STEP_MICROSECONDS + _WALKER_MICROSECONDS * count) * 1e-6

@@ -2,21 +2,18 @@
 
 A run is made in ``<name>-<hash>.part`` and renamed to ``<name>-<hash>`` when its manifest has been written, last: a
 directory without a manifest is not a run, and a run that is made anew replaces the old one only when it has finished.
-While it is made, the file ``<name>-<hash>.lock`` is locked, also by the engine itself, so that an engine which outlives
-its launcher keeps others away.
+While it is made, the file ``<name>-<hash>.lock`` is locked, also by the engine itself (see `runner.locks`).
 """
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
-import os
 import platform
 import re
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -27,14 +24,16 @@ from inputs.case import WalkerCase
 from runner.audits import read_audit
 from runner.binary import Engine
 from runner.failures import DiskFull, EngineFailure, RunBusy
-from runner.files import read_json, write_json
+from runner.files import read_json, settle, write_json
 from runner.launch import EngineReport
-from templates.deck import DECK_NAME, LAYOUT_NAME, Deck
+from runner.locks import locked
+from templates.deck import DECK_NAME, LAYOUT_NAME, Deck, render_deck
 from templates.layout import Layout
 
 MANIFEST_NAME = "manifest.json"
 CASE_NAME = "case.json"
 FAILURE_NAME = "failure.json"
+UNFINISHED = ".part"
 _FORMAT = 1
 _LONGEST_NAME = 80
 
@@ -51,6 +50,11 @@ def run_name(case: WalkerCase, deck: Deck, engine: Engine) -> str:
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
     name = re.sub(r"[^\w.+-]+", "_", case.name)[:_LONGEST_NAME]
     return f"{name}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
+
+
+def run_place(case: WalkerCase, engine: Engine, out: Path) -> Path:
+    """Where the run of a case by itself belongs."""
+    return out / run_name(case, render_deck(case), engine)
 
 
 @dataclass(frozen=True)
@@ -82,14 +86,14 @@ def finished_run(directory: Path) -> FinishedRun | None:
 
 @dataclass
 class OpenRun:
-    """A run that is being made, in a directory of its own beside its final place."""
+    """A run that is being made, in a directory of its own beside its final place; ``locks`` are file descriptors."""
 
     case: WalkerCase
     deck: Deck
     engine: Engine
     directory: Path
     place: Path
-    lock: int
+    locks: Sequence[int]
     started: float
 
     def discard(self) -> None:
@@ -98,14 +102,23 @@ class OpenRun:
 
     def finish(self, report: EngineReport) -> FinishedRun:
         """Write the manifest, last, and move the directory to its place."""
-        manifest = _manifest(self, report)
-        write_json(self.directory / MANIFEST_NAME, manifest)
-        replaced = _aside(self.place)
-        if self.place.exists():
-            self.place.rename(replaced)
-        self.directory.rename(self.place)
-        shutil.rmtree(replaced, ignore_errors=True)
+        made = self.directory
+        write_json(
+            made / MANIFEST_NAME,
+            manifest(self.case, self.place.name, self.engine, report, started=self.started, directory=made),
+        )
+        move_into_place(made, self.place)
         return FinishedRun(self.place)
+
+
+def move_into_place(made: Path, place: Path) -> None:
+    """Give a directory that has been made its name, safe on disk, in exchange for one that has it already."""
+    settle(made)
+    replaced = _aside(place)
+    if place.exists():
+        place.rename(replaced)
+    made.rename(place)
+    shutil.rmtree(replaced, ignore_errors=True)
 
 
 def _aside(place: Path) -> Path:
@@ -137,43 +150,36 @@ def open_run(case: WalkerCase, deck: Deck, engine: Engine, out: Path) -> Iterato
         If there is no room even for the deck.
     """
     place = out / run_name(case, deck, engine)
-    part = place.with_name(place.name + ".part")
     out.mkdir(parents=True, exist_ok=True)
-    lock_file = place.with_name(place.name + ".lock")
-    lock = _lock(lock_file, part)
+    with locked([place]) as ours:
+        if place not in ours:
+            raise RunBusy(unfinished(place))
+        with make_run(case, deck, engine, place, list(ours.values())) as run:
+            yield run
+
+
+def unfinished(place: Path) -> Path:
+    """Where the run of a place is made."""
+    return place.with_name(place.name + UNFINISHED)
+
+
+@contextmanager
+def make_run(case: WalkerCase, deck: Deck, engine: Engine, place: Path, locks: Sequence[int]) -> Iterator[OpenRun]:
+    """`open_run` for somebody who has locked the place already."""
+    part = unfinished(place)
+    recover(place)
+    shutil.rmtree(part, ignore_errors=True)
+    run = OpenRun(case, deck, engine, part, place, locks, time.time())
     try:
-        _recover(place)
-        shutil.rmtree(part, ignore_errors=True)
-        run = OpenRun(case, deck, engine, part, place, lock, time.time())
-        try:
-            with _room_on_disk(part, deck):
-                _write_deck(run)
-                yield run
-        except EngineFailure as failure:
-            _record(part, failure)
-            raise
-    finally:
-        lock_file.unlink(missing_ok=True)
-        os.close(lock)
+        with room_on_disk(part, deck):
+            _write_deck(run)
+            yield run
+    except EngineFailure as failure:
+        _record(part, failure)
+        raise
 
 
-def _lock(lock_file: Path, part: Path) -> int:
-    """Lock a file that others may be removing at this moment: the lock counts only on the file that has the name."""
-    while True:
-        lock = os.open(lock_file, os.O_RDWR | os.O_CREAT, 0o644)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if os.path.samestat(os.fstat(lock), lock_file.stat()):
-                return lock
-        except BlockingIOError as error:
-            os.close(lock)
-            raise RunBusy(part) from error
-        except FileNotFoundError:
-            pass
-        os.close(lock)
-
-
-def _recover(place: Path) -> None:
+def recover(place: Path) -> None:
     """Undo a replacement that was interrupted between its two renames."""
     replaced = _aside(place)
     if replaced.exists() and not place.exists():
@@ -181,7 +187,8 @@ def _recover(place: Path) -> None:
 
 
 @contextmanager
-def _room_on_disk(part: Path, deck: Deck) -> Iterator[None]:
+def room_on_disk(part: Path, deck: Deck) -> Iterator[None]:
+    """Turn the system's word for a full disk into a `DiskFull`."""
     import errno
 
     try:
@@ -207,40 +214,43 @@ def write_deck(deck: Deck, directory: Path) -> None:
 
 def _record(part: Path, failure: EngineFailure) -> None:
     with suppress(OSError):  # a full disk: the message reaches the user all the same
-        write_json(part / FAILURE_NAME, {"reason": failure.reason, "message": str(failure)})
+        write_json(part / FAILURE_NAME, {"reason": failure.reason, "message": str(failure), "lost": failure.lost})
 
 
-def _manifest(run: OpenRun, report: EngineReport) -> dict[str, Any]:
+def manifest(
+    case: WalkerCase, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path
+) -> dict[str, Any]:
+    """What the manifest of a run says."""
     finished = time.time()
     try:
         own_version = version("granular-walkers")
     except PackageNotFoundError:
         own_version = "not installed"
-    audit = read_audit(run.engine.sha256)
+    audit = read_audit(engine.sha256)
     return {
         "format": _FORMAT,
         "status": "finished",
-        "name": run.case.name,
-        "run": run.place.name,
+        "name": case.name,
+        "run": name,
         "engine": {
-            "path": str(run.engine.path),
+            "path": str(engine.path),
             "version": report.version,
-            "sha256": run.engine.sha256,
+            "sha256": engine.sha256,
             "audit": audit.summary() if audit else None,
         },
         "granular_walkers": own_version,
         "host": platform.node(),
         "platform": platform.platform(),
-        "started": _iso(run.started),
+        "started": _iso(started),
         "finished": _iso(finished),
         "seconds": {
-            "total": finished - run.started,
+            "total": finished - started,
             "engine": report.wall_seconds,
             "engine_loop": report.loop_seconds,
         },
         "steps": report.steps,
         "steps_per_second": report.steps / report.loop_seconds if report.loop_seconds else None,
-        "files": {path.name: path.stat().st_size for path in sorted(run.directory.iterdir())},
+        "files": {path.name: path.stat().st_size for path in sorted(directory.iterdir()) if path.is_file()},
     }
 
 

@@ -17,7 +17,9 @@ INSTALL_COMMAND = "sudo apt-get install liggghts"
 
 
 class EngineFailure(WalkersError):
-    """Root of the failures of a run; ``directory`` is where its remains are."""
+    """Root of the failures of a run; ``directory`` is where its remains are, ``lost`` the number of beads lost."""
+
+    lost = 0
 
     def __init__(self, message: str, directory: Path | None = None) -> None:
         self.directory = directory
@@ -36,6 +38,15 @@ class EngineMissing(EngineFailure):
         super().__init__(
             f"no engine: {wanted} is not an executable file on this machine; install it with: {INSTALL_COMMAND}"
         )
+
+
+class EngineDiffers(EngineFailure):
+    """A worker of a sweep has another engine than the one that the sweep was started with."""
+
+    def __init__(self, found: Path) -> None:
+        import platform
+
+        super().__init__(f"the engine on {platform.node()}, {found}, is not the one that this sweep was started with")
 
 
 class EngineError(EngineFailure):
@@ -103,6 +114,13 @@ class TimeLimitExceeded(EngineFailure):
 
     def __init__(self, limit: float, step: int, steps: int, directory: Path) -> None:
         super().__init__(f"time limit of {limit:g} s reached at step {step} of {steps}", directory)
+
+
+class WalkersMet(EngineFailure):
+    """Walkers of different cases that shared a deck came close to each other. Seen when the deck's output is parted."""
+
+    def __init__(self, directory: Path) -> None:
+        super().__init__("walkers of different cases came close to each other in a shared deck", directory)
 
 
 class RunBusy(EngineFailure):

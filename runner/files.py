@@ -28,6 +28,17 @@ def write_json(path: Path, contents: Mapping[str, Any]) -> None:
     write_text(path, json.dumps(contents, indent=2, ensure_ascii=False) + "\n")
 
 
+def settle(directory: Path) -> None:
+    """Put a directory and all that is in it on the disk, so that its new name outlives a loss of power."""
+    for folder, _, names in os.walk(directory):
+        for entry in [Path(folder) / name for name in names] + [Path(folder)]:
+            descriptor = os.open(entry, os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file."""
     beside = path.with_name(path.name + ".new")

@@ -33,6 +33,8 @@ from templates.engine import AUDITED_VERSION, POSITION_IS_NO_NUMBER
 _POLL_SECONDS = 0.05
 # See templates.engine: without this the message of an abort is lost.
 _LINE_BUFFERED = ("stdbuf", "-oL")
+# The kernel ends the engine when whoever launched it dies, be it by SIGKILL.
+_MORTAL = ("setpriv", "--pdeathsig", "KILL")
 _GRACE_SECONDS = 2.0
 _SPARE_BYTES = 64 * 1024
 _STATUS_LINE = re.compile(rb"^ *(\d+) +(\d+) +(\S+)((?: +[-+.\w]+){6}) *$", re.MULTILINE)
@@ -119,10 +121,11 @@ def launch(
 
 def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]) -> subprocess.Popen[bytes]:
     # Debian's mpirun refuses root and more ranks than cores unless told otherwise.
-    parallel = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    mortal = _MORTAL if shutil.which(_MORTAL[0]) else ()
+    parallel = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), *mortal] if ranks > 1 else []
     with (directory / OUTPUT_NAME).open("wb") as output:
         return subprocess.Popen(
-            [*parallel, *_LINE_BUFFERED, str(engine.path), "-log", "none", "-in", DECK_NAME],
+            [*mortal, *parallel, *_LINE_BUFFERED, str(engine.path), "-log", "none", "-in", DECK_NAME],
             cwd=directory,
             stdin=subprocess.DEVNULL,
             stdout=output,

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import degrees, sqrt
 from typing import TYPE_CHECKING
 
-from inputs.case import WalkerCase
+from inputs.case import Contact, WalkerCase
 from inputs.dimer import contact_loads, dimer_of, hop_height
 from templates.engine import ALL_REMEDIES, Remedies, contact_angle_setting, separation_cap, wall_mesh
 from templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
 from templates.placement import place_walkers
 from templates.scene import Point, Scene, vector_along, without_riders
+from templates.sharing import check_sharing, surfaces_of
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -97,6 +98,10 @@ class Plan:
         Number of MPI processes; the scene must have riders for each.
     checkpoint
         Restart file to write or to go on from.
+    surfaces
+        How the beads' surfaces touch, by `templates.scene.Bead.surface`; the case's own contact if left out.
+    fastest
+        A speed that no bead can reach, m/s; computed from the case if left out.
     """
 
     case: WalkerCase
@@ -107,6 +112,8 @@ class Plan:
     prescribed: bool = False
     ranks: int = 1
     checkpoint: Checkpoint = NO_CHECKPOINT
+    surfaces: tuple[Contact, ...] = ()
+    fastest: float | None = None
 
 
 def render_deck(case: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Deck:
@@ -124,12 +131,25 @@ def render_deck(case: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Deck:
     Deck
         Numbers in full precision (the shortest text that reads back as the same double).
     """
-    return compose(walker_plan(case, remedies))
+    return compose(walker_plan(case, remedies=remedies))
 
 
-def walker_plan(case: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Plan:
-    """The plan of a walker case: its replicates on their substrate, recorded as the case says."""
-    scene, walkers = place_walkers(case)
+def render_shared_deck(cases: Sequence[WalkerCase]) -> Deck:
+    """Render one deck for the walkers of several cases, in their order.
+
+    Raises
+    ------
+    ValueError
+        If they cannot share a deck (see `templates.sharing.sharing_key`).
+    """
+    return compose(walker_plan(*cases))
+
+
+def walker_plan(*cases: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Plan:
+    """The plan of walker cases that share a deck: their replicates on one substrate, recorded as the cases say."""
+    check_sharing(cases)
+    case = cases[0]
+    scene, walkers = place_walkers(cases)
     run = case.run
     recording = Recording(
         steps=run.steps,
@@ -137,7 +157,8 @@ def walker_plan(case: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Plan:
         bridge_every=run.steps_per_cycle // run.bridge_samples_per_cycle,
         status_every=-(-run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
     )
-    return Plan(case, scene, recording, walkers, remedies)
+    fastest = max(_fastest(one) for one in cases)
+    return Plan(case, scene, recording, walkers, remedies, surfaces=surfaces_of(cases), fastest=fastest)
 
 
 def compose(plan: Plan) -> Deck:
@@ -151,6 +172,7 @@ def compose(plan: Plan) -> Deck:
     drive, axis = case.drive, vector_along(case.drive.axis)
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
     angle = case.liquid.contact_angle
+    surfaces = plan.surfaces or (case.contact,)
     text = _environment().get_template("walker.lig.j2").render(
         case=case,
         scene=scene,
@@ -162,6 +184,10 @@ def compose(plan: Plan) -> Deck:
         wall_file=WALL_NAME,
         copies=[f"walls_{number}" for number in range(1, remedies.wall_copies + 1)],
         contact_model=_contact_model(case),
+        types=len(surfaces) + 1,
+        friction=_pairs([(surface.friction_bead_bead, surface.friction_bead_wall) for surface in surfaces]),
+        rolling_friction=_pairs([(surface.rolling_friction,) * 2 for surface in surfaces]),
+        restitution=_pairs([(surface.restitution,) * 2 for surface in surfaces]),
         contact_angle_setting=contact_angle_setting(angle) if remedies.contact_angle else degrees(angle),
         separation_cap=separation_cap((bead.radius for bead in scene.beads), case.liquid.volume_fraction, angle),
         bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
@@ -173,11 +199,28 @@ def compose(plan: Plan) -> Deck:
         checkpoint=plan.checkpoint,
         pair_bridge_terms=[f"c_pair_bridges[{number + 1}]" for number in range(len(layout.pair_bridge_columns))],
         wall_bridge_terms=[f"c_wall_bridges[{number + 1}]" for number in range(len(layout.wall_bridge_columns))],
-        skin=min(case.beads.radii),
-        bin_size=_bin_size(case, scene),
+        skin=min(bead.radius for bead in scene.beads),
+        bin_size=_bin_size(scene),
     )  # fmt: skip
     files = {WALL_NAME: wall_mesh(scene.faces, max(scene.upper))}
-    return Deck(text, files, layout, (scene.lower, scene.upper), _fastest(case))
+    fastest = plan.fastest if plan.fastest is not None else _fastest(case)
+    return Deck(text, files, layout, (scene.lower, scene.upper), fastest)
+
+
+def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
+    """A coefficient for every pair of atom types: the surfaces of beads, then the walls.
+
+    Parameters
+    ----------
+    surfaces
+        Of each surface its value against itself and against the walls. Beads of different surfaces never meet.
+    """
+    wall = len(surfaces)
+    return [
+        surfaces[min(one, other, wall - 1)][int(max(one, other) == wall)]
+        for one in range(wall + 1)
+        for other in range(wall + 1)
+    ]
 
 
 def _contact_model(case: WalkerCase) -> str:
@@ -185,10 +228,10 @@ def _contact_model(case: WalkerCase) -> str:
     return f"hertz tangential history cohesion easo/capillary/viscous{rolling}"
 
 
-def _bin_size(case: WalkerCase, scene: Scene) -> float:
+def _bin_size(scene: Scene) -> float:
     """At most some ten thousand bins, none smaller than two beads (m)."""
     width, depth, height = (high - low for low, high in zip(scene.lower, scene.upper, strict=True))
-    return float(max(4.0 * max(case.beads.radii), (width * depth * height / 2e4) ** (1.0 / 3.0)))
+    return float(max(4.0 * max(bead.radius for bead in scene.beads), (width * depth * height / 2e4) ** (1.0 / 3.0)))
 
 
 def _fastest(case: WalkerCase) -> float:
@@ -229,6 +272,7 @@ def _environment() -> Environment:
         keep_trailing_newline=True,
         trim_blocks=True,
         lstrip_blocks=True,
+        auto_reload=False,
     )
 
     def number(value: float) -> str:

@@ -2,40 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
 from math import ceil, cos, pi, sin, sqrt
 
 from inputs.case import WalkerCase
 from inputs.dimer import contact_loads, hop_height, horizontal_distance, reach
 from templates.layout import PlacedWalker
 from templates.scene import Bead, Face, Scene
+from templates.sharing import surfaces_of
 
 _FIRST_BEAD = 2  # atom 1 is the rider of the substrate
 
 
-def place_walkers(case: WalkerCase) -> tuple[Scene, tuple[PlacedWalker, ...]]:
-    """Place a case's replicates and size the simulation box so that none can leave it unnoticed.
+def place_walkers(cases: Sequence[WalkerCase]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
+    """Place the replicates of cases that share a deck, and size the box so that none can leave it unnoticed.
 
     Replicates alternate between facing right and left where the case says both. Each draws its start angle and the
-    gap of its contacts from its own random stream (seed, number of the walker), so that walker k is the same whether
-    it shares the deck or not.
+    gap of its contacts from its own random stream (seed, number of the walker in its case), so that walker k is the
+    same whoever shares the deck.
     """
-    start = case.start
-    columns = ceil(sqrt(start.replicates))
-    rows = ceil(start.replicates / columns)
+    placed = [(case, number) for case in cases for number in range(case.start.replicates)]
+    surfaces = surfaces_of(cases)
+    spacing = max(case.start.spacing for case in cases)
+    columns = ceil(sqrt(len(placed)))
+    rows = ceil(len(placed) / columns)
     walkers: list[PlacedWalker] = []
     beads: list[Bead] = []
-    for number in range(start.replicates):
-        row, column = divmod(number, columns)
-        origin = ((row - (rows - 1) / 2.0) * start.spacing, (column - (columns - 1) / 2.0) * start.spacing)
-        walker, pair = _place(case, number, origin)
+    for place, (case, number) in enumerate(placed):
+        row, column = divmod(place, columns)
+        origin = ((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing)
+        walker, pair = _place(case, number, place, origin)
         walkers.append(walker)
-        beads += pair
-    far = max(reach(case), start.spacing / 2.0)
-    half_x = (rows - 1) / 2.0 * start.spacing + far
-    half_y = (columns - 1) / 2.0 * start.spacing + far
-    largest = max(case.beads.radii)
-    margin = 4.0 * largest + 2.0 * case.drive.amplitude
-    height = 10.0 * largest + hop_height(case) + 2.0 * case.drive.amplitude
+        surface = 1 + surfaces.index(case.contact)
+        beads += [replace(bead, surface=surface) for bead in pair] if surface > 1 else pair
+    far = max(spacing / 2.0, *(reach(case) for case in cases))
+    half_x = (rows - 1) / 2.0 * spacing + far
+    half_y = (columns - 1) / 2.0 * spacing + far
+    largest = max(max(case.beads.radii) for case in cases)
+    amplitude = cases[0].drive.amplitude
+    margin = 4.0 * largest + 2.0 * amplitude
+    height = 10.0 * largest + max(hop_height(case) for case in cases) + 2.0 * amplitude
     scene = Scene(
         beads=tuple(beads),
         faces=(Face("z", 1, (0.0, 0.0, 0.0)),),
@@ -55,14 +63,23 @@ def _facing(case: WalkerCase, number: int) -> int:
 
 def _perturbation(case: WalkerCase, number: int) -> tuple[float, float]:
     """Start angle (rad) and the factor on the equilibrium overlap of one walker."""
+    start = case.start
+    turn, press = _draws(start.seed, number)
+    return start.angle + start.angle_spread * turn, 1.0 + start.gap_spread * press
+
+
+@lru_cache(maxsize=4096)
+def _draws(seed: int, number: int) -> tuple[float, float]:
     from numpy.random import default_rng
 
-    start = case.start
-    turn, press = default_rng([start.seed, number]).uniform(-1.0, 1.0, size=2)
-    return start.angle + start.angle_spread * float(turn), 1.0 + start.gap_spread * float(press)
+    turn, press = default_rng([seed, number]).uniform(-1.0, 1.0, size=2)
+    return float(turn), float(press)
 
 
-def _place(case: WalkerCase, number: int, origin: tuple[float, float]) -> tuple[PlacedWalker, tuple[Bead, Bead]]:
+def _place(
+    case: WalkerCase, number: int, place: int, origin: tuple[float, float]
+) -> tuple[PlacedWalker, tuple[Bead, Bead]]:
+    """Walker ``number`` of its case, at a place of the deck."""
     radii, facing = case.beads.radii, _facing(case, number)
     angle, factor = _perturbation(case, number)
     at_rest = contact_loads(case).overlaps if case.start.gap is None else (-case.start.gap,) * 3
@@ -72,7 +89,7 @@ def _place(case: WalkerCase, number: int, origin: tuple[float, float]) -> tuple[
     # The point of contact of the two beads lies over the origin.
     lever = distance * radii[0] / sum(radii)
     arms = (lever, lever - distance)
-    ids = (_FIRST_BEAD + 2 * number, _FIRST_BEAD + 2 * number + 1)
+    ids = (_FIRST_BEAD + 2 * place, _FIRST_BEAD + 2 * place + 1)
     first, second = (
         Bead(
             identifier,
@@ -81,4 +98,4 @@ def _place(case: WalkerCase, number: int, origin: tuple[float, float]) -> tuple[
         )
         for identifier, arm, radius, overlap in zip(ids, arms, radii, overlaps[:2], strict=True)
     )
-    return PlacedWalker(number, ids, facing, angle, origin), (first, second)
+    return PlacedWalker(place, ids, facing, angle, origin), (first, second)

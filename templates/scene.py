@@ -12,13 +12,14 @@ AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Bead:
-    """A bead at the start: id, centre (m), radius (m), velocity (m/s) and angular velocity (rad/s)."""
+    """A bead at the start: id, centre (m), radius (m), velocity (m/s), angular velocity (rad/s), surface (from 1)."""
 
     id: int
     centre: Point
     radius: float
     velocity: Point = (0.0, 0.0, 0.0)
     spin: Point = (0.0, 0.0, 0.0)
+    surface: int = 1
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ def _lines(deck: str, start: str) -> list[list[str]]:
 def test_the_rider_is_created_first_and_atoms_are_not_sorted(deck: str) -> None:
     case = load_case("fig1b")
     first = _lines(deck, "create_atoms")[0]
-    assert tuple(map(float, first[3:6])) == place_walkers(case)[0].riders[0]
+    assert tuple(map(float, first[3:6])) == place_walkers([case])[0].riders[0]
     assert _lines(deck, "group           rider") == [["group", "rider", "id", "<=", "1"]]
     assert ["atom_modify", "map", "array", "sort", "0", "0"] in _lines(deck, "atom_modify")
 
@@ -45,7 +45,7 @@ def test_the_triangle_is_far_larger_than_the_box_and_its_centroid_in_it() -> Non
     case = load_case("fig4b")
     (stl,) = render_deck(case).files.values()
     corners = [tuple(map(float, match)) for match in re.findall(r"vertex (\S+) (\S+) (\S+)", stl)]
-    scene, _ = place_walkers(case)
+    scene, _ = place_walkers([case])
     centroid = [sum(corner[axis] for corner in corners) / 3 for axis in range(3)]
     assert all(low < middle < high for low, middle, high in zip(scene.lower, centroid, scene.upper, strict=True))
     assert min(abs(corner[1]) for corner in corners) > 10 * scene.upper[1]
@@ -114,7 +114,7 @@ def test_numbers_are_rendered_in_full_precision(name: str) -> None:
     deck = render_deck(case).text
     assert f"timestep        {case.run.time_step!r}\n" in deck
     starts = [tuple(map(float, line[3:6])) for line in _lines(deck, "create_atoms")[1:]]
-    assert starts == [bead.centre for bead in place_walkers(case)[0].beads]
+    assert starts == [bead.centre for bead in place_walkers([case])[0].beads]
     assert contact_angle_setting(0.0) == 0.0
 
 

@@ -46,7 +46,7 @@ def _launch(case: WalkerCase, out: Path, change: Callable[[str], str] = str, **o
 
 def _launch_deck(case: WalkerCase, deck: Deck, out: Path, **options: object) -> None:
     with open_run(case, deck, find_engine(), out) as run:
-        launch(deck, run.directory, run.engine, keep_open=[run.lock], **options)  # type: ignore[arg-type]
+        launch(deck, run.directory, run.engine, keep_open=run.locks, **options)  # type: ignore[arg-type]
 
 
 def _remains(out: Path) -> dict[str, str]:

@@ -142,26 +142,45 @@ def test_two_at_once_do_not_share_a_directory(tmp_path: Path) -> None:
 def test_an_engine_that_outlives_its_launcher_keeps_others_away(in_folder: Path) -> None:
     long = {"cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
     (in_folder / "test.toml").write_text(to_toml(document(run=long)))
-    program = subprocess.Popen([PROGRAM, "run", "test.toml"], stderr=subprocess.DEVNULL)
+    # The kernel ends an engine whose launcher dies, but not the engine's own children.
+    front = in_folder / "front"
+    front.write_text('#!/bin/sh\nliggghts "$@"\nexit 0\n')
+    front.chmod(0o755)
+    program = subprocess.Popen([PROGRAM, "run", "test.toml", "--engine", str(front)], stderr=subprocess.DEVNULL)
     while not list(in_folder.glob("runs/*.part/beads.bin")):
         assert program.poll() is None
         time.sleep(0.02)
     program.kill()
     program.wait()
-    (engine,) = engines_in(in_folder)
     case = make_case(run=long).renamed("test")
     try:
         with pytest.raises(RunBusy):
-            run_case(case, in_folder / "runs")
+            run_case(case, in_folder / "runs", engine=str(front))
     finally:
-        os.kill(engine, signal.SIGKILL)
+        for engine in engines_in(in_folder):
+            os.kill(engine, signal.SIGKILL)
     for _ in range(100):  # a dying process lets go of its files a moment after it has left the process table
         try:
-            with open_run(case, render_deck(case), find_engine(), in_folder / "runs"):
+            with open_run(case, render_deck(case), find_engine(str(front)), in_folder / "runs"):
                 return
         except RunBusy:
             time.sleep(0.05)
     pytest.fail("the lock outlived the engine")
+
+
+def test_an_engine_dies_with_its_launcher(in_folder: Path) -> None:
+    (in_folder / "test.toml").write_text(to_toml(document(run={"cycles": 4000, "samples_per_cycle": 1})))
+    program = subprocess.Popen([PROGRAM, "run", "test.toml"], stderr=subprocess.DEVNULL)
+    while not engines_in(in_folder):
+        assert program.poll() is None
+        time.sleep(0.02)
+    program.kill()
+    program.wait()
+    for _ in range(100):
+        if not engines_in(in_folder):
+            return
+        time.sleep(0.05)
+    pytest.fail("an engine runs on for nobody")
 
 
 def test_a_run_is_found_by_its_directory_or_its_case(tmp_path: Path) -> None:

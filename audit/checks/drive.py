@@ -37,7 +37,7 @@ def reference_walker(**changes: dict[str, Any]) -> WalkerCase:
 
 def walking_speed(bench: Bench, case: WalkerCase) -> float:
     """Velocity of the first walker of a case, m/s."""
-    series = bench.run(walker_plan(case, bench.remedies))
+    series = bench.run(walker_plan(case, remedies=bench.remedies))
     write_json(series.directory / CASE_NAME, case.as_dict())
     return float(walk(read_trajectory(series.directory)).velocity[0])
 
@@ -57,7 +57,7 @@ def wall_motion(bench: Bench) -> Iterator[Line]:
         },
         environment={"gravity": "9.81 m/s^2"},
     )
-    series = bench.run(walker_plan(case, bench.remedies))
+    series = bench.run(walker_plan(case, remedies=bench.remedies))
     drive, time = case.drive, series.steps * case.run.time_step
     expected, speed = (motion[:, 2] for motion in prescribed_motion(drive, time))
     if bench.remedies.riders:

@@ -30,7 +30,7 @@ def _ensemble(replicates: int, frame: str = "lab") -> WalkerCase:
 
 def independence(bench: Bench) -> Iterator[Line]:
     """A walker among four against the same one alone; a rerun against the run."""
-    together, alone, again = (bench.run(walker_plan(_ensemble(count), bench.remedies)) for count in (4, 1, 4))
+    together, alone, again = (bench.run(walker_plan(_ensemble(count), remedies=bench.remedies)) for count in (4, 1, 4))
     tracks = [series.position[:, series.row(FIRST_BEAD)] for series in (together, alone)]
     ways = [track - track[0] for track in tracks]
     error = float(np.abs(ways[0] - ways[1]).max() / np.abs(ways[1]).max())
@@ -44,7 +44,7 @@ def independence(bench: Bench) -> Iterator[Line]:
 def restart(bench: Bench) -> Iterator[Line]:
     """Ten cycles at a stretch against five, a restart file, and five more (container frame)."""
     case = _ensemble(2, "container")
-    run, plan = case.run, walker_plan(case, bench.remedies)
+    run, plan = case.run, walker_plan(case, remedies=bench.remedies)
     whole = bench.run(plan)
     half = replace(plan.recording, steps=run.steps // 2)
     first = bench.run(replace(plan, recording=half, checkpoint=Checkpoint(write=_RESTART_FILE)))

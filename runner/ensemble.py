@@ -1,0 +1,140 @@
+"""Ensembles: the runs of several cases made by one deck, each a run directory of its own within the ensemble's.
+
+An ensemble is made in ``ensembles/<name>-<hash>.part`` and renamed at the end, which finishes all of its runs at once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from inputs.case import WalkerCase
+from runner.binary import Engine
+from runner.directory import (
+    CASE_NAME,
+    MANIFEST_NAME,
+    UNFINISHED,
+    FinishedRun,
+    manifest,
+    move_into_place,
+    recover,
+    room_on_disk,
+    unfinished,
+    write_deck,
+)
+from runner.files import write_json
+from runner.launch import EngineReport
+from runner.locks import is_locked
+from templates.deck import Deck
+
+FOLDER = "ensembles"
+
+
+@dataclass
+class OpenEnsemble:
+    """Runs that are being made by one deck.
+
+    Attributes
+    ----------
+    cases
+        From the name of each run to its case, in the order of the deck.
+    deck, engine
+        What makes them.
+    directory, place
+        Where the ensemble is made and where it belongs.
+    locks
+        Descriptors of the lock files of the runs.
+    started
+        Seconds since the epoch.
+    """
+
+    cases: Mapping[str, WalkerCase]
+    deck: Deck
+    engine: Engine
+    directory: Path
+    place: Path
+    locks: Sequence[int]
+    started: float
+
+    def run_directory(self, name: str) -> Path:
+        """Where a run of the ensemble is made."""
+        return self.directory / name
+
+    def finish(self, report: EngineReport) -> dict[str, FinishedRun]:
+        """Write the manifests and move the ensemble to its place; its runs by name."""
+        shared = {"ensemble": self.place.name, "runs": len(self.cases), "walkers": len(self.deck.layout.walkers)}
+        for name, case in self.cases.items():
+            made = self.run_directory(name)
+            said = manifest(case, name, self.engine, report, started=self.started, directory=made)
+            write_json(made / MANIFEST_NAME, {**said, "shared_deck": shared})
+        first = next(iter(self.cases.values()))
+        said = manifest(first, self.place.name, self.engine, report, started=self.started, directory=self.directory)
+        write_json(self.directory / MANIFEST_NAME, {**said, "shared_deck": {**shared, "names": list(self.cases)}})
+        move_into_place(self.directory, self.place)
+        return {name: FinishedRun(self.place / name) for name in self.cases}
+
+
+@contextmanager
+def make_ensemble(
+    cases: Mapping[str, WalkerCase], deck: Deck, engine: Engine, out: Path, locks: Sequence[int]
+) -> Iterator[OpenEnsemble]:
+    """Make a fresh directory for an ensemble whose runs are locked, with its deck and the cases of its runs.
+
+    Left without `OpenEnsemble.finish`, nothing stays: what fails together is to be made apart.
+    """
+    digest = hashlib.sha256("\n".join(cases).encode()).hexdigest()[:12]
+    place = out / FOLDER / f"{next(iter(cases)).rpartition('-')[0]}-{digest}"
+    part = unfinished(place)
+    recover(place)
+    shutil.rmtree(part, ignore_errors=True)
+    ensemble = OpenEnsemble(cases, deck, engine, part, place, locks, time.time())
+    try:
+        with room_on_disk(part, deck):
+            part.mkdir(parents=True)
+            write_deck(deck, part)
+            for name, case in cases.items():
+                ensemble.run_directory(name).mkdir()
+                write_json(ensemble.run_directory(name) / CASE_NAME, case.as_dict())
+            yield ensemble
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def finished_places(out: Path) -> dict[str, Path]:
+    """All finished runs of a folder, alone and in ensembles: from their names to their directories."""
+    found: dict[str, Path] = {}
+    for folder in (out, *_folders(out / FOLDER)):
+        for entry in _folders(folder):
+            if (entry / MANIFEST_NAME).is_file():
+                found.setdefault(entry.name, entry)
+    return found
+
+
+def finished_place(out: Path, name: str) -> Path | None:
+    """The directory of a finished run, alone or in an ensemble; None if there is none."""
+    for place in (out / name, *(folder / name for folder in _folders(out / FOLDER))):
+        if (place / MANIFEST_NAME).is_file():
+            return place
+    return None
+
+
+def _folders(out: Path) -> list[Path]:
+    try:
+        with os.scandir(out) as entries:
+            return sorted(Path(entry) for entry in entries if entry.is_dir() and not entry.name.endswith(UNFINISHED))
+    except FileNotFoundError:
+        return []
+
+
+def remove_remains(out: Path) -> None:
+    """Remove ensembles that were being made when their makers were killed, unless engines still write into them."""
+    for part in (out / FOLDER).glob(f"*{UNFINISHED}"):
+        names = [path.name for path in part.iterdir() if path.is_dir()]
+        if names and not any(is_locked(out / name) for name in names):
+            shutil.rmtree(part, ignore_errors=True)
