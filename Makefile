@@ -5,6 +5,7 @@ PYTHON ?= python3
 WALKERS := .venv/bin/walkers
 OUT ?= runs
 CASE ?= fig1b
+SWEEP ?= fig2
 
 .PHONY: help
 help: ## List the targets
@@ -18,6 +19,11 @@ walker: setup ## Run the walker of Fig. 1b (or CASE=...): velocity, pictures, Pa
 	@$(WALKERS) render $(CASE) --out $(OUT) | sed 's/^/  /'
 	@echo "for ParaView:"
 	@$(WALKERS) vtk $(CASE) --out $(OUT) | sed 's/^/  /'
+
+.PHONY: sweep
+sweep: setup ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.toml: on that cluster), print its table
+	@$(WALKERS) sweep $(SWEEP) --out $(OUT) $(if $(SITE),--site $(SITE)) $(if $(JOBS),--jobs $(JOBS))
+	@$(WALKERS) table $(OUT)/$(basename $(notdir $(SWEEP)))
 
 .PHONY: test
 test: setup ## Lint, check types, run the tests (a 2-bead smoke test first)

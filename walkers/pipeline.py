@@ -13,7 +13,6 @@ from inputs.errors import InputError, Problem
 
 if TYPE_CHECKING:
     from inputs.case import WalkerCase
-    from runner.binary import Engine
     from runner.directory import FinishedRun
     from runner.launch import Progress
 
@@ -68,43 +67,25 @@ def run_case(
         If the engine fails in one of the known ways.
     """
     from runner.binary import find_engine
-    from runner.directory import finished_run, open_run, run_name
-    from runner.launch import launch
-    from templates.deck import render_deck
+    from runner.directory import finished_run, run_place, unfinished
+    from runner.ensemble import finished_place
+    from runner.failures import RunBusy
+    from sweeps.together import check_audit, make_together
 
-    deck, binary = render_deck(case), find_engine(engine)
-    old = finished_run(out / run_name(case, deck, binary))
-    if old is not None and not force:
+    binary = find_engine(engine)
+    place = run_place(case, binary, out)
+    there = finished_place(out, place.name)
+    old = finished_run(there) if there and not force else None
+    if old is not None:
         return Outcome(old, _result_of(old), found=True)
-    _check_audit(binary, despite_audit)
+    check_audit(binary, despite_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
-    loading = threading.Thread(target=_load_postprocess, daemon=True)
-    loading.start()
-    with open_run(case, deck, binary, out) as run:
-        old = finished_run(run.place)
-        if old is not None and not force:  # somebody else has finished it since
-            run.discard()
-            return Outcome(old, _result_of(old), found=True)
-        report = launch(
-            deck, run.directory, binary, on_progress=on_progress, time_limit=time_limit, keep_open=[run.lock]
-        )
-        loading.join()
-        from postprocess.result import tabulate
-
-        result = tabulate(run.directory)
-        return Outcome(run.finish(report), result, found=False)
-
-
-def _check_audit(engine: Engine, despite_audit: bool) -> None:
-    from runner.audits import read_audit
-    from runner.failures import AuditFailed, UnauditedEngineWarning
-
-    audit = read_audit(engine.sha256)
-    if audit is None:
-        message = "this engine was never audited; prove what it computes with: walkers audit"
-        warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
-    elif not audit.passed and not despite_audit:
-        raise AuditFailed(audit.failures)
+    threading.Thread(target=_load_postprocess, daemon=True).start()
+    made = make_together([case], out, binary, force=force, on_progress=on_progress, time_limit=time_limit)
+    if made.busy:
+        raise RunBusy(unfinished(place))
+    run = made.runs[place.name]
+    return Outcome(run, _result_of(run), found=place.name in made.found)
 
 
 def _load_postprocess() -> None:
@@ -114,17 +95,9 @@ def _load_postprocess() -> None:
 
 
 def _result_of(run: FinishedRun) -> dict[str, Any]:
-    """The result of a finished run; tabulated anew if it or a table is gone or damaged."""
-    from postprocess.result import read_result, tabulate
-    from postprocess.tables import intact
+    from postprocess.result import current_result
 
-    try:
-        result = read_result(run.directory)
-        if "velocity" in result and intact(run.directory):
-            return result
-    except (OSError, ValueError):
-        pass
-    return tabulate(run.directory)
+    return current_result(run.directory)
 
 
 def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
@@ -144,7 +117,8 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
     runner.EngineFailure
         If a case is given and there is no engine to look it up for.
     """
-    from runner.directory import finished_run, run_name
+    from runner.directory import finished_run, run_place
+    from runner.ensemble import finished_place
 
     path = Path(run)
     if path.is_dir():
@@ -156,11 +130,9 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
     else:
         from inputs.reading import load_case
         from runner.binary import find_engine
-        from templates.deck import render_deck
 
-        case = load_case(path)
-        place = out / run_name(case, render_deck(case), find_engine())
-        found = finished_run(place)
+        there = finished_place(out, run_place(load_case(path), find_engine(), out).name)
+        found = finished_run(there) if there else None
         if found is None:
             raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
     return _readable(found)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from inputs.case import WalkerCase
     from runner.launch import Progress
+    from sweeps.conduct import Progress as SweepProgress
 
 _FIRST_LINE_SECONDS = 1.0
 _LONGEST_SILENCE_SECONDS = 60.0
@@ -65,6 +66,61 @@ def _lines(case: WalkerCase) -> Callable[[Progress], None]:
         )
 
     return advance
+
+
+@contextmanager
+def progress_of_sweep(name: str) -> Iterator[Callable[[SweepProgress], None]]:
+    """Yield a function that shows how far a sweep is."""
+    if sys.stderr.isatty():
+        with _sweep_bar(name) as advance:
+            yield advance
+    else:
+        yield _sweep_lines(name)
+
+
+@contextmanager
+def _sweep_bar(name: str) -> Iterator[Callable[[SweepProgress], None]]:
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn
+    from rich.progress import Progress as Bar
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[told]}"))
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(name, total=None, told="")
+
+        def advance(progress: SweepProgress) -> None:
+            bar.update(task, total=progress.points, completed=progress.done + progress.failed, told=_told(progress))
+
+        yield advance
+
+
+def _sweep_lines(name: str) -> Callable[[SweepProgress], None]:
+    due = _FIRST_LINE_SECONDS
+
+    def advance(progress: SweepProgress) -> None:
+        nonlocal due
+        if progress.elapsed < due:
+            return
+        due = progress.elapsed + min(progress.elapsed, _LONGEST_SILENCE_SECONDS)
+        print(f"{name}: {_told(progress)}", file=sys.stderr, flush=True)
+
+    return advance
+
+
+def _told(progress: SweepProgress) -> str:
+    """How far a sweep is, on a line."""
+    rate = (progress.done - progress.found) / progress.elapsed if progress.elapsed else 0.0
+    parts = [
+        f"{progress.done} of {progress.points} points done",
+        f"{progress.running} running",
+        f"{progress.failed} failed",
+        f"{rate:.2g} points/s",
+    ]
+    if progress.left is not None:
+        parts.append(f"{progress.left:.0f} s left")
+    if progress.last_failure is not None:
+        parts.append(f"last failure: point {progress.last_failure.point}, {progress.last_failure.reason}")
+    return ", ".join(parts)
 
 
 def _rate(progress: Progress) -> float:

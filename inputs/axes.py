@@ -1,0 +1,223 @@
+"""Axes of a sweep: lists, spaced values, values that go together, and samplers.
+
+An axis is a set of keys with, for each of its points, one value a key. The values are what a case file could say, so
+that everything a case may say can be varied. To add a way of writing an axis, add it to `values_of`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import log
+from typing import Any
+
+from inputs.units import split_quantity
+
+Value = Any
+"""A TOML value: text with a unit, a number, or a list of such."""
+
+MOST_POINTS = 1_000_000
+_SPACINGS = ("linspace", "geomspace")
+_DISTRIBUTIONS = ("uniform", "loguniform")
+
+
+class UnusableAxisError(ValueError):
+    """An axis that makes no sense: the key, the value at fault, and what was expected."""
+
+    def __init__(self, key: str, value: object, expected: str) -> None:
+        self.key = key
+        self.value = value
+        self.expected = expected
+        super().__init__(expected)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Keys that vary together: ``rows`` has for each point of the axis one value a key."""
+
+    keys: tuple[str, ...]
+    rows: tuple[tuple[Value, ...], ...]
+
+
+def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool], prefix: str = "") -> dict[str, Any]:
+    """Dotted keys of nested tables: ``{"drive": {"frequency": …}}`` and ``{"drive.frequency": …}`` are the same."""
+    flat: dict[str, Any] = {}
+    for name, value in table.items():
+        key = f"{prefix}.{name}" if prefix else name
+        flat |= flatten(value, is_leaf, key) if isinstance(value, Mapping) and not is_leaf(value) else {key: value}
+    return flat
+
+
+def is_axis(value: object) -> bool:
+    """Whether a table is an axis rather than a table of axes."""
+    return isinstance(value, Mapping) and any(name in value for name in (*_SPACINGS, *_DISTRIBUTIONS))
+
+
+def values_of(key: str, axis: object) -> list[Value]:
+    """The values of an axis: a list, ``{ linspace = [first, last, number] }`` or ``{ geomspace = [...] }``.
+
+    Raises
+    ------
+    UnusableAxisError
+        If it is something else.
+    """
+    if isinstance(axis, list):
+        if not axis:
+            raise UnusableAxisError(key, axis, "expected at least one value")
+        unit_of(key, axis)
+        return axis
+    if isinstance(axis, Mapping) and len(axis) == 1 and (kind := next(iter(axis))) in _SPACINGS:
+        return _spaced(key, kind, axis[kind])
+    raise UnusableAxisError(
+        key, axis, "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
+    )
+
+
+def _spaced(key: str, kind: str, given: object) -> list[Value]:
+    import numpy as np
+
+    example = f'{{ {kind} = ["0.5 g", "10 g", 20] }}'
+    if not (isinstance(given, list) and len(given) == 3 and type(given[2]) is int and 1 <= given[2] <= MOST_POINTS):
+        raise UnusableAxisError(key, {kind: given}, f"expected first value, last value and number, such as {example}")
+    first, last, unit = _range(key, given[:2], positive=kind == "geomspace")
+    space = np.linspace if kind == "linspace" else np.geomspace
+    return [written(float(number), unit) for number in space(first, last, given[2])]
+
+
+def _range(key: str, given: Sequence[Value], *, positive: bool) -> tuple[float, float, str | None]:
+    """Both ends of a range and their unit."""
+    unit = unit_of(key, list(given))
+    first, last = (_number(key, end)[0] for end in given)
+    if positive and not (first > 0 and last > 0):
+        raise UnusableAxisError(key, list(given), "expected two values above zero")
+    return first, last, unit
+
+
+def _number(key: str, value: Value) -> tuple[float, str | None]:
+    """A value as number and unit; the unit of a plain number is None."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value), None
+    if isinstance(value, str):
+        try:
+            return split_quantity(value)
+        except ValueError:
+            pass
+    raise UnusableAxisError(key, value, "expected a number, or a number with its unit in quotes")
+
+
+def written(number: float, unit: str | None) -> Value:
+    """A number as a case file has it, rounded to twelve digits so that 0.1 + 0.2 reads 0.3."""
+    rounded = float(f"{number:.12g}")
+    return rounded if unit is None else f"{rounded!r} {unit}"
+
+
+def unit_of(key: str, values: Sequence[Value]) -> str | None:
+    """The unit of the values of an axis; None if they are plain numbers, or no numbers at all (names, "auto").
+
+    Raises
+    ------
+    UnusableAxisError
+        If they are in several units.
+    """
+    units = set()
+    for value in values:
+        for part in value if isinstance(value, list) else [value]:
+            try:
+                units.add(_number(key, part)[1])
+            except UnusableAxisError:
+                continue
+    if len(units) > 1:
+        raise UnusableAxisError(key, list(values), "expected one unit throughout")
+    return units.pop() if units else None
+
+
+def plain(value: Value) -> Any:
+    """A value without its unit: a number where it is a quantity, else as it is."""
+    try:
+        return _number("", value)[0] if isinstance(value, str) else value
+    except UnusableAxisError:
+        return value
+
+
+def zipped(table: Mapping[str, Any]) -> Axis:
+    """Keys whose values go together, the first with the first."""
+    columns = {key: values_of(key, axis) for key, axis in flatten(table, is_axis).items()}
+    if not columns:
+        raise UnusableAxisError("zip", dict(table), "expected keys and their values")
+    lengths = {key: len(values) for key, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        key = list(columns)[-1]
+        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise UnusableAxisError(key, columns[key], f"expected as many values for each key of a zip: {told}")
+    return Axis(tuple(columns), tuple(zip(*columns.values(), strict=True)))
+
+
+def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
+    """Points of a sampler of `scipy.stats.qmc` in the ranges of several keys.
+
+    Parameters
+    ----------
+    method
+        ``sobol``, ``halton`` or ``latin-hypercube``.
+    points
+        How many; a power of two suits Sobol's sequence.
+    seed
+        Of the sampler's scrambling.
+    ranges
+        For each key ``{ uniform = [low, high] }`` or ``{ loguniform = [low, high] }``.
+    """
+    import warnings
+
+    import numpy as np
+    from scipy.stats import qmc
+
+    ends: dict[str, tuple[float, float, str | None, bool]] = {}
+    for key, given in flatten(ranges, is_axis).items():
+        kind = next(iter(given)) if isinstance(given, Mapping) and len(given) == 1 else ""
+        if kind not in _DISTRIBUTIONS or not (isinstance(given[kind], list) and len(given[kind]) == 2):
+            raise UnusableAxisError(key, given, "expected { uniform = [low, high] } or { loguniform = [low, high] }")
+        low, high, unit = _range(key, given[kind], positive=kind == "loguniform")
+        ends[key] = (low, high, unit, kind == "loguniform")
+    if not ends:
+        raise UnusableAxisError("sample.ranges", dict(ranges), "expected keys and their ranges")
+    makers: dict[str, Callable[..., qmc.QMCEngine]] = {
+        "sobol": qmc.Sobol,
+        "halton": qmc.Halton,
+        "latin-hypercube": qmc.LatinHypercube,
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # a number of points that is no power of two is the user's choice
+        unit_cube = makers[method](d=len(ends), rng=np.random.default_rng(seed)).random(points)
+    columns = []
+    for share, (low, high, unit, logarithmic) in zip(unit_cube.T, ends.values(), strict=True):
+        numbers = np.exp(log(low) + share * log(high / low)) if logarithmic else low + share * (high - low)
+        columns.append([written(float(number), unit) for number in numbers])
+    return Axis(tuple(ends), tuple(zip(*columns, strict=True)))
+
+
+def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Value, ...]]]:
+    """All combinations of the axes' points, the last axis running fastest.
+
+    Returns
+    -------
+    keys
+        Of all axes.
+    rows
+        For each combination one value a key.
+
+    Raises
+    ------
+    UnusableAxisError
+        If a key is on two axes, or there are too many combinations.
+    """
+    keys = tuple(key for axis in axes for key in axis.keys)
+    twice = next((key for number, key in enumerate(keys) if key in keys[:number]), None)
+    if twice:
+        raise UnusableAxisError(twice, None, "varies on two axes")
+    number = 1
+    for axis in axes:
+        number *= len(axis.rows)
+    if number > MOST_POINTS:
+        raise UnusableAxisError("axes", None, f"{number} points; expected at most {MOST_POINTS}")
+    return keys, [tuple(value for row in rows for value in row) for rows in product(*(axis.rows for axis in axes))]

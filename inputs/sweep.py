@@ -1,0 +1,311 @@
+"""Sweep files: a base case and what to vary, read as TOML and expanded into points.
+
+case = "fig1b"
+
+[set]
+drive.frequency = "80 Hz"
+
+[axes]
+drive.peak_acceleration = { linspace = ["0.5 g", "10 g", 20] }
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from inputs.axes import (
+    MOST_POINTS,
+    Axis,
+    UnusableAxisError,
+    Value,
+    combinations,
+    flatten,
+    is_axis,
+    sampled,
+    unit_of,
+    values_of,
+    written,
+    zipped,
+)
+from inputs.case import WalkerCase
+from inputs.errors import InputError, Problem
+from inputs.messages import problem_of, quoted, suggested_key
+from inputs.reading import find_input, read_toml, resolve_case, shipped_cases
+from inputs.schema import ALTERNATIVES, Whole
+from inputs.units import Speed, split_quantity
+
+_SHIPPED = Path(__file__).parent / "sweeps"
+_INDEXED = re.compile(r"(?P<key>.+)\[(?P<index>\d)\]")
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class SampleTable(_Table):
+    """``[[sample]]``: a sampler of scipy.stats.qmc over ranges of keys."""
+
+    method: Literal["sobol", "halton", "latin-hypercube"] = "sobol"
+    points: Annotated[Whole, Field(ge=1, le=MOST_POINTS)]
+    seed: Annotated[Whole, Field(ge=0)] = 1
+    ranges: dict[str, Any]
+
+
+class DescendTable(_Table):
+    """``[descend]``: a key that is lowered step by step until the walkers stop."""
+
+    key: str = "drive.peak_acceleration"
+    start: Any = Field(alias="from")
+    to: Any
+    step: Any
+    until_below: Speed
+
+
+class SweepFile(_Table):
+    """A sweep file."""
+
+    title: str = ""
+    case: str
+    set: dict[str, Any] = {}
+    axes: dict[str, Any] = {}
+    zip: list[dict[str, Any]] = []
+    sample: list[SampleTable] = []
+    descend: DescendTable | None = None
+
+
+@dataclass(frozen=True)
+class Descent:
+    """The last axis of a sweep is followed downward and left when the walkers are slower than ``until_below`` (m/s).
+
+    ``steps`` is the number of its points; consecutive points of the sweep, so many at a time, are one descent.
+    """
+
+    key: str
+    steps: int
+    until_below: float
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A base case and its variations.
+
+    Attributes
+    ----------
+    name
+        Of the sweep: its file's.
+    title
+        For people.
+    source
+        What messages call the file.
+    case_name
+        Of the base case; the runs' directories begin with it.
+    document
+        Tables of the base case, with those of ``[set]``.
+    keys
+        What varies.
+    units
+        Of each key, None where it has none.
+    rows
+        The points: one value a key.
+    descent
+        How the points depend on each other, if they do.
+    """
+
+    name: str
+    title: str
+    source: str
+    case_name: str
+    document: Mapping[str, Any]
+    keys: tuple[str, ...]
+    units: tuple[str | None, ...]
+    rows: Sequence[tuple[Value, ...]]
+    descent: Descent | None
+
+    def cases(self) -> Iterator[WalkerCase]:
+        """The case of each point, resolved.
+
+        Raises
+        ------
+        InputError
+            If a point cannot be used; it says which.
+        """
+        for number, row in enumerate(self.rows):
+            document = changed(self.document, dict(zip(self.keys, row, strict=True)))
+            told = ", ".join(f"{key} = {value}" for key, value in zip(self.keys, row, strict=True))
+            where = f"{self.source}: point {number} ({told})" if told else self.source
+            yield resolve_case(document, source=where, name=self.case_name)
+
+
+def shipped_sweeps() -> dict[str, Path]:
+    """The sweeps that come with the project: name to file."""
+    return {path.stem: path for path in sorted(_SHIPPED.glob("*.toml"))}
+
+
+def load_sweep(sweep: str | Path) -> Sweep:
+    """Read a sweep file and expand it.
+
+    Parameters
+    ----------
+    sweep
+        A TOML file, or the name of a shipped sweep such as ``fig2``.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or anything in it cannot be used. Its points are checked by `Sweep.cases`.
+    """
+    path = find_input(sweep, shipped_sweeps(), "sweep")
+    return expand(read_toml(path), source=str(sweep), name=path.stem, folder=path.parent)
+
+
+def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Sweep:
+    """Expand a sweep given as nested tables.
+
+    Parameters
+    ----------
+    document
+        The tables of a sweep file.
+    source
+        What messages call the input.
+    name
+        Name of the sweep.
+    folder
+        Where a base case given as a file is looked up.
+
+    Raises
+    ------
+    InputError
+        If anything in it cannot be used.
+    """
+    try:
+        file = SweepFile.model_validate(document)
+    except ValidationError as error:
+        problems = [problem_of(details, document, SweepFile, "a sweep") for details in error.errors()]
+        raise InputError(source, problems) from error
+    base = _base(file.case, source, folder)
+    try:
+        keys, rows, units, descent = _points(file)
+        settings = flatten(file.set, lambda _: False)
+        for key in (*settings, *keys):
+            _check_key(key)
+        tables = changed(read_toml(base), settings)
+        changed(tables, dict(zip(keys, rows[0], strict=True)))
+    except UnusableAxisError as unusable:
+        value = quoted({"value": unusable.value}, ["value"]) if unusable.value is not None else None
+        raise InputError(source, [Problem(unusable.key, value, unusable.expected)]) from unusable
+    return Sweep(
+        name=name,
+        title=file.title,
+        source=source,
+        case_name=base.stem,
+        document=tables,
+        keys=keys,
+        units=units,
+        rows=rows,
+        descent=descent,
+    )
+
+
+def _base(case: str, source: str, folder: Path) -> Path:
+    beside = folder / case
+    try:
+        return beside if beside.is_file() else find_input(case, shipped_cases(), "case")
+    except InputError as error:
+        raise InputError(source, [Problem("case", f'"{case}"', error.problems[0].expected)]) from error
+
+
+def _check_key(key: str) -> None:
+    match = _INDEXED.fullmatch(key)
+    unknown = suggested_key(match["key"] if match else key)
+    if unknown is not None:
+        raise UnusableAxisError(key, None, unknown)
+
+
+def _points(
+    file: SweepFile,
+) -> tuple[tuple[str, ...], list[tuple[Value, ...]], tuple[str | None, ...], Descent | None]:
+    axes = [Axis((key,), tuple((value,) for value in values_of(key, given))) for key, given in _axes(file.axes)]
+    axes += [zipped(table) for table in file.zip]
+    axes += [sampled(table.method, table.points, table.seed, table.ranges) for table in file.sample]
+    descent = None
+    if file.descend is not None:
+        values = _descending(file.descend)
+        axes.append(Axis((file.descend.key,), tuple((value,) for value in values)))
+        descent = Descent(file.descend.key, len(values), file.descend.until_below)
+    keys, rows = combinations(axes)
+    units = [unit_of(key, [row[number] for row in axis.rows]) for axis in axes for number, key in enumerate(axis.keys)]
+    return keys, rows, tuple(units), descent
+
+
+def _axes(tables: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    return list(flatten(tables, is_axis).items())
+
+
+def _descending(table: DescendTable) -> list[Value]:
+    unit = unit_of(table.key, [table.start, table.to, table.step])
+    ends = []
+    for name, value in (("from", table.start), ("to", table.to), ("step", table.step)):
+        try:
+            ends.append(split_quantity(value)[0] if isinstance(value, str) else float(value))
+        except (ValueError, TypeError) as error:
+            raise UnusableAxisError(
+                f"descend.{name}", value, "expected a number, with its unit if it has one"
+            ) from error
+    start, to, step = ends
+    if not (start >= to and step > 0 and ceil((start - to) / step) < MOST_POINTS):
+        raise UnusableAxisError("descend", f"{table.start} to {table.to}", "expected a way down in steps above zero")
+    number = int((start - to) / step + 1e-9) + 1
+    return [written(start - step * count, unit) for count in range(number)]
+
+
+def changed(document: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[str, Any]:
+    """A case's tables with dotted keys (``beads.radii[0]`` for one of a list) given other values.
+
+    Raises
+    ------
+    UnusableAxisError
+        If there is no such place in a list.
+
+    What a new value stands for in other words (`inputs.schema.ALTERNATIVES`) is left out, unless it is changed too.
+    """
+    changed_document = copy.deepcopy(dict(document))
+    for key in changes:
+        for other in ALTERNATIVES.get(key, ()):
+            if other not in changes:
+                _remove(changed_document, other)
+    for key, value in changes.items():
+        _put(changed_document, key, value)
+    return changed_document
+
+
+def _remove(document: dict[str, Any], key: str) -> None:
+    *tables, name = key.split(".")
+    table: Any = document
+    for part in tables:
+        table = table.get(part) if isinstance(table, dict) else None
+    if isinstance(table, dict):
+        table.pop(name, None)
+
+
+def _put(document: dict[str, Any], key: str, value: Value) -> None:
+    match = _INDEXED.fullmatch(key)
+    *tables, name = (match["key"] if match else key).split(".")
+    table: Any = document
+    for part in tables:
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):  # the base case is wrong there, which its own check tells
+            return
+    if match is None:
+        table[name] = value
+    elif isinstance(table.get(name), list) and int(match["index"]) < len(table[name]):
+        table[name][int(match["index"])] = value
+    else:
+        raise UnusableAxisError(key, value, f"the base case has no {match['key']} of that length")

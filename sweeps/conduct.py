@@ -1,0 +1,353 @@
+"""Conduct a sweep: decks handed to Parsl's workers, what they report taken in, until every point is settled."""
+
+from __future__ import annotations
+
+import resource
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+from inputs.case import WalkerCase
+from inputs.errors import WalkersError
+from runner.binary import Engine
+from runner.ensemble import finished_places, remove_remains
+from runner.locks import is_locked
+from sweeps.packing import PlannedDeck, halves, pack, unfinished_parts
+from sweeps.record import SweepRecord, at_rest, chains
+from sweeps.site import Site, pilots, threads
+from sweeps.worker import STOP, Report, SweepStopped, Task, work
+from templates.sharing import sharing_key
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+_LOOK_SECONDS = 0.25
+_BUSY_SECONDS = 2.0
+_MOST_LOSSES = 5
+"""How often a deck is given out again after its worker was lost (a cancelled job, a node gone down)."""
+
+
+class ClusterFailed(WalkersError):
+    """The cluster's jobs end without having worked."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a sweep is conducted.
+
+    Attributes
+    ----------
+    workers
+        How many decks run at once on this machine; on a site its own number counts.
+    site
+        The cluster, or None for this machine.
+    retries
+        How often a point that failed is tried again.
+    time_limit
+        Wall time in s that an engine may take, or None.
+    """
+
+    workers: int
+    site: Site | None = None
+    retries: int = 0
+    time_limit: float | None = None
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A point that failed: its number, its run, the name of the failure, what it says, where its remains are."""
+
+    point: int
+    run: str
+    reason: str
+    message: str
+    directory: str | None
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a sweep is: numbers of points, wall time in s since the start, time left in s as far as one can say."""
+
+    points: int
+    found: int
+    done: int
+    failed: int
+    running: int
+    elapsed: float
+    left: float | None
+    last_failure: Failure | None
+
+
+@dataclass(eq=False)
+class _Course:
+    """Batches of points of which each waits for the one before."""
+
+    batches: Generator[list[int], None, None]
+    unsettled: set[int] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """A deck on its way: how often it failed and how often its worker was lost."""
+
+    deck: PlannedDeck
+    course: _Course
+    failures: int = 0
+    losses: int = 0
+
+
+def conduct(
+    record: SweepRecord,
+    cases: Sequence[WalkerCase],
+    engine: Engine,
+    options: Options,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> list[Failure]:
+    """Make all runs of a sweep that are missing.
+
+    Parameters
+    ----------
+    record
+        The sweep.
+    cases
+        Of its points.
+    engine
+        The binary.
+    options
+        How.
+    on_progress
+        Called whenever a deck has ended, and a few times a second.
+
+    Returns
+    -------
+    list of Failure
+        The points that failed; all others are finished or, below the end of a descent, not needed.
+
+    Raises
+    ------
+    ClusterFailed
+        If the cluster's jobs end without having worked.
+    """
+    _raise_file_limit()
+    out = record.out
+    out.mkdir(parents=True, exist_ok=True)
+    remove_remains(out)
+    with _workers(options, record) as submit:
+        conductor = _Conductor(record, cases, engine, options, submit, on_progress)
+        return conductor.run()
+
+
+def _raise_file_limit() -> None:
+    """Each point of a running deck keeps a lock open."""
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with suppress(ValueError, OSError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+
+
+@contextmanager
+def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[[Task], Future[Report]]]:
+    """Start Parsl; at the end its workers and their engines have ended, however the block is left."""
+    import parsl
+
+    STOP.clear()
+    folder = Path(tempfile.mkdtemp(prefix="walkers-")) if options.site is None else record.directory / "parsl"
+    config = threads(options.workers, folder) if options.site is None else pilots(options.site, folder)
+    kernel = parsl.DataFlowKernel(config)
+    app = parsl.python_app(work, data_flow_kernel=kernel)
+    try:
+        yield app
+    finally:
+        STOP.set()
+        kernel.cleanup()
+        if options.site is None:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def batches(
+    record: SweepRecord, cases: Sequence[WalkerCase], stopped: Callable[[int], bool]
+) -> list[Generator[list[int], None, None]]:
+    """The order in which points may be made.
+
+    Parameters
+    ----------
+    record, cases
+        The sweep.
+    stopped
+        Whether the walkers of a settled point were at rest.
+
+    Returns
+    -------
+    list of generators
+        Each yields batches of points; the next is to be asked for when the last is settled. A sweep without a descent
+        is one batch. Descents go down side by side where their points can share a deck.
+    """
+    if record.descent is None:
+        return [(numbers for numbers in [list(range(len(cases)))])]
+    together: dict[Any, list[list[int]]] = {}
+    for chain in chains(record):
+        together.setdefault(sharing_key(cases[chain[0]]), []).append(chain)
+
+    def descend(descents: list[list[int]]) -> Generator[list[int], None, None]:
+        for step in range(len(descents[0])):
+            yield [chain[step] for chain in descents]
+            descents = [chain for chain in descents if not stopped(chain[step])]
+            if not descents:
+                return
+
+    return [descend(group) for group in together.values()]
+
+
+class _Conductor:
+    """Hands out decks and takes in reports."""
+
+    def __init__(
+        self,
+        record: SweepRecord,
+        cases: Sequence[WalkerCase],
+        engine: Engine,
+        options: Options,
+        submit: Callable[[Task], Future[Report]],
+        on_progress: Callable[[Progress], None] | None,
+    ) -> None:
+        self.record, self.options, self.submit, self.engine = record, options, submit, engine
+        self.cases: Mapping[int, WalkerCase] = dict(enumerate(cases))
+        self.on_progress = on_progress or (lambda _: None)
+        self.finished = {run: str(place) for run, place in finished_places(record.out).items()}
+        self.failures: list[Failure] = []
+        self.ended: SimpleQueue[tuple[_Job, Future[Report]]] = SimpleQueue()
+        self.out_there: dict[_Job, None] = {}
+        self.later: list[tuple[float, _Job]] = []
+        self.begin = time.perf_counter()
+        self.seconds_done = 0.0
+        self.found = sum(run in self.finished for run in record.runs)
+        self.done = 0
+        self.told = 0.0
+
+    @property
+    def workers(self) -> int:
+        return self.options.site.workers if self.options.site else self.options.workers
+
+    def run(self) -> list[Failure]:
+        for batch in batches(self.record, list(self.cases.values()), self._stopped):
+            self._advance(_Course(batch))
+        while self.out_there or self.later:
+            now = time.perf_counter()
+            for due, job in [entry for entry in self.later if entry[0] <= now]:
+                self.later.remove((due, job))
+                self._hand_out(job)
+            with suppress(Empty):
+                self._take_in(*self.ended.get(timeout=_LOOK_SECONDS))
+            self._tell(now)
+        self.on_progress(self._progress())
+        return sorted(self.failures, key=lambda failure: failure.point)
+
+    def _stopped(self, point: int) -> bool:
+        place = self.finished.get(self.record.runs[point])
+        return place is not None and self.record.descent is not None and at_rest(Path(place), self.record.descent)
+
+    def _is_finished(self, point: int) -> bool:
+        return self.record.runs[point] in self.finished
+
+    def _advance(self, course: _Course) -> None:
+        """Hand out the next batch of which anything is missing."""
+        while not course.unsettled:
+            batch = next(course.batches, None)
+            if batch is None:
+                return
+            course.unsettled = {point for point in batch if not self._is_finished(point)}
+            if course.unsettled:
+                for deck in pack({point: self.cases[point] for point in batch}, self.workers):
+                    for part in unfinished_parts(deck.points, self.cases, self._is_finished):
+                        self._hand_out(_Job(part, course))
+
+    def _hand_out(self, job: _Job) -> None:
+        task = Task(
+            cases=tuple(self.cases[point] for point in job.deck.points),
+            out=self.record.out,
+            engine=str(self.engine.path),
+            sha256=self.engine.sha256,
+            time_limit=self.options.time_limit,
+        )
+        self.out_there[job] = None
+        self.submit(task).add_done_callback(lambda future: self.ended.put((job, future)))
+
+    def _take_in(self, job: _Job, future: Future[Report]) -> None:
+        del self.out_there[job]
+        error = future.exception()
+        report = self._lost(job, error) if error else future.result()
+        if report is None:
+            return
+        self.finished |= report.finished
+        settled = [point for point in job.deck.points if self._is_finished(point)]
+        left = [point for point in job.deck.points if not self._is_finished(point)]
+        self.seconds_done += job.deck.seconds * len(settled) / len(job.deck.points)
+        if report.failure:
+            self._failed(job, report, left)
+        elif left:
+            self.later.append((time.perf_counter() + _BUSY_SECONDS, replace(job, deck=self._deck_of(left, job))))
+        self.done += len(settled)
+        job.course.unsettled -= set(settled)
+        self._advance(job.course)
+
+    def _deck_of(self, points: Sequence[int], job: _Job) -> PlannedDeck:
+        return PlannedDeck(tuple(points), job.deck.seconds * len(points) / len(job.deck.points))
+
+    def _failed(self, job: _Job, report: Report, left: Sequence[int]) -> None:
+        """Try the points of a deck apart, a point by itself as often as told."""
+        if report.failure == SweepStopped.__name__ or not left:
+            return
+        if len(left) > 1:
+            for half in halves(left):
+                self._hand_out(replace(job, deck=self._deck_of(half, job)))
+        elif job.failures < self.options.retries:
+            self._hand_out(replace(job, failures=job.failures + 1))
+        else:
+            (point,) = left
+            run = self.record.runs[point]
+            failure = Failure(point, run, report.failure or "", report.message, report.directory)
+            self.failures.append(failure)
+            self.seconds_done += job.deck.seconds
+            job.course.unsettled -= {point}
+            self._advance(job.course)
+
+    def _lost(self, job: _Job, error: BaseException) -> Report | None:
+        """An exception out of a worker: lost with its job or node, or something that nobody foresaw."""
+        from parsl.executors.errors import BadStateException
+        from parsl.executors.high_throughput.errors import ManagerLost, WorkerLost
+
+        if isinstance(error, BadStateException):
+            raise ClusterFailed(f"the cluster's jobs fail: {error}") from error
+        if isinstance(error, (ManagerLost, WorkerLost)) and job.losses < _MOST_LOSSES:
+            self._hand_out(replace(job, losses=job.losses + 1))
+            return None
+        return Report(failure=type(error).__name__, message=str(error) or repr(error))
+
+    def _tell(self, now: float) -> None:
+        if now - self.told > _LOOK_SECONDS:
+            self.told = now
+            self.on_progress(self._progress())
+
+    def _progress(self) -> Progress:
+        running = sum(
+            len(job.deck.points)
+            for job in list(self.out_there)[: 4 * self.workers]
+            if is_locked(self.record.out / self.record.runs[job.deck.points[0]])
+        )
+        waiting = sum(job.deck.seconds for job in [*self.out_there, *(job for _, job in self.later)])
+        elapsed = time.perf_counter() - self.begin
+        return Progress(
+            points=len(self.record.runs),
+            found=self.found,
+            done=self.found + self.done,
+            failed=len(self.failures),
+            running=running,
+            elapsed=elapsed,
+            left=waiting / self.seconds_done * elapsed if self.seconds_done else None,
+            last_failure=self.failures[-1] if self.failures else None,
+        )

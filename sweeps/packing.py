@@ -1,0 +1,118 @@
+"""Which points travel in which deck: by predicted cost, so that all cores finish together.
+
+A deck costs a start-up and a share a step whoever is in it, so that fewer decks are cheaper; more of them fill the
+cores more evenly and give results sooner. The packing is one of the whole sweep and of the number of workers: it does
+not depend on what is finished, so that an interrupted sweep goes on with the decks that it would have had.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil
+
+from inputs.case import WalkerCase
+from runner.cost import predicted_seconds
+from templates.sharing import sharing_key
+
+MOST_WALKERS = 96
+"""In a deck; with 96 the share of the deck's own cost is down to 4 %."""
+MOST_POINTS = 64
+LONGEST_SECONDS = 60.0
+"""Predicted time of a deck of several points: results are to keep coming."""
+_ROUNDS = (1, 2, 3, 4, 6, 8, 12, 16)
+_AS_GOOD = 1.02
+
+
+@dataclass(frozen=True)
+class PlannedDeck:
+    """Numbers of the points of a deck, in order, and its predicted time in s on one core."""
+
+    points: tuple[int, ...]
+    seconds: float
+
+
+def pack(cases: Mapping[int, WalkerCase], workers: int) -> list[PlannedDeck]:
+    """Pack points into decks.
+
+    Parameters
+    ----------
+    cases
+        From the number of a point to its case.
+    workers
+        How many decks run at once.
+
+    Returns
+    -------
+    list of PlannedDeck
+        Longest first, the order in which they are to be started.
+    """
+    groups: dict[Hashable, list[int]] = {}
+    for number, case in cases.items():
+        groups.setdefault(sharing_key(case), []).append(number)
+    choices = _ROUNDS if any(len(group) > 1 for group in groups.values()) else (1,)
+    plans = [_parted(groups.values(), cases, workers * rounds) for rounds in choices]
+    spans = [makespan((deck.seconds for deck in plan), workers) for plan in plans]
+    # Of plans that take as long, the one with the smallest decks.
+    good = max(number for number, span in enumerate(spans) if span <= _AS_GOOD * min(spans))
+    return sorted(plans[good], key=lambda deck: -deck.seconds)
+
+
+def _parted(groups: Iterable[Sequence[int]], cases: Mapping[int, WalkerCase], wanted: int) -> list[PlannedDeck]:
+    """Part the groups so that there are about so many decks of the same length."""
+    groups = list(groups)
+    whole = [_deck(group, cases) for group in groups]
+    total = sum(deck.seconds for deck in whole)
+    decks: list[PlannedDeck] = []
+    for group, deck in zip(groups, whole, strict=True):
+        walkers = sum(cases[number].start.replicates for number in group)
+        parts = max(
+            ceil(wanted * deck.seconds / total),
+            ceil(walkers / MOST_WALKERS),
+            ceil(len(group) / MOST_POINTS),
+            ceil(deck.seconds / LONGEST_SECONDS),
+        )
+        decks += [_deck(part, cases) for part in _parts(group, min(parts, len(group)))]
+    return decks
+
+
+def _parts(group: Sequence[int], count: int) -> list[Sequence[int]]:
+    """A sequence in so many consecutive parts, of equal lengths as far as that goes."""
+    edges = [len(group) * number // count for number in range(count + 1)]
+    return [group[start:end] for start, end in pairwise(edges)]
+
+
+def _deck(points: Sequence[int], cases: Mapping[int, WalkerCase]) -> PlannedDeck:
+    walkers = sum(cases[number].start.replicates for number in points)
+    return PlannedDeck(tuple(points), predicted_seconds(cases[points[0]], walkers))
+
+
+def makespan(seconds: Iterable[float], workers: int) -> float:
+    """Time until all is done when each free worker takes the longest that is left, s."""
+    ends = [0.0] * workers
+    for duration in sorted(seconds, reverse=True):
+        heapq.heapreplace(ends, ends[0] + duration)
+    return max(ends)
+
+
+def unfinished_parts(
+    points: Sequence[int], cases: Mapping[int, WalkerCase], is_finished: Callable[[int], bool]
+) -> list[PlannedDeck]:
+    """What is left of a deck: itself, or those of its halves, halves of halves …, of which nothing is finished.
+
+    A deck that fails is tried again in halves; so what is left of it consists of the same decks, whenever the sweep was
+    interrupted.
+    """
+    finished = [is_finished(number) for number in points]
+    if all(finished):
+        return []
+    if not any(finished):
+        return [_deck(points, cases)]
+    return [part for half in halves(points) for part in unfinished_parts(half, cases, is_finished)]
+
+
+def halves(points: Sequence[int]) -> list[Sequence[int]]:
+    """The two halves of a deck of several points."""
+    return _parts(points, 2)

@@ -1,0 +1,231 @@
+"""What a sweep's directory holds: ``sweep.json``, the list of its points, each with the name of its run.
+
+The runs themselves are beside the sweep's directory, shared by all sweeps of that folder: what is finished, failed or
+being made is read from them and from nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from inputs.axes import plain
+from inputs.case import WalkerCase
+from inputs.dimer import dimer_of
+from inputs.errors import InputError, Problem
+from inputs.sweep import Descent, Sweep
+from runner.binary import Engine
+from runner.directory import FAILURE_NAME, run_place, unfinished
+from runner.ensemble import FOLDER, finished_places
+from runner.files import read_json, write_json
+from runner.locks import is_locked
+
+RECORD_NAME = "sweep.json"
+_FORMAT = 1
+
+DERIVED = {
+    "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄)"),
+    "sin_delta": ("", "asymmetry parameter (R1 - R2)/(R1 + R2)"),
+    "mass_asymmetry": ("", "μ = (m1 - m2)/M"),
+    "frequency": ("Hz", "of the drive"),
+    "peak_acceleration": ("m/s^2", "of the substrate"),
+    "peak_velocity": ("m/s", "of the substrate"),
+    "amplitude": ("m", "of the substrate's displacement"),
+    "radius_1": ("m", "of bead 1"),
+    "radius_2": ("m", "of bead 2"),
+}
+"""What follows from a point's case: unit and meaning."""
+
+
+@dataclass(frozen=True)
+class SweepRecord:
+    """A sweep as its directory describes it.
+
+    Attributes
+    ----------
+    directory
+        Of the sweep; the folder of the runs is its parent.
+    name, title
+        Of the sweep.
+    units
+        From the keys that vary to their units, None where one has none.
+    values
+        Of each point, one a key.
+    derived
+        Of each point, one a column of `DERIVED`.
+    runs
+        Name of each point's run.
+    descent
+        How the points depend on each other, if they do.
+    """
+
+    directory: Path
+    name: str
+    title: str
+    units: Mapping[str, str | None]
+    values: Sequence[Sequence[Any]]
+    derived: Sequence[Sequence[float]]
+    runs: Sequence[str]
+    descent: Descent | None
+
+    @property
+    def out(self) -> Path:
+        """Folder of the run directories."""
+        return self.directory.parent
+
+
+def derived_of(case: WalkerCase) -> list[float]:
+    """The columns of `DERIVED`."""
+    dimer, drive = dimer_of(case), case.drive
+    return [
+        dimer.gamma0(drive.peak_acceleration),
+        dimer.sin_delta,
+        dimer.mass_asymmetry,
+        drive.frequency,
+        drive.peak_acceleration,
+        drive.peak_velocity,
+        drive.amplitude,
+        *case.beads.radii,
+    ]
+
+
+def describe_sweep(sweep: Sweep, cases: Sequence[WalkerCase], engine: Engine, out: Path) -> SweepRecord:
+    """The record of a sweep whose points have been resolved.
+
+    Raises
+    ------
+    InputError
+        If a sweep cannot have that name.
+    """
+    if sweep.name == FOLDER:
+        raise InputError(sweep.source, [Problem("", None, f"a sweep cannot be called {FOLDER}: rename the file")])
+    return SweepRecord(
+        directory=out / sweep.name,
+        name=sweep.name,
+        title=sweep.title,
+        units=dict(zip(sweep.keys, sweep.units, strict=True)),
+        values=[[_plain(value) for value in row] for row in sweep.rows],
+        derived=[derived_of(case) for case in cases],
+        runs=[run_place(case, engine, out).name for case in cases],
+        descent=sweep.descent,
+    )
+
+
+def _plain(value: Any) -> Any:
+    return [plain(part) for part in value] if isinstance(value, list) else plain(value)
+
+
+def write_record(record: SweepRecord) -> None:
+    """Make the sweep's directory, if need be, and write its ``sweep.json``."""
+    record.directory.mkdir(parents=True, exist_ok=True)
+    descent = record.descent
+    write_json(
+        record.directory / RECORD_NAME,
+        {
+            "format": _FORMAT,
+            "name": record.name,
+            "title": record.title,
+            "units": dict(record.units),
+            "descent": vars(descent) if descent else None,
+            "derived": list(DERIVED),
+            "points": [
+                {"values": list(values), "derived": list(derived), "run": run}
+                for values, derived, run in zip(record.values, record.derived, record.runs, strict=True)
+            ],
+        },
+    )
+
+
+def read_record(directory: str | Path) -> SweepRecord:
+    """Read a sweep's directory.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    directory = Path(directory)
+    try:
+        contents = read_json(directory / RECORD_NAME)
+        points = contents["points"]
+        return SweepRecord(
+            directory=directory,
+            name=contents["name"],
+            title=contents["title"],
+            units=contents["units"],
+            values=[point["values"] for point in points],
+            derived=[point["derived"] for point in points],
+            runs=[point["run"] for point in points],
+            descent=Descent(**contents["descent"]) if contents["descent"] else None,
+        )
+    except FileNotFoundError as error:
+        told = f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"
+        raise InputError(str(directory), [Problem("", None, told)]) from error
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(str(directory), [Problem("", None, f"{RECORD_NAME} cannot be read ({error})")]) from error
+
+
+@dataclass(frozen=True)
+class PointState:
+    """What has become of a point.
+
+    Attributes
+    ----------
+    status
+        ``finished``, ``failed``, ``running``, ``missing``, or ``not needed``: below where a descent ended.
+    directory
+        Of the finished run, or of what is left of the failed one; None if there is none.
+    reason, message, lost
+        Of a failure; the number of beads lost.
+    """
+
+    status: str
+    directory: Path | None = None
+    reason: str | None = None
+    message: str | None = None
+    lost: int = 0
+
+
+def states(record: SweepRecord) -> list[PointState]:
+    """What has become of each point, as the run directories say."""
+    finished = finished_places(record.out)
+    found = [_state(record.out / run, finished.get(run)) for run in record.runs]
+    if record.descent is None:
+        return found
+    for chain in chains(record):
+        stopped = False
+        for number in chain:
+            if stopped and found[number].status != "finished":
+                found[number] = PointState("not needed")
+            directory = found[number].directory
+            if found[number].status == "finished" and directory is not None:
+                stopped = stopped or at_rest(directory, record.descent)
+    return found
+
+
+def _state(place: Path, finished: Path | None) -> PointState:
+    if finished is not None:
+        return PointState("finished", finished)
+    if is_locked(place):
+        return PointState("running")
+    part = unfinished(place)
+    try:
+        failure = read_json(part / FAILURE_NAME)
+        return PointState("failed", part, str(failure["reason"]), str(failure["message"]), int(failure.get("lost", 0)))
+    except (OSError, ValueError, KeyError, TypeError):
+        return PointState("missing")
+
+
+def chains(record: SweepRecord) -> list[list[int]]:
+    """The descents of a sweep: numbers of their points, from the top."""
+    steps = record.descent.steps if record.descent else len(record.runs)
+    return [list(range(start, start + steps)) for start in range(0, len(record.runs), steps or 1)]
+
+
+def at_rest(directory: Path, descent: Descent) -> bool:
+    """Whether the walkers of a finished run are slower than a descent's limit."""
+    from postprocess.result import current_result
+
+    return bool(abs(current_result(directory)["velocity"]["mean"]) < descent.until_below)

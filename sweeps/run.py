@@ -1,0 +1,161 @@
+"""A sweep from its file to its directory: planned, and run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from inputs.case import WalkerCase
+from inputs.sweep import Sweep
+from runner.binary import Engine, find_engine
+from runner.cost import predicted_seconds
+from sweeps.conduct import Failure, Options, Progress, conduct
+from sweeps.packing import PlannedDeck, makespan, pack, unfinished_parts
+from sweeps.record import SweepRecord, describe_sweep, states, write_record
+from sweeps.together import check_audit
+
+_SETTLED = ("finished", "not needed")
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """What a sweep would do.
+
+    Attributes
+    ----------
+    record
+        The sweep, its points resolved.
+    cases
+        Of the points.
+    engine
+        The binary.
+    decks
+        Those that are missing. Of a sweep with a descent all down to its bottom, one a point: it may end earlier.
+    statuses
+        Of the points, see `sweeps.record.PointState`.
+    workers
+        How many decks run at once.
+    """
+
+    record: SweepRecord
+    cases: Sequence[WalkerCase]
+    engine: Engine
+    decks: Sequence[PlannedDeck]
+    statuses: Sequence[str]
+    workers: int
+
+    @property
+    def core_seconds(self) -> float:
+        """Predicted time of the engines, s."""
+        return sum(deck.seconds for deck in self.decks)
+
+    @property
+    def wall_seconds(self) -> float:
+        """Predicted time until all is done, s."""
+        return makespan((deck.seconds for deck in self.decks), self.workers)
+
+    @property
+    def core_seconds_apart(self) -> float:
+        """What the same points would cost with one deck a point, s."""
+        missing = {point for deck in self.decks for point in deck.points}
+        return sum(predicted_seconds(self.cases[point]) for point in missing)
+
+    def as_text(self) -> str:
+        """The plan in a few lines."""
+        record, counts = self.record, {status: self.statuses.count(status) for status in set(self.statuses)}
+        told = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
+        keys = ", ".join(f"{key} ({unit})" if unit else key for key, unit in record.units.items())
+        atmost = "at most " if record.descent else ""
+        lines = [
+            f"{record.name}: {record.title}".rstrip(": "),
+            f"  varied     {keys}" if keys else "  varied     nothing",
+            f"  points     {len(record.runs)}: {told}",
+            f"  to do      {atmost}{sum(len(deck.points) for deck in self.decks)} points in {len(self.decks)} decks",
+            f"  predicted  {atmost}{self.core_seconds:.0f} core-seconds ({self.core_seconds_apart:.0f} with a deck a "
+            f"point), {self.wall_seconds:.0f} s with {self.workers} at once",
+            f"  directory  {record.directory}",
+        ]
+        return "\n".join(lines)
+
+
+def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = None) -> SweepPlan:
+    """Resolve a sweep's points and see what is missing; nothing is written.
+
+    Parameters
+    ----------
+    sweep
+        From `inputs.sweep.load_sweep`.
+    out
+        Folder of the run directories.
+    options
+        How it is to be conducted.
+    engine
+        Name or path of the binary; see `runner.find_engine`.
+
+    Raises
+    ------
+    InputError
+        If a point cannot be used.
+    runner.EngineFailure
+        If there is no engine.
+    """
+    binary = find_engine(engine)
+    cases = list(sweep.cases())
+    record = describe_sweep(sweep, cases, binary, out)
+    statuses = [state.status for state in states(record)]
+    workers = options.site.workers if options.site else options.workers
+    numbered = dict(enumerate(cases))
+    # The points of a descent come one after the other, so that few of them can share a deck.
+    packed = [deck for point in numbered for deck in pack({point: cases[point]}, 1)] if record.descent else None
+    decks = [
+        part
+        for deck in packed or pack(numbered, workers)
+        for part in unfinished_parts(deck.points, numbered, lambda point: statuses[point] in _SETTLED)
+    ]
+    return SweepPlan(record, cases, binary, decks, statuses, workers)
+
+
+def run_sweep(
+    sweep: Sweep,
+    out: Path,
+    options: Options,
+    *,
+    engine: str | None = None,
+    despite_audit: bool = False,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> tuple[SweepRecord, list[Failure]]:
+    """Make all runs of a sweep that are missing.
+
+    Parameters
+    ----------
+    sweep, out, options, engine
+        As for `plan_sweep`.
+    despite_audit
+        Run on an engine that failed its audit.
+    on_progress
+        Called a few times a second.
+
+    Returns
+    -------
+    record
+        The sweep; `sweeps.table.load` reads the table from ``record.directory``.
+    failures
+        The points that failed.
+
+    Raises
+    ------
+    InputError
+        If a point cannot be used.
+    runner.EngineFailure
+        If there is no engine, or its audit failed.
+    sweeps.conduct.ClusterFailed
+        If the cluster's jobs end without having worked.
+    """
+    plan = plan_sweep(sweep, out, options, engine)
+    if plan.decks:
+        check_audit(plan.engine, despite_audit)
+    write_record(plan.record)
+    if not plan.decks:
+        return plan.record, []
+    return plan.record, conduct(plan.record, plan.cases, plan.engine, options, on_progress)

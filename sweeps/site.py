@@ -1,0 +1,203 @@
+"""Where a sweep runs: on this machine's cores, or on the cluster that a site file describes.
+
+    scheduler = "slurm"
+    partition = "main"
+    walltime  = "02:00:00"
+    cores     = 32
+    jobs      = 4
+
+The scheduling is Parsl's. Jobs of a cluster are pilots: each holds workers that take deck after deck until
+none is left.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from inputs.errors import InputError, Problem
+from inputs.library import suggestion
+from inputs.messages import problem_of, quoted
+from inputs.reading import read_toml
+from inputs.schema import Whole
+
+if TYPE_CHECKING:
+    from parsl.config import Config
+
+_OURS = {
+    # Our key: what one or the other of Parsl's providers calls it.
+    "partition": ("partition", "queue"),
+    "account": ("account", "allocation", "project"),
+    "walltime": ("walltime",),
+    "nodes": ("nodes_per_block",),
+    "cores": ("cores_per_node", "cpus_per_node"),
+    "jobs": ("max_blocks",),
+}
+_SCHEDULERS = {
+    "slurm": "SlurmProvider",
+    "pbs": "PBSProProvider",
+    "torque": "TorqueProvider",
+    "lsf": "LSFProvider",
+    "grid-engine": "GridEngineProvider",
+    "condor": "CondorProvider",
+    "local": "LocalProvider",
+}
+
+
+class SiteFile(BaseModel):
+    """A site file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    scheduler: str
+    partition: str | None = None
+    account: str | None = None
+    walltime: str | None = None
+    nodes: Annotated[Whole, Field(ge=1)] = 1
+    cores: Annotated[Whole, Field(ge=1)]
+    jobs: Annotated[Whole, Field(ge=1)] = 1
+    modules: list[str] = []
+    shell: list[str] = []
+    launcher: str | None = None
+    provider: dict[str, Any] = {}
+    executor: dict[str, Any] = {}
+
+
+@dataclass(frozen=True)
+class Site:
+    """A cluster: how many decks run at once on it, and what Parsl is told."""
+
+    workers: int
+    file: SiteFile
+
+
+def cores_here() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def load_site(path: str | Path) -> Site:
+    """Read a site file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be used: unknown keys are told with those that Parsl's class takes.
+    """
+    document = read_toml(Path(path))
+    try:
+        file = SiteFile.model_validate(document)
+    except ValidationError as error:
+        problems = [problem_of(details, document, SiteFile, "a site") for details in error.errors()]
+        raise InputError(str(path), problems) from error
+    problems = _problems(file, document)
+    if problems:
+        raise InputError(str(path), problems)
+    return Site(file.cores * file.nodes * file.jobs, file)
+
+
+def _problems(file: SiteFile, document: Mapping[str, Any]) -> list[Problem]:
+    """What pydantic cannot see: whether Parsl has such a scheduler, and whether that takes such keys."""
+    if file.scheduler not in _SCHEDULERS:
+        expected = f"expected one of {', '.join(_SCHEDULERS)}{suggestion(file.scheduler, _SCHEDULERS)}"
+        return [Problem("scheduler", quoted(document, ["scheduler"]), expected)]
+    found = []
+    taken = _parameters("parsl.providers", _SCHEDULERS[file.scheduler])
+    for key, names in _OURS.items():
+        if key in document and not taken.intersection(names) and key != "cores":
+            found.append(Problem(key, quoted(document, [key]), f"{_SCHEDULERS[file.scheduler]} has no such setting"))
+    for table, known in (("provider", taken), ("executor", _parameters("parsl.executors", "HighThroughputExecutor"))):
+        for key in document.get(table, {}):
+            if key not in known:
+                expected = f"unknown key; Parsl takes {', '.join(sorted(known))}{suggestion(key, known)}"
+                found.append(Problem(f"{table}.{key}", quoted(document, [table, key]), expected))
+    if file.launcher is not None and file.launcher not in _launchers():
+        expected = f"expected one of {', '.join(sorted(_launchers()))}"
+        found.append(Problem("launcher", quoted(document, ["launcher"]), expected))
+    return found
+
+
+@cache
+def _parameters(module: str, name: str) -> frozenset[str]:
+    import importlib
+
+    parameters = inspect.signature(getattr(importlib.import_module(module), name)).parameters
+    return frozenset(parameters) - {"label", "provider", "launcher"}
+
+
+@cache
+def _launchers() -> Mapping[str, str]:
+    """Our names for Parsl's launchers (``srun``) and theirs (``SrunLauncher``)."""
+    import parsl.launchers
+
+    return {name.removesuffix("Launcher").lower(): name for name in parsl.launchers.__all__ if name[:4] != "Wrap"}
+
+
+def threads(workers: int, run_dir: Path) -> Config:
+    """Parsl's configuration for so many decks at once on this machine: threads, no server, no open port."""
+    from parsl.config import Config
+    from parsl.executors import ThreadPoolExecutor
+
+    return Config(
+        executors=[ThreadPoolExecutor(label="threads", max_threads=workers)],
+        run_dir=str(run_dir),
+        strategy="none",
+        initialize_logging=False,
+        usage_tracking=0,
+    )
+
+
+def pilots(site: Site, run_dir: Path) -> Config:
+    """Parsl's configuration for a cluster.
+
+    Parameters
+    ----------
+    site
+        The cluster.
+    run_dir
+        Where Parsl keeps its scripts and logs; the nodes must see it.
+    """
+    import parsl.launchers
+    import parsl.providers
+    from parsl.config import Config
+    from parsl.executors import HighThroughputExecutor
+    from parsl.jobs.error_handlers import windowed_error_handler
+
+    file = site.file
+    name = _SCHEDULERS[file.scheduler]
+    taken = _parameters("parsl.providers", name)
+    settings: dict[str, Any] = {"worker_init": _worker_init(file)}
+    for key, names in _OURS.items():
+        value = getattr(file, key)
+        if value is not None:
+            settings |= {theirs: value for theirs in names if theirs in taken}
+    # A node is shared with others unless the provider table says otherwise; jobs come and go with the work.
+    settings |= {key: value for key, value in (("exclusive", False), ("min_blocks", 0)) if key in taken}
+    # On several nodes each needs a step of its own to start its workers.
+    launcher = file.launcher or ("srun" if name == "SlurmProvider" and file.nodes > 1 else None)
+    if launcher is not None:
+        settings["launcher"] = getattr(parsl.launchers, _launchers()[launcher])()
+    provider = getattr(parsl.providers, name)(**(settings | file.provider))
+    options: dict[str, Any] = {
+        "max_workers_per_node": file.cores,
+        "heartbeat_period": 10,
+        "heartbeat_threshold": 60,
+        "block_error_handler": windowed_error_handler,
+        "worker_logdir_root": str(run_dir),
+    }
+    executor = HighThroughputExecutor(label="pilots", provider=provider, **(options | file.executor))
+    return Config(executors=[executor], run_dir=str(run_dir), strategy="simple", strategy_period=2, usage_tracking=0)
+
+
+def _worker_init(file: SiteFile) -> str:
+    """Shell lines before the workers: the modules, the site's own lines, and this Python first on the path."""
+    modules = [f"module load {name}" for name in file.modules]
+    return "\n".join([*modules, *file.shell, f'export PATH="{Path(sys.executable).parent}:$PATH"'])

@@ -1,0 +1,249 @@
+"""The table of a sweep: a row a point, what was varied, what follows from it, and what came out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from math import nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from inputs.errors import InputError, Problem
+from postprocess.result import current_result
+from runner.files import write_text
+from sweeps.record import DERIVED, PointState, SweepRecord, chains, read_record, states
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_CONTACTS = "contacts 1, 2: beads on the substrate, 3: bead on bead"
+
+RESULTS = {
+    "velocity": ("m/s", "mean over the walkers, along the heading, positive toward the large bead"),
+    "smallest": ("m/s", "velocity of the slowest walker"),
+    "largest": ("m/s", "velocity of the fastest walker; the paper's error bar is largest minus smallest"),
+    "standard_error": ("m/s", "of the velocity"),
+    "right_facing": ("m/s", "mean velocity of the walkers that started facing right"),
+    "left_facing": ("m/s", "mean velocity of the walkers that started facing left"),
+    "rotation_1": ("m/s", "mean rotation velocity -R dphi/dt of bead 1"),
+    "rotation_2": ("m/s", "mean rotation velocity -R dphi/dt of bead 2"),
+    "sliding_1": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
+    "sliding_2": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
+    "sliding_3": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
+    "open_1": ("", f"share of time in which the contact is open; {_CONTACTS}"),
+    "open_2": ("", f"share of time in which the contact is open; {_CONTACTS}"),
+    "open_3": ("", f"share of time in which the contact is open; {_CONTACTS}"),
+    "orientation_end": ("rad", "mean orientation at the end"),
+    "walkers": ("", "replicates"),
+    "steady": ("", "how many of them are steady"),
+    "turned_round": ("", "how many of them turned by more than 90 degrees"),
+    "walkers_met": ("", "whether two of them came near each other"),
+}
+"""Columns that a finished run gives: unit and meaning."""
+
+STATE = {
+    "status": ("", "finished, failed, running or missing"),
+    "lost": ("", "number of beads that left the simulation box, so that there is no result"),
+    "reason": ("", "name of the failure, empty where there is none"),
+    "run": ("", "run directory, from where the table was made; of a failed point what is left of it"),
+}
+
+_LEFT_OUT = {
+    *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
+    *("standard_error", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2", "open_3"),
+    *("orientation_end", "turned_round", "walkers_met", "lost", "reason"),
+}
+"""Columns that a table to look at leaves out."""
+
+FORMATS = ("csv", "parquet", "json")
+
+
+def load(directory: str | Path) -> pd.DataFrame:
+    """The table of a sweep.
+
+    Parameters
+    ----------
+    directory
+        A sweep's directory, such as ``runs/fig2``.
+
+    Returns
+    -------
+    DataFrame
+        A row a point, in the order of the sweep; a descent's points below its end are left out. Columns are ``point``,
+        the keys that vary (in the unit of the sweep file), `sweeps.record.DERIVED`, `RESULTS` and `STATE` (SI units).
+        ``attrs["units"]`` maps columns to units, ``attrs["meanings"]`` to what they are. Numbers of points that are
+        not finished are NaN.
+
+    Raises
+    ------
+    InputError
+        If it is no sweep's directory.
+    """
+    import pandas as pd
+
+    record = read_record(directory)
+    rows = [_row(record, number, state) for number, state in enumerate(states(record)) if state.status != "not needed"]
+    described = {**_varied(record), **DERIVED, **RESULTS, **STATE}
+    frame = pd.DataFrame(rows, columns=["point", *described])
+    frame.attrs["units"] = {"point": "", **{name: unit for name, (unit, _) in described.items()}}
+    frame.attrs["meanings"] = {"point": "number of the point", **{name: told for name, (_, told) in described.items()}}
+    frame.attrs["sweep"] = record.name
+    return frame
+
+
+def _varied(record: SweepRecord) -> dict[str, tuple[str, str]]:
+    """The columns of the keys that vary; a key with several numbers, such as the radii, has one for each."""
+    columns: dict[str, tuple[str, str]] = {}
+    for place, (key, unit) in enumerate(record.units.items()):
+        parts = max((len(values[place]) for values in record.values if isinstance(values[place], list)), default=0)
+        names = [f"{key}[{part}]" for part in range(parts)] or [key]
+        columns |= dict.fromkeys(names, (unit or "", "varied"))
+    return columns
+
+
+def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
+    row: dict[str, Any] = {"point": number}
+    for key, value in zip(record.units, record.values[number], strict=True):
+        row |= {f"{key}[{part}]": one for part, one in enumerate(value)} if isinstance(value, list) else {key: value}
+    row |= dict(zip(DERIVED, record.derived[number], strict=True))
+    finished = state.status == "finished" and state.directory is not None
+    row |= _result(current_result(state.directory)) if finished and state.directory else dict.fromkeys(RESULTS, nan)
+    return row | {
+        "status": state.status,
+        "lost": state.lost,
+        "reason": state.reason or "",
+        "run": os.path.relpath(state.directory) if state.directory else "",
+    }
+
+
+def _result(result: Mapping[str, Any]) -> dict[str, Any]:
+    velocity = result["velocity"]
+    return {
+        "velocity": velocity["mean"],
+        **{name: velocity[name] for name in ("smallest", "largest", "standard_error")},
+        **{name: result[name]["mean"] for name in ("right_facing", "left_facing", "orientation_end")},
+        **{f"rotation_{bead}": result["rotation"][f"bead_{bead}"] for bead in (1, 2)},
+        **{f"{what}_{at}": result[what][f"contact_{at}"] for what in ("sliding", "open") for at in (1, 2, 3)},
+        **{name: result[name] for name in ("walkers", "steady", "turned_round", "walkers_met")},
+    }
+
+
+def as_text(frame: pd.DataFrame, form: str) -> str | bytes:
+    """A sweep's table as CSV (units in the head), JSON (with units and meanings) or parquet (units in the metadata).
+
+    Raises
+    ------
+    InputError
+        If there is no such form.
+    """
+    if form == "csv":
+        units = frame.attrs["units"]
+        heads = [f"{name} ({units[name]})" if units[name] else name for name in frame.columns]
+        return str(frame.to_csv(index=False, header=heads))
+    if form == "json":
+        import json
+
+        rows = json.loads(frame.to_json(orient="records", double_precision=15))
+        contents = {"units": frame.attrs["units"], "meanings": frame.attrs["meanings"], "points": rows}
+        return json.dumps(contents, indent=2, ensure_ascii=False) + "\n"
+    if form == "parquet":
+        return _parquet(frame)
+    raise InputError(form, [Problem("", None, f"expected one of {', '.join(FORMATS)}")])
+
+
+def short_text(frame: pd.DataFrame) -> str:
+    """A table to look at: what varied, Γ0, sin δ, speeds in mm/s, status, run."""
+    import pandas as pd
+
+    shown = frame.drop(columns=[name for name in frame.columns if name in _LEFT_OUT])
+    units = dict(frame.attrs.get("units", {}))
+    for name, unit in units.items():
+        if name in shown and unit == "m/s" and name in RESULTS:
+            shown[name], units[name] = shown[name].astype(float) * 1e3, "mm/s"
+    shown.columns = pd.Index([f"{name} ({units[name]})" if units.get(name) else name for name in shown.columns])
+    return str(shown.to_string(index=False, float_format=lambda value: f"{value:.4g}", na_rep="-"))
+
+
+def _parquet(frame: pd.DataFrame) -> bytes:
+    import io
+
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.Table.from_pandas(frame, preserve_index=False)
+    units, meanings = frame.attrs["units"], frame.attrs["meanings"]
+    fields = [
+        field.with_metadata({"unit": units[field.name], "meaning": meanings[field.name]}) for field in table.schema
+    ]
+    buffer = io.BytesIO()
+    pq.write_table(table.cast(pa.schema(fields, metadata=table.schema.metadata)), buffer, compression="zstd")
+    return buffer.getvalue()
+
+
+def thresholds(directory: str | Path) -> pd.DataFrame:
+    """Where the descents of a sweep ended.
+
+    Parameters
+    ----------
+    directory
+        The directory of a sweep with a descent.
+
+    Returns
+    -------
+    DataFrame
+        A row a descent: the other keys that vary, ``moving`` and ``at_rest``, the last values of the lowered key at
+        which the walkers moved and the first at which they did not (NaN where there is none, yet or at all), and
+        ``gamma0_moving`` and ``gamma0_at_rest``, the dimensionless peak forces Γ0 there.
+
+    Raises
+    ------
+    InputError
+        If it is no such directory.
+    """
+    import numpy as np
+    import pandas as pd
+
+    record = read_record(directory)
+    descent = record.descent
+    if descent is None:
+        raise InputError(str(directory), [Problem("", None, "the sweep has no descent, hence no thresholds")])
+    frame = load(directory).set_index("point", drop=False)
+    others = [name for name in _varied(record) if name != descent.key]
+    rows = []
+    for chain in chains(record):
+        points = frame.loc[[number for number in chain if number in frame.index]]
+        finished = points[points["status"] == "finished"]
+        slow = np.abs(finished["velocity"].to_numpy(dtype=float)) < descent.until_below
+        row = {name: points.iloc[0][name] for name in others}
+        for name, part in (("moving", finished[~slow].tail(1)), ("at_rest", finished[slow].head(1))):
+            row[name] = part.iloc[0][descent.key] if len(part) else nan
+            row[f"gamma0_{name}"] = part.iloc[0]["gamma0"] if len(part) else nan
+        rows.append(row)
+    table = pd.DataFrame(rows)
+    unit = record.units[descent.key] or ""
+    table.attrs["units"] = {**{name: frame.attrs["units"][name] for name in others}, "moving": unit, "at_rest": unit}
+    table.attrs["units"] |= {name: "" for name in table.columns if name not in table.attrs["units"]}
+    table.attrs["meanings"] = dict.fromkeys(others, "varied") | {
+        "moving": f"last {descent.key} at which the walkers moved",
+        "at_rest": f"first {descent.key} at which they did not",
+        "gamma0_moving": "dimensionless peak force Γ0 of moving",
+        "gamma0_at_rest": "dimensionless peak force Γ0 of at_rest",
+    }
+    return table
+
+
+def write_table_file(frame: pd.DataFrame, path: Path) -> None:
+    """Write a table in the form that the file's name ends in.
+
+    Raises
+    ------
+    InputError
+        If that is none of `FORMATS`.
+    """
+    contents = as_text(frame, path.suffix.lstrip("."))
+    if isinstance(contents, str):
+        write_text(path, contents)
+        return
+    beside = path.with_name(path.name + ".new")
+    beside.write_bytes(contents)
+    beside.replace(path)

@@ -1,0 +1,140 @@
+"""Make the runs of several cases with one deck; of a single case with its own."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from inputs.case import WalkerCase
+from runner.audits import read_audit
+from runner.binary import Engine
+from runner.directory import FinishedRun, finished_run, make_run, run_place
+from runner.ensemble import finished_place, make_ensemble
+from runner.failures import AuditFailed, UnauditedEngineWarning
+from runner.launch import Progress, launch
+from runner.locks import locked
+from templates.deck import render_deck, render_shared_deck
+
+
+@dataclass(frozen=True)
+class Made:
+    """What has become of cases whose runs were wanted, by the names of the runs.
+
+    Attributes
+    ----------
+    runs
+        Finished.
+    found
+        Names of those that were there before.
+    busy
+        Names of those that somebody else is making.
+    """
+
+    runs: Mapping[str, FinishedRun]
+    found: frozenset[str]
+    busy: frozenset[str]
+
+
+def make_together(
+    cases: Sequence[WalkerCase],
+    out: Path,
+    engine: Engine,
+    *,
+    force: bool = False,
+    on_progress: Callable[[Progress], None] | None = None,
+    time_limit: float | None = None,
+) -> Made:
+    """Make the runs that are missing, in one deck, and tabulate them.
+
+    Parameters
+    ----------
+    cases
+        Cases that may share a deck (`templates.sharing`).
+    out
+        Folder of the run directories; made if need be.
+    engine
+        The binary.
+    force
+        Also make those that are there; they are replaced by finished ones only.
+    on_progress
+        Called a few times a second while the engine runs; what it raises ends the engine.
+    time_limit
+        Wall time in s that the engine may take.
+
+    Raises
+    ------
+    runner.EngineFailure
+        If the engine fails. Of several cases nothing is left then: they are to be tried apart.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    places = {run_place(case, engine, out): case for case in cases}
+    with locked(places) as ours:
+        runs = {} if force else {place.name: run for place in places if (run := _finished(out, place.name))}
+        busy = frozenset(place.name for place in places if place not in ours and place.name not in runs)
+        missing = {place: case for place, case in places.items() if place in ours and place.name not in runs}
+        found = frozenset(runs)
+        if missing:
+            locks = [ours[place] for place in missing]
+            runs |= _make(missing, out, engine, locks, on_progress, time_limit)
+    return Made(runs, found, busy)
+
+
+def _finished(out: Path, name: str) -> FinishedRun | None:
+    place = finished_place(out, name)
+    return finished_run(place) if place else None
+
+
+def _make(
+    missing: Mapping[Path, WalkerCase],
+    out: Path,
+    engine: Engine,
+    locks: Sequence[int],
+    on_progress: Callable[[Progress], None] | None,
+    time_limit: float | None,
+) -> dict[str, FinishedRun]:
+    # Numpy and pyarrow are imported after the engine has run: who is in a hurry loads them while it does.
+    cases = list(missing.values())
+    if len(cases) == 1:
+        (place,) = missing
+        with make_run(cases[0], render_deck(cases[0]), engine, place, locks) as run:
+            report = launch(
+                run.deck, run.directory, engine, on_progress=on_progress, time_limit=time_limit, keep_open=locks
+            )
+            _tabulate([run.directory])
+            return {place.name: run.finish(report)}
+    named = {place.name: case for place, case in missing.items()}
+    with make_ensemble(named, render_shared_deck(cases), engine, out, locks) as ensemble:
+        report = launch(
+            ensemble.deck, ensemble.directory, engine, on_progress=on_progress, time_limit=time_limit, keep_open=locks
+        )
+        from postprocess.parting import part_output
+
+        directories = {ensemble.run_directory(name): case for name, case in named.items()}
+        part_output(ensemble.directory, ensemble.deck.layout, directories)
+        _tabulate(directories)
+        return ensemble.finish(report)
+
+
+def _tabulate(directories: Iterable[Path]) -> None:
+    from postprocess.result import tabulate
+
+    for directory in directories:
+        tabulate(directory)
+
+
+def check_audit(engine: Engine, despite_audit: bool) -> None:
+    """Refuse an engine whose audit failed, unless told otherwise; warn of one that never had one.
+
+    Raises
+    ------
+    runner.failures.AuditFailed
+        If the record of the binary says so.
+    """
+    audit = read_audit(engine.sha256)
+    if audit is None:
+        message = "this engine was never audited; prove what it computes with: walkers audit"
+        warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
+    elif not audit.passed and not despite_audit:
+        raise AuditFailed(audit.failures)

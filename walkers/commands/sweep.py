@@ -1,0 +1,65 @@
+"""``walkers sweep``: all points of a sweep file."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from walkers.commands.arguments import Out
+from walkers.pipeline import DEFAULT_OUT
+
+SweepFile = Annotated[str, typer.Argument(metavar="SWEEP", help="A sweep file, or a shipped sweep such as fig2.")]
+Jobs = Annotated[int | None, typer.Option("-j", "--jobs", min=1, help="Decks at once; all cores if left out.")]
+SitePath = Annotated[Path | None, typer.Option("--site", help="A site file: run on that cluster instead.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be done, and its cost; write nothing.")]
+Retries = Annotated[int, typer.Option("--retries", min=0, help="How often a failed point is tried again.")]
+Limit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Stop an engine after this many seconds.")]
+EngineOption = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
+DespiteAudit = Annotated[bool, typer.Option("--despite-audit", help="Run on an engine that failed its audit.")]
+
+
+def command(
+    sweep: SweepFile,
+    out: Out = DEFAULT_OUT,
+    jobs: Jobs = None,
+    site: SitePath = None,
+    dry_run: DryRun = False,
+    retries: Retries = 0,
+    limit: Limit = None,
+    engine: EngineOption = None,
+    despite_audit: DespiteAudit = False,
+) -> int:
+    """Run the points of a sweep that are missing, on all cores or on a cluster; exit status 1 if any failed."""
+    from inputs.errors import InputError, Problem
+    from inputs.sweep import load_sweep
+    from sweeps.conduct import Options
+    from sweeps.run import plan_sweep, run_sweep
+    from sweeps.site import cores_here, load_site
+    from sweeps.summary import describe_status
+    from walkers.progress import progress_of_sweep
+
+    loaded = load_sweep(sweep)
+    if out.exists() and not out.is_dir():
+        raise InputError("--out", [Problem("", None, f"expected a folder, {out} is a file")])
+    if jobs is not None and site is not None:
+        raise InputError("--jobs", [Problem("", None, "a site says by itself how many decks run at once")])
+    options = Options(jobs or cores_here(), load_site(site) if site else None, retries, limit)
+    if dry_run:
+        print(plan_sweep(loaded, out, options, engine).as_text())
+        return 0
+    with progress_of_sweep(loaded.name) as advance:
+        record, failures = run_sweep(
+            loaded,
+            out.resolve() if site else out,
+            options,
+            engine=engine,
+            despite_audit=despite_audit,
+            on_progress=advance,
+        )
+    for failure in failures:
+        print(f"walkers: point {failure.point}, {failure.run}: {failure.message}", file=sys.stderr)
+    print(describe_status(record.directory))
+    return 1 if failures else 0

@@ -1,0 +1,47 @@
+"""``walkers table``: the table of a sweep."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Directory = Annotated[Path, typer.Argument(metavar="DIR", help="A sweep's directory, such as runs/fig2.")]
+Csv = Annotated[bool, typer.Option("--csv", help="Comma-separated, units in the head.")]
+Parquet = Annotated[bool, typer.Option("--parquet", help="Parquet, units in the field metadata.")]
+Json = Annotated[bool, typer.Option("--json", help="JSON with units and meanings.")]
+Target = Annotated[Path | None, typer.Option("--to", help="Write this file (.csv, .parquet, .json) instead.")]
+Thresholds = Annotated[bool, typer.Option("--thresholds", help="Where the descents ended instead.")]
+
+
+def command(
+    directory: Directory,
+    csv: Csv = False,
+    parquet: Parquet = False,
+    json: Json = False,
+    to: Target = None,
+    thresholds: Thresholds = False,
+) -> None:
+    """Print the table of a sweep, a row a point: what varied, what follows, what came out, where the run is."""
+    from inputs.errors import InputError, Problem
+    from sweeps.table import as_text, load, short_text, write_table_file
+    from sweeps.table import thresholds as thresholds_of
+
+    frame = thresholds_of(directory) if thresholds else load(directory)
+    forms = [name for name, wanted in (("csv", csv), ("parquet", parquet), ("json", json)) if wanted]
+    if len(forms) + (to is not None) > 1:
+        raise InputError("--csv, --parquet, --json, --to", [Problem("", None, "expected one of them")])
+    if to is not None:
+        write_table_file(frame, to)
+        print(to)
+    elif forms == ["parquet"] and sys.stdout.isatty():
+        raise InputError(
+            "--parquet", [Problem("", None, "is not for a terminal: use --to FILE.parquet, or redirect it")]
+        )
+    elif forms:
+        contents = as_text(frame, forms[0])
+        sys.stdout.buffer.write(contents if isinstance(contents, bytes) else contents.encode())
+    else:
+        print(short_text(frame))
