@@ -18,8 +18,8 @@ from inputs.errors import WalkersError
 from runner.binary import Engine
 from runner.ensemble import finished_places, remove_remains
 from runner.locks import is_locked
-from sweeps.packing import PlannedDeck, halves, pack, unfinished_parts
-from sweeps.record import SweepRecord, at_rest, chains
+from sweeps.packing import LONGEST_SECONDS, PlannedDeck, halves, pack, unfinished_parts
+from sweeps.record import SweepRecord, at_rest, chains, states
 from sweeps.site import Site, pilots, threads
 from sweeps.worker import STOP, Report, SweepStopped, Task, work
 from templates.sharing import sharing_key
@@ -58,6 +58,11 @@ class Options:
     retries: int = 0
     time_limit: float | None = None
 
+    @property
+    def longest_seconds(self) -> float:
+        """Predicted time that no shared deck may exceed: well below the limit, for a point by itself could be."""
+        return min(LONGEST_SECONDS, 0.5 * self.time_limit) if self.time_limit else LONGEST_SECONDS
+
 
 @dataclass(frozen=True)
 class Failure:
@@ -81,7 +86,18 @@ class Progress:
     running: int
     elapsed: float
     left: float | None
-    last_failure: Failure | None
+    worst_failure: Failure | None
+
+
+_WORST_FIRST = (
+    *("EngineMissing", "EngineDiffers", "DiskFull"),  # these threaten all other points
+    *("EngineError", "MissingFrames", "EngineKilled"),
+    *("BlowUp", "BeadsLost", "TimeLimitExceeded"),
+)
+
+
+def _mildness(failure: Failure) -> int:
+    return _WORST_FIRST.index(failure.reason) if failure.reason in _WORST_FIRST else -1
 
 
 @dataclass(eq=False)
@@ -225,7 +241,7 @@ class _Conductor:
         self.later: list[tuple[float, _Job]] = []
         self.begin = time.perf_counter()
         self.seconds_done = 0.0
-        self.found = sum(run in self.finished for run in record.runs)
+        self.found = sum(state.status == "finished" for state in states(record))
         self.done = 0
         self.told = 0.0
 
@@ -262,7 +278,9 @@ class _Conductor:
                 return
             course.unsettled = {point for point in batch if not self._is_finished(point)}
             if course.unsettled:
-                for deck in pack({point: self.cases[point] for point in batch}, self.workers):
+                for deck in pack(
+                    {point: self.cases[point] for point in batch}, self.workers, self.options.longest_seconds
+                ):
                     for part in unfinished_parts(deck.points, self.cases, self._is_finished):
                         self._hand_out(_Job(part, course))
 
@@ -349,5 +367,5 @@ class _Conductor:
             running=running,
             elapsed=elapsed,
             left=waiting / self.seconds_done * elapsed if self.seconds_done else None,
-            last_failure=self.failures[-1] if self.failures else None,
+            worst_failure=min(self.failures, key=_mildness, default=None),
         )

@@ -8,10 +8,10 @@ not depend on what is finished, so that an interrupted sweep goes on with the de
 from __future__ import annotations
 
 import heapq
+from bisect import bisect_left
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import ceil
 
 from inputs.case import WalkerCase
 from runner.cost import predicted_seconds
@@ -22,7 +22,7 @@ MOST_WALKERS = 96
 MOST_POINTS = 64
 LONGEST_SECONDS = 60.0
 """Predicted time of a deck of several points: results are to keep coming."""
-_ROUNDS = (1, 2, 3, 4, 6, 8, 12, 16)
+_TRIALS = 24
 _AS_GOOD = 1.02
 
 
@@ -34,7 +34,7 @@ class PlannedDeck:
     seconds: float
 
 
-def pack(cases: Mapping[int, WalkerCase], workers: int) -> list[PlannedDeck]:
+def pack(cases: Mapping[int, WalkerCase], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
     """Pack points into decks.
 
     Parameters
@@ -43,6 +43,8 @@ def pack(cases: Mapping[int, WalkerCase], workers: int) -> list[PlannedDeck]:
         From the number of a point to its case.
     workers
         How many decks run at once.
+    longest_seconds
+        Predicted time that no deck of several points may exceed.
 
     Returns
     -------
@@ -52,30 +54,39 @@ def pack(cases: Mapping[int, WalkerCase], workers: int) -> list[PlannedDeck]:
     groups: dict[Hashable, list[int]] = {}
     for number, case in cases.items():
         groups.setdefault(sharing_key(case), []).append(number)
-    choices = _ROUNDS if any(len(group) > 1 for group in groups.values()) else (1,)
-    plans = [_parted(groups.values(), cases, workers * rounds) for rounds in choices]
+    together = list(groups.values())
+    singles = [_deck([number], cases).seconds for number in cases]
+    if len(together) == len(cases):
+        lengths = [max(singles, default=0.0)]
+    else:
+        whole = sum(_deck(group, cases).seconds for group in together)
+        lengths = [2.0 * max(whole / workers, *singles) * 2.0 ** (-number / 4) for number in range(_TRIALS)]
+    plans = [
+        [deck for group in together for deck in _parted(group, cases, min(length, longest_seconds))]
+        for length in lengths
+    ]
     spans = [makespan((deck.seconds for deck in plan), workers) for plan in plans]
     # Of plans that take as long, the one with the smallest decks.
     good = max(number for number, span in enumerate(spans) if span <= _AS_GOOD * min(spans))
     return sorted(plans[good], key=lambda deck: -deck.seconds)
 
 
-def _parted(groups: Iterable[Sequence[int]], cases: Mapping[int, WalkerCase], wanted: int) -> list[PlannedDeck]:
-    """Part the groups so that there are about so many decks of the same length."""
-    groups = list(groups)
-    whole = [_deck(group, cases) for group in groups]
-    total = sum(deck.seconds for deck in whole)
-    decks: list[PlannedDeck] = []
-    for group, deck in zip(groups, whole, strict=True):
-        walkers = sum(cases[number].start.replicates for number in group)
-        parts = max(
-            ceil(wanted * deck.seconds / total),
-            ceil(walkers / MOST_WALKERS),
-            ceil(len(group) / MOST_POINTS),
-            ceil(deck.seconds / LONGEST_SECONDS),
+def _parted(group: Sequence[int], cases: Mapping[int, WalkerCase], longest: float) -> list[PlannedDeck]:
+    """A group in the fewest decks that keep to the bounds; a point by itself may exceed them."""
+
+    def too_large(parts: int) -> bool:
+        return any(
+            len(part) > 1
+            and (
+                len(part) > MOST_POINTS
+                or sum(cases[number].start.replicates for number in part) > MOST_WALKERS
+                or _deck(part, cases).seconds > longest
+            )
+            for part in _parts(group, parts)
         )
-        decks += [_deck(part, cases) for part in _parts(group, min(parts, len(group)))]
-    return decks
+
+    fewest = bisect_left(range(1, len(group)), True, key=lambda parts: not too_large(parts)) + 1
+    return [_deck(part, cases) for part in _parts(group, fewest)]
 
 
 def _parts(group: Sequence[int], count: int) -> list[Sequence[int]]:

@@ -197,11 +197,11 @@ def states(record: SweepRecord) -> list[PointState]:
     for chain in chains(record):
         stopped = False
         for number in chain:
-            if stopped and found[number].status != "finished":
+            if stopped:
                 found[number] = PointState("not needed")
             directory = found[number].directory
             if found[number].status == "finished" and directory is not None:
-                stopped = stopped or at_rest(directory, record.descent)
+                stopped = at_rest(directory, record.descent)
     return found
 
 

@@ -110,7 +110,7 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     packed = [deck for point in numbered for deck in pack({point: cases[point]}, 1)] if record.descent else None
     decks = [
         part
-        for deck in packed or pack(numbered, workers)
+        for deck in packed or pack(numbered, workers, options.longest_seconds)
         for part in unfinished_parts(deck.points, numbered, lambda point: statuses[point] in _SETTLED)
     ]
     return SweepPlan(record, cases, binary, decks, statuses, workers)

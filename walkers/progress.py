@@ -118,8 +118,8 @@ def _told(progress: SweepProgress) -> str:
     ]
     if progress.left is not None:
         parts.append(f"{progress.left:.0f} s left")
-    if progress.last_failure is not None:
-        parts.append(f"last failure: point {progress.last_failure.point}, {progress.last_failure.reason}")
+    if progress.worst_failure is not None:
+        parts.append(f"worst failure: point {progress.worst_failure.point}, {progress.worst_failure.reason}")
     return ", ".join(parts)
 
 

@@ -1,0 +1,94 @@
+"""Packing: which points travel together, and that all cores finish together."""
+
+import random
+
+import pytest
+
+from inputs.case import WalkerCase
+from inputs.sweep import load_sweep
+from sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, makespan, pack, unfinished_parts
+from templates import render_deck
+from templates.deck import render_shared_deck
+from templates.sharing import sharing_key
+from tests.conftest import make_case
+
+STEP = {"time_step": "2 us"}
+
+
+def _numbered(*cases: WalkerCase) -> dict[int, WalkerCase]:
+    return dict(enumerate(cases))
+
+
+def test_what_may_differ_within_a_deck() -> None:
+    same = [
+        make_case(run=STEP),
+        make_case(run=STEP, start={"angle": "30 deg", "seed": 2, "replicates": 3}),
+        make_case(run=STEP, beads={"radii": ["0.35 mm", "0.2 mm"]}),
+        make_case(run=STEP, contact={"friction": {"bead_bead": 0.2, "bead_wall": 0.05}}),
+        make_case(run=STEP, contact={"restitution": 0.6}),
+    ]
+    assert len({sharing_key(case) for case in same}) == 1
+    others = [
+        make_case(run=STEP, drive={"frequency": "60 Hz"}),
+        make_case(run=STEP, drive={"peak_acceleration": "5 g"}),
+        make_case(run=STEP, liquid={"volume_fraction": 0.02}),
+        make_case(run=STEP, contact={"rolling_friction": 0.003}),
+        make_case(run=STEP, contact={"youngs_modulus": "40 MPa"}),
+        make_case(run=STEP, beads={"density": "3.9 g/cm^3"}),
+        make_case(run={"time_step": "1 us"}),
+        make_case(run=STEP, environment={"gravity": "0 m/s^2"}),
+    ]
+    assert len({sharing_key(case) for case in [same[0], *others]}) == 9
+    with pytest.raises(ValueError, match="cannot share"):
+        render_shared_deck([same[0], others[0]])
+
+
+def test_a_deck_of_one_case_is_the_cases_own() -> None:
+    case = make_case()
+    assert render_shared_deck([case]) == render_deck(case)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 16])
+@pytest.mark.parametrize("sweep", ["fig2", "fig3", "alignment", "modes"])
+def test_every_point_travels_once_and_cores_finish_together(sweep: str, workers: int) -> None:
+    cases = _numbered(*load_sweep(sweep).cases())
+    decks = pack(cases, workers)
+    assert sorted(point for deck in decks for point in deck.points) == list(cases)
+    for deck in decks:
+        assert len({sharing_key(cases[point]) for point in deck.points}) == 1
+        assert len(deck.points) == 1 or sum(cases[point].start.replicates for point in deck.points) <= MOST_WALKERS
+        assert len(deck.points) == 1 or deck.seconds <= LONGEST_SECONDS
+    seconds = [deck.seconds for deck in decks]
+    assert seconds == sorted(seconds, reverse=True)
+    # Within a fifth of the time in which no core would ever be idle, unless a single deck takes longer than that.
+    assert makespan(seconds, workers) <= max(1.2 * sum(seconds) / workers, seconds[0])
+
+
+def test_sharing_a_deck_is_cheaper_than_a_deck_each() -> None:
+    cases = _numbered(*(make_case(run=STEP, start={"seed": seed}) for seed in range(48)))
+    alone = sum(deck.seconds for number, case in cases.items() for deck in pack({number: case}, 1))
+    assert sum(deck.seconds for deck in pack(cases, 2)) < 0.35 * alone
+
+
+def test_more_cores_than_decks_part_them_further() -> None:
+    cases = _numbered(*(make_case(run=STEP, start={"seed": seed}) for seed in range(48)))
+    assert len(pack(cases, 2)) < len(pack(cases, 16))
+
+
+def test_what_is_left_of_a_deck_is_made_of_its_halves() -> None:
+    cases = _numbered(*(make_case(run=STEP, start={"seed": seed}) for seed in range(13)))
+    points = tuple(cases)
+    halves_of_halves = {points}
+    for _ in range(4):
+        halves_of_halves |= {
+            half
+            for part in halves_of_halves
+            for half in (part[: len(part) // 2], part[len(part) // 2 :])
+            if 0 < len(half) < len(part)
+        }
+    draw = random.Random(1)
+    for _ in range(50):
+        finished = {point for point in points if draw.random() < 0.3}
+        left = unfinished_parts(points, cases, finished.__contains__)
+        assert sorted(point for deck in left for point in deck.points) == sorted(set(points) - finished)
+        assert {deck.points for deck in left} <= halves_of_halves

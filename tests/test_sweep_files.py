@@ -1,0 +1,207 @@
+"""Sweep files: what may be varied and how, and what is said of one that makes no sense."""
+
+import json
+import subprocess
+from collections.abc import Callable
+from math import asin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+from inputs import InputError
+from inputs.case import WalkerCase
+from inputs.dimer import dimer_of
+from inputs.sweep import Sweep, expand, load_sweep, shipped_sweeps
+from tests.conftest import PROGRAM, document, to_toml
+
+Make = Callable[..., Sweep]
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Make:
+    """Expand a sweep over the reference case, which says everything that a case may say in other words too."""
+    (tmp_path / "base.toml").write_text(to_toml(document()))
+
+    def expanded(**tables: Any) -> Sweep:
+        return expand({"case": "base.toml", **tables}, source="test.toml", name="test", folder=tmp_path)
+
+    return expanded
+
+
+def _cases(sweep: Sweep) -> list[WalkerCase]:
+    return list(sweep.cases())
+
+
+def test_axes_multiply_and_the_last_runs_fastest(make: Make) -> None:
+    sweep = make(axes={"drive": {"frequency": ["60 Hz", "80 Hz"], "peak_acceleration": ["1 g", "2 g", "4 g"]}})
+    found = [(case.drive.frequency, case.drive.peak_acceleration) for case in _cases(sweep)]
+    assert found == [(f, pytest.approx(9.8 * a)) for f in (60.0, 80.0) for a in (1, 2, 4)]
+    assert sweep.units == ("Hz", "g")
+
+
+def test_dotted_and_nested_keys_are_the_same(make: Make) -> None:
+    nested = make(axes={"contact": {"friction": {"bead_wall": [0.1, 0.2]}}})
+    assert nested.keys == make(axes={"contact.friction.bead_wall": [0.1, 0.2]}).keys == ("contact.friction.bead_wall",)
+    assert [case.contact.friction_bead_wall for case in _cases(nested)] == [0.1, 0.2]
+
+
+def test_linspace_and_geomspace_are_numpys(make: Make) -> None:
+    sweep = make(
+        axes={
+            "drive.peak_acceleration": {"linspace": ["0.5 g", "10 g", 20]},
+            "liquid.volume_fraction": {"geomspace": [1e-3, 1e-1, 5]},
+        }
+    )
+    cases = _cases(sweep)
+    assert len(cases) == 100
+    assert sweep.rows[1][0] == "0.5 g"
+    accelerations = np.array([case.drive.peak_acceleration for case in cases[::5]]) / 9.8
+    np.testing.assert_allclose(accelerations, np.linspace(0.5, 10, 20), rtol=1e-12)
+    fractions = [case.liquid.volume_fraction for case in cases[:5]]
+    np.testing.assert_allclose(fractions, np.geomspace(1e-3, 1e-1, 5), rtol=1e-11)
+
+
+def test_zipped_keys_go_together(make: Make) -> None:
+    pairs = [["0.3 mm", "0.2 mm"], ["0.4 mm", "0.2 mm"]]
+    sweep = make(zip=[{"beads.radii": pairs, "start": {"seed": [3, 4]}}], axes={"drive.frequency": ["60 Hz", "90 Hz"]})
+    found = [(case.drive.frequency, case.beads.radii, case.start.seed) for case in _cases(sweep)]
+    assert found == [(f, r, s) for f in (60.0, 90.0) for r, s in (((3e-4, 2e-4), 3), ((4e-4, 2e-4), 4))]
+
+
+@pytest.mark.parametrize(
+    ("method", "sampler"), [("sobol", qmc.Sobol), ("halton", qmc.Halton), ("latin-hypercube", qmc.LatinHypercube)]
+)
+def test_samplers_are_scipys_and_seeded(make: Make, method: str, sampler: type[qmc.QMCEngine]) -> None:
+    ranges = {
+        "contact.friction.bead_wall": {"uniform": [0.05, 0.3]},
+        "liquid.volume_fraction": {"loguniform": [1e-3, 1e-1]},
+    }
+    sweep = make(sample=[{"method": method, "points": 8, "seed": 5, "ranges": ranges}])
+    unit = sampler(d=2, rng=np.random.default_rng(5)).random(8)
+    expected = np.stack([0.05 + 0.25 * unit[:, 0], 1e-3 * 100 ** unit[:, 1]], axis=1)
+    np.testing.assert_allclose(np.array(sweep.rows, dtype=float), expected, rtol=1e-11)
+    again = make(sample=[{"method": method, "points": 8, "seed": 6, "ranges": ranges}])
+    assert again.rows != sweep.rows
+
+
+def test_samples_of_quantities_keep_their_unit(make: Make) -> None:
+    ranges = {
+        "drive.peak_acceleration": {"uniform": ["1 g", "2 g"]},
+        "beads.radii[0]": {"uniform": ["0.3 mm", "0.4 mm"]},
+    }
+    cases = _cases(make(sample=[{"points": 4, "ranges": ranges}]))
+    assert all(9.8 <= case.drive.peak_acceleration <= 19.6 for case in cases)
+    assert all(3e-4 <= case.beads.radii[0] <= 4e-4 and case.beads.radii[1] == 2e-4 for case in cases)
+
+
+def test_a_key_that_says_the_same_in_other_words_gives_way(make: Make) -> None:
+    (case,) = _cases(make(axes={"drive.gamma0": [0.5]}))
+    assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(0.5)
+    (case,) = _cases(make(set={"beads.mean_radius": "0.25 mm"}, axes={"beads.sin_delta": [0.2]}))
+    assert case.beads.radii == (3e-4, 2e-4)
+
+
+def test_a_descent_is_the_last_axis_downward(make: Make) -> None:
+    descend = {"key": "drive.peak_acceleration", "from": "1 g", "to": "0.1 g", "step": "0.3 g", "until_below": "1 um/s"}
+    sweep = make(axes={"drive.frequency": ["60 Hz", "80 Hz"]}, descend=descend)
+    assert [row[1] for row in sweep.rows] == ["1.0 g", "0.7 g", "0.4 g", "0.1 g"] * 2
+    assert sweep.descent is not None
+    assert (sweep.descent.steps, sweep.descent.until_below) == (4, pytest.approx(1e-6))
+
+
+def test_shipped_sweeps_are_the_papers() -> None:
+    assert set(shipped_sweeps()) == {"alignment", "fig2", "fig2-threshold", "fig3", "modes"}
+    fig2 = _cases(load_sweep("fig2"))
+    assert len(fig2) == 80
+    assert {case.drive.frequency for case in fig2} == {60.0, 70.0, 80.0, 90.0}
+    accelerations = {round(case.drive.peak_acceleration / 9.8, 9) for case in fig2}
+    assert (min(accelerations), max(accelerations)) == (0.5, 10.0)
+    assert {case.start.replicates for case in fig2} == {6}
+    fig3 = _cases(load_sweep("fig3"))
+    assert [round(dimer_of(case).sin_delta, 3) for case in fig3] == [0.111, 0.143, 0.2, 0.273, 0.333]
+    assert all(dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(0.5) for case in fig3)
+    assert len({case.drive.peak_acceleration for case in fig3}) == 5
+    turned = _cases(load_sweep("alignment"))
+    assert {round(np.degrees(case.start.angle)) for case in turned} == set(range(0, 91, 10))
+    assert {dimer_of(case).sin_delta == 0 for case in turned} == {True, False}
+    modes = _cases(load_sweep("modes"))
+    assert {round(asin(dimer_of(case).sin_delta), 6) for case in modes} == {round(asin(s / 20), 6) for s in range(9)}
+
+
+BAD: list[tuple[dict[str, Any], str]] = [
+    ({"axes": {"drive.frequncy": ["60 Hz"]}}, 'drive.frequncy: unknown key; .*did you mean "frequency"'),
+    ({"axes": {"drive": ["60 Hz"]}}, "drive: is a table of a case"),
+    ({"axes": {"drive.frequency": []}}, "drive.frequency = \\[\\]: expected at least one value"),
+    ({"axes": {"drive.frequency": "60 Hz"}}, "expected a list of values"),
+    ({"axes": {"drive.frequency": {"linspace": ["60 Hz", "90 Hz"]}}}, "first value, last value and number"),
+    ({"axes": {"drive.frequency": {"linspace": ["60 Hz", "90 Hz", 2.5]}}}, "first value, last value and number"),
+    ({"axes": {"drive.frequency": {"linspace": ["60 Hz", "9 kHz", 3]}}}, "one unit throughout"),
+    ({"axes": {"drive.frequency": {"linspace": ["fast", "90 Hz", 3]}}}, "expected a number"),
+    ({"axes": {"liquid.volume_fraction": {"geomspace": [0, 1, 3]}}}, "above zero"),
+    ({"axes": {"drive.frequency": ["60 Hz", "60 mHz"]}}, "one unit throughout"),
+    ({"axes": {"beads.radii[2]": ["1 mm"]}}, "no beads.radii of that length"),
+    ({"axes": {"start.seed": {"linspace": [1, 1000, 2000]}, "drive.frequency": {"linspace": ["60 Hz", "90 Hz", 999]}}},
+     "1998000 points"),
+    ({"axes": {"start.seed": [1]}, "zip": [{"start.seed": [1]}]}, "varies on two axes"),
+    ({"zip": [{"start.seed": [1, 2], "start.angle": ["0 deg"]}]}, "as many values .*seed has 2, start.angle has 1"),
+    ({"zip": [{}]}, "keys and their values"),
+    ({"sample": [{"points": 4, "method": "sobbol", "ranges": {}}]}, 'did you mean "sobol"'),
+    ({"sample": [{"points": 4, "ranges": {"start.seed": [1, 2]}}]}, "uniform"),
+    ({"sample": [{"points": 4, "ranges": {}}]}, "keys and their ranges"),
+    ({"sample": [{"points": 0, "ranges": {"contact.restitution": {"uniform": [0.1, 0.2]}}}]}, "at least 1"),
+    ({"descend": {"from": "1 g", "to": "2 g", "step": "0.1 g", "until_below": "1 um/s"}}, "a way down"),
+    ({"descend": {"from": "1 g", "to": "0 g", "step": "0 g", "until_below": "1 um/s"}}, "a way down"),
+    ({"descend": {"from": "1 g", "to": "0 g", "step": "fast", "until_below": "1 um/s"}}, "descend.step"),
+    ({"descend": {"from": "1 g", "to": "0 g", "step": "0.1 g", "until_below": "1 um"}}, "descend.until_below.*speed"),
+    ({"descend": {"from": "1 g", "to": "0 g", "until_below": "1 um/s"}}, "descend.step: missing"),
+    ({"axis": {}}, 'unknown key; a sweep takes .*did you mean "axes"'),
+    ({"case": "fig1c"}, 'case = "fig1c": no such file, nor a shipped case .*did you mean "fig1b"'),
+    ({"set": {"drive.frequncy": "60 Hz"}}, "drive.frequncy: unknown key"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("tables", "message"), BAD)
+def test_a_sweep_that_makes_no_sense(make: Make, tables: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=f"test.toml: .*{message}"):
+        make(**tables)
+
+
+def test_a_point_that_makes_no_sense_is_named(make: Make) -> None:
+    sweep = make(axes={"drive.frequency": ["60 Hz", "-80 Hz"]})
+    with pytest.raises(InputError, match=r"test.toml: point 1 \(drive.frequency = -80 Hz\): drive.frequency = "):
+        _cases(sweep)
+
+
+def test_bad_sweeps_end_with_status_2_and_leave_nothing(tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text('case = "fig1b"\naxes.drive.frequency = ["60 Hz", "0 Hz"]\n')
+    for arguments in (["bad.toml"], ["nosuch"], ["fig2", "--site", "nosite.toml"], ["fig2", "--out", "bad.toml"]):
+        done = subprocess.run([PROGRAM, "sweep", *arguments], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 2, arguments
+        assert "Traceback" not in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.toml"]
+
+
+def test_a_case_by_mean_radius_and_asymmetry() -> None:
+    from inputs import resolve_case
+
+    tables = document()
+    tables["beads"] = {"mean_radius": "0.25 mm", "sin_delta": 0.2, "material": "ruby"}
+    assert resolve_case(tables).beads.radii == (3e-4, 2e-4)
+    for beads, message in (
+        ({"sin_delta": 0.2}, "beads.mean_radius: missing"),
+        ({"mean_radius": "0.2 mm"}, "beads.sin_delta: missing"),
+        ({"radii": ["0.3 mm", "0.2 mm"], "sin_delta": 0.2}, "beads.sin_delta = 0.2: expected either"),
+        ({}, "beads.radii: missing"),
+    ):
+        with pytest.raises(InputError, match=message):
+            resolve_case({**tables, "beads": {"material": "ruby", **beads}})
+
+
+def test_json_of_a_sweeps_document_survives(make: Make) -> None:
+    sweep = make(axes={"liquid.name": ["Si AK5", "Si AK10"]})
+    assert sweep.units == (None,)
+    assert json.loads(json.dumps(sweep.rows)) == [["Si AK5"], ["Si AK10"]]

@@ -1,0 +1,464 @@
+"""Sweeps run by the real engine: shared decks, failures, resumption, tables."""
+
+import io
+import json
+import os
+import random
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import psutil
+import pyarrow.parquet as pq
+import pytest
+
+import walkers
+from inputs.dimer import dimer_of
+from postprocess import read_table, read_trajectory
+from runner import find_engine, finished_run
+from runner.ensemble import finished_place
+from runner.failures import WalkersMet
+from sweeps.table import load, thresholds
+from sweeps.together import make_together
+from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml
+
+TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
+SLOW = {"time_step": "2 us", "cycles": 400, "settling_cycles": 2, "samples_per_cycle": 5}
+
+
+@pytest.fixture
+def sweep_file(in_folder: Path) -> Callable[..., str]:
+    """Write a sweep of the reference case into the working directory and return its file's name."""
+
+    def write(name: str = "test", text: str = "", **changes: Any) -> str:
+        (in_folder / "base.toml").write_text(to_toml(document(**{"run": TINY, **changes})))
+        (in_folder / f"{name}.toml").write_text(f'case = "base.toml"\n{text}\n')
+        return f"{name}.toml"
+
+    return write
+
+
+def _sweep(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([PROGRAM, "sweep", *arguments], capture_output=True, text=True, check=False, **options)
+
+
+def _start(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen([PROGRAM, "sweep", *arguments], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def _wait_for(condition: Callable[[], Any], seconds: float = 60.0) -> Any:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if found := condition():
+            return found
+        time.sleep(0.02)
+    raise AssertionError("waited in vain")
+
+
+def _contents(out: Path) -> dict[str, dict[str, bytes]]:
+    """What each finished run computed: tables, result and dumps, by the names of runs and files."""
+    manifests = [*out.glob("*/manifest.json"), *out.glob("ensembles/*/*/manifest.json")]
+    kept = (
+        "beads.bin",
+        "bridges.pairs.txt",
+        "bridges.walls.txt",
+        "trajectory.parquet",
+        "walkers.parquet",
+        "result.json",
+    )
+    return {path.parent.name: {name: (path.parent / name).read_bytes() for name in kept} for path in manifests}
+
+
+@pytest.fixture
+def counting_engine(in_folder: Path) -> Iterator[tuple[str, Callable[[], list[str]]]]:
+    """An engine that notes where it was launched, and the notes."""
+    front, log = in_folder / "front", in_folder / "launches"
+    front.write_text(f'#!/bin/sh\npwd >> {log}\nexec liggghts "$@"\n')
+    front.chmod(0o755)
+    log.touch()
+    yield str(front), lambda: log.read_text().split()
+
+
+def test_points_of_a_shared_deck_are_what_they_are_alone(tmp_path: Path) -> None:
+    """Other radii, frictions, restitution and starts: the same to rounding, and ordinary run directories."""
+    run = {**TINY, "cycles": 20, "settling_cycles": 5}
+    cases = [
+        make_case(run=run),
+        make_case(run=run, contact={"friction": {"bead_bead": 0.05, "bead_wall": 0.2}}),
+        make_case(run=run, contact={"restitution": 0.6}),
+        make_case(run=run, beads={"radii": ["0.35 mm", "0.2 mm"]}, start={"angle": "20 deg", "replicates": 3}),
+        make_case(run=run, beads={"radii": ["0.25 mm", "0.25 mm"]}),
+    ]
+    engine = find_engine()
+    together = make_together(cases, tmp_path / "together", engine)
+    assert len({run.directory.parent for run in together.runs.values()}) == 1
+    for case, (name, run_there) in zip(cases, together.runs.items(), strict=True):
+        alone = make_together([case], tmp_path / "alone", engine).runs[name]
+        one, other = read_trajectory(run_there.directory), read_trajectory(alone.directory)
+        assert one.case == other.case == case
+        assert one.layout.bead_dump_bytes == (run_there.directory / one.layout.bead_dump).stat().st_size
+        way, way_alone = one.position - one.position[0], other.position - other.position[0]
+        assert np.abs(way - way_alone).max() < 1e-12
+        np.testing.assert_allclose(one.orientation, other.orientation, atol=1e-9)
+        np.testing.assert_allclose(one.force, other.force, atol=1e-10)
+        for table in ("walkers", "bridges"):
+            left, right = read_table(run_there.directory, table), read_table(alone.directory, table)
+            pd.testing.assert_frame_equal(left, right, check_exact=False, rtol=1e-6, atol=1e-9)
+        assert run_there.manifest["shared_deck"]["walkers"] == 7
+        assert {path.name for path in run_there.directory.iterdir()} == {
+            *("case.json", "layout.json", "manifest.json", "result.json", "beads.bin", "bridges.pairs.txt"),
+            *("bridges.walls.txt", "trajectory.parquet", "walkers.parquet", "bridges.parquet"),
+        }
+
+
+def test_a_run_of_a_shared_deck_is_an_ordinary_one(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    name = sweep_file(text='[axes]\nstart.angle = ["0 deg", "10 deg", "20 deg", "30 deg"]')
+    assert _sweep(name, "-j", "1").returncode == 0
+    directory = in_folder / load(in_folder / "runs" / "test")["run"][0]
+    assert directory.parent.parent.name == "ensembles"
+    found = subprocess.run([PROGRAM, "run", "base.toml", "--json"], capture_output=True, text=True, check=True)
+    assert json.loads(found.stdout)["found"] is True
+    for command in ("result", "plot", "vtk", "render"):
+        subprocess.run([PROGRAM, command, str(directory)], capture_output=True, check=True)
+    (directory / "walkers.parquet").unlink()
+    subprocess.run([PROGRAM, "result", "base.toml"], capture_output=True, check=True)
+    assert (directory / "walkers.parquet").exists()
+
+
+def test_walkers_that_meet_are_taken_apart(tmp_path: Path) -> None:
+    """Walkers of different cases face each other at a distance that the first push of the drive bridges."""
+    drive, start = {"peak_acceleration": "6 g"}, {"spacing": "1.6 mm", "replicates": 2}
+    cases = [make_case(run=TINY, drive=drive, start={**start, "seed": seed}) for seed in range(3)]
+    with pytest.raises(WalkersMet):
+        make_together(cases, tmp_path, find_engine())
+    assert not list(tmp_path.glob("ensembles/*"))
+
+
+def test_the_table_of_a_sweep(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    text = """
+    title = "A small one"
+    [axes]
+    beads.radii = [["0.3 mm", "0.2 mm"], ["0.25 mm", "0.25 mm"]]
+    drive.peak_acceleration = { linspace = ["2 g", "4 g", 2] }
+    """
+    name = sweep_file(text=text, start={"replicates": 2})
+    done = _sweep(name)
+    assert (done.returncode, done.stdout.splitlines()[0]) == (0, "test: 4 points, 4 finished")
+    frame = walkers.load(in_folder / "runs" / "test")
+    assert list(frame["point"]) == [0, 1, 2, 3]
+    assert list(frame["drive.peak_acceleration"]) == [2.0, 4.0, 2.0, 4.0]
+    assert list(frame["beads.radii[0]"]) == [0.3, 0.3, 0.25, 0.25]
+    units = frame.attrs["units"]
+    assert (units["drive.peak_acceleration"], units["beads.radii[1]"], units["velocity"]) == ("g", "mm", "m/s")
+    assert set(frame["status"]) == {"finished"}
+    assert list(frame["lost"]) == [0] * 4
+    for row in frame.itertuples():
+        run = finished_run(Path(row.run))
+        assert run is not None
+        result = json.loads((run.directory / "result.json").read_text())
+        assert row.velocity == result["velocity"]["mean"]
+        assert (row.smallest, row.largest) == (result["velocity"]["smallest"], result["velocity"]["largest"])
+        assert row.gamma0 == pytest.approx(dimer_of(run.case).gamma0(run.case.drive.peak_acceleration))
+        assert row.walkers == 2
+    directory = "runs/test"
+    csv = subprocess.run([PROGRAM, "table", directory, "--csv"], capture_output=True, text=True, check=True).stdout
+    read = pd.read_csv(io.StringIO(csv))
+    assert list(read["drive.peak_acceleration (g)"]) == [2.0, 4.0, 2.0, 4.0]
+    np.testing.assert_array_equal(read["velocity (m/s)"], frame["velocity"])
+    told = subprocess.run([PROGRAM, "table", directory, "--json"], capture_output=True, text=True, check=True).stdout
+    contents = json.loads(told)
+    assert contents["units"]["velocity"] == "m/s"
+    assert [point["velocity"] for point in contents["points"]] == pytest.approx(list(frame["velocity"]), rel=1e-13)
+    subprocess.run([PROGRAM, "table", directory, "--to", "table.parquet"], capture_output=True, check=True)
+    table = pq.read_table("table.parquet")
+    assert table.schema.field("velocity").metadata[b"unit"] == b"m/s"
+    assert list(table.column("velocity").to_pylist()) == list(frame["velocity"])
+    shown = subprocess.run([PROGRAM, "table", directory], capture_output=True, text=True, check=True).stdout
+    assert "velocity (mm/s)" in shown
+    assert len(shown.splitlines()) == 5
+
+
+def test_dry_run_says_what_is_to_do_and_writes_nothing(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    name = sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g", "3 g", "4 g"]')
+    before = sorted(in_folder.iterdir())
+    told = _sweep(name, "--dry-run").stdout
+    assert "3 points in 3 decks" in told
+    assert sorted(in_folder.iterdir()) == before
+    _sweep(name)
+    assert "3: 3 finished" in _sweep(name, "--dry-run").stdout
+    assert "0 points in 0 decks" in _sweep(name, "--dry-run").stdout
+
+
+HOT = """
+[set]
+run.allow_unstable = true
+[[zip]]
+start.seed    = [1, 2, 3, 4, 5]
+run.time_step = ["2 us", "2 us", "40 us", "2 us", "2 us"]
+"""
+
+
+def test_a_failing_point_does_not_stop_the_others(
+    sweep_file: Callable[..., str], in_folder: Path, counting_engine: tuple[str, Callable[[], list[str]]]
+) -> None:
+    name = sweep_file(text=HOT, liquid={"name": "glycerol 87 %"}, run={**TINY, "cycles": 60, "samples_per_cycle": 1})
+    engine, launches = counting_engine
+    done = _sweep(name, "--engine", engine)
+    assert done.returncode == 1
+    assert "point 2, base-" in done.stderr
+    assert "blow-up" in done.stderr
+    frame = load(in_folder / "runs" / "test")
+    assert list(frame["status"]) == ["finished", "finished", "failed", "finished", "finished"]
+    assert np.isnan(frame["velocity"][2])
+    assert frame["reason"][2] == "BlowUp"
+    assert (Path(frame["run"][2]) / "failure.json").exists()
+    status = subprocess.run([PROGRAM, "status", "runs/test"], capture_output=True, text=True, check=True).stdout
+    assert "5 points, 4 finished, 1 failed" in status
+    assert "failed     point 2: blow-up" in status
+    before = len(launches())
+    assert _sweep(name, "--engine", engine, "--retries", "2").returncode == 1
+    again = launches()[before:]
+    assert len(again) == 3
+    assert {Path(place).name.removesuffix(".part") for place in again} == {
+        json.loads((in_folder / "runs" / "test" / "sweep.json").read_text())["points"][2]["run"]
+    }
+
+
+def test_lost_beads_in_a_shared_deck_cost_only_their_own_point(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    """Walkers given no room: the deck fails, its halves are tried, and the three others are finished."""
+    text = """
+    [set]
+    drive.peak_acceleration = "10 g"
+    [[zip]]
+    start.seed    = [1, 2, 3, 4]
+    start.spacing = ["40 mm", "40 mm", "1.61 mm", "40 mm"]
+    start.replicates = [1, 1, 4, 1]
+    """
+    name = sweep_file(text=text, run={**TINY, "cycles": 30, "settling_cycles": 2})
+    done = _sweep(name, "-j", "1")
+    frame = load(in_folder / "runs" / "test")
+    assert done.returncode == int((frame["status"] == "failed").any())
+    assert list(frame["status"][[0, 1, 3]]) == ["finished"] * 3
+
+
+def test_a_point_that_fails_at_first_is_retried(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    front, seen = in_folder / "front", in_folder / "seen"
+    front.write_text(f'#!/bin/sh\n[ -e {seen} ] || {{ touch {seen}; kill -9 $$; }}\nexec liggghts "$@"\n')
+    front.chmod(0o755)
+    name = sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g"]')
+    done = _sweep(name, "--engine", str(front))
+    assert done.returncode == 1
+    assert "SIGKILL" in done.stderr
+    seen.unlink()
+    assert _sweep(name, "--engine", str(front), "--retries", "1").returncode == 0
+
+
+def test_the_time_limit_takes_shared_decks_apart(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    name = sweep_file(text='[axes]\nstart.angle = ["0 deg", "10 deg"]', run=SLOW)
+    done = _sweep(name, "--limit", "0.8", "-j", "1")
+    assert done.returncode == 1
+    assert done.stderr.count("time limit of 0.8 s") == 2
+    assert set(load(in_folder / "runs" / "test")["reason"]) == {"TimeLimitExceeded"}
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_interrupts_leave_no_engine_and_the_next_call_goes_on(
+    number: signal.Signals, status: int, sweep_file: Callable[..., str], in_folder: Path
+) -> None:
+    name = sweep_file(text='[axes]\ndrive.peak_acceleration = { linspace = ["2 g", "3 g", 4] }', run=SLOW)
+    program = _start(name)
+    _wait_for(lambda: len(engines_in(in_folder)) == 2)
+    program.send_signal(number)
+    _, errors = program.communicate(timeout=60)
+    assert program.returncode == status
+    assert "Traceback" not in errors
+    assert not engines_in(in_folder)
+    sweep_file(text='[axes]\ndrive.peak_acceleration = { linspace = ["2 g", "3 g", 4] }')
+    assert _sweep(name).returncode == 0
+
+
+def test_nothing_listens_on_the_network(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    name = sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g", "3 g"]', run=SLOW)
+    program = _start(name)
+    _wait_for(lambda: engines_in(in_folder))
+    process = psutil.Process(program.pid)
+    assert not process.net_connections()
+    assert all(b"liggghts" in Path(f"/proc/{child.pid}/cmdline").read_bytes() for child in process.children())
+    program.send_signal(signal.SIGINT)
+    program.communicate(timeout=60)
+
+
+def test_engines_die_with_a_sweep_that_is_killed(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    name = sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g", "3 g"]', run=SLOW)
+    program = _start(name)
+    _wait_for(lambda: len(engines_in(in_folder)) == 2)
+    program.kill()
+    program.communicate()
+    _wait_for(lambda: not engines_in(in_folder), 5.0)
+
+
+def test_an_engine_that_outlives_a_killed_sweep_is_waited_for(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    """The engine is the child of a front, which alone dies with the sweep."""
+    front = in_folder / "front"
+    front.write_text('#!/bin/sh\nliggghts "$@"\nexit 0\n')
+    front.chmod(0o755)
+    run = {**SLOW, "cycles": 100}
+    name = sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g"]', run=run)
+    program = _start(name, "--engine", str(front))
+    (dump,) = _wait_for(lambda: list(in_folder.glob("runs/*.part/beads.bin")))
+    program.kill()
+    program.communicate()
+    (orphan,) = [pid for pid in engines_in(in_folder) if b"front" not in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    os.kill(orphan, signal.SIGSTOP)  # it holds its files for as long as we like
+    node = dump.stat().st_ino
+    second = _start(name, "--engine", str(front))
+    time.sleep(4.0)
+    assert second.poll() is None
+    assert dump.stat().st_ino == node
+    status = subprocess.run([PROGRAM, "status", "runs/test"], capture_output=True, text=True, check=True).stdout
+    assert "1 running" in status
+    os.kill(orphan, signal.SIGKILL)
+    second.communicate(timeout=60)
+    assert second.returncode == 0
+
+
+def test_two_sweeps_over_the_same_points_share_them(
+    sweep_file: Callable[..., str], in_folder: Path, counting_engine: tuple[str, Callable[[], list[str]]]
+) -> None:
+    engine, launches = counting_engine
+    first = sweep_file("first", '[axes]\ndrive.peak_acceleration = { linspace = ["1 g", "8 g", 8] }')
+    second = sweep_file("second", '[axes]\ndrive.peak_acceleration = { linspace = ["5 g", "12 g", 8] }')
+    programs = [_start(name, "--engine", engine, "-j", "2") for name in (first, second)]
+    for program in programs:
+        program.communicate(timeout=120)
+        assert program.returncode == 0
+    assert len(launches()) == 12
+    assert len(set(launches())) == 12
+    one, other = (load(in_folder / "runs" / name) for name in ("first", "second"))
+    assert set(one["status"]) | set(other["status"]) == {"finished"}
+    assert list(one["run"][4:]) == list(other["run"][:4])
+    told = subprocess.run([PROGRAM, "status", "runs"], capture_output=True, text=True, check=True).stdout
+    assert "first: 8 points, 8 finished" in told
+    assert "second: 8 points, 8 finished" in told
+
+
+def test_a_descent_ends_where_the_walkers_stop(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    """Coulomb friction: the threshold lies where inertia of the beads overcomes it, whatever the frequency."""
+    text = """
+    [axes]
+    drive.frequency = ["60 Hz", "90 Hz"]
+    [descend]
+    from = "1.4 g"
+    to = "0.2 g"
+    step = "0.2 g"
+    until_below = "0.002 mm/s"
+    """
+    name = sweep_file(text=text, run={"cycles": 20, "settling_cycles": 10})
+    assert "at most 14 points" in _sweep(name, "--dry-run").stdout
+    done = _sweep(name)
+    assert done.returncode == 0, done.stderr
+    frame = load(in_folder / "runs" / "test")
+    for _, descent in frame.groupby("drive.frequency"):
+        assert list(descent["drive.peak_acceleration"]) == pytest.approx([1.4 - 0.2 * n for n in range(len(descent))])
+        assert (descent["velocity"].iloc[:-1] >= 2e-6).all()
+        assert descent["velocity"].iloc[-1] < 2e-6
+    ends = thresholds(in_folder / "runs" / "test")
+    assert list(ends["moving"] - ends["at_rest"]) == pytest.approx([0.2, 0.2])
+    assert ends["moving"].nunique() == 1
+    assert "moving (g)" in done.stdout
+
+
+def test_descents_that_share_a_drive_share_decks(
+    sweep_file: Callable[..., str], in_folder: Path, counting_engine: tuple[str, Callable[[], list[str]]]
+) -> None:
+    text = """
+    [axes]
+    contact.friction.bead_wall = [0.05, 0.1, 0.3]
+    [descend]
+    from = "2 g"
+    to = "1 g"
+    step = "0.5 g"
+    until_below = "0.002 mm/s"
+    """
+    engine, launches = counting_engine
+    name = sweep_file(text=text, run={**TINY, "cycles": 20, "settling_cycles": 10})
+    assert _sweep(name, "-j", "1", "--engine", engine).returncode == 0
+    points = len(load(in_folder / "runs" / "test"))
+    assert len(launches()) < points
+
+
+def test_a_damaged_table_is_made_anew(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    name = sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g", "3 g"]')
+    _sweep(name)
+    before = load(in_folder / "runs" / "test")
+    (Path(before["run"][0]) / "result.json").write_text("{")
+    pd.testing.assert_frame_equal(load(in_folder / "runs" / "test"), before)
+
+
+def test_folders_that_are_no_sweeps(tmp_path: Path) -> None:
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "sweep.json").write_text("{")
+    for command, folder in (("status", "."), ("table", "."), ("table", "broken"), ("status", "nowhere")):
+        done = subprocess.run(
+            [PROGRAM, command, folder if folder != "." else str(tmp_path / "empty")],
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 2
+        assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_sweep_that_is_killed_twenty_times(
+    sweep_file: Callable[..., str], in_folder: Path, counting_engine: tuple[str, Callable[[], list[str]]]
+) -> None:
+    """SIGKILL at random moments, of the sweep and at times of an engine: nothing lost, nothing twice, bit for bit."""
+    text = """
+    [axes]
+    drive.frequency         = ["60 Hz", "70 Hz", "80 Hz"]
+    drive.peak_acceleration = { linspace = ["1 g", "5 g", 10] }
+    start.angle             = ["0 deg", "20 deg"]
+    """
+    name = sweep_file(text=text, run={**TINY, "cycles": 10, "settling_cycles": 2})
+    engine, launches = counting_engine
+    undisturbed = _sweep(name, "--engine", engine, "--out", "undisturbed")
+    assert undisturbed.returncode == 0
+    draw = random.Random(20)
+    finished: set[str] = set()
+    for _ in range(20):
+        begun = len(launches())
+        program = _start(name, "--engine", engine)
+        _wait_for(lambda begun=begun, program=program: len(launches()) > begun or program.poll() is not None)
+        time.sleep(draw.uniform(0.0, 0.9))
+        if draw.random() < 0.3 and (engines := engines_in(in_folder)):
+            os.kill(draw.choice(engines), signal.SIGKILL)
+            time.sleep(0.05)
+        program.kill()
+        program.communicate()
+        now = set(_contents(in_folder / "runs"))
+        assert finished <= now
+        finished = now
+    assert finished
+    before = len(launches())
+    done = _sweep(name, "--engine", engine)
+    assert (done.returncode, "60 points, 60 finished" in done.stdout) == (0, True)
+    frame = load(in_folder / "runs" / "test")
+    assert len(frame) == frame["run"].nunique() == 60
+    assert _contents(in_folder / "runs") == _contents(in_folder / "undisturbed")
+    # The last call made no finished point again: each of its decks holds points that were missing before.
+    again = {Path(place).name.removesuffix(".part") for place in launches()[before:]}
+    assert not again & finished
+    assert not list(in_folder.glob("runs/**/*.part"))
+    assert not list(in_folder.glob("runs/**/*.lock"))
+
+
+def test_runs_in_ensembles_are_found_by_their_names(tmp_path: Path) -> None:
+    cases = [make_case(run=SHORT), make_case(run=SHORT, start={"seed": 2, "angle_spread": "1 deg"})]
+    made = make_together(cases, tmp_path, find_engine())
+    for name, run in made.runs.items():
+        assert finished_place(tmp_path, name) == run.directory
+    again = make_together(cases, tmp_path, find_engine())
+    assert again.found == frozenset(made.runs)
