@@ -28,7 +28,7 @@ from runner.failures import (
     TimeLimitExceeded,
 )
 from templates.deck import DECK_NAME, OUTPUT_NAME, Deck
-from templates.engine import AUDITED_VERSION, POSITION_IS_NO_NUMBER
+from templates.engine import AUDITED_VERSION, POSITION_IS_NO_NUMBER, STEP_VARIABLES
 
 _POLL_SECONDS = 0.05
 # See templates.engine: without this the message of an abort is lost.
@@ -127,6 +127,7 @@ def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]
         return subprocess.Popen(
             [*mortal, *parallel, *_LINE_BUFFERED, str(engine.path), "-log", "none", "-in", DECK_NAME],
             cwd=directory,
+            env={name: value for name, value in os.environ.items() if name not in STEP_VARIABLES},
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=subprocess.STDOUT,

@@ -144,6 +144,12 @@ DEFECTS = (
         "The engine is run through `stdbuf -oL`, its output redirected.",
     ),
     Defect(
+        "Dies within a step of SLURM",
+        "Started as one process inside an `srun` step, it takes itself for a part of the step's MPI job and ends in "
+        "MPI_Init. `srun` cannot start its ranks either: Debian's SLURM and Open MPI have no PMI in common.",
+        "The variables that tell of the step are taken from its environment; ranks are started by `mpirun`.",
+    ),
+    Defect(
         "A position that is no number",
         'ends in "Internal error (./src/tri_mesh_I.h:109)": no number lies on any side of a triangle\'s edges.',
         "The runner tells it as a blow-up.",
@@ -155,6 +161,9 @@ AUDITED_VERSION = "LIGGGHTS-PUBLIC 3.8.0"
 
 POSITION_IS_NO_NUMBER = "tri_mesh_I.h:109"
 """In the ERROR line of an engine that has met a bead whose position is no number."""
+
+STEP_VARIABLES = ("SLURM_STEP_ID", "SLURM_STEPID", "SLURM_PROCID")
+"""Variables of the environment that the engine must not see."""
 
 SMALLEST_SEPARATION_CAP = 1.2
 

@@ -51,7 +51,7 @@ def _start(*arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen([PROGRAM, "sweep", *arguments], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
-def _wait_for(condition: Callable[[], Any], seconds: float = 60.0) -> Any:
+def wait_for(condition: Callable[[], Any], seconds: float = 60.0) -> Any:
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if found := condition():
@@ -60,7 +60,7 @@ def _wait_for(condition: Callable[[], Any], seconds: float = 60.0) -> Any:
     raise AssertionError("waited in vain")
 
 
-def _contents(out: Path) -> dict[str, dict[str, bytes]]:
+def contents_of(out: Path) -> dict[str, dict[str, bytes]]:
     """What each finished run computed: tables, result and dumps, by the names of runs and files."""
     manifests = [*out.glob("*/manifest.json"), *out.glob("ensembles/*/*/manifest.json")]
     kept = (
@@ -272,7 +272,7 @@ def test_interrupts_leave_no_engine_and_the_next_call_goes_on(
 ) -> None:
     name = sweep_file(text='[axes]\ndrive.peak_acceleration = { linspace = ["2 g", "3 g", 4] }', run=SLOW)
     program = _start(name)
-    _wait_for(lambda: len(engines_in(in_folder)) == 2)
+    wait_for(lambda: len(engines_in(in_folder)) == 2)
     program.send_signal(number)
     _, errors = program.communicate(timeout=60)
     assert program.returncode == status
@@ -285,7 +285,7 @@ def test_interrupts_leave_no_engine_and_the_next_call_goes_on(
 def test_nothing_listens_on_the_network(sweep_file: Callable[..., str], in_folder: Path) -> None:
     name = sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g", "3 g"]', run=SLOW)
     program = _start(name)
-    _wait_for(lambda: engines_in(in_folder))
+    wait_for(lambda: engines_in(in_folder))
     process = psutil.Process(program.pid)
     assert not process.net_connections()
     assert all(b"liggghts" in Path(f"/proc/{child.pid}/cmdline").read_bytes() for child in process.children())
@@ -296,10 +296,10 @@ def test_nothing_listens_on_the_network(sweep_file: Callable[..., str], in_folde
 def test_engines_die_with_a_sweep_that_is_killed(sweep_file: Callable[..., str], in_folder: Path) -> None:
     name = sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g", "3 g"]', run=SLOW)
     program = _start(name)
-    _wait_for(lambda: len(engines_in(in_folder)) == 2)
+    wait_for(lambda: len(engines_in(in_folder)) == 2)
     program.kill()
     program.communicate()
-    _wait_for(lambda: not engines_in(in_folder), 5.0)
+    wait_for(lambda: not engines_in(in_folder), 5.0)
 
 
 def test_an_engine_that_outlives_a_killed_sweep_is_waited_for(sweep_file: Callable[..., str], in_folder: Path) -> None:
@@ -310,7 +310,7 @@ def test_an_engine_that_outlives_a_killed_sweep_is_waited_for(sweep_file: Callab
     run = {**SLOW, "cycles": 100}
     name = sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g"]', run=run)
     program = _start(name, "--engine", str(front))
-    (dump,) = _wait_for(lambda: list(in_folder.glob("runs/*.part/beads.bin")))
+    (dump,) = wait_for(lambda: list(in_folder.glob("runs/*.part/beads.bin")))
     program.kill()
     program.communicate()
     (orphan,) = [pid for pid in engines_in(in_folder) if b"front" not in Path(f"/proc/{pid}/cmdline").read_bytes()]
@@ -431,14 +431,14 @@ def test_a_sweep_that_is_killed_twenty_times(
     for _ in range(20):
         begun = len(launches())
         program = _start(name, "--engine", engine)
-        _wait_for(lambda begun=begun, program=program: len(launches()) > begun or program.poll() is not None)
+        wait_for(lambda begun=begun, program=program: len(launches()) > begun or program.poll() is not None)
         time.sleep(draw.uniform(0.0, 0.9))
         if draw.random() < 0.3 and (engines := engines_in(in_folder)):
             os.kill(draw.choice(engines), signal.SIGKILL)
             time.sleep(0.05)
         program.kill()
         program.communicate()
-        now = set(_contents(in_folder / "runs"))
+        now = set(contents_of(in_folder / "runs"))
         assert finished <= now
         finished = now
     assert finished
@@ -447,7 +447,7 @@ def test_a_sweep_that_is_killed_twenty_times(
     assert (done.returncode, "60 points, 60 finished" in done.stdout) == (0, True)
     frame = load(in_folder / "runs" / "test")
     assert len(frame) == frame["run"].nunique() == 60
-    assert _contents(in_folder / "runs") == _contents(in_folder / "undisturbed")
+    assert contents_of(in_folder / "runs") == contents_of(in_folder / "undisturbed")
     # The last call made no finished point again: each of its decks holds points that were missing before.
     again = {Path(place).name.removesuffix(".part") for place in launches()[before:]}
     assert not again & finished

@@ -1,0 +1,110 @@
+"""Sweeps on a real SLURM cluster: a throw-away one of this machine alone, started by the tests as root."""
+
+import signal
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from sweeps.table import load
+from tests.cluster import slurm_cluster, why_not
+from tests.conftest import PROGRAM, document, to_toml
+from tests.test_sweeps import contents_of, wait_for
+
+SITE = """
+scheduler = "slurm"
+partition = "main"
+walltime  = "00:10:00"
+cores     = 2
+jobs      = 2
+
+[executor]
+address             = "127.0.0.1"
+heartbeat_period    = 1
+heartbeat_threshold = 5
+"""
+# Twelve drives; at the fifth the time step is far beyond the viscous limit of glycerol.
+SWEEP = """
+case = "base.toml"
+[set]
+run.allow_unstable = true
+[[zip]]
+drive.peak_acceleration = { linspace = ["1 g", "6.5 g", 12] }
+run.time_step = ["2 us", "2 us", "2 us", "2 us", "40 us", "2 us", "2 us", "2 us", "2 us", "2 us", "2 us", "2 us"]
+"""
+RUN = {"cycles": 80, "settling_cycles": 2, "samples_per_cycle": 5}
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[dict[str, str]]:
+    """The environment in which SLURM's commands speak to the cluster."""
+    if reason := why_not():
+        pytest.skip(reason)
+    with tempfile.TemporaryDirectory(prefix="slurm-") as folder:
+        Path(folder).chmod(0o711)
+        with slurm_cluster(Path(folder)) as environment:
+            yield environment
+
+
+@pytest.fixture
+def files(in_folder: Path) -> Path:
+    (in_folder / "base.toml").write_text(to_toml(document(liquid={"name": "glycerol 87 %"}, run=RUN)))
+    (in_folder / "test.toml").write_text(SWEEP)
+    (in_folder / "site.toml").write_text(SITE)
+    return in_folder
+
+
+def _jobs(environment: dict[str, str], *options: str) -> list[str]:
+    command = ["squeue", "-h", "-o", "%A", *options]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
+
+
+def _sweep(environment: dict[str, str]) -> subprocess.Popen[str]:
+    command = [PROGRAM, "sweep", "test.toml", "--site", "site.toml", "--out", "cluster"]
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def test_a_sweep_through_slurm(cluster: dict[str, str], files: Path) -> None:
+    """A failing point, a pilot cancelled midway, an interrupt and a resumption: bit for bit what this machine gives."""
+
+    def at_least(number: int) -> Callable[[], bool]:
+        return lambda: len(contents_of(files / "cluster")) >= number
+
+    first = _sweep(cluster)
+    wait_for(at_least(2), 120.0)
+    (pilot,) = _jobs(cluster, "-t", "running")  # the other waits for cores
+    subprocess.run(["scancel", pilot], env=cluster, check=True)
+    wait_for(at_least(6), 120.0)
+    assert pilot not in _jobs(cluster)
+    first.send_signal(signal.SIGINT)
+    _, errors = first.communicate(timeout=60)
+    assert (first.returncode, "Traceback" in errors) == (130, False)
+    wait_for(lambda: not _jobs(cluster), 30.0)
+    left = contents_of(files / "cluster")
+    assert 6 <= len(left) < 11
+    second = _sweep(cluster)
+    _, errors = second.communicate(timeout=120)
+    assert second.returncode == 1
+    assert "point 4, base-" in errors
+    assert "blow-up" in errors
+    wait_for(lambda: not _jobs(cluster), 30.0)
+    frame = load(files / "cluster" / "test")
+    assert list(frame["status"]) == ["finished"] * 4 + ["failed"] + ["finished"] * 7
+    local = subprocess.run([PROGRAM, "sweep", "test.toml", "--out", "local"], capture_output=True, check=False)
+    assert local.returncode == 1
+    assert contents_of(files / "cluster") == contents_of(files / "local")
+    assert len(contents_of(files / "local")) == 11
+
+
+@pytest.mark.parametrize(("check", "launcher"), [("independence", "srun "), ("ranks", "")])
+def test_engines_within_a_job(cluster: dict[str, str], in_folder: Path, check: str, launcher: str) -> None:
+    """One process within a step of srun, and two ranks of mpirun within a job, as workers of a pilot start them."""
+    wrapped = f"{launcher}{PROGRAM} audit --only {check}"
+    job = ["sbatch", "--wait", "--ntasks", "1", "--cpus-per-task", "2", "--output", "job.log", "--wrap", wrapped]
+    done = subprocess.run(job, env=cluster, capture_output=True, check=False, timeout=120)
+    told = (in_folder / "job.log").read_text()
+    assert done.returncode == 0, told
+    assert "pass" in told
+    assert "skip" not in told
