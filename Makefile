@@ -46,6 +46,10 @@ docs-audit: setup ## Write docs/engine.md from an audit of the installed engine
 bench: setup ## Measure what docs/performance.md states
 	.venv/bin/python tests/benchmark.py
 
+.PHONY: bench-sweeps
+bench-sweeps: setup ## Measure what docs/performance.md states of sweeps
+	.venv/bin/python tests/benchmark_sweeps.py
+
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info
