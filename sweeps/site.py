@@ -50,6 +50,7 @@ _SCHEDULERS = {
     "condor": "CondorProvider",
     "local": "LocalProvider",
 }
+"""Names of our own; the class names of Parsl's other providers are taken as they are."""
 
 
 class SiteFile(BaseModel):
@@ -106,14 +107,15 @@ def load_site(path: str | Path) -> Site:
 
 def _problems(file: SiteFile, document: Mapping[str, Any]) -> list[Problem]:
     """What pydantic cannot see: whether Parsl has such a scheduler, and whether that takes such keys."""
-    if file.scheduler not in _SCHEDULERS:
+    provider = _provider(file.scheduler)
+    if provider is None:
         expected = f"expected one of {', '.join(_SCHEDULERS)}{suggestion(file.scheduler, _SCHEDULERS)}"
-        return [Problem("scheduler", quoted(document, ["scheduler"]), expected)]
+        return [Problem("scheduler", quoted(document, ["scheduler"]), f"{expected}, or a provider of Parsl's")]
     found = []
-    taken = _parameters("parsl.providers", _SCHEDULERS[file.scheduler])
+    taken = _parameters("parsl.providers", provider)
     for key, names in _OURS.items():
         if key in document and not taken.intersection(names) and key != "cores":
-            found.append(Problem(key, quoted(document, [key]), f"{_SCHEDULERS[file.scheduler]} has no such setting"))
+            found.append(Problem(key, quoted(document, [key]), f"{provider} has no such setting"))
     for table, known in (("provider", taken), ("executor", _parameters("parsl.executors", "HighThroughputExecutor"))):
         for key in document.get(table, {}):
             if key not in known:
@@ -123,6 +125,13 @@ def _problems(file: SiteFile, document: Mapping[str, Any]) -> list[Problem]:
         expected = f"expected one of {', '.join(sorted(_launchers()))}"
         found.append(Problem("launcher", quoted(document, ["launcher"]), expected))
     return found
+
+
+def _provider(scheduler: str) -> str | None:
+    """Name of the class of Parsl's for a scheduler."""
+    import parsl.providers
+
+    return _SCHEDULERS.get(scheduler, scheduler if scheduler in parsl.providers.__all__ else None)
 
 
 @cache
@@ -172,7 +181,7 @@ def pilots(site: Site, run_dir: Path) -> Config:
     from parsl.jobs.error_handlers import windowed_error_handler
 
     file = site.file
-    name = _SCHEDULERS[file.scheduler]
+    name = _provider(file.scheduler) or file.scheduler
     taken = _parameters("parsl.providers", name)
     settings: dict[str, Any] = {"worker_init": _worker_init(file)}
     for key, names in _OURS.items():

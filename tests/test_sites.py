@@ -1,0 +1,87 @@
+"""Site files: what is handed to Parsl, and what is said of one that makes no sense."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from inputs import InputError
+from sweeps.site import load_site, pilots
+from sweeps.table import load
+from tests.conftest import PROGRAM, document, to_toml
+from tests.test_sweeps import TINY, contents_of
+
+SLURM = 'scheduler = "slurm"\ncores = 16\n'
+
+
+def _load(folder: Path, text: str) -> None:
+    (folder / "site.toml").write_text(text)
+    load_site(folder / "site.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("cores = 2", "scheduler: missing"),
+        (SLURM.replace("slurm", "slrum"), 'scheduler = "slrum": .*did you mean "slurm"'),
+        ('scheduler = "slurm"', "cores: missing"),
+        (SLURM.replace("16", "0"), "cores = 0: expected at least 1"),
+        (SLURM.replace("16", '"16"'), "cores = .*whole number"),
+        (SLURM + 'partitoin = "main"', 'partitoin = .*did you mean "partition"'),
+        (SLURM + '[provider]\nqoss = "long"', 'provider.qoss = "long": unknown key; .*did you mean "qos"'),
+        (SLURM + "[executor]\nadress = 1", 'executor.adress = 1: unknown key; .*did you mean "address"'),
+        (SLURM + 'launcher = "run"', "launcher = .*srun"),
+        ('scheduler = "local"\ncores = 2\npartition = "main"', "partition = .*LocalProvider has no such setting"),
+        ("scheduler = ", "not TOML"),
+    ],
+)
+def test_a_site_that_makes_no_sense(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=f"site.toml: {message}"):
+        _load(tmp_path, text)
+
+
+def test_what_parsl_is_told(tmp_path: Path) -> None:
+    text = """
+    scheduler = "slurm"
+    partition = "main"
+    account   = "granular"
+    walltime  = "02:00:00"
+    nodes     = 2
+    cores     = 16
+    jobs      = 4
+    modules   = ["openmpi"]
+    shell     = ["ulimit -c 0"]
+    [provider]
+    qos = "long"
+    [executor]
+    heartbeat_period = 7
+    """
+    (tmp_path / "site.toml").write_text(text)
+    site = load_site(tmp_path / "site.toml")
+    assert site.workers == 2 * 16 * 4
+    (executor,) = pilots(site, tmp_path / "parsl").executors
+    provider = executor.provider
+    assert (provider.partition, provider.account, provider.walltime, provider.qos) == (
+        "main",
+        "granular",
+        "02:00:00",
+        "long",
+    )
+    assert (provider.nodes_per_block, provider.cores_per_node, provider.max_blocks) == (2, 16, 4)
+    assert type(provider.launcher).__name__ == "SrunLauncher"
+    assert provider.worker_init.splitlines()[:2] == ["module load openmpi", "ulimit -c 0"]
+    assert (executor.max_workers_per_node, executor.heartbeat_period, executor.encrypted) == (16, 7, True)
+    assert not provider.exclusive
+
+
+def test_workers_of_another_process_give_the_same(in_folder: Path) -> None:
+    """Parsl's local provider: pilots without a scheduler. A point fails there as it does here."""
+    (in_folder / "base.toml").write_text(to_toml(document(run=TINY)))
+    axes = '[axes]\ndrive.peak_acceleration = ["1 g", "2 g", "3 g"]\nstart.angle = ["0 deg", "10 deg"]\n'
+    (in_folder / "test.toml").write_text(f'case = "base.toml"\n{axes}')
+    (in_folder / "site.toml").write_text('scheduler = "local"\ncores = 2\n[executor]\naddress = "127.0.0.1"\n')
+    command = [PROGRAM, "sweep", "test.toml"]
+    subprocess.run([*command, "--out", "here", "-j", "2"], capture_output=True, check=True)
+    subprocess.run([*command, "--out", "there", "--site", "site.toml"], capture_output=True, check=True)
+    assert contents_of(in_folder / "here") == contents_of(in_folder / "there")
+    assert set(load(in_folder / "there" / "test")["status"]) == {"finished"}
