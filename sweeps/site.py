@@ -201,6 +201,8 @@ def pilots(site: Site, run_dir: Path) -> Config:
         "heartbeat_threshold": 60,
         "block_error_handler": windowed_error_handler,
         "worker_logdir_root": str(run_dir),
+        # Parsl would look for it on the PATH, where this Python need not be.
+        "interchange_launch_cmd": [str(Path(sys.executable).with_name("interchange.py"))],
     }
     executor = HighThroughputExecutor(label="pilots", provider=provider, **(options | file.executor))
     return Config(executors=[executor], run_dir=str(run_dir), strategy="simple", strategy_period=2, usage_tracking=0)

@@ -94,7 +94,16 @@ def slurm_cluster(folder: Path) -> Iterator[dict[str, str]]:
         time.sleep(1.0)
         for pid_file in (folder / "slurmd.pid", folder / "slurmctld.pid", folder / "munge" / "pid"):
             with suppress(OSError, ValueError):
-                os.kill(int(pid_file.read_text()), signal.SIGTERM)
+                _stop(int(pid_file.read_text()))
+
+
+def _stop(pid: int) -> None:
+    os.kill(pid, signal.SIGTERM)
+    for _ in range(100):
+        if not Path(f"/proc/{pid}/exe").exists():  # gone, or a zombie of whoever should have reaped it
+            return
+        time.sleep(0.1)
+    os.kill(pid, signal.SIGKILL)
 
 
 def _start_munge(folder: Path) -> None:

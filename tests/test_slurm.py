@@ -42,7 +42,7 @@ def cluster() -> Iterator[dict[str, str]]:
     """The environment in which SLURM's commands speak to the cluster."""
     if reason := why_not():
         pytest.skip(reason)
-    with tempfile.TemporaryDirectory(prefix="slurm-") as folder:
+    with tempfile.TemporaryDirectory(prefix="slurm-", ignore_cleanup_errors=True) as folder:
         Path(folder).chmod(0o711)
         with slurm_cluster(Path(folder)) as environment:
             yield environment
@@ -70,13 +70,14 @@ def test_a_sweep_through_slurm(cluster: dict[str, str], files: Path) -> None:
     """A failing point, a pilot cancelled midway, an interrupt and a resumption: bit for bit what this machine gives."""
 
     def at_least(number: int) -> Callable[[], bool]:
-        return lambda: len(contents_of(files / "cluster")) >= number
+        return lambda: first.poll() is not None or len(contents_of(files / "cluster")) >= number
 
     first = _sweep(cluster)
     wait_for(at_least(2), 120.0)
     (pilot,) = _jobs(cluster, "-t", "running")  # the other waits for cores
     subprocess.run(["scancel", pilot], env=cluster, check=True)
     wait_for(at_least(6), 120.0)
+    assert first.poll() is None
     assert pilot not in _jobs(cluster)
     first.send_signal(signal.SIGINT)
     _, errors = first.communicate(timeout=60)
