@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from inputs import resolve_case
 from inputs.case import WalkerCase
-from inputs.errors import WalkersError
+from inputs.errors import Stopped
 from postprocess.dump import BinaryDump, FloatArray
 from postprocess.local_dump import read_local_dump
 from runner.binary import Engine
@@ -88,7 +88,7 @@ class Measured:
         return steps, rows[:, columns.index(column)]
 
 
-class AuditStopped(WalkersError):
+class AuditStopped(Stopped):
     """Somebody stopped the audit while an engine ran."""
 
 

@@ -7,9 +7,10 @@ that everything a case may say can be varied. To add a way of writing an axis, a
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
-from math import log
+from math import isfinite, log
 from typing import Any
 
 from inputs.units import split_quantity
@@ -41,11 +42,20 @@ class Axis:
 
 
 def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool], prefix: str = "") -> dict[str, Any]:
-    """Dotted keys of nested tables: ``{"drive": {"frequency": …}}`` and ``{"drive.frequency": …}`` are the same."""
+    """Dotted keys of nested tables: ``{"drive": {"frequency": …}}`` and ``{"drive.frequency": …}`` are the same.
+
+    Raises
+    ------
+    UnusableAxisError
+        If a key is given both ways.
+    """
     flat: dict[str, Any] = {}
     for name, value in table.items():
         key = f"{prefix}.{name}" if prefix else name
-        flat |= flatten(value, is_leaf, key) if isinstance(value, Mapping) and not is_leaf(value) else {key: value}
+        below = flatten(value, is_leaf, key) if isinstance(value, Mapping) and not is_leaf(value) else {key: value}
+        if twice := flat.keys() & below.keys():
+            raise UnusableAxisError(twice.pop(), None, "is given twice")
+        flat |= below
     return flat
 
 
@@ -82,27 +92,35 @@ def _spaced(key: str, kind: str, given: object) -> list[Value]:
         raise UnusableAxisError(key, {kind: given}, f"expected first value, last value and number, such as {example}")
     first, last, unit = _range(key, given[:2], positive=kind == "geomspace")
     space = np.linspace if kind == "linspace" else np.geomspace
-    return [written(float(number), unit) for number in space(first, last, given[2])]
+    numbers = [written(float(number), unit) for number in space(first, last, given[2])]
+    # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
+    if type(given[0]) is type(given[1]) is int:
+        return [int(number) if number.is_integer() else number for number in numbers]
+    return numbers
 
 
 def _range(key: str, given: Sequence[Value], *, positive: bool) -> tuple[float, float, str | None]:
     """Both ends of a range and their unit."""
     unit = unit_of(key, list(given))
-    first, last = (_number(key, end)[0] for end in given)
+    first, last = (number_of(key, end)[0] for end in given)
     if positive and not (first > 0 and last > 0):
         raise UnusableAxisError(key, list(given), "expected two values above zero")
     return first, last, unit
 
 
-def _number(key: str, value: Value) -> tuple[float, str | None]:
-    """A value as number and unit; the unit of a plain number is None."""
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return float(value), None
-    if isinstance(value, str):
-        try:
+def number_of(key: str, value: Value) -> tuple[float, str | None]:
+    """A value as number and unit; the unit of a plain number is None.
+
+    Raises
+    ------
+    UnusableAxisError
+        If it is no finite number.
+    """
+    with suppress(ValueError, OverflowError):
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(float(value)):
+            return float(value), None
+        if isinstance(value, str) and isfinite(split_quantity(value)[0]):
             return split_quantity(value)
-        except ValueError:
-            pass
     raise UnusableAxisError(key, value, "expected a number, or a number with its unit in quotes")
 
 
@@ -124,7 +142,7 @@ def unit_of(key: str, values: Sequence[Value]) -> str | None:
     for value in values:
         for part in value if isinstance(value, list) else [value]:
             try:
-                units.add(_number(key, part)[1])
+                units.add(number_of(key, part)[1])
             except UnusableAxisError:
                 continue
     if len(units) > 1:
@@ -135,7 +153,7 @@ def unit_of(key: str, values: Sequence[Value]) -> str | None:
 def plain(value: Value) -> Any:
     """A value without its unit: a number where it is a quantity, else as it is."""
     try:
-        return _number("", value)[0] if isinstance(value, str) else value
+        return number_of("", value)[0] if isinstance(value, str) else value
     except UnusableAxisError:
         return value
 
@@ -212,9 +230,10 @@ def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Valu
         If a key is on two axes, or there are too many combinations.
     """
     keys = tuple(key for axis in axes for key in axis.keys)
-    twice = next((key for number, key in enumerate(keys) if key in keys[:number]), None)
-    if twice:
-        raise UnusableAxisError(twice, None, "varies on two axes")
+    for number, key in enumerate(keys):
+        list_of = key.partition("[")[0]
+        if any(other in (key, list_of) or other.partition("[")[0] == key for other in keys[:number]):
+            raise UnusableAxisError(key, None, "varies on two axes")
     number = 1
     for axis in axes:
         number *= len(axis.rows)

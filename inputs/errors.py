@@ -14,6 +14,10 @@ class WalkersError(Exception):
     """Root of every error that this project raises on purpose."""
 
 
+class Stopped(WalkersError):
+    """Somebody stopped what was going on: no failure."""
+
+
 @dataclass(frozen=True)
 class Problem:
     """One thing that is wrong with an input.

@@ -42,6 +42,8 @@ _PLAIN = {
     "bool_parsing": "expected true or false",
     "string_type": "expected text in quotes",
     "finite_number": "expected a finite number",
+    "string_pattern_mismatch": 'expected hours, minutes and seconds, such as "02:00:00"',
+    "list_type": "expected a list (a table of tables is written [[name]])",
 }
 
 
@@ -53,7 +55,10 @@ def quoted(document: Mapping[str, Any], location: Sequence[str | int]) -> str | 
         if part not in known:
             return None
         value = known[part]
-    text = json.dumps(value, ensure_ascii=False, default=str)
+    try:
+        text = json.dumps(value, ensure_ascii=False, default=str)
+    except (ValueError, RecursionError):  # integers of thousands of digits, brackets without end
+        return "..."
     return text if len(text) <= 80 else text[:77] + "..."
 
 

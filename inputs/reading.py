@@ -59,7 +59,7 @@ def find_input(name: str | Path, shipped: Mapping[str, Path], kind: str) -> Path
     """
     path = Path(name)
     try:
-        if path.exists():
+        if path.is_file() or (path.exists() and str(name) not in shipped):
             return path
     except OSError as error:
         raise InputError(str(name)[:80], [Problem("", None, f"cannot be read: {error.strerror}")]) from error

@@ -15,7 +15,6 @@ import copy
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -29,6 +28,7 @@ from inputs.axes import (
     combinations,
     flatten,
     is_axis,
+    number_of,
     sampled,
     unit_of,
     values_of,
@@ -40,7 +40,7 @@ from inputs.errors import InputError, Problem
 from inputs.messages import problem_of, quoted, suggested_key
 from inputs.reading import find_input, read_toml, resolve_case, shipped_cases
 from inputs.schema import ALTERNATIVES, Whole
-from inputs.units import Speed, split_quantity
+from inputs.units import Speed
 
 _SHIPPED = Path(__file__).parent / "sweeps"
 _INDEXED = re.compile(r"(?P<key>.+)\[(?P<index>\d)\]")
@@ -92,6 +92,10 @@ class Descent:
     steps: int
     until_below: float
 
+    def at_rest(self, velocity: float) -> bool:
+        """Whether walkers of a mean velocity (m/s) count as at rest; never where there is none (NaN)."""
+        return abs(velocity) < self.until_below
+
 
 @dataclass(frozen=True)
 class Sweep:
@@ -138,9 +142,12 @@ class Sweep:
             If a point cannot be used; it says which.
         """
         for number, row in enumerate(self.rows):
-            document = changed(self.document, dict(zip(self.keys, row, strict=True)))
             told = ", ".join(f"{key} = {value}" for key, value in zip(self.keys, row, strict=True))
             where = f"{self.source}: point {number} ({told})" if told else self.source
+            try:
+                document = changed(self.document, dict(zip(self.keys, row, strict=True)))
+            except UnusableAxisError as unusable:
+                raise InputError(where, [Problem(unusable.key, None, unusable.expected)]) from unusable
             yield resolve_case(document, source=where, name=self.case_name)
 
 
@@ -201,6 +208,8 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
     except UnusableAxisError as unusable:
         value = quoted({"value": unusable.value}, ["value"]) if unusable.value is not None else None
         raise InputError(source, [Problem(unusable.key, value, unusable.expected)]) from unusable
+    except RecursionError as error:
+        raise InputError(source, [Problem("", None, "has tables within tables without end")]) from error
     return Sweep(
         name=name,
         title=file.title,
@@ -217,13 +226,17 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
 def _base(case: str, source: str, folder: Path) -> Path:
     beside = folder / case
     try:
-        return beside if beside.is_file() else find_input(case, shipped_cases(), "case")
+        return beside if case and beside.is_file() else find_input(case or "no name", shipped_cases(), "case")
+    except OSError as error:
+        raise InputError(source, [Problem("case", f'"{case[:40]}…"', f"cannot be read: {error.strerror}")]) from error
     except InputError as error:
         raise InputError(source, [Problem("case", f'"{case}"', error.problems[0].expected)]) from error
 
 
 def _check_key(key: str) -> None:
     match = _INDEXED.fullmatch(key)
+    if "" in key.split("."):
+        raise UnusableAxisError(key, None, "is no key of a case")
     unknown = suggested_key(match["key"] if match else key)
     if unknown is not None:
         raise UnusableAxisError(key, None, unknown)
@@ -250,17 +263,10 @@ def _axes(tables: Mapping[str, Any]) -> list[tuple[str, Any]]:
 
 
 def _descending(table: DescendTable) -> list[Value]:
-    unit = unit_of(table.key, [table.start, table.to, table.step])
-    ends = []
-    for name, value in (("from", table.start), ("to", table.to), ("step", table.step)):
-        try:
-            ends.append(split_quantity(value)[0] if isinstance(value, str) else float(value))
-        except (ValueError, TypeError) as error:
-            raise UnusableAxisError(
-                f"descend.{name}", value, "expected a number, with its unit if it has one"
-            ) from error
-    start, to, step = ends
-    if not (start >= to and step > 0 and ceil((start - to) / step) < MOST_POINTS):
+    given = {"descend.from": table.start, "descend.to": table.to, "descend.step": table.step}
+    start, to, step = (number_of(name, value)[0] for name, value in given.items())
+    unit = unit_of(table.key, list(given.values()))
+    if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
         raise UnusableAxisError("descend", f"{table.start} to {table.to}", "expected a way down in steps above zero")
     number = int((start - to) / step + 1e-9) + 1
     return [written(start - step * count, unit) for count in range(number)]
@@ -306,6 +312,6 @@ def _put(document: dict[str, Any], key: str, value: Value) -> None:
     if match is None:
         table[name] = value
     elif isinstance(table.get(name), list) and int(match["index"]) < len(table[name]):
-        table[name][int(match["index"])] = value
+        table[name] = [value if place == int(match["index"]) else one for place, one in enumerate(table[name])]
     else:
         raise UnusableAxisError(key, value, f"the base case has no {match['key']} of that length")

@@ -139,7 +139,8 @@ class BinaryDump:
             head[1], head[-1] = data.shape[1], 1
             heads.append(np.frombuffer(_HEADER.pack(*head) + _COUNT.pack(count), dtype=np.uint8))
         body = np.ascontiguousarray(data).reshape(len(data), -1).view(np.uint8)
-        np.concatenate([np.stack(heads), body], axis=1).tofile(path)
+        with path.open("wb") as file:  # ndarray.tofile does not say why it could not write
+            file.write(np.concatenate([np.stack(heads), body], axis=1).data)
 
     def column(self, name: str) -> int:
         """Number of a column."""

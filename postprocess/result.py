@@ -66,7 +66,7 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     directory = Path(directory)
     try:
         result = read_result(directory)
-        if "velocity" in result and intact(directory):
+        if result.keys() >= {"velocity", "walkers", "gamma0"} and intact(directory):
             return result
     except (OSError, ValueError):
         pass

@@ -21,10 +21,11 @@ from pathlib import Path
 from typing import Any
 
 from inputs.case import WalkerCase
+from inputs.errors import Stopped, WalkersError
 from runner.audits import read_audit
 from runner.binary import Engine
-from runner.failures import DiskFull, EngineFailure, RunBusy
-from runner.files import read_json, settle, write_json
+from runner.failures import DiskFull, RunBusy
+from runner.files import read_json, settle, settle_entry, write_json
 from runner.launch import EngineReport
 from runner.locks import locked
 from templates.deck import DECK_NAME, LAYOUT_NAME, Deck, render_deck
@@ -118,6 +119,7 @@ def move_into_place(made: Path, place: Path) -> None:
     if place.exists():
         place.rename(replaced)
     made.rename(place)
+    settle_entry(place.parent)
     shutil.rmtree(replaced, ignore_errors=True)
 
 
@@ -139,8 +141,8 @@ def open_run(case: WalkerCase, deck: Deck, engine: Engine, out: Path) -> Iterato
     Yields
     ------
     OpenRun
-        Call its `OpenRun.finish` at the end. Left without that, the directory stays as ``….part`` with a
-        ``failure.json`` if it was an `EngineFailure`.
+        Call its `OpenRun.finish` at the end. Left without that, the directory stays as ``….part``, with a
+        ``failure.json`` if something failed.
 
     Raises
     ------
@@ -174,7 +176,9 @@ def make_run(case: WalkerCase, deck: Deck, engine: Engine, place: Path, locks: S
         with room_on_disk(part, deck):
             _write_deck(run)
             yield run
-    except EngineFailure as failure:
+    except Stopped:
+        raise
+    except (WalkersError, OSError) as failure:
         _record(part, failure)
         raise
 
@@ -212,9 +216,10 @@ def write_deck(deck: Deck, directory: Path) -> None:
     write_json(directory / LAYOUT_NAME, deck.layout.as_dict())
 
 
-def _record(part: Path, failure: EngineFailure) -> None:
+def _record(part: Path, failure: Exception) -> None:
+    said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
     with suppress(OSError):  # a full disk: the message reaches the user all the same
-        write_json(part / FAILURE_NAME, {"reason": failure.reason, "message": str(failure), "lost": failure.lost})
+        write_json(part / FAILURE_NAME, said)
 
 
 def manifest(

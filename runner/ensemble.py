@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from inputs.case import WalkerCase
@@ -29,8 +30,8 @@ from runner.directory import (
     write_deck,
 )
 from runner.files import write_json
-from runner.launch import EngineReport
-from runner.locks import is_locked
+from runner.launch import EngineReport, check_room
+from runner.locks import locked
 from templates.deck import Deck
 
 FOLDER = "ensembles"
@@ -96,7 +97,9 @@ def make_ensemble(
     ensemble = OpenEnsemble(cases, deck, engine, part, place, locks, time.time())
     try:
         with room_on_disk(part, deck):
-            part.mkdir(parents=True)
+            place.parent.mkdir(exist_ok=True)
+            check_room(place.parent, 2 * deck.layout.bead_dump_bytes)  # the whole and its parts, side by side
+            part.mkdir()
             write_deck(deck, part)
             for name, case in cases.items():
                 ensemble.run_directory(name).mkdir()
@@ -118,23 +121,35 @@ def finished_places(out: Path) -> dict[str, Path]:
 
 def finished_place(out: Path, name: str) -> Path | None:
     """The directory of a finished run, alone or in an ensemble; None if there is none."""
-    for place in (out / name, *(folder / name for folder in _folders(out / FOLDER))):
-        if (place / MANIFEST_NAME).is_file():
-            return place
-    return None
+    if (out / name / MANIFEST_NAME).is_file():
+        return out / name
+    try:
+        ensembles = [path for path in (out / FOLDER).iterdir() if path.suffix != UNFINISHED]
+    except FileNotFoundError:
+        return None
+    places = (ensemble / name for ensemble in ensembles if name in _runs_in(ensemble))
+    return next((place for place in places if (place / MANIFEST_NAME).is_file()), None)
+
+
+@lru_cache(maxsize=100_000)
+def _runs_in(ensemble: Path) -> frozenset[str]:
+    """Names of the runs of an ensemble, which is never changed once it has its name."""
+    return frozenset(path.name for path in _folders(ensemble))
 
 
 def _folders(out: Path) -> list[Path]:
     try:
         with os.scandir(out) as entries:
             return sorted(Path(entry) for entry in entries if entry.is_dir() and not entry.name.endswith(UNFINISHED))
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return []
 
 
 def remove_remains(out: Path) -> None:
     """Remove ensembles that were being made when their makers were killed, unless engines still write into them."""
     for part in (out / FOLDER).glob(f"*{UNFINISHED}"):
-        names = [path.name for path in part.iterdir() if path.is_dir()]
-        if names and not any(is_locked(out / name) for name in names):
-            shutil.rmtree(part, ignore_errors=True)
+        places = [out / path.name for path in _folders(part)]
+        with locked(places) as ours:
+            # Whoever makes an ensemble has its runs locked before its directory is there.
+            if places and len(ours) == len(places):
+                shutil.rmtree(part, ignore_errors=True)

@@ -49,6 +49,15 @@ class EngineDiffers(EngineFailure):
         super().__init__(f"the engine on {platform.node()}, {found}, is not the one that this sweep was started with")
 
 
+class ProgramDiffers(EngineFailure):
+    """A worker of a sweep makes other decks of the same cases than the program that the sweep was started with."""
+
+    def __init__(self) -> None:
+        import platform
+
+        super().__init__(f"on {platform.node()} this program is another version than where the sweep was started")
+
+
 class EngineError(EngineFailure):
     """The engine stopped with an ERROR line, or with a non-zero status and none. The line is quoted."""
 

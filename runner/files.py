@@ -32,11 +32,16 @@ def settle(directory: Path) -> None:
     """Put a directory and all that is in it on the disk, so that its new name outlives a loss of power."""
     for folder, _, names in os.walk(directory):
         for entry in [Path(folder) / name for name in names] + [Path(folder)]:
-            descriptor = os.open(entry, os.O_RDONLY)
-            try:
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
+            settle_entry(entry)
+
+
+def settle_entry(path: Path) -> None:
+    """Put a file, or the names in a directory, on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def write_text(path: Path, text: str) -> None:

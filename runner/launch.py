@@ -93,9 +93,7 @@ def launch(
     EngineFailure
         One of the failures of `runner.failures`; the engine and its children have ended by then.
     """
-    free = shutil.disk_usage(directory).free
-    if free < deck.layout.bead_dump_bytes + _SPARE_BYTES:
-        raise DiskFull(deck.layout.bead_dump_bytes, free, directory)
+    check_room(directory, deck.layout.bead_dump_bytes)
     begin = time.perf_counter()
     watch = _Watch(deck, directory, begin)
     process = None
@@ -117,6 +115,13 @@ def launch(
     watch.look()
     watch.check(None)
     return _verdict(watch, process.returncode, wall_seconds)
+
+
+def check_room(folder: Path, needed: int) -> None:
+    """Raise `DiskFull` unless so many bytes, and some more, are free where a folder is."""
+    free = shutil.disk_usage(folder).free
+    if free < needed + _SPARE_BYTES:
+        raise DiskFull(needed, free, folder)
 
 
 def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]) -> subprocess.Popen[bytes]:

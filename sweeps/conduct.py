@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import resource
 import shutil
-import tempfile
+import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from math import nan
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 from inputs.case import WalkerCase
 from inputs.errors import WalkersError
 from runner.binary import Engine
-from runner.ensemble import finished_places, remove_remains
+from runner.ensemble import finished_place, finished_places, remove_remains
 from runner.locks import is_locked
 from sweeps.packing import LONGEST_SECONDS, PlannedDeck, halves, pack, unfinished_parts
-from sweeps.record import SweepRecord, at_rest, chains, states
+from sweeps.record import SweepRecord, chains, states, velocity_of
 from sweeps.site import Site, pilots, threads
-from sweeps.worker import STOP, Report, SweepStopped, Task, work
+from sweeps.worker import STOPS, Report, SweepStopped, Task, work
 from templates.sharing import sharing_key
 
 if TYPE_CHECKING:
@@ -154,9 +155,8 @@ def conduct(
     out = record.out
     out.mkdir(parents=True, exist_ok=True)
     remove_remains(out)
-    with _workers(options, record) as submit:
-        conductor = _Conductor(record, cases, engine, options, submit, on_progress)
-        return conductor.run()
+    with _workers(options, record) as workers:
+        return _Conductor(record, cases, engine, options, workers, on_progress).run()
 
 
 def _raise_file_limit() -> None:
@@ -166,23 +166,35 @@ def _raise_file_limit() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
 
 
+@dataclass(frozen=True)
+class _Workers:
+    """Where tasks are handed in, and what the sweep is called there."""
+
+    submit: Callable[[Task], Future[Report]]
+    sweep: str
+
+
 @contextmanager
-def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[[Task], Future[Report]]]:
+def _workers(options: Options, record: SweepRecord) -> Iterator[_Workers]:
     """Start Parsl; at the end its workers and their engines have ended, however the block is left."""
     import parsl
 
-    STOP.clear()
-    folder = Path(tempfile.mkdtemp(prefix="walkers-")) if options.site is None else record.directory / "parsl"
-    config = threads(options.workers, folder) if options.site is None else pilots(options.site, folder)
-    kernel = parsl.DataFlowKernel(config)
-    app = parsl.python_app(work, data_flow_kernel=kernel)
+    sweep = uuid4().hex
+    stop = STOPS[sweep] = threading.Event()
+    folder = record.directory / "parsl"
+    kernel = parsl.DataFlowKernel(
+        threads(options.workers, folder) if options.site is None else pilots(options.site, folder)
+    )
     try:
-        yield app
+        yield _Workers(parsl.python_app(work, data_flow_kernel=kernel), sweep)
     finally:
-        STOP.set()
+        stop.set()
         kernel.cleanup()
-        if options.site is None:
-            shutil.rmtree(folder, ignore_errors=True)
+        del STOPS[sweep]
+        if options.site is None:  # threads leave nothing to look into
+            shutil.rmtree(kernel.run_dir, ignore_errors=True)
+            with suppress(OSError):
+                folder.rmdir()
 
 
 def batches(
@@ -228,13 +240,14 @@ class _Conductor:
         cases: Sequence[WalkerCase],
         engine: Engine,
         options: Options,
-        submit: Callable[[Task], Future[Report]],
+        workers: _Workers,
         on_progress: Callable[[Progress], None] | None,
     ) -> None:
-        self.record, self.options, self.submit, self.engine = record, options, submit, engine
+        self.record, self.options, self.parsl, self.engine = record, options, workers, engine
         self.cases: Mapping[int, WalkerCase] = dict(enumerate(cases))
         self.on_progress = on_progress or (lambda _: None)
-        self.finished = {run: str(place) for run, place in finished_places(record.out).items()}
+        self.finished = set(finished_places(record.out))
+        self.velocities: dict[str, float] = {}
         self.failures: list[Failure] = []
         self.ended: SimpleQueue[tuple[_Job, Future[Report]]] = SimpleQueue()
         self.out_there: dict[_Job, None] = {}
@@ -264,8 +277,11 @@ class _Conductor:
         return sorted(self.failures, key=lambda failure: failure.point)
 
     def _stopped(self, point: int) -> bool:
-        place = self.finished.get(self.record.runs[point])
-        return place is not None and self.record.descent is not None and at_rest(Path(place), self.record.descent)
+        run = self.record.runs[point]
+        if run in self.finished and run not in self.velocities:
+            place = finished_place(self.record.out, run)
+            self.velocities[run] = velocity_of(place) if place else nan
+        return self.record.descent is not None and self.record.descent.at_rest(self.velocities.get(run, nan))
 
     def _is_finished(self, point: int) -> bool:
         return self.record.runs[point] in self.finished
@@ -286,6 +302,8 @@ class _Conductor:
 
     def _hand_out(self, job: _Job) -> None:
         task = Task(
+            sweep=self.parsl.sweep,
+            runs=tuple(self.record.runs[point] for point in job.deck.points),
             cases=tuple(self.cases[point] for point in job.deck.points),
             out=self.record.out,
             engine=str(self.engine.path),
@@ -293,7 +311,7 @@ class _Conductor:
             time_limit=self.options.time_limit,
         )
         self.out_there[job] = None
-        self.submit(task).add_done_callback(lambda future: self.ended.put((job, future)))
+        self.parsl.submit(task).add_done_callback(lambda future: self.ended.put((job, future)))
 
     def _take_in(self, job: _Job, future: Future[Report]) -> None:
         del self.out_there[job]
@@ -301,7 +319,8 @@ class _Conductor:
         report = self._lost(job, error) if error else future.result()
         if report is None:
             return
-        self.finished |= report.finished
+        self.finished |= set(report.finished)
+        self.velocities |= {run: velocity for run, (_, velocity) in report.finished.items()}
         settled = [point for point in job.deck.points if self._is_finished(point)]
         left = [point for point in job.deck.points if not self._is_finished(point)]
         self.seconds_done += job.deck.seconds * len(settled) / len(job.deck.points)
@@ -318,7 +337,7 @@ class _Conductor:
 
     def _failed(self, job: _Job, report: Report, left: Sequence[int]) -> None:
         """Try the points of a deck apart, a point by itself as often as told."""
-        if report.failure == SweepStopped.__name__ or not left:
+        if not left or (report.failure == SweepStopped.__name__ and STOPS[self.parsl.sweep].is_set()):
             return
         if len(left) > 1:
             for half in halves(left):

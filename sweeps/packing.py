@@ -11,7 +11,7 @@ import heapq
 from bisect import bisect_left
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 from inputs.case import WalkerCase
 from runner.cost import predicted_seconds
@@ -73,26 +73,28 @@ def pack(cases: Mapping[int, WalkerCase], workers: int, longest_seconds: float =
 
 def _parted(group: Sequence[int], cases: Mapping[int, WalkerCase], longest: float) -> list[PlannedDeck]:
     """A group in the fewest decks that keep to the bounds; a point by itself may exceed them."""
+    # Walkers of the points before each; the group shares the number of steps.
+    before = list(accumulate((cases[number].start.replicates for number in group), initial=0))
+    case = cases[group[0]]
 
-    def too_large(parts: int) -> bool:
-        return any(
-            len(part) > 1
-            and (
-                len(part) > MOST_POINTS
-                or sum(cases[number].start.replicates for number in part) > MOST_WALKERS
-                or _deck(part, cases).seconds > longest
-            )
-            for part in _parts(group, parts)
-        )
+    def allowed(parts: int) -> bool:
+        edges = _edges(len(group), parts)
+        walkers = max(before[end] - before[start] for start, end in pairwise(edges))
+        points = -(-len(group) // parts)
+        seconds = predicted_seconds(case, walkers)
+        return points == 1 or (points <= MOST_POINTS and walkers <= MOST_WALKERS and seconds <= longest)
 
-    fewest = bisect_left(range(1, len(group)), True, key=lambda parts: not too_large(parts)) + 1
+    fewest = bisect_left(range(1, len(group)), True, key=allowed) + 1
     return [_deck(part, cases) for part in _parts(group, fewest)]
 
 
 def _parts(group: Sequence[int], count: int) -> list[Sequence[int]]:
     """A sequence in so many consecutive parts, of equal lengths as far as that goes."""
-    edges = [len(group) * number // count for number in range(count + 1)]
-    return [group[start:end] for start, end in pairwise(edges)]
+    return [group[start:end] for start, end in pairwise(_edges(len(group), count))]
+
+
+def _edges(length: int, count: int) -> list[int]:
+    return [length * number // count for number in range(count + 1)]
 
 
 def _deck(points: Sequence[int], cases: Mapping[int, WalkerCase]) -> PlannedDeck:
@@ -102,8 +104,9 @@ def _deck(points: Sequence[int], cases: Mapping[int, WalkerCase]) -> PlannedDeck
 
 def makespan(seconds: Iterable[float], workers: int) -> float:
     """Time until all is done when each free worker takes the longest that is left, s."""
-    ends = [0.0] * workers
-    for duration in sorted(seconds, reverse=True):
+    durations = sorted(seconds, reverse=True)
+    ends = [0.0] * max(1, min(workers, len(durations)))
+    for duration in durations:
         heapq.heapreplace(ends, ends[0] + duration)
     return max(ends)
 

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import nan
 from pathlib import Path
 from typing import Any
 
 from inputs.axes import plain
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
-from inputs.errors import InputError, Problem
+from inputs.errors import InputError, Problem, WalkersError
 from inputs.sweep import Descent, Sweep
 from runner.binary import Engine
 from runner.directory import FAILURE_NAME, run_place, unfinished
@@ -146,7 +147,7 @@ def read_record(directory: str | Path) -> SweepRecord:
     InputError
         If it is none.
     """
-    directory = Path(directory)
+    given, directory = directory, Path(directory).resolve()
     try:
         contents = read_json(directory / RECORD_NAME)
         points = contents["points"]
@@ -162,9 +163,9 @@ def read_record(directory: str | Path) -> SweepRecord:
         )
     except FileNotFoundError as error:
         told = f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"
-        raise InputError(str(directory), [Problem("", None, told)]) from error
+        raise InputError(str(given), [Problem("", None, told)]) from error
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(str(directory), [Problem("", None, f"{RECORD_NAME} cannot be read ({error})")]) from error
+        raise InputError(str(given), [Problem("", None, f"{RECORD_NAME} cannot be read ({error})")]) from error
 
 
 @dataclass(frozen=True)
@@ -201,7 +202,7 @@ def states(record: SweepRecord) -> list[PointState]:
                 found[number] = PointState("not needed")
             directory = found[number].directory
             if found[number].status == "finished" and directory is not None:
-                stopped = at_rest(directory, record.descent)
+                stopped = record.descent.at_rest(velocity_of(directory))
     return found
 
 
@@ -224,8 +225,29 @@ def chains(record: SweepRecord) -> list[list[int]]:
     return [list(range(start, start + steps)) for start in range(0, len(record.runs), steps or 1)]
 
 
-def at_rest(directory: Path, descent: Descent) -> bool:
-    """Whether the walkers of a finished run are slower than a descent's limit."""
+def velocity_of(directory: Path) -> float:
+    """Mean velocity of a finished run, m/s; NaN if its files are damaged."""
+    try:
+        return float(result_in(directory)["velocity"]["mean"])
+    except DamagedRunError:
+        return nan
+
+
+class DamagedRunError(WalkersError):
+    """A finished run whose files were changed or cut since."""
+
+
+def result_in(directory: Path) -> dict[str, Any]:
+    """The result of a finished run.
+
+    Raises
+    ------
+    DamagedRunError
+        If it can neither be read nor be made anew from the dumps.
+    """
     from postprocess.result import current_result
 
-    return bool(abs(current_result(directory)["velocity"]["mean"]) < descent.until_below)
+    try:
+        return current_result(directory)
+    except (OSError, ValueError, KeyError, TypeError, IndexError, WalkersError) as error:
+        raise DamagedRunError(f"{directory} is damaged ({error}): delete it to have it made again") from error

@@ -41,6 +41,9 @@ _OURS = {
     "cores": ("cores_per_node", "cpus_per_node"),
     "jobs": ("max_blocks",),
 }
+_GUARDED = ("setsid", "setpriv", "--pdeathsig", "TERM")
+"""How Parsl's interchange is started: out of Ctrl-C's reach, for Parsl waits for its word at the end; and mortal, so
+that the pilots of a sweep that was killed miss it and end too."""
 _SCHEDULERS = {
     "slurm": "SlurmProvider",
     "pbs": "PBSProProvider",
@@ -53,6 +56,10 @@ _SCHEDULERS = {
 """Names of our own; the class names of Parsl's other providers are taken as they are."""
 
 
+MOST = 10_000
+"""Of anything that a site file counts."""
+
+
 class SiteFile(BaseModel):
     """A site file."""
 
@@ -61,10 +68,10 @@ class SiteFile(BaseModel):
     scheduler: str
     partition: str | None = None
     account: str | None = None
-    walltime: str | None = None
-    nodes: Annotated[Whole, Field(ge=1)] = 1
-    cores: Annotated[Whole, Field(ge=1)]
-    jobs: Annotated[Whole, Field(ge=1)] = 1
+    walltime: Annotated[str, Field(pattern=r"^\d+:\d\d:\d\d$")] | None = None
+    nodes: Annotated[Whole, Field(ge=1, le=MOST)] = 1
+    cores: Annotated[Whole, Field(ge=1, le=MOST)]
+    jobs: Annotated[Whole, Field(ge=1, le=MOST)] = 1
     modules: list[str] = []
     shell: list[str] = []
     launcher: str | None = None
@@ -102,7 +109,13 @@ def load_site(path: str | Path) -> Site:
     problems = _problems(file, document)
     if problems:
         raise InputError(str(path), problems)
-    return Site(file.cores * file.nodes * file.jobs, file)
+    site = Site(file.cores * file.nodes * file.jobs, file)
+    try:
+        pilots(site, Path("parsl"))
+    except Exception as error:  # whatever Parsl's classes raise about what they are given
+        told = " ".join(str(error).split())
+        raise InputError(str(path), [Problem("", None, f"Parsl cannot use it: {told}")]) from error
+    return site
 
 
 def _problems(file: SiteFile, document: Mapping[str, Any]) -> list[Problem]:
@@ -194,18 +207,22 @@ def pilots(site: Site, run_dir: Path) -> Config:
     launcher = file.launcher or ("srun" if name == "SlurmProvider" and file.nodes > 1 else None)
     if launcher is not None:
         settings["launcher"] = getattr(parsl.launchers, _launchers()[launcher])()
-    provider = getattr(parsl.providers, name)(**(settings | file.provider))
+    provider = getattr(parsl.providers, name)(**(settings | _as_tuples(file.provider)))
     options: dict[str, Any] = {
         "max_workers_per_node": file.cores,
         "heartbeat_period": 10,
         "heartbeat_threshold": 60,
         "block_error_handler": windowed_error_handler,
         "worker_logdir_root": str(run_dir),
-        # Parsl would look for it on the PATH, where this Python need not be.
-        "interchange_launch_cmd": [str(Path(sys.executable).with_name("interchange.py"))],
+        "interchange_launch_cmd": [*_GUARDED, str(Path(sys.executable).with_name("interchange.py"))],
     }
-    executor = HighThroughputExecutor(label="pilots", provider=provider, **(options | file.executor))
+    executor = HighThroughputExecutor(label="pilots", provider=provider, **(options | _as_tuples(file.executor)))
     return Config(executors=[executor], run_dir=str(run_dir), strategy="simple", strategy_period=2, usage_tracking=0)
+
+
+def _as_tuples(table: Mapping[str, Any]) -> dict[str, Any]:
+    """TOML has lists only, while Parsl's ranges are tuples."""
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
 
 
 def _worker_init(file: SiteFile) -> str:

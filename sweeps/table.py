@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from inputs.errors import InputError, Problem
-from postprocess.result import current_result
 from runner.files import write_text
-from sweeps.record import DERIVED, PointState, SweepRecord, chains, read_record, states
+from sweeps.record import (
+    DERIVED,
+    DamagedRunError,
+    PointState,
+    SweepRecord,
+    chains,
+    read_record,
+    result_in,
+    states,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -106,17 +113,22 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
     for key, value in zip(record.units, record.values[number], strict=True):
         row |= {f"{key}[{part}]": one for part, one in enumerate(value)} if isinstance(value, list) else {key: value}
     row |= dict(zip(DERIVED, record.derived[number], strict=True))
-    finished = state.status == "finished" and state.directory is not None
-    row |= _result(current_result(state.directory)) if finished and state.directory else dict.fromkeys(RESULTS, nan)
-    return row | {
+    row |= dict.fromkeys(RESULTS, nan) | {
         "status": state.status,
         "lost": state.lost,
         "reason": state.reason or "",
         "run": os.path.relpath(state.directory) if state.directory else "",
     }
+    if state.status != "finished" or state.directory is None:
+        return row
+    try:
+        return row | _result(state.directory)
+    except DamagedRunError:
+        return row | {"status": "failed", "reason": DamagedRunError.__name__}
 
 
-def _result(result: Mapping[str, Any]) -> dict[str, Any]:
+def _result(directory: Path) -> dict[str, Any]:
+    result = result_in(directory)
     velocity = result["velocity"]
     return {
         "velocity": velocity["mean"],
@@ -143,12 +155,13 @@ def as_text(frame: pd.DataFrame, form: str) -> str | bytes:
     if form == "json":
         import json
 
-        rows = json.loads(frame.to_json(orient="records", double_precision=15))
+        # Not DataFrame.to_json, which rounds to decimals.
+        rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
         contents = {"units": frame.attrs["units"], "meanings": frame.attrs["meanings"], "points": rows}
         return json.dumps(contents, indent=2, ensure_ascii=False) + "\n"
     if form == "parquet":
         return _parquet(frame)
-    raise InputError(form, [Problem("", None, f"expected one of {', '.join(FORMATS)}")])
+    raise InputError("the form of a table", [Problem("", form, f"expected one of {', '.join(FORMATS)}")])
 
 
 def short_text(frame: pd.DataFrame) -> str:
@@ -170,7 +183,9 @@ def _parquet(frame: pd.DataFrame) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    table = pa.Table.from_pandas(frame, preserve_index=False)
+    # A column of numbers and words ("auto") becomes one of words.
+    mixed = [name for name in frame.columns if frame[name].dtype == object and frame[name].map(type).nunique() > 1]
+    table = pa.Table.from_pandas(frame.astype(dict.fromkeys(mixed, str)), preserve_index=False)
     units, meanings = frame.attrs["units"], frame.attrs["meanings"]
     fields = [
         field.with_metadata({"unit": units[field.name], "meaning": meanings[field.name]}) for field in table.schema
@@ -240,6 +255,8 @@ def write_table_file(frame: pd.DataFrame, path: Path) -> None:
     InputError
         If that is none of `FORMATS`.
     """
+    if path.suffix.lstrip(".") not in FORMATS:
+        raise InputError(str(path), [Problem("", None, f"expected a name that ends in .{', .'.join(FORMATS)}")])
     contents = as_text(frame, path.suffix.lstrip("."))
     if isinstance(contents, str):
         write_text(path, contents)

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from inputs.case import WalkerCase
-from inputs.errors import WalkersError
+from inputs.errors import Stopped, WalkersError
 from runner.binary import find_engine
-from runner.failures import EngineDiffers, EngineFailure
+from runner.directory import run_place
+from runner.failures import EngineDiffers, EngineFailure, ProgramDiffers
 from runner.launch import Progress
 from sweeps.together import make_together
 
-STOP = threading.Event()
-"""Set to end the engines of this process's workers and to let those that wait begin nothing."""
+STOPS: dict[str, threading.Event] = {}
+"""Of the sweeps that this process conducts, by `Task.sweep`: set to end their engines and to let none begin."""
 
 
-class SweepStopped(WalkersError):
+class SweepStopped(Stopped):
     """Somebody stopped the sweep while an engine ran."""
 
 
@@ -28,8 +29,12 @@ class Task:
 
     Attributes
     ----------
+    sweep
+        Which conductor it is from.
+    runs
+        Names of the runs, as the conductor calls them.
     cases
-        May share a deck.
+        Of the runs; may share a deck.
     out
         Folder of the run directories.
     engine, sha256
@@ -38,6 +43,8 @@ class Task:
         Wall time in s that the engine may take, or None.
     """
 
+    sweep: str
+    runs: tuple[str, ...]
     cases: tuple[WalkerCase, ...]
     out: Path
     engine: str
@@ -52,7 +59,7 @@ class Report:
     Attributes
     ----------
     finished
-        From names of runs to their directories.
+        From names of runs to their directories and mean velocities (m/s).
     busy
         Names of runs that somebody else is making.
     failure
@@ -61,7 +68,7 @@ class Report:
         What it says and where its remains are.
     """
 
-    finished: Mapping[str, str] = field(default_factory=dict)
+    finished: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     busy: tuple[str, ...] = ()
     failure: str | None = None
     message: str = ""
@@ -70,22 +77,34 @@ class Report:
 
 def work(task: Task) -> Report:
     """Make the runs of a task's cases. Never raises what is known to happen: see `Report`."""
+    stop = STOPS.get(task.sweep, threading.Event())
 
     def look(_: Progress) -> None:
-        if STOP.is_set():
+        if stop.is_set():
             raise SweepStopped("stopped")
 
-    if STOP.is_set():
-        return Report(failure=SweepStopped.__name__)
     try:
-        engine = find_engine(task.engine)
-        if engine.sha256 != task.sha256:
-            raise EngineDiffers(engine.path)
-        made = make_together(task.cases, task.out, engine, on_progress=look, time_limit=task.time_limit)
+        if stop.is_set():
+            raise SweepStopped("stopped")
+        return _made(task, look)
     except EngineFailure as failure:
         directory = str(failure.directory) if failure.directory else None
         return Report(failure=failure.reason, message=str(failure), directory=directory)
     except (WalkersError, OSError) as error:
         return Report(failure=type(error).__name__, message=str(error))
-    finished = {name: str(run.directory) for name, run in made.runs.items()}
+
+
+def _made(task: Task, look: Callable[[Progress], None]) -> Report:
+    from postprocess.result import current_result
+
+    engine = find_engine(task.engine)
+    if engine.sha256 != task.sha256:
+        raise EngineDiffers(engine.path)
+    if task.runs != tuple(run_place(case, engine, task.out).name for case in task.cases):
+        raise ProgramDiffers
+    made = make_together(task.cases, task.out, engine, on_progress=look, time_limit=task.time_limit)
+    finished = {
+        name: (str(run.directory), float(current_result(run.directory)["velocity"]["mean"]))
+        for name, run in made.runs.items()
+    }
     return Report(finished=finished, busy=tuple(sorted(made.busy)))

@@ -10,6 +10,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
 from inputs.case import Contact, WalkerCase
+from inputs.dimer import reach
 
 
 def surfaces_of(cases: Sequence[WalkerCase]) -> tuple[Contact, ...]:
@@ -23,6 +24,8 @@ def sharing_key(case: WalkerCase) -> Hashable:
     The time step is among it. Cases whose ``"auto"`` steps differ (beads of other sizes) stay apart, so that a case is
     integrated with the same step whoever shares the deck.
     """
+    # Walkers that are to stand closer than their own reach would not meet the same neighbours in another company.
+    crowded = case if case.start.spacing < 2.0 * reach(case) else None
     contact = replace(
         case.contact,
         friction_bead_bead=0.0,
@@ -32,7 +35,7 @@ def sharing_key(case: WalkerCase) -> Hashable:
         rolling_friction=float(case.contact.rolling_friction > 0.0),
     )
     liquid = replace(case.liquid, name=None, density=None)
-    return (liquid, contact, case.drive, case.run, case.gravity, case.beads.density)
+    return (liquid, contact, case.drive, case.run, case.gravity, case.beads.density, crowded)
 
 
 def check_sharing(cases: Sequence[WalkerCase]) -> None:

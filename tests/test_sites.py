@@ -1,15 +1,19 @@
 """Site files: what is handed to Parsl, and what is said of one that makes no sense."""
 
+import os
+import signal
 import subprocess
+from contextlib import suppress
 from pathlib import Path
 
+import psutil
 import pytest
 
 from inputs import InputError
 from sweeps.site import load_site, pilots
 from sweeps.table import load
-from tests.conftest import PROGRAM, document, to_toml
-from tests.test_sweeps import TINY, contents_of
+from tests.conftest import PROGRAM, document, engines_in, to_toml
+from tests.test_sweeps import SLOW, TINY, contents_of, wait_for
 
 SLURM = 'scheduler = "slurm"\ncores = 16\n'
 
@@ -33,6 +37,10 @@ def _load(folder: Path, text: str) -> None:
         (SLURM + 'launcher = "run"', "launcher = .*srun"),
         ('scheduler = "local"\ncores = 2\npartition = "main"', "partition = .*LocalProvider has no such setting"),
         ("scheduler = ", "not TOML"),
+        (SLURM + 'walltime = "2h"', 'walltime = "2h": expected hours, minutes and seconds'),
+        (SLURM.replace("16", "1000000000"), "cores = 1000000000: expected .*at most 10000"),
+        (SLURM + '[provider]\ninit_blocks = "three"', "Parsl cannot use it: .*init_blocks"),
+        (SLURM + '[executor]\nheartbeat_period = "x"', "Parsl cannot use it: .*heartbeat_period"),
     ],
 )
 def test_a_site_that_makes_no_sense(tmp_path: Path, text: str, message: str) -> None:
@@ -55,6 +63,7 @@ def test_what_parsl_is_told(tmp_path: Path) -> None:
     qos = "long"
     [executor]
     heartbeat_period = 7
+    worker_port_range = [54000, 54100]
     """
     (tmp_path / "site.toml").write_text(text)
     site = load_site(tmp_path / "site.toml")
@@ -71,6 +80,7 @@ def test_what_parsl_is_told(tmp_path: Path) -> None:
     assert type(provider.launcher).__name__ == "SrunLauncher"
     assert provider.worker_init.splitlines()[:2] == ["module load openmpi", "ulimit -c 0"]
     assert (executor.max_workers_per_node, executor.heartbeat_period, executor.encrypted) == (16, 7, True)
+    assert executor.worker_port_range == (54000, 54100)
     assert not provider.exclusive
 
 
@@ -85,3 +95,50 @@ def test_workers_of_another_process_give_the_same(in_folder: Path) -> None:
     subprocess.run([*command, "--out", "there", "--site", "site.toml"], capture_output=True, check=True)
     assert contents_of(in_folder / "here") == contents_of(in_folder / "there")
     assert set(load(in_folder / "there" / "test")["status"]) == {"finished"}
+
+
+SLOW_SWEEP = """
+case = "base.toml"
+[axes]
+drive.peak_acceleration = ["1 g", "2 g", "3 g", "4 g"]
+"""
+LOCAL = """
+scheduler = "local"
+cores     = 2
+[executor]
+address             = "127.0.0.1"
+heartbeat_period    = 1
+heartbeat_threshold = 5
+"""
+
+
+def _helpers(folder: Path) -> list[psutil.Process]:
+    """Parsl's processes for a sweep in a folder: interchange, pilots, workers."""
+    found = []
+    for process in psutil.process_iter():
+        with suppress(psutil.Error):
+            command = " ".join(process.cmdline())
+            if ("interchange" in command or "process_worker_pool" in command) and (
+                str(folder) in command or process.cwd().startswith(str(folder))
+            ):
+                found.append(process)
+    return found
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_sweep_of_pilots_leaves_nobody_behind(in_folder: Path, number: signal.Signals) -> None:
+    """Ctrl-C of a terminal reaches the whole group of processes, SIGKILL the program alone."""
+    (in_folder / "base.toml").write_text(to_toml(document(run=SLOW)))
+    (in_folder / "test.toml").write_text(SLOW_SWEEP)
+    (in_folder / "site.toml").write_text(LOCAL)
+    command = [PROGRAM, "sweep", "test.toml", "--site", "site.toml"]
+    program = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE, text=True)
+    wait_for(lambda: len(engines_in(in_folder)) == 2)
+    if number == signal.SIGINT:
+        os.killpg(program.pid, number)
+    else:
+        program.kill()
+    _, errors = program.communicate(timeout=60)
+    assert "Traceback" not in errors
+    assert program.returncode == (130 if number == signal.SIGINT else -signal.SIGKILL)
+    wait_for(lambda: not engines_in(in_folder) and not _helpers(in_folder), 60.0)

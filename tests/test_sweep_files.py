@@ -64,6 +64,14 @@ def test_linspace_and_geomspace_are_numpys(make: Make) -> None:
     np.testing.assert_allclose(fractions, np.geomspace(1e-3, 1e-1, 5), rtol=1e-11)
 
 
+def test_whole_numbers_stay_whole(make: Make) -> None:
+    sweep = make(axes={"start.seed": {"linspace": [1, 4, 4]}, "run.cycles": {"geomspace": [10, 40, 3]}})
+    assert [(case.start.seed, case.run.cycles) for case in _cases(make(set={"run.settling_cycles": 2}, axes={
+        "start.seed": {"linspace": [1, 2, 2]}, "run.cycles": {"geomspace": [10, 40, 3]}}))] == [
+        (1, 10), (1, 20), (1, 40), (2, 10), (2, 20), (2, 40)]  # fmt: skip
+    assert [row[0] for row in sweep.rows[::3]] == [1, 2, 3, 4]
+
+
 def test_zipped_keys_go_together(make: Make) -> None:
     pairs = [["0.3 mm", "0.2 mm"], ["0.4 mm", "0.2 mm"]]
     sweep = make(zip=[{"beads.radii": pairs, "start": {"seed": [3, 4]}}], axes={"drive.frequency": ["60 Hz", "90 Hz"]})
@@ -157,6 +165,18 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"descend": {"from": "1 g", "to": "0 g", "step": "fast", "until_below": "1 um/s"}}, "descend.step"),
     ({"descend": {"from": "1 g", "to": "0 g", "step": "0.1 g", "until_below": "1 um"}}, "descend.until_below.*speed"),
     ({"descend": {"from": "1 g", "to": "0 g", "until_below": "1 um/s"}}, "descend.step: missing"),
+    ({"descend": {"from": float("inf"), "to": 0, "step": 1, "until_below": "1 um/s"}}, "descend.from = .*a number"),
+    ({"descend": {"from": True, "to": 0, "step": 1, "until_below": "1 um/s"}}, "from = true: expected a number"),
+    ({"descend": {"from": "1 g", "to": "0 g", "step": "1e-320 g", "until_below": "1 um/s"}}, "a way down"),
+    ({"axes": {"contact.restitution": {"linspace": [0, float("inf"), 3]}}}, "expected a number"),
+    ({"axes": {"contact.restitution": {"linspace": [0, 10**400, 3]}}}, "expected a number"),
+    ({"axes": {"drive": {"frequency": ["60 Hz"]}, "drive.frequency": ["70 Hz"]}}, "drive.frequency: is given twice"),
+    ({"axes": {"beads.radii": [["0.3 mm", "0.2 mm"]], "beads.radii[1]": ["0.1 mm"]}}, "radii.*varies on two axes"),
+    ({"axes": {"beads.radii[1]": ["0.1 mm"], "beads.radii": [["0.3 mm", "0.2 mm"]]}}, "radii.*varies on two axes"),
+    ({"axes": {".": [1]}}, "is no key of a case"),
+    ({"case": ""}, 'case = "": no such file'),
+    ({"case": "x" * 5000}, "case = .*cannot be read"),
+    ({"sample": {"points": 4}}, r"sample = .*\[\[name\]\]"),
     ({"axis": {}}, 'unknown key; a sweep takes .*did you mean "axes"'),
     ({"case": "fig1c"}, 'case = "fig1c": no such file, nor a shipped case .*did you mean "fig1b"'),
     ({"set": {"drive.frequncy": "60 Hz"}}, "drive.frequncy: unknown key"),

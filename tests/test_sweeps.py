@@ -8,6 +8,8 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +21,16 @@ import pytest
 
 import walkers
 from inputs.dimer import dimer_of
+from inputs.sweep import load_sweep
 from postprocess import read_table, read_trajectory
 from runner import find_engine, finished_run
 from runner.ensemble import finished_place
 from runner.failures import WalkersMet
+from sweeps.conduct import Options
+from sweeps.run import run_sweep
 from sweeps.table import load, thresholds
 from sweeps.together import make_together
+from sweeps.worker import Task, work
 from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml
 
 TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
@@ -63,6 +69,7 @@ def wait_for(condition: Callable[[], Any], seconds: float = 60.0) -> Any:
 def contents_of(out: Path) -> dict[str, dict[str, bytes]]:
     """What each finished run computed: tables, result and dumps, by the names of runs and files."""
     manifests = [*out.glob("*/manifest.json"), *out.glob("ensembles/*/*/manifest.json")]
+    manifests = [path for path in manifests if not any(folder.suffix == ".part" for folder in path.parents)]
     kept = (
         "beads.bin",
         "bridges.pairs.txt",
@@ -130,13 +137,25 @@ def test_a_run_of_a_shared_deck_is_an_ordinary_one(sweep_file: Callable[..., str
     assert (directory / "walkers.parquet").exists()
 
 
-def test_walkers_that_meet_are_taken_apart(tmp_path: Path) -> None:
-    """Walkers of different cases face each other at a distance that the first push of the drive bridges."""
-    drive, start = {"peak_acceleration": "6 g"}, {"spacing": "1.6 mm", "replicates": 2}
-    cases = [make_case(run=TINY, drive=drive, start={**start, "seed": seed}) for seed in range(3)]
+def test_walkers_that_meet_are_taken_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They have room for more than they walk; so what counts as near is made larger than all of it."""
+    monkeypatch.setattr("postprocess.parting.NEAR", 1e3)
     with pytest.raises(WalkersMet):
-        make_together(cases, tmp_path, find_engine())
+        make_together([make_case(run=TINY, start={"seed": seed}) for seed in (1, 2)], tmp_path, find_engine())
     assert not list(tmp_path.glob("ensembles/*"))
+
+
+def test_walkers_that_are_to_stand_close_keep_their_neighbours(sweep_file: Callable[..., str]) -> None:
+    """Replicates 1.6 mm apart run into each other; in a deck with others, 60 mm apart, they would not."""
+    text = '[axes]\nstart.spacing = ["1.6 mm", "60 mm", "70 mm"]'
+    name = sweep_file(
+        text=text, run={**TINY, "cycles": 20}, drive={"peak_acceleration": "6 g"}, start={"replicates": 6}
+    )
+    assert _sweep(name, "-j", "1").returncode == 0
+    frame = load("runs/test")
+    assert list(frame["walkers_met"]) == [True, False, False]
+    assert ["ensembles" in run for run in frame["run"]] == [False, True, True]
+    subprocess.run([PROGRAM, "run", "base.toml"], capture_output=True, check=True)
 
 
 def test_the_table_of_a_sweep(sweep_file: Callable[..., str], in_folder: Path) -> None:
@@ -173,7 +192,8 @@ def test_the_table_of_a_sweep(sweep_file: Callable[..., str], in_folder: Path) -
     told = subprocess.run([PROGRAM, "table", directory, "--json"], capture_output=True, text=True, check=True).stdout
     contents = json.loads(told)
     assert contents["units"]["velocity"] == "m/s"
-    assert [point["velocity"] for point in contents["points"]] == pytest.approx(list(frame["velocity"]), rel=1e-13)
+    for column in ("velocity", "amplitude", "rotation_2"):
+        assert [point[column] for point in contents["points"]] == list(frame[column])
     subprocess.run([PROGRAM, "table", directory, "--to", "table.parquet"], capture_output=True, check=True)
     table = pq.read_table("table.parquet")
     assert table.schema.field("velocity").metadata[b"unit"] == b"m/s"
@@ -230,20 +250,17 @@ def test_a_failing_point_does_not_stop_the_others(
 
 
 def test_lost_beads_in_a_shared_deck_cost_only_their_own_point(sweep_file: Callable[..., str], in_folder: Path) -> None:
-    """Walkers given no room: the deck fails, its halves are tried, and the three others are finished."""
-    text = """
-    [set]
-    drive.peak_acceleration = "10 g"
-    [[zip]]
-    start.seed    = [1, 2, 3, 4]
-    start.spacing = ["40 mm", "40 mm", "1.61 mm", "40 mm"]
-    start.replicates = [1, 1, 4, 1]
-    """
-    name = sweep_file(text=text, run={**TINY, "cycles": 30, "settling_cycles": 2})
-    done = _sweep(name, "-j", "1")
+    """An engine that loses a bead of whoever has a restitution of 0.61, and takes all down that are in the deck."""
+    front = in_folder / "front"
+    loses = "s/^run /group gone id 3\\ndelete_atoms group gone compress no\\nrun /"
+    front.write_text(f'#!/bin/sh\ngrep -qF " 0.61 " walker.lig && sed -i "{loses}" walker.lig\nexec liggghts "$@"\n')
+    front.chmod(0o755)
+    name = sweep_file(text="[axes]\ncontact.restitution = [0.3, 0.5, 0.61, 0.7]")
+    assert _sweep(name, "-j", "1", "--engine", str(front)).returncode == 1
     frame = load(in_folder / "runs" / "test")
-    assert done.returncode == int((frame["status"] == "failed").any())
-    assert list(frame["status"][[0, 1, 3]]) == ["finished"] * 3
+    assert list(frame["status"]) == ["finished", "finished", "failed", "finished"]
+    assert list(frame["lost"]) == [0, 0, 1, 0]
+    assert frame["reason"][2] == "BeadsLost"
 
 
 def test_a_point_that_fails_at_first_is_retried(sweep_file: Callable[..., str], in_folder: Path) -> None:
@@ -398,6 +415,64 @@ def test_a_damaged_table_is_made_anew(sweep_file: Callable[..., str], in_folder:
     before = load(in_folder / "runs" / "test")
     (Path(before["run"][0]) / "result.json").write_text("{")
     pd.testing.assert_frame_equal(load(in_folder / "runs" / "test"), before)
+
+
+def test_a_run_that_was_cut_since_is_told_and_stops_nothing(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    descend = '[descend]\nfrom = "3 g"\nto = "2 g"\nstep = "0.5 g"\nuntil_below = "1 um/s"'
+    name = sweep_file(text=descend)
+    assert _sweep(name).returncode == 0
+    run = Path(load("runs/test")["run"][1])
+    (run / "result.json").unlink()
+    os.truncate(run / "beads.bin", 100)
+    frame = load("runs/test")
+    assert list(frame["status"]) == ["finished", "failed", "finished"]
+    assert frame["reason"][1] == "DamagedRunError"
+    assert _sweep(name).returncode == 0
+    subprocess.run([PROGRAM, "status", "runs"], capture_output=True, check=True)
+    (run / "manifest.json").unlink()
+    assert _sweep(name).returncode == 0
+    assert set(load("runs/test")["status"]) == {"finished"}
+
+
+def test_a_sweep_from_within_its_directory(sweep_file: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> None:
+    name = sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g"]')
+    _sweep(name)
+    monkeypatch.chdir("runs/test")
+    assert list(load(".")["status"]) == ["finished"]
+    assert Path(load(".")["run"][0]).is_dir()
+
+
+def test_a_folder_of_the_name_of_a_shipped_sweep(in_folder: Path) -> None:
+    (in_folder / "fig3").mkdir()
+    assert _sweep("fig3", "--dry-run", "--out", ".").returncode == 0
+
+
+def test_a_column_of_numbers_and_words(sweep_file: Callable[..., str]) -> None:
+    name = sweep_file(text='[axes]\nrun.time_step = ["auto", "1 us"]')
+    _sweep(name)
+    told = subprocess.run([PROGRAM, "table", "runs/test", "--parquet"], capture_output=True, check=True).stdout
+    assert pq.read_table(io.BytesIO(told)).column("run.time_step").to_pylist() == ["auto", "1.0"]
+
+
+def test_two_sweeps_of_one_process_do_not_stop_each_other(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    short = load_sweep(sweep_file("short", '[axes]\ndrive.peak_acceleration = ["2 g"]'))
+    (in_folder / "base.toml").write_text(to_toml(document(run={**TINY, "cycles": 60})))
+    (in_folder / "long.toml").write_text(
+        'case = "base.toml"\n[axes]\ndrive.peak_acceleration = ["3 g", "4 g", "5 g"]\n'
+    )
+    long = load_sweep("long.toml")
+    with ThreadPoolExecutor(2) as pool:
+        ends = [pool.submit(run_sweep, sweep, in_folder / "runs", Options(1)) for sweep in (long, short)]
+        assert [end.result()[1] for end in ends] == [[], []]
+    assert set(load(in_folder / "runs" / "long")["status"]) == {"finished"}
+
+
+def test_a_worker_of_another_version_refuses(tmp_path: Path) -> None:
+    engine = find_engine()
+    task = Task("", ("test-0123456789ab",), (make_case(run=TINY),), tmp_path, str(engine.path), engine.sha256, None)
+    assert work(task).failure == "ProgramDiffers"
+    assert work(replace(task, sha256="0" * 64)).failure == "EngineDiffers"
+    assert not list(tmp_path.iterdir())
 
 
 def test_folders_that_are_no_sweeps(tmp_path: Path) -> None:
