@@ -61,7 +61,6 @@ def registry() -> UnitRegistry[float]:
     return units
 
 
-@lru_cache(maxsize=4096)  # a sweep reads the same few texts for thousands of points
 def parse_quantity(text: str, kind: Kind) -> float:
     """Read a quantity.
 
@@ -85,21 +84,27 @@ def parse_quantity(text: str, kind: Kind) -> float:
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:
         raise ValueError(kind.expectation)
-    symbol = _GRAM_SYMBOL.sub("gee", match["unit"]) if kind is ACCELERATION else match["unit"]
+    # Rounded: 4.0 g/cm³ is 4000 kg/m³, not 3999.9999999999995.
+    value = float(f"{float(match['number']) * _si_units_in(match['unit'], kind):.15g}")
+    if value != 0.0 and not kind.smallest <= abs(value) <= kind.largest:
+        raise ValueError(f"{kind.expectation}; it must lie within {kind.smallest:g} and {kind.largest:g} {kind.unit}")
+    return value
+
+
+@lru_cache(maxsize=1024)  # a sweep reads thousands of quantities in the same few units
+def _si_units_in(symbol: str, kind: Kind) -> float:
+    """How many of the kind's SI unit a unit is."""
     units = registry()
     try:
-        unit = units.parse_units(symbol)
-        converted = units.Quantity(float(match["number"]), unit).to(kind.unit).magnitude
-        value = float(f"{converted:.15g}")  # 4.0 g/cm³ is 4000 kg/m³, not 3999.9999999999995
+        unit = units.parse_units(_GRAM_SYMBOL.sub("gee", symbol) if kind is ACCELERATION else symbol)
+        factor = float(units.Quantity(1.0, unit).to(kind.unit).magnitude)
     except Exception as error:  # pint's parser raises a dozen types, the tokenizer's errors among them
         raise ValueError(kind.expectation) from error
     if kind is ANGLE and str(unit) not in _ANGLE_UNITS:
         raise ValueError(kind.expectation)
     if kind is FREQUENCY and "radian" in str(units.Quantity(1.0, unit).to_root_units().units):
         raise ValueError(kind.expectation + " (cycles a second, not an angular frequency)")
-    if value != 0.0 and not kind.smallest <= abs(value) <= kind.largest:
-        raise ValueError(f"{kind.expectation}; it must lie within {kind.smallest:g} and {kind.largest:g} {kind.unit}")
-    return value
+    return factor
 
 
 def split_quantity(text: str) -> tuple[float, str]:

@@ -11,7 +11,8 @@ import heapq
 from bisect import bisect_left
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
+from itertools import pairwise
+from math import ceil
 
 from inputs.case import WalkerCase
 from runner.cost import predicted_seconds
@@ -73,15 +74,12 @@ def pack(cases: Mapping[int, WalkerCase], workers: int, longest_seconds: float =
 
 def _parted(group: Sequence[int], cases: Mapping[int, WalkerCase], longest: float) -> list[PlannedDeck]:
     """A group in the fewest decks that keep to the bounds; a point by itself may exceed them."""
-    # Walkers of the points before each; the group shares the number of steps.
-    before = list(accumulate((cases[number].start.replicates for number in group), initial=0))
-    case = cases[group[0]]
+    most_replicates = max(cases[number].start.replicates for number in group)
 
     def allowed(parts: int) -> bool:
-        edges = _edges(len(group), parts)
-        walkers = max(before[end] - before[start] for start, end in pairwise(edges))
-        points = -(-len(group) // parts)
-        seconds = predicted_seconds(case, walkers)
+        points = ceil(len(group) / parts)
+        walkers = points * most_replicates
+        seconds = predicted_seconds(cases[group[0]], walkers)  # a group shares the number of steps
         return points == 1 or (points <= MOST_POINTS and walkers <= MOST_WALKERS and seconds <= longest)
 
     fewest = bisect_left(range(1, len(group)), True, key=allowed) + 1
@@ -90,11 +88,8 @@ def _parted(group: Sequence[int], cases: Mapping[int, WalkerCase], longest: floa
 
 def _parts(group: Sequence[int], count: int) -> list[Sequence[int]]:
     """A sequence in so many consecutive parts, of equal lengths as far as that goes."""
-    return [group[start:end] for start, end in pairwise(_edges(len(group), count))]
-
-
-def _edges(length: int, count: int) -> list[int]:
-    return [length * number // count for number in range(count + 1)]
+    edges = [len(group) * number // count for number in range(count + 1)]
+    return [group[start:end] for start, end in pairwise(edges)]
 
 
 def _deck(points: Sequence[int], cases: Mapping[int, WalkerCase]) -> PlannedDeck:

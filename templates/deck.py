@@ -279,7 +279,7 @@ def _environment() -> Environment:
         return repr(float(value))
 
     def numbers(values: Iterable[float]) -> str:
-        return " ".join(number(value) for value in values)
+        return " ".join([repr(float(value)) for value in values])
 
     environment.filters.update(number=number, numbers=numbers, any=any, zip=zip)
     return environment
