@@ -99,6 +99,18 @@ def largest_normal_drag(dynamic_viscosity: float, reduced_radius: float, minimum
     return 6.0 * pi * dynamic_viscosity * reduced_radius / minimum_separation_ratio
 
 
+def largest_tangential_drag(dynamic_viscosity: float, reduced_radius: float, minimum_separation_ratio: float) -> float:
+    """Coefficient of the tangential viscous force of a touching bridge, 6πηR* (8/15 ln(1/ε) + 0.9588), N s/m.
+
+    Parameters
+    ----------
+    dynamic_viscosity, reduced_radius, minimum_separation_ratio
+        As for `largest_normal_drag`.
+    """
+    stokes = 6.0 * pi * dynamic_viscosity * reduced_radius
+    return stokes * (8.0 / 15.0 * log(1.0 / minimum_separation_ratio) + 0.9588)
+
+
 def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -> float:
     """Overlap at which the Hertz force 4/3 E* √R* δ^(3/2) carries a load, m.
 

@@ -1,0 +1,196 @@
+"""The theory against the paper's numbers, against itself, and against the engine."""
+
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy
+
+from inputs import load_case
+from inputs.case import WalkerCase
+from inputs.dimer import Dimer
+from postprocess.result import read_result
+from sweeps.conduct import Options
+from sweeps.run import run_sweep
+from sweeps.table import thresholds
+from tests.conftest import PROGRAM, document, make_case, to_toml
+from theory.friction import Friction
+from theory.mathieu import alignment, is_stable, largest_stable_v
+from theory.motion import Walker, walk
+from theory.prediction import motion_of, threshold
+from theory.quasistatic import detachment, mean_velocity, mean_velocity_closed_form
+
+RUBY = Dimer((0.3e-3, 0.2e-3), 4000.0, 19.2e-3)
+
+# sin δ, Γ0, v̄ in mm/s with κ = 0.033 s/mm and equal densities.
+TABLE = [
+    (0.05, 0.5, 0.48364),
+    (0.1, 0.5, 0.99159),
+    (0.2, 0.1, 0.08119),
+    (0.2, 0.3, 0.75011),
+    (0.2, 0.5, 2.20005),
+    (1 / 3, 0.5, 4.88017),
+]
+
+
+@pytest.mark.parametrize("model", [mean_velocity, mean_velocity_closed_form])
+@pytest.mark.parametrize(("sin_delta", "gamma0", "velocity"), TABLE)
+def test_velocities_of_the_papers_model(
+    model: Callable[..., Any], sin_delta: float, gamma0: float, velocity: float
+) -> None:
+    assert float(model(gamma0, sin_delta)) * 1e3 == pytest.approx(velocity, abs=6e-6)
+
+
+def test_matrices_and_closed_form_are_the_same_model() -> None:
+    gamma, sine = np.meshgrid(np.linspace(0.01, 2.5, 60), np.linspace(-0.6, 0.6, 61))
+    matrices, closed = mean_velocity(gamma, sine), mean_velocity_closed_form(gamma, sine)
+    np.testing.assert_array_equal(np.isnan(matrices), np.isnan(closed))
+    assert 0.2 < np.isnan(matrices).mean() < 0.8
+    np.testing.assert_allclose(matrices, closed, rtol=1e-9, atol=1e-12)
+
+
+def test_matrices_and_closed_form_agree_identically() -> None:
+    """Symbolically, for beads of equal density: the difference of the two is zero on c² = 1 - s²."""
+    s, mu, gamma, c = sympy.symbols("s mu gamma c")
+    heavy, light = (1 + mu) / 2, (1 - mu) / 2
+    matrix = sympy.Matrix([[-light * s, heavy * s, -1], [light * s, -heavy * s, 1], [light, -heavy, s]]) / c
+    one, two = 5 / (1 + mu), 5 / (1 - mu)
+    gains = sympy.Matrix([[1 + one, 1, one], [1, 1 + two, two], [one, two, one + two]])
+    unit = sympy.simplify(gains.inv() * sympy.Matrix([-1, -1, 0]))
+    assert unit == sympy.Matrix([-1, -1, 1]) / 2
+    velocity = 0
+    for force in (gamma / sympy.sqrt(2), -gamma / sympy.sqrt(2)):
+        normal = sympy.Matrix([1 + s, 1 - s, c**2 / 2]) + matrix * unit * force
+        sliding = [unit[contact] * force / normal[contact] for contact in range(3)]
+        velocity += (sliding[0] + sliding[1] - sliding[2]) / 4
+    first = c**3 * (1 + mu * s)
+    first /= (c**2 * (1 + s**2) - gamma**2 / 8 * (1 + mu * s) ** 2) ** 2 - (2 * c**2 * s) ** 2
+    second = 4 * c * (1 + s**2) / ((c**6 - gamma**2 / 2 * (mu + s) ** 2) * (1 + 3 * s**2))
+    difference = sympy.numer(sympy.together(velocity - gamma**2 * s / 4 * (first + second)))
+    on_circle = sympy.rem(sympy.expand(difference), c**2 - (1 - s**2), c)
+    assert sympy.simplify(on_circle.subs(mu, (3 * s + s**3) / (1 + 3 * s**2))) == 0
+
+
+def test_exchanged_beads_walk_the_other_way() -> None:
+    np.testing.assert_allclose(mean_velocity(0.5, -0.2), -mean_velocity(0.5, 0.2), rtol=1e-12)
+    assert float(mean_velocity(0.5, 0.0)) == 0.0
+
+
+def test_velocities_are_none_where_a_contact_opens() -> None:
+    end = float(detachment(1 / 3).gamma)
+    assert np.isfinite(mean_velocity(np.sqrt(2.0) * end * 0.999, 1 / 3))
+    assert np.isnan(mean_velocity(np.sqrt(2.0) * end * 1.001, 1 / 3))
+    assert np.isnan(mean_velocity(3.5, 1 / 3))
+
+
+def test_the_motion_under_the_papers_friction_is_quasistatic_at_low_frequency() -> None:
+    """A sine instead of a square wave: the mean over its phases of what steady forces give."""
+    gamma0, phases = 0.3, (np.arange(4000) + 0.5) / 4000
+    forces = gamma0 * np.cos(2.0 * np.pi * phases)
+    expected = np.mean([float(mean_velocity(abs(force) * np.sqrt(2.0), 0.2)) for force in forces])
+    found = walk(
+        Walker.of_dimer(RUBY), Friction(linear=33.0), 2.0, RUBY.peak_acceleration(gamma0), steps_per_cycle=1600
+    )
+    assert float(found.velocity[0]) == pytest.approx(expected, rel=0.01)
+
+
+def test_a_static_coefficient_raises_the_threshold() -> None:
+    accelerations = np.linspace(1.0, 30.0, 59)
+    walker = Walker.of_dimer(RUBY)
+    dry = walk(walker, Friction.coulomb(0.07, 0.07), 80.0, accelerations)
+    sticky = walk(walker, Friction(kinetic=0.07, static=0.14, stribeck_velocity=1e-3), 80.0, accelerations)
+    first, second = (accelerations[np.argmax(np.abs(motion.velocity) > 1e-6)] for motion in (dry, sticky))
+    assert second > 1.5 * first
+
+
+def test_many_walkers_are_what_each_is_alone() -> None:
+    accelerations = np.linspace(5.0, 80.0, 12)
+    friction, walker = Friction.coulomb(0.1, 0.05), Walker.of_dimer(RUBY)
+    together = walk(walker, friction, 80.0, accelerations, cycles=6).velocity
+    alone = [float(walk(walker, friction, 80.0, a, cycles=6).velocity[0]) for a in accelerations]
+    np.testing.assert_allclose(together, alone, atol=2e-6)
+
+
+@pytest.mark.parametrize("friction", [0.05, 0.1, 0.3])
+def test_the_threshold_of_coulomb_friction_does_not_depend_on_the_frequency(friction: float) -> None:
+    contact = {"friction": {"bead_bead": friction, "bead_wall": friction}}
+    found = [threshold(make_case(contact=contact, drive={"frequency": f}), viscous=False) for f in ("60 Hz", "90 Hz")]
+    assert found[0] == pytest.approx(found[1], rel=0.01)  # moving is a speed, and speeds go as 1/f
+    assert 0.5 * friction < found[0] < 1.5 * friction
+
+
+@pytest.mark.parametrize("friction", [0.05, 0.1, 0.3])
+def test_theory_and_engine_agree_on_the_threshold(tmp_path: Path, friction: float) -> None:
+    """The engine's walkers are lowered in steps of a tenth of the predicted threshold."""
+    from inputs.sweep import expand
+
+    tables = document(contact={"friction": {"bead_bead": friction, "bead_wall": friction}})
+    tables["run"] = {"cycles": 20, "settling_cycles": 10}
+    (tmp_path / "base.toml").write_text(to_toml(tables))
+    expected = threshold(make_case(contact={"friction": {"bead_bead": friction, "bead_wall": friction}}))
+    step = 0.1 * expected
+    descend = {"key": "drive.gamma0", "from": 14 * step, "to": 6 * step, "step": step, "until_below": "2 um/s"}
+    sweep = expand({"case": "base.toml", "descend": descend}, source="test", name="test", folder=tmp_path)
+    record, failures = run_sweep(sweep, tmp_path / "runs", Options(1))
+    assert not failures
+    (end,) = thresholds(record.directory).to_dict("records")
+    assert end["at_rest"] < end["moving"]
+    assert (end["at_rest"] + end["moving"]) / 2.0 == pytest.approx(expected, rel=0.3)
+
+
+@pytest.mark.parametrize("frequency", ["60 Hz", "90 Hz"])
+@pytest.mark.parametrize("acceleration", ["2 g", "4 g"])
+def test_theory_and_engine_agree_on_the_speed(
+    run_directory: Callable[..., Path], frequency: str, acceleration: str
+) -> None:
+    """Coulomb's friction and the drag of the bridges, beads in contact: two independent ways to the same walker."""
+    drive = {"frequency": frequency, "peak_acceleration": acceleration}
+    case = make_case(drive=drive)
+    result = read_result(run_directory(case))
+    motion = motion_of(case)
+    assert float(motion.velocity[0]) == pytest.approx(result["velocity"]["mean"], rel=0.08)
+    assert float(motion.rotation[0, 0]) == pytest.approx(result["rotation"]["bead_1"], rel=0.08)
+
+
+def test_mathieu_parameters_of_the_papers_drives() -> None:
+    """All below the 0.4 that the paper states, within the stable interval of ±0.45."""
+    large = Dimer((0.6e-3, 0.3e-3), 4000.0, 19.2e-3)
+    found = [alignment(dimer, f, 98.0).v for dimer, f in ((RUBY, 60.0), (RUBY, 80.0), (large, 80.0))]
+    assert found == pytest.approx([0.35, 0.20, 0.17], abs=0.006)
+    assert largest_stable_v() == pytest.approx(0.454, abs=5e-4)
+    for name in ("fig1b", "fig4a", "fig4b"):
+        case: WalkerCase = load_case(name)
+        one = alignment(Dimer(case.beads.radii, 4000.0, 19.2e-3), case.drive.frequency, case.drive.peak_acceleration)
+        assert one.stable
+        assert one.v < 0.4
+
+
+def test_stability_of_the_mathieu_equation_is_that_of_its_solutions() -> None:
+    from scipy.integrate import solve_ivp
+
+    def largest(start: tuple[float, float], u: float, v: float) -> float:
+        def slope(x: float, y: list[float]) -> list[float]:
+            return [y[1], -(u - 4.0 * v * np.cos(2.0 * x)) * y[0]]
+
+        return float(np.abs(solve_ivp(slope, (0.0, 60.0 * np.pi), start, rtol=1e-8).y).max())
+
+    for u, v in ((0.0, 0.3), (0.0, 0.5), (0.5, 0.1), (-0.1, 0.3), (-0.5, 0.3), (1.0, 0.2), (2.5, 0.4)):
+        growth = max(largest(start, u, v) for start in ((1.0, 0.0), (0.0, 1.0)))
+        assert bool(is_stable(u, v)) == (growth < 1e3), (u, v)
+
+
+def test_the_program_prints_theory_beside_the_engine(in_folder: Path) -> None:
+    (in_folder / "test.toml").write_text(to_toml(document(run={"cycles": 20, "settling_cycles": 10})))
+    told = subprocess.run([PROGRAM, "theory", "test.toml"], capture_output=True, text=True, check=True).stdout
+    assert "not run" in told
+    subprocess.run([PROGRAM, "run", "test.toml"], capture_output=True, check=True)
+    told = subprocess.run([PROGRAM, "theory", "test.toml", "--json"], capture_output=True, text=True, check=True).stdout
+    contents = json.loads(told)
+    assert contents["engine"]["velocity"]["mean"] == pytest.approx(contents["viscous"]["velocity"], rel=0.08)
+    (in_folder / "up.toml").write_text(to_toml(document(drive={"axis": "z"})))
+    done = subprocess.run([PROGRAM, "theory", "up.toml"], capture_output=True, text=True, check=False)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)

@@ -1,0 +1,185 @@
+"""What the theory says of a case: the paper's model, the same motion under Coulomb's law, where it ends, alignment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from inputs.case import WalkerCase
+from inputs.dimer import dimer_of
+from inputs.forces import largest_tangential_drag
+from theory.friction import Friction
+from theory.mathieu import alignment, largest_stable_v
+from theory.motion import FloatArray, Motion, Walker, walk
+from theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, detachment, mean_velocity
+
+MOVING = 1e-6
+"""A walker faster than this, m/s, moves."""
+_TRIALS = 33
+_ROUNDS = 3
+
+
+def bridge_drag(case: WalkerCase) -> FloatArray:
+    """Coefficient of the tangential viscous force at each contact as in the engine, N s/m, shape (3,).
+
+    Lubrication of touching bridges (Nase et al., in Shi and McCarthy 2008); a wall is an equal sphere, twice.
+    """
+
+    def drag(reduced_radius: float) -> float:
+        contact = case.contact
+        return largest_tangential_drag(case.liquid.dynamic_viscosity, reduced_radius, contact.minimum_separation_ratio)
+
+    return np.array([*(2.0 * drag(radius / 2.0) for radius in case.beads.radii), drag(dimer_of(case).reduced_radius)])
+
+
+def friction_of(case: WalkerCase, *, viscous: bool) -> Friction:
+    """Coulomb's law with a case's coefficients, with or without the drag of its bridges."""
+    contact = case.contact
+    dry = [contact.friction_bead_wall, contact.friction_bead_wall, contact.friction_bead_bead]
+    return Friction(kinetic=np.array(dry)[:, None], viscous=bridge_drag(case)[:, None] if viscous else 0.0)
+
+
+def motion_of(case: WalkerCase, *, viscous: bool = True) -> Motion:
+    """The motion of a case's walker, aligned with the drive, with the capillary forces that the engine gives it.
+
+    Parameters
+    ----------
+    case
+        Driven along the substrate.
+    viscous
+        Whether the bridges' drag acts beside friction.
+
+    Raises
+    ------
+    ValueError
+        If the drive is not along the substrate.
+    """
+    _check(case)
+    return walk(
+        Walker.of_case(case), friction_of(case, viscous=viscous), case.drive.frequency, case.drive.peak_acceleration
+    )
+
+
+def _check(case: WalkerCase) -> None:
+    if case.drive.axis == "z":
+        raise ValueError("the theory is one of drives along the substrate")
+
+
+def threshold(case: WalkerCase, *, viscous: bool = True) -> float:
+    """Γc: the smallest Γ0 at which a case's walker moves at the case's frequency.
+
+    Parameters
+    ----------
+    case, viscous
+        As for `motion_of`.
+
+    Returns
+    -------
+    float
+        To a part in ten thousand of the range in which contacts stay closed; NaN if it does not move there.
+    """
+    _check(case)
+    dimer, walker, friction = dimer_of(case), Walker.of_case(case), friction_of(case, viscous=viscous)
+    low, high = 0.0, float(detachment(dimer.sin_delta).gamma)
+    for _ in range(_ROUNDS):
+        trials = np.linspace(low, high, _TRIALS)
+        accelerations = np.array([dimer.peak_acceleration(float(gamma)) for gamma in trials])
+        moves = np.abs(walk(walker, friction, case.drive.frequency, accelerations).velocity) > MOVING
+        if not moves.any():
+            return float("nan")
+        first = int(np.argmax(moves))
+        low, high = float(trials[max(first - 1, 0)]), float(trials[first])
+    return (low + high) / 2.0
+
+
+def predict(case: WalkerCase) -> dict[str, Any]:
+    """Everything that ``walkers theory`` prints, SI units; None where the model does not hold, with the reason.
+
+    Parameters
+    ----------
+    case
+        Driven along the substrate.
+
+    Raises
+    ------
+    ValueError
+        If it is not.
+    """
+    dimer = dimer_of(case)
+    gamma0 = dimer.gamma0(case.drive.peak_acceleration)
+    end = detachment(dimer.sin_delta)
+    linear = float(mean_velocity(gamma0, dimer.sin_delta))
+    mathieu = alignment(dimer, case.drive.frequency, case.drive.peak_acceleration)
+    models = {name: motion_of(case, viscous=viscous) for name, viscous in (("coulomb", False), ("viscous", True))}
+    return {
+        "gamma0": gamma0,
+        "sin_delta": dimer.sin_delta,
+        "paper": {
+            "friction": FRICTION_OF_THE_PAPER,
+            "velocity": _number(linear),
+            "reason": None if np.isfinite(linear) else f"{CONTACTS[int(end.contact)]} would open",
+        },
+        **{
+            name: {
+                "velocity": _number(float(motion.velocity[0])),
+                "rotation": [float(value) for value in motion.rotation[:, 0]],
+                "sliding": [float(value) for value in motion.sliding[:, 0]],
+                "reason": _reason(motion),
+                "threshold": _number(threshold(case, viscous=name == "viscous")),
+            }
+            for name, motion in models.items()
+        },
+        "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},
+        "alignment": {"u": mathieu.u, "v": mathieu.v, "stable": mathieu.stable, "largest_stable_v": largest_stable_v()},
+    }
+
+
+def _number(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _reason(motion: Motion) -> str | None:
+    if not motion.opened[0]:
+        return None
+    return f"{CONTACTS[int(np.argmin(motion.smallest_normal_force[:, 0]))]} would open"
+
+
+def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
+    """A prediction as text, beside the engine's result where there is one; speeds in mm/s."""
+    paper, end, mathieu = prediction["paper"], prediction["detachment"], prediction["alignment"]
+    lines = [
+        f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}",
+        f"  paper's model, κ = {paper['friction'] * 1e-3:g} s/mm      {_speed(paper)}",
+        f"  Coulomb friction               {_speed(prediction['coulomb'])}{_details(prediction['coulomb'])}",
+        f"  Coulomb friction and bridges   {_speed(prediction['viscous'])}{_details(prediction['viscous'])}",
+    ]
+    if result is not None:
+        rotation, sliding = result["rotation"], result["sliding"]
+        found = {
+            "velocity": result["velocity"]["mean"],
+            "rotation": [rotation["bead_1"], rotation["bead_2"]],
+            "sliding": [sliding[f"contact_{number}"] for number in (1, 2, 3)],
+        }
+        lines.append(f"  engine                         {_speed(found)}{_details(found)}")
+    else:
+        lines.append("  engine                         not run; do: walkers run CASE")
+    stays = "small angles stay small" if mathieu["stable"] else "small angles grow"
+    if mathieu["v"] == mathieu["u"] == 0.0:
+        stays = "no tendency to the axis"
+    lines += [
+        f"  detachment  {end['contact']}, from a steady force of Γ = {end['gamma']:.3g}",
+        f"  alignment   Mathieu V = {mathieu['v']:.3g}, stable up to {mathieu['largest_stable_v']:.3g}: {stays}",
+    ]
+    return "\n".join(lines)
+
+
+def _speed(model: dict[str, Any]) -> str:
+    return f"{model['velocity'] * 1e3:8.3f} mm/s" if model["velocity"] is not None else f"none: {model['reason']}"
+
+
+def _details(model: dict[str, Any]) -> str:
+    rotation = ", ".join(f"{value * 1e3:.2f}" for value in model["rotation"])
+    told = f"; beads rotate at {rotation}, large one slides at {model['sliding'][0] * 1e3:.2f}"
+    gamma = model.get("threshold")
+    return told + (f"; moves from Γc = {gamma:.3f}" if gamma is not None else "")

@@ -1,0 +1,167 @@
+"""The paper's model: a dimer whose beads stay in contact, under friction linear in the sliding velocity.
+
+Symbols are those of Khan et al., *Self-assembled granular walkers*: bead 1 is the large one,
+sin δ = (R1 - R2)/(R1 + R2) and μ = (m1 - m2)/M. Contacts 1 and 2 are the beads on the substrate, 3 is bead on bead; x
+points from bead 2 to bead 1. Forces are in units of 4πγR̄, so that a drive of Γ0 pulls with Γ0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+FRICTION_OF_THE_PAPER = 33.0
+"""κ of F∥ = κ v F, s/m: 0.033 s/mm, fitted in the paper to its Figs. 2 and 3."""
+CONTACTS = ("bead 1 on the substrate", "bead 2 on the substrate", "bead on bead")
+_ALONG = np.array([1.0, 1.0, 0.0])
+_QUASISTATIC = np.sqrt(0.5)
+
+
+def mass_asymmetry(sin_delta: npt.ArrayLike) -> FloatArray:
+    """μ of two beads of equal density."""
+    s = np.asarray(sin_delta, dtype=np.float64)
+    asymmetry: FloatArray = (3.0 * s + s**3) / (1.0 + 3.0 * s**2)
+    return asymmetry
+
+
+def _matrix(rows: list[list[FloatArray]]) -> FloatArray:
+    return np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
+
+
+def normal_force_matrix(sin_delta: npt.ArrayLike, asymmetry: npt.ArrayLike) -> FloatArray:
+    """The matrix D of F = F0 + D F∥ (their Eq. 2), from the balance of forces with fixed distances.
+
+    Parameters
+    ----------
+    sin_delta, asymmetry
+        sin δ and μ, of the same shape (…).
+
+    Returns
+    -------
+    ndarray, shape (…, 3, 3)
+    """
+    s, mu = np.broadcast_arrays(np.asarray(sin_delta, np.float64), np.asarray(asymmetry, np.float64))
+    heavy, light, one = (1.0 + mu) / 2.0, (1.0 - mu) / 2.0, np.ones_like(s)
+    rows = [[-light * s, heavy * s, -one], [light * s, -heavy * s, one], [light, -heavy, s]]
+    matrix: FloatArray = _matrix(rows) / np.sqrt(1.0 - s**2)[..., None, None]
+    return matrix
+
+
+def inertia_matrix(asymmetry: npt.ArrayLike) -> FloatArray:
+    """The matrix G of M dv/dt = -M a (1, 1, 0) - G F∥ (their Eq. 3), solid spheres.
+
+    Parameters
+    ----------
+    asymmetry
+        μ, of shape (…).
+
+    Returns
+    -------
+    ndarray, shape (…, 3, 3)
+    """
+    mu = np.asarray(asymmetry, np.float64)
+    first, second, one = 5.0 / (1.0 + mu), 5.0 / (1.0 - mu), np.ones_like(mu)
+    rows = [[1.0 + first, one, first], [one, 1.0 + second, second], [first, second, first + second]]
+    return _matrix(rows)
+
+
+def forces_at_rest(sin_delta: npt.ArrayLike) -> FloatArray:
+    """F0, shape (…, 3): the normal forces at rest that balance the capillary ones; perfect wetting, no weight."""
+    s = np.asarray(sin_delta, np.float64)
+    forces: FloatArray = np.stack([1.0 + s, 1.0 - s, (1.0 - s**2) / 2.0], axis=-1)
+    return forces
+
+
+def _friction_forces(sin_delta: FloatArray) -> FloatArray:
+    """F∥ under a steady force of 1 along -x, shape (…, 3): inertia alone decides, whatever the friction law."""
+    gains = inertia_matrix(mass_asymmetry(sin_delta))
+    forces: FloatArray = np.linalg.solve(gains, np.broadcast_to(-_ALONG, (*sin_delta.shape, 3))[..., None])[..., 0]
+    return forces
+
+
+@dataclass(frozen=True)
+class Detachment:
+    """Where the model ends: at a larger peak force a contact's normal force reaches zero.
+
+    Attributes
+    ----------
+    gamma : ndarray, shape (…)
+        The steady force, in units of 4πγR̄, at which it does.
+    contact : ndarray of int, shape (…)
+        Which one, a place in `CONTACTS`.
+    """
+
+    gamma: FloatArray
+    contact: npt.NDArray[np.int64]
+
+
+def detachment(sin_delta: npt.ArrayLike) -> Detachment:
+    """The smallest force along the axis, either way, that pulls a contact open.
+
+    The friction forces that go with a steady force follow from inertia alone, so that this holds for any friction law
+    that can give them.
+
+    Parameters
+    ----------
+    sin_delta
+        sin δ of beads of equal density, shape (…).
+    """
+    s = np.asarray(sin_delta, np.float64)
+    matrix = normal_force_matrix(s, mass_asymmetry(s))
+    slope = np.abs(np.einsum("...ij,...j->...i", matrix, _friction_forces(s)))
+    with np.errstate(divide="ignore"):
+        limits = forces_at_rest(s) / slope
+    return Detachment(limits.min(axis=-1), limits.argmin(axis=-1))
+
+
+def mean_velocity(
+    gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike, friction: float = FRICTION_OF_THE_PAPER
+) -> FloatArray:
+    """Mean velocity for a quasi-static drive of ±Γ0/√2, from the matrices.
+
+    Parameters
+    ----------
+    gamma0, sin_delta
+        Γ0 and sin δ of beads of equal density, of shapes that broadcast.
+    friction
+        κ, s/m.
+
+    Returns
+    -------
+    ndarray
+        m/s, positive toward the large bead; NaN where a contact would open (`detachment`), for there the model does not
+        hold.
+    """
+    gamma, s = np.broadcast_arrays(np.asarray(gamma0, np.float64), np.asarray(sin_delta, np.float64))
+    matrix, rest = normal_force_matrix(s, mass_asymmetry(s)), forces_at_rest(s)
+    unit = _friction_forces(s)
+    sides = []
+    for sign in (1.0, -1.0):
+        parallel = sign * _QUASISTATIC * gamma[..., None] * unit
+        normal = rest + np.einsum("...ij,...j->...i", matrix, parallel)
+        sliding = parallel / (friction * np.where(normal > 0.0, normal, np.nan))
+        sides.append((sliding[..., 0] + sliding[..., 1] - sliding[..., 2]) / 2.0)
+    mean: FloatArray = (sides[0] + sides[1]) / 2.0
+    return mean
+
+
+def mean_velocity_closed_form(
+    gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike, friction: float = FRICTION_OF_THE_PAPER
+) -> FloatArray:
+    """The paper's closed form of `mean_velocity` (the equation with h1 and h2).
+
+    Parameters and result as there; beyond `detachment` it has poles and is NaN here.
+    """
+    gamma, s = np.broadcast_arrays(np.asarray(gamma0, np.float64), np.asarray(sin_delta, np.float64))
+    mu, c = mass_asymmetry(s), np.sqrt(1.0 - s**2)
+    square = gamma**2
+    first = c**3 * (1.0 + mu * s)
+    first /= (c**2 * (1.0 + s**2) - square / 8.0 * (1.0 + mu * s) ** 2) ** 2 - (2.0 * c**2 * s) ** 2
+    second = 4.0 * c * (1.0 + s**2)
+    second /= (c**6 - square / 2.0 * (mu + s) ** 2) * (1.0 + 3.0 * s**2)
+    velocity: FloatArray = square * s / (4.0 * friction) * (first + second)
+    return np.where(_QUASISTATIC * gamma < detachment(s).gamma, velocity, np.nan)

@@ -1,0 +1,29 @@
+"""``walkers theory``: what the models predict for a case."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from typing import Any
+
+from walkers.commands.arguments import Case, Json, Out
+from walkers.pipeline import DEFAULT_OUT
+
+
+def command(case: Case, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
+    """Print what the paper's model and its extensions predict, beside the engine's result if the case was run."""
+    from inputs.errors import InputError, Problem
+    from inputs.reading import load_case
+    from postprocess.result import current_result
+    from runner.failures import EngineMissing
+    from theory.prediction import describe, predict
+    from walkers.pipeline import find_run
+
+    try:
+        prediction = predict(load_case(case))
+    except ValueError as error:
+        raise InputError(case, [Problem("drive.axis", None, str(error))]) from error
+    result: dict[str, Any] | None = None
+    with suppress(InputError, EngineMissing):  # not run yet, or never to be run here
+        result = current_result(find_run(case, out).directory)
+    print(json.dumps({**prediction, "engine": result}, indent=2) if as_json else describe(prediction, result))
