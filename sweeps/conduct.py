@@ -359,7 +359,8 @@ class _Conductor:
         from parsl.executors.high_throughput.errors import ManagerLost, WorkerLost
 
         if isinstance(error, BadStateException):
-            raise ClusterFailed(f"the cluster's jobs fail: {error}") from error
+            first = " ".join(str(error).partition("Error 2:")[0].split())  # the others say the same
+            raise ClusterFailed(f"the cluster's jobs fail: {first}") from error
         if isinstance(error, (ManagerLost, WorkerLost)) and job.losses < _MOST_LOSSES:
             self._hand_out(replace(job, losses=job.losses + 1))
             return None
