@@ -97,10 +97,6 @@ class OpenRun:
     locks: Sequence[int]
     started: float
 
-    def discard(self) -> None:
-        """Give the run up without a trace."""
-        shutil.rmtree(self.directory, ignore_errors=True)
-
     def finish(self, report: EngineReport) -> FinishedRun:
         """Write the manifest, last, and move the directory to its place."""
         made = self.directory

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -35,9 +36,8 @@ def bridge_drag(case: WalkerCase) -> FloatArray:
 
 def friction_of(case: WalkerCase, *, viscous: bool) -> Friction:
     """Coulomb's law with a case's coefficients, with or without the drag of its bridges."""
-    contact = case.contact
-    dry = [contact.friction_bead_wall, contact.friction_bead_wall, contact.friction_bead_bead]
-    return Friction(kinetic=np.array(dry)[:, None], viscous=bridge_drag(case)[:, None] if viscous else 0.0)
+    dry = Friction.coulomb(case.contact.friction_bead_wall, case.contact.friction_bead_bead)
+    return replace(dry, viscous=bridge_drag(case)[:, None]) if viscous else dry
 
 
 def motion_of(case: WalkerCase, *, viscous: bool = True) -> Motion:
