@@ -182,9 +182,15 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[_Workers]:
     sweep = uuid4().hex
     stop = STOPS[sweep] = threading.Event()
     folder = record.directory / "parsl"
-    kernel = parsl.DataFlowKernel(
-        threads(options.workers, folder) if options.site is None else pilots(options.site, folder)
-    )
+    config = threads(options.workers, folder) if options.site is None else pilots(options.site, folder)
+    try:
+        kernel = parsl.DataFlowKernel(config)
+    except Exception as error:  # whatever Parsl raises: an address that this machine does not have, ports in use
+        del STOPS[sweep]
+        told = " ".join(str(error).split())
+        raise ClusterFailed(
+            f"Parsl cannot start ({told}); see {folder}, and [executor] address in the site file"
+        ) from error
     try:
         yield _Workers(parsl.python_app(work, data_flow_kernel=kernel), sweep)
     finally:
