@@ -245,7 +245,10 @@ def _check_key(key: str) -> None:
 def _points(
     file: SweepFile,
 ) -> tuple[tuple[str, ...], list[tuple[Value, ...]], tuple[str | None, ...], Descent | None]:
-    axes = [Axis((key,), tuple((value,) for value in values_of(key, given))) for key, given in _axes(file.axes)]
+    axes = [
+        Axis((key,), tuple((value,) for value in values_of(key, given)))
+        for key, given in flatten(file.axes, is_axis).items()
+    ]
     axes += [zipped(table) for table in file.zip]
     axes += [sampled(table.method, table.points, table.seed, table.ranges) for table in file.sample]
     descent = None
@@ -256,10 +259,6 @@ def _points(
     keys, rows = combinations(axes)
     units = [unit_of(key, [row[number] for row in axis.rows]) for axis in axes for number, key in enumerate(axis.keys)]
     return keys, rows, tuple(units), descent
-
-
-def _axes(tables: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    return list(flatten(tables, is_axis).items())
 
 
 def _descending(table: DescendTable) -> list[Value]:

@@ -46,9 +46,14 @@ def settle_entry(path: Path) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, contents: bytes) -> None:
+    """Write a file."""
     beside = path.with_name(path.name + ".new")
-    with beside.open("w", encoding="utf-8") as file:
-        file.write(text)
+    with beside.open("wb") as file:
+        file.write(contents)
         file.flush()
         os.fsync(file.fileno())
     beside.replace(path)

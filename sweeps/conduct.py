@@ -17,7 +17,7 @@ from uuid import uuid4
 from inputs.case import WalkerCase
 from inputs.errors import WalkersError
 from runner.binary import Engine
-from runner.ensemble import finished_place, finished_places, remove_remains
+from runner.ensemble import remove_remains
 from runner.locks import is_locked
 from sweeps.packing import LONGEST_SECONDS, PlannedDeck, halves, pack, unfinished_parts
 from sweeps.record import SweepRecord, chains, states, velocity_of
@@ -58,6 +58,11 @@ class Options:
     site: Site | None = None
     retries: int = 0
     time_limit: float | None = None
+
+    @property
+    def decks_at_once(self) -> int:
+        """How many decks run at once, here or on the site."""
+        return self.site.workers if self.site else self.workers
 
     @property
     def longest_seconds(self) -> float:
@@ -252,7 +257,10 @@ class _Conductor:
         self.record, self.options, self.parsl, self.engine = record, options, workers, engine
         self.cases: Mapping[int, WalkerCase] = dict(enumerate(cases))
         self.on_progress = on_progress or (lambda _: None)
-        self.finished = set(finished_places(record.out))
+        known = zip(record.runs, states(record), strict=True)
+        finished = [(run, state.directory) for run, state in known if state.status == "finished"]
+        self.places = {run: directory for run, directory in finished if directory is not None}
+        self.finished = set(self.places)
         self.velocities: dict[str, float] = {}
         self.failures: list[Failure] = []
         self.ended: SimpleQueue[tuple[_Job, Future[Report]]] = SimpleQueue()
@@ -260,13 +268,9 @@ class _Conductor:
         self.later: list[tuple[float, _Job]] = []
         self.begin = time.perf_counter()
         self.seconds_done = 0.0
-        self.found = sum(state.status == "finished" for state in states(record))
+        self.found = len(finished)
         self.done = 0
         self.told = 0.0
-
-    @property
-    def workers(self) -> int:
-        return self.options.site.workers if self.options.site else self.options.workers
 
     def run(self) -> list[Failure]:
         for batch in batches(self.record, list(self.cases.values()), self._stopped):
@@ -284,9 +288,8 @@ class _Conductor:
 
     def _stopped(self, point: int) -> bool:
         run = self.record.runs[point]
-        if run in self.finished and run not in self.velocities:
-            place = finished_place(self.record.out, run)
-            self.velocities[run] = velocity_of(place) if place else nan
+        if run in self.places and run not in self.velocities:
+            self.velocities[run] = velocity_of(self.places[run])
         return self.record.descent is not None and self.record.descent.at_rest(self.velocities.get(run, nan))
 
     def _is_finished(self, point: int) -> bool:
@@ -301,7 +304,9 @@ class _Conductor:
             course.unsettled = {point for point in batch if not self._is_finished(point)}
             if course.unsettled:
                 for deck in pack(
-                    {point: self.cases[point] for point in batch}, self.workers, self.options.longest_seconds
+                    {point: self.cases[point] for point in batch},
+                    self.options.decks_at_once,
+                    self.options.longest_seconds,
                 ):
                     for part in unfinished_parts(deck.points, self.cases, self._is_finished):
                         self._hand_out(_Job(part, course))
@@ -380,7 +385,7 @@ class _Conductor:
     def _progress(self) -> Progress:
         running = sum(
             len(job.deck.points)
-            for job in list(self.out_there)[: 4 * self.workers]
+            for job in list(self.out_there)[: 4 * self.options.decks_at_once]
             if is_locked(self.record.out / self.record.runs[job.deck.points[0]])
         )
         waiting = sum(job.deck.seconds for job in [*self.out_there, *(job for _, job in self.later)])

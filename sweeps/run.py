@@ -104,16 +104,15 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     cases = list(sweep.cases())
     record = describe_sweep(sweep, cases, binary, out)
     statuses = [state.status for state in states(record)]
-    workers = options.site.workers if options.site else options.workers
     numbered = dict(enumerate(cases))
     # The points of a descent come one after the other, so that few of them can share a deck.
     packed = [deck for point in numbered for deck in pack({point: cases[point]}, 1)] if record.descent else None
     decks = [
         part
-        for deck in packed or pack(numbered, workers, options.longest_seconds)
+        for deck in packed or pack(numbered, options.decks_at_once, options.longest_seconds)
         for part in unfinished_parts(deck.points, numbered, lambda point: statuses[point] in _SETTLED)
     ]
-    return SweepPlan(record, cases, binary, decks, statuses, workers)
+    return SweepPlan(record, cases, binary, decks, statuses, options.decks_at_once)
 
 
 def run_sweep(

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from inputs.errors import InputError, Problem
-from runner.files import write_text
+from postprocess.tables import WALKERS
+from runner.files import write_bytes
 from sweeps.record import (
     DERIVED,
     DamagedRunError,
@@ -23,8 +24,6 @@ from sweeps.record import (
 if TYPE_CHECKING:
     import pandas as pd
 
-_CONTACTS = "contacts 1, 2: beads on the substrate, 3: bead on bead"
-
 RESULTS = {
     "velocity": ("m/s", "mean over the walkers, along the heading, positive toward the large bead"),
     "smallest": ("m/s", "velocity of the slowest walker"),
@@ -32,14 +31,8 @@ RESULTS = {
     "standard_error": ("m/s", "of the velocity"),
     "right_facing": ("m/s", "mean velocity of the walkers that started facing right"),
     "left_facing": ("m/s", "mean velocity of the walkers that started facing left"),
-    "rotation_1": ("m/s", "mean rotation velocity -R dphi/dt of bead 1"),
-    "rotation_2": ("m/s", "mean rotation velocity -R dphi/dt of bead 2"),
-    "sliding_1": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
-    "sliding_2": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
-    "sliding_3": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
-    "open_1": ("", f"share of time in which the contact is open; {_CONTACTS}"),
-    "open_2": ("", f"share of time in which the contact is open; {_CONTACTS}"),
-    "open_3": ("", f"share of time in which the contact is open; {_CONTACTS}"),
+    # Means over the walkers of what the table of a run says of each.
+    **{name: WALKERS[name] for name in WALKERS if name.startswith(("rotation_", "sliding_", "open_"))},
     "orientation_end": ("rad", "mean orientation at the end"),
     "walkers": ("", "replicates"),
     "steady": ("", "how many of them are steady"),
@@ -140,7 +133,7 @@ def _result(directory: Path) -> dict[str, Any]:
     }
 
 
-def as_text(frame: pd.DataFrame, form: str) -> str | bytes:
+def encoded(frame: pd.DataFrame, form: str) -> bytes:
     """A sweep's table as CSV (units in the head), JSON (with units and meanings) or parquet (units in the metadata).
 
     Raises
@@ -151,14 +144,14 @@ def as_text(frame: pd.DataFrame, form: str) -> str | bytes:
     if form == "csv":
         units = frame.attrs["units"]
         heads = [f"{name} ({units[name]})" if units[name] else name for name in frame.columns]
-        return str(frame.to_csv(index=False, header=heads))
+        return str(frame.to_csv(index=False, header=heads)).encode()
     if form == "json":
         import json
 
         # Not DataFrame.to_json, which rounds to decimals.
         rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
         contents = {"units": frame.attrs["units"], "meanings": frame.attrs["meanings"], "points": rows}
-        return json.dumps(contents, indent=2, ensure_ascii=False) + "\n"
+        return (json.dumps(contents, indent=2, ensure_ascii=False) + "\n").encode()
     if form == "parquet":
         return _parquet(frame)
     raise InputError("the form of a table", [Problem("", form, f"expected one of {', '.join(FORMATS)}")])
@@ -257,10 +250,4 @@ def write_table_file(frame: pd.DataFrame, path: Path) -> None:
     """
     if path.suffix.lstrip(".") not in FORMATS:
         raise InputError(str(path), [Problem("", None, f"expected a name that ends in .{', .'.join(FORMATS)}")])
-    contents = as_text(frame, path.suffix.lstrip("."))
-    if isinstance(contents, str):
-        write_text(path, contents)
-        return
-    beside = path.with_name(path.name + ".new")
-    beside.write_bytes(contents)
-    beside.replace(path)
+    write_bytes(path, encoded(frame, path.suffix.lstrip(".")))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 from math import ceil, cos, pi, sin, sqrt
 
@@ -33,10 +32,9 @@ def place_walkers(cases: Sequence[WalkerCase]) -> tuple[Scene, tuple[PlacedWalke
     for place, (case, number) in enumerate(placed):
         row, column = divmod(place, columns)
         origin = ((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing)
-        walker, pair = _place(case, number, place, origin)
+        walker, pair = _place(case, number, place, origin, surface=1 + surfaces.index(case.contact))
         walkers.append(walker)
-        surface = 1 + surfaces.index(case.contact)
-        beads += [replace(bead, surface=surface) for bead in pair] if surface > 1 else pair
+        beads += pair
     far = max(spacing / 2.0, *(reach(case) for case in cases))
     half_x = (rows - 1) / 2.0 * spacing + far
     half_y = (columns - 1) / 2.0 * spacing + far
@@ -77,7 +75,7 @@ def _draws(seed: int, number: int) -> tuple[float, float]:
 
 
 def _place(
-    case: WalkerCase, number: int, place: int, origin: tuple[float, float]
+    case: WalkerCase, number: int, place: int, origin: tuple[float, float], *, surface: int
 ) -> tuple[PlacedWalker, tuple[Bead, Bead]]:
     """Walker ``number`` of its case, at a place of the deck."""
     radii, facing = case.beads.radii, _facing(case, number)
@@ -95,6 +93,7 @@ def _place(
             identifier,
             (origin[0] + arm * cos(heading), origin[1] + arm * sin(heading), radius - overlap),
             radius,
+            surface=surface,
         )
         for identifier, arm, radius, overlap in zip(ids, arms, radii, overlaps[:2], strict=True)
     )

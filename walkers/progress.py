@@ -47,15 +47,26 @@ def _bar(case: WalkerCase) -> Iterator[Callable[[Progress], None]]:
         yield advance
 
 
-def _lines(case: WalkerCase) -> Callable[[Progress], None]:
-    """Lines that grow rarer as the run grows older, down to one a minute."""
+def _rarely() -> Callable[[float], bool]:
+    """Whether a line is due after so many seconds: they grow rarer with time, down to one a minute."""
     due = _FIRST_LINE_SECONDS
 
-    def advance(progress: Progress) -> None:
+    def is_due(elapsed: float) -> bool:
         nonlocal due
-        if progress.elapsed < due:
+        if elapsed < due:
+            return False
+        due = elapsed + min(elapsed, _LONGEST_SILENCE_SECONDS)
+        return True
+
+    return is_due
+
+
+def _lines(case: WalkerCase) -> Callable[[Progress], None]:
+    is_due = _rarely()
+
+    def advance(progress: Progress) -> None:
+        if not is_due(progress.elapsed):
             return
-        due = progress.elapsed + min(progress.elapsed, _LONGEST_SILENCE_SECONDS)
         rate = _rate(progress)
         left = f"{(progress.steps - progress.step) / rate:.0f} s left" if rate else "starting"
         print(
@@ -95,14 +106,11 @@ def _sweep_bar(name: str) -> Iterator[Callable[[SweepProgress], None]]:
 
 
 def _sweep_lines(name: str) -> Callable[[SweepProgress], None]:
-    due = _FIRST_LINE_SECONDS
+    is_due = _rarely()
 
     def advance(progress: SweepProgress) -> None:
-        nonlocal due
-        if progress.elapsed < due:
-            return
-        due = progress.elapsed + min(progress.elapsed, _LONGEST_SILENCE_SECONDS)
-        print(f"{name}: {_told(progress)}", file=sys.stderr, flush=True)
+        if is_due(progress.elapsed):
+            print(f"{name}: {_told(progress)}", file=sys.stderr, flush=True)
 
     return advance
 

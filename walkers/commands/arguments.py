@@ -10,4 +10,14 @@ import typer
 Case = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the name of a shipped case such as fig1b.")]
 Run = Annotated[str, typer.Argument(metavar="RUN", help="A run directory, or a case whose run is looked up in --out.")]
 Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
+EngineName = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
+DespiteAudit = Annotated[bool, typer.Option("--despite-audit", help="Run on an engine that failed its audit.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, SI units.")]
+
+
+def check_out(out: Path) -> None:
+    """Refuse a file as the folder of the run directories."""
+    from inputs.errors import InputError, Problem
+
+    if out.exists() and not out.is_dir():
+        raise InputError("--out", [Problem("", None, f"expected a folder, {out} is a file")])

@@ -11,12 +11,11 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import Json
+from walkers.commands.arguments import EngineName, Json
 
 Only = Annotated[list[str] | None, typer.Option("--only", help="Name of a check; may be repeated.")]
 Quick = Annotated[bool, typer.Option("--quick", help="Leave out the checks that take longest.")]
 Markdown = Annotated[Path | None, typer.Option("--markdown", help="Write docs/engine.md: the defects and the table.")]
-EngineOption = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
 
 
 def command(
@@ -24,7 +23,7 @@ def command(
     quick: Quick = False,
     as_json: Json = False,
     markdown: Markdown = None,
-    engine: EngineOption = None,
+    engine: EngineName = None,
 ) -> int:
     """Measure the engine's forces and our remedies against published formulas; exit status 1 if a line fails."""
     from audit.run import CheckedLines, record, run_audit, selected

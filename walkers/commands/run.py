@@ -8,15 +8,12 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import Json, Out
+from walkers.commands.arguments import DespiteAudit, EngineName, Json, Out, check_out
 from walkers.pipeline import DEFAULT_OUT
 
 Cases = Annotated[list[str], typer.Argument(metavar="CASE...", help="Case files, or names of shipped cases.")]
 Force = Annotated[bool, typer.Option("--force", help="Run again even if the run is there.")]
 Limit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Stop a run after this many seconds.")]
-EngineOption = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
-
-DespiteAudit = Annotated[bool, typer.Option("--despite-audit", help="Run on an engine that failed its audit.")]
 
 
 def command(
@@ -25,11 +22,10 @@ def command(
     force: Force = False,
     as_json: Json = False,
     limit: Limit = None,
-    engine: EngineOption = None,
+    engine: EngineName = None,
     despite_audit: DespiteAudit = False,
 ) -> int:
     """Run cases, unless they have been run, and print their results (with --json an object a line)."""
-    from inputs.errors import InputError, Problem
     from inputs.reading import load_case
     from postprocess.report import describe_result
     from runner.failures import EngineFailure
@@ -37,8 +33,7 @@ def command(
     from walkers.progress import progress_of
 
     loaded = [load_case(case) for case in cases]  # a mistake in the last file shows before the first run starts
-    if out.exists() and not out.is_dir():
-        raise InputError("--out", [Problem("", None, f"expected a folder, {out} is a file")])
+    check_out(out)
     failed = 0
     for case in loaded:
         try:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import Out
+from walkers.commands.arguments import DespiteAudit, EngineName, Out, check_out
 from walkers.pipeline import DEFAULT_OUT
 
 SweepFile = Annotated[str, typer.Argument(metavar="SWEEP", help="A sweep file, or a shipped sweep such as fig2.")]
@@ -17,8 +17,6 @@ SitePath = Annotated[Path | None, typer.Option("--site", help="A site file: run 
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be done, and its cost; write nothing.")]
 Retries = Annotated[int, typer.Option("--retries", min=0, help="How often a failed point is tried again.")]
 Limit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Stop an engine after this many seconds.")]
-EngineOption = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
-DespiteAudit = Annotated[bool, typer.Option("--despite-audit", help="Run on an engine that failed its audit.")]
 
 
 def command(
@@ -29,7 +27,7 @@ def command(
     dry_run: DryRun = False,
     retries: Retries = 0,
     limit: Limit = None,
-    engine: EngineOption = None,
+    engine: EngineName = None,
     despite_audit: DespiteAudit = False,
 ) -> int:
     """Run the points of a sweep that are missing, on all cores or on a cluster; exit status 1 if any failed."""
@@ -42,8 +40,7 @@ def command(
     from walkers.progress import progress_of_sweep
 
     loaded = load_sweep(sweep)
-    if out.exists() and not out.is_dir():
-        raise InputError("--out", [Problem("", None, f"expected a folder, {out} is a file")])
+    check_out(out)
     if jobs is not None and site is not None:
         raise InputError("--jobs", [Problem("", None, "a site says by itself how many decks run at once")])
     options = Options(jobs or cores_here(), load_site(site) if site else None, retries, limit)

@@ -26,7 +26,7 @@ def command(
 ) -> None:
     """Print the table of a sweep, a row a point: what varied, what follows, what came out, where the run is."""
     from inputs.errors import InputError, Problem
-    from sweeps.table import as_text, load, short_text, write_table_file
+    from sweeps.table import encoded, load, short_text, write_table_file
     from sweeps.table import thresholds as thresholds_of
 
     frame = thresholds_of(directory) if thresholds else load(directory)
@@ -41,7 +41,6 @@ def command(
             "--parquet", [Problem("", None, "is not for a terminal: use --to FILE.parquet, or redirect it")]
         )
     elif forms:
-        contents = as_text(frame, forms[0])
-        sys.stdout.buffer.write(contents if isinstance(contents, bytes) else contents.encode())
+        sys.stdout.buffer.write(encoded(frame, forms[0]))
     else:
         print(short_text(frame))
