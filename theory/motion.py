@@ -3,8 +3,8 @@
     M dv/dt = -M a(t) (1, 1, 0) - G F∥,    F = F0 + D F∥,    F∥ = law(v, F)
 
 (symbols as in `theory.quasistatic`). Coulomb's law is set-valued: a contact that sticks is held by whatever force
-keeps it at rest. Each step is implicit (`theory.stepping`), its friction forces found by a semi-smooth Newton method: sticking
-needs no regularisation, and steps are short only where a contact begins to stick or to slip.
+keeps it at rest. Each step is implicit (`theory.stepping`), its friction forces found by a semi-smooth Newton method:
+sticking needs no regularisation, and steps are short only where a contact begins to stick or to slip.
 """
 
 from __future__ import annotations
