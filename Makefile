@@ -25,6 +25,10 @@ sweep: setup ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.tom
 	@$(WALKERS) sweep $(SWEEP) --out $(OUT) $(if $(SITE),--site $(SITE)) $(if $(JOBS),--jobs $(JOBS)); status=$$?; \
 	  [ $$status -gt 1 ] || $(WALKERS) table $(OUT)/$(basename $(notdir $(SWEEP))); exit $$status
 
+.PHONY: figures
+figures: setup ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)
+	@$(WALKERS) figures --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
+
 .PHONY: test
 test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test first)
 	.venv/bin/ruff check .

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
+from postprocess.drawing import new_figure, save_figure
 from postprocess.gait import distance_walked, fit_slopes, gait
 from postprocess.trajectory import Trajectory, read_trajectory
 from templates.scene import vector_along
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 WALK_NAME = "walk.png"
 GAIT_NAME = "gait.png"
-_STYLE = Path(__file__).parent / "style.mplstyle"
 _FEWEST_SAMPLES = 8
 """Samples a cycle below which a gait shows nothing."""
 
@@ -44,29 +44,11 @@ def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
     trajectory = read_trajectory(directory)
     destination = destination or directory
     destination.mkdir(parents=True, exist_ok=True)
-    written = [_save(_walk_figure(trajectory), destination / WALK_NAME, directory)]
+    written = save_figure(_walk_figure(trajectory), destination / WALK_NAME, [directory.name])
     samples = trajectory.case.run.samples_per_cycle
     if samples >= _FEWEST_SAMPLES and len(trajectory.time) > 2 * samples:
-        written.append(_save(_gait_figure(trajectory), destination / GAIT_NAME, directory))
+        written += save_figure(_gait_figure(trajectory), destination / GAIT_NAME, [directory.name])
     return written
-
-
-def _save(figure: Figure, path: Path, directory: Path) -> Path:
-    beside = path.with_name(path.name + ".new")
-    figure.savefig(beside, format="png", metadata={"Source": directory.name, "Software": "granular-walkers"})
-    beside.replace(path)
-    return path
-
-
-def _figure(**options: Any) -> tuple[Figure, Any]:
-    """A figure in the project's style, without pyplot's global state."""
-    import matplotlib.style
-    from matplotlib.figure import Figure
-
-    matplotlib.style.use(_STYLE)
-    figure = Figure(figsize=options.pop("figsize"), layout="constrained")
-    mosaic = options.pop("mosaic", None)
-    return figure, figure.subplots(**options) if mosaic is None else figure.subplot_mosaic(mosaic, **options)
 
 
 def _title(case: WalkerCase) -> str:
@@ -79,9 +61,7 @@ def _title(case: WalkerCase) -> str:
 
 
 def _walk_figure(trajectory: Trajectory) -> Figure:
-    figure, axes = _figure(
-        mosaic=[["strobe", "walked"], ["strobe", "turned"]], figsize=(7.6, 5.4), width_ratios=[1, 1.6]
-    )
+    figure, axes = new_figure(7.6, 5.4, mosaic=[["strobe", "walked"], ["strobe", "turned"]], width_ratios=[1, 1.6])
     top, middle, bottom = axes["strobe"], axes["walked"], axes["turned"]
     figure.suptitle(_title(trajectory.case), fontsize=10)
     _draw_strobe(top, trajectory)
@@ -138,7 +118,7 @@ def _gait_figure(trajectory: Trajectory) -> Figure:
     cycles = (len(trajectory.time) - 1) // run.samples_per_cycle
     last = slice((cycles - 2) * run.samples_per_cycle, cycles * run.samples_per_cycle + 1)
     phase = trajectory.time[last] * trajectory.case.drive.frequency - (cycles - 2)
-    figure, axes = _figure(figsize=(6.4, 3.8))
+    figure, axes = new_figure(6.4, 3.8)
     figure.suptitle(_title(trajectory.case), fontsize=10)
     series = [
         ("walker", motion.velocity[last, 0], "s", "#c4473a"),

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from postprocess.dump import FloatArray
 from postprocess.trajectory import Trajectory, read_trajectory
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 PICTURE_NAME = "walker.png"
 _RUBY = ("#b0203c", "#e0566c")
+_FLOOR = "#c9d2d8"
 
 
 def render_run(
@@ -63,8 +65,7 @@ def render_run(
 
 
 def _scene(trajectory: Trajectory, walker: int, images: int, size: tuple[int, int]) -> pv.Plotter:
-    # Without this VTK tries an X server first and says so.
-    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    _prefer_egl()
     import pyvista as pv
 
     strobe = trajectory.case.run.samples_per_cycle
@@ -93,12 +94,57 @@ def _scene(trajectory: Trajectory, walker: int, images: int, size: tuple[int, in
     return plotter
 
 
+def top_view(
+    trajectory: Trajectory, walker: int, frame: int, along: tuple[float, float], across: tuple[float, float]
+) -> npt.NDArray[np.uint8]:
+    """One walker seen from above, as a stroboscope shows it.
+
+    Parameters
+    ----------
+    trajectory
+        Of the run.
+    walker, frame
+        Which, and when.
+    along, across
+        Bounds of the picture along and across the drive axis, m, relative to the substrate.
+
+    Returns
+    -------
+    ndarray, shape (height, width, 3)
+        Red, green, blue; the first row is the farthest to the left of the drive axis, 120 pixels to the smaller radius.
+    """
+    _prefer_egl()
+    import pyvista as pv
+
+    pixels = 120.0 / float(trajectory.radii.min())
+    size = [round((bounds[1] - bounds[0]) * pixels) for bounds in (along, across)]
+    turned = np.stack([trajectory.drive_axis, trajectory.across_axis, np.array([0.0, 0.0, 1.0])], axis=-1)
+    middle = np.array([sum(along) / 2.0, sum(across) / 2.0, 0.0])
+    centres = (trajectory.position[frame, walker] @ turned - middle) * 1e3
+    plotter = pv.Plotter(off_screen=True, window_size=size, lighting="light kit")
+    plotter.background_color = pv.Color(_FLOOR)
+    for bead, radius in enumerate(trajectory.radii * 1e3):
+        sphere = pv.Sphere(radius=radius, center=centres[bead], theta_resolution=80, phi_resolution=80)
+        plotter.add_mesh(sphere, color=_RUBY[bead], smooth_shading=True, specular=0.6, specular_power=40)
+    plotter.camera_position = [(0.0, 0.0, 10.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+    plotter.camera.parallel_projection = True
+    plotter.camera.parallel_scale = (across[1] - across[0]) / 2.0 * 1e3
+    picture: npt.NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
+    plotter.close()
+    return picture
+
+
+def _prefer_egl() -> None:
+    """Without this VTK tries an X server first and says so."""
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+
 def _add_floor(plotter: pv.Plotter, low: FloatArray, high: FloatArray) -> None:
     import pyvista as pv
 
     middle, extent = (low + high) / 2.0, high - low
     floor = pv.Plane(center=(middle[0], middle[1], 0.0), i_size=extent[0], j_size=extent[1], direction=(0.0, 0.0, 1.0))
-    plotter.add_mesh(floor, color="#c9d2d8", lighting=False)
+    plotter.add_mesh(floor, color=_FLOOR, lighting=False)
 
 
 def _add_label(plotter: pv.Plotter, place: list[float], text: str) -> None:

@@ -82,3 +82,37 @@ def largest_stable_v() -> float:
     from scipy.optimize import brentq
 
     return float(brentq(lambda q: mathieu_b(1, q), 0.5, 1.5)) / 2.0
+
+
+def turning(parameters: Alignment, start: float, angles: npt.ArrayLike, phase: float = 0.0) -> FloatArray:
+    """Orientation of a dimer that begins at rest and rolls sideways without sliding, whatever its angle to the axis.
+
+    The Mathieu equation with sin ψ instead of ψ: a parametric pendulum, d²ψ/dϑ² = -[U - 4V cos(2ϑ + phase)] sin ψ.
+
+    Parameters
+    ----------
+    parameters
+        U and V.
+    start
+        ψ at ϑ = 0, rad.
+    angles : ndarray, shape (N,)
+        ϑ = πft at which ψ is wanted, from 0 on.
+    phase
+        Of the drive, rad; at 0 the substrate accelerates toward the large bead first.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        ψ, rad.
+    """
+    from scipy.integrate import solve_ivp
+
+    theta = np.asarray(angles, np.float64)
+
+    def slope(at: float, state: FloatArray) -> list[float]:
+        pull = parameters.u - 4.0 * parameters.v * np.cos(2.0 * at + phase)
+        return [state[1], -pull * np.sin(state[0])]
+
+    solution = solve_ivp(slope, (0.0, float(theta[-1])), [start, 0.0], t_eval=theta, rtol=1e-8, atol=1e-10)
+    psi: FloatArray = solution.y[0]
+    return psi

@@ -9,7 +9,8 @@ sticking needs no regularisation, and steps are short only where a contact begin
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -66,6 +67,13 @@ class Walker:
         dimer = dimer_of(case)
         forces = np.array(contact_loads(case).capillary) + np.array([*dimer.masses, 0.0]) * case.gravity
         return replace(cls.of_dimer(dimer), at_rest=(forces / dimer.capillary_scale)[:, None])
+
+    @classmethod
+    def joined(cls, walkers: Sequence[Walker]) -> Walker:
+        """All walkers of several."""
+        return cls(
+            *(np.concatenate([getattr(one, field.name) for one in walkers], axis=-1) for field in fields(cls)),
+        )
 
 
 @dataclass(frozen=True)

@@ -34,35 +34,39 @@ def bridge_drag(case: WalkerCase) -> FloatArray:
     return np.array([*(2.0 * drag(radius / 2.0) for radius in case.beads.radii), drag(dimer_of(case).reduced_radius)])
 
 
-def friction_of(case: WalkerCase, *, viscous: bool) -> Friction:
-    """Coulomb's law with a case's coefficients, with or without the drag of its bridges."""
-    dry = Friction.coulomb(case.contact.friction_bead_wall, case.contact.friction_bead_bead)
-    return replace(dry, viscous=bridge_drag(case)[:, None]) if viscous else dry
+def friction_of(*cases: WalkerCase, viscous: bool) -> Friction:
+    """Coulomb's law with each case's coefficients, with or without the drag of its bridges."""
+    contacts = [case.contact for case in cases]
+    dry = Friction.coulomb([one.friction_bead_wall for one in contacts], [one.friction_bead_bead for one in contacts])
+    return replace(dry, viscous=np.stack([bridge_drag(case) for case in cases], axis=-1)) if viscous else dry
 
 
-def motion_of(case: WalkerCase, *, viscous: bool = True) -> Motion:
-    """The motion of a case's walker, aligned with the drive, with the capillary forces that the engine gives it.
+def motion_of(*cases: WalkerCase, viscous: bool = True) -> Motion:
+    """The motions of cases' walkers, aligned with the drive, with the capillary forces that the engine gives them.
 
     Parameters
     ----------
-    case
-        Driven along the substrate.
+    cases
+        N of them, driven along the substrate.
     viscous
         Whether the bridges' drag acts beside friction.
 
     Raises
     ------
     ValueError
-        If the drive is not along the substrate.
+        If a drive is not along the substrate.
     """
-    _check(case)
+    _check(*cases)
     return walk(
-        Walker.of_case(case), friction_of(case, viscous=viscous), case.drive.frequency, case.drive.peak_acceleration
+        Walker.joined([Walker.of_case(case) for case in cases]),
+        friction_of(*cases, viscous=viscous),
+        [case.drive.frequency for case in cases],
+        [case.drive.peak_acceleration for case in cases],
     )
 
 
-def _check(case: WalkerCase) -> None:
-    if case.drive.axis == "z":
+def _check(*cases: WalkerCase) -> None:
+    if any(case.drive.axis == "z" for case in cases):
         raise ValueError("the theory is one of drives along the substrate")
 
 

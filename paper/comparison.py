@@ -1,0 +1,270 @@
+"""Every published number beside this project's: ``comparison.md`` and ``comparison.json``."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inputs.dimer import dimer_of
+from inputs.reading import load_case
+from paper import dimers, published
+from paper.alignment import paper_drives
+from paper.published import NUMBERS, Published
+from paper.sensitivity import misalignment
+from paper.sources import Sources
+from sweeps.table import thresholds
+from theory.mathieu import largest_stable_v
+from theory.prediction import motion_of, threshold
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from inputs.case import WalkerCase
+
+AGREES = 0.15
+"""A number within this share of the published one agrees with it, where the paper gives no spread."""
+_SMALL = 0.05
+"""mm/s: where the published value is zero, a number within this agrees with it."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """One of our numbers, in the unit of the published one: engine with its range, and theory; NaN where there is none.
+
+    The range is over walkers, or over the frequencies where a number is a mean over these.
+    """
+
+    engine: float
+    low: float
+    high: float
+    theory: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the comparison.
+
+    Attributes
+    ----------
+    key, what, unit, published, measured
+        See `paper.published.Published`.
+    engine, low, high, theory
+        See `Value`; theory is Coulomb friction with the bridges' drag, nothing fitted.
+    ratio
+        Engine (or theory, where the number is one of theory alone) to published; None where that is zero or in words.
+    within_bounds
+        Whether it lies within what the paper says; None where the paper gives no bounds.
+    agrees
+        Whether it lies within the bounds or, where there are none, within `AGREES` of the published value.
+    why
+        What the disagreement hangs on; empty where it agrees.
+    """
+
+    key: str
+    what: str
+    unit: str
+    published: float | None
+    measured: bool
+    engine: float | None
+    low: float | None
+    high: float | None
+    theory: float | None
+    ratio: float | None
+    within_bounds: bool | None
+    agrees: bool
+    why: str
+
+
+def compare(sources: Sources) -> list[Row]:
+    """All published numbers, in the order of the paper."""
+    values = {**_fig2(sources), **_fig3(sources), **_fig4(sources), **_alignment(sources)}
+    return [_row(number, values[number.key]) for number in NUMBERS]
+
+
+def _row(number: Published, value: Value) -> Row:
+    ours = value.engine if np.isfinite(value.engine) else value.theory
+    within = None if number.bounds is None else number.bounds[0] <= ours <= number.bounds[1]
+    agrees = within if within is not None else _near(ours, number.value)
+    return Row(
+        key=number.key,
+        what=number.what,
+        unit=number.unit,
+        published=number.value,
+        measured=number.measured,
+        engine=_finite(value.engine),
+        low=_finite(value.low),
+        high=_finite(value.high),
+        theory=_finite(value.theory),
+        ratio=_finite(ours / number.value) if number.value else None,
+        within_bounds=None if within is None else bool(within),
+        agrees=bool(agrees),
+        why="" if agrees else number.hangs_on or "A run that it needs is missing or failed.",
+    )
+
+
+def _near(ours: float, value: float | None) -> bool:
+    if value is None:
+        return bool(np.isfinite(ours))
+    return abs(ours - value) <= (AGREES * abs(value) if value else _SMALL)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _speed(rows: pd.DataFrame, column: str = "velocity", theory: float = float("nan")) -> Value:
+    """The mean over some points; its range over walkers of one point, or over several points."""
+    mean = rows[column].mean() * 1e3
+    ends = ("smallest", "largest") if len(rows) == 1 and column == "velocity" else (column, column)
+    low, high = rows[ends[0]].min() * 1e3, rows[ends[1]].max() * 1e3
+    return Value(float(mean), float(low), float(high), theory)
+
+
+def _theory(case: WalkerCase) -> float:
+    return float(motion_of(case).velocity[0]) * 1e3
+
+
+def _fig2(sources: Sources) -> dict[str, Value]:
+    table, case = sources.table("fig2"), dimers.shipped()
+    dimer = dimer_of(case)
+    values = {}
+    frequencies = sorted(table["frequency"].unique())
+    for g in published.FIT:
+        rows = table[np.isclose(table["peak_acceleration"], g * published.GRAVITY)]
+        cases = [one for f in frequencies for one in dimers.driven(case, f, [g * published.GRAVITY])]
+        values[f"fig2_{g:g}g"] = _speed(rows, theory=float(motion_of(*cases).velocity.mean() * 1e3))
+        values[f"fig2_gamma_{g:g}g"] = _exact(dimer.gamma0(g * published.GRAVITY))
+    slow, fast = frequencies[0], frequencies[-1]
+    values["fig2_frequency"] = _quotient(table, case, (fast, published.PLATEAU), (slow, published.PLATEAU))
+    plateau = [_quotient(table, case, (f, 10.0), (f, published.PLATEAU)) for f in frequencies]
+    values["fig2_plateau"] = _mean(plateau)
+    ends = thresholds(sources.out / "fig2-threshold")
+    found = [
+        dimer.gamma0((row["at_rest"] + row["moving"]) / 2.0 * published.GRAVITY) for row in ends.to_dict("records")
+    ]
+    predicted = [threshold(one) for f in (slow, fast) for one in dimers.driven(case, f, [published.GRAVITY])]
+    values["fig2_threshold"] = Value(float(np.mean(found)), min(found), max(found), float(np.mean(predicted)))
+    values["fig2_threshold_frequency"] = _exact(found[-1] / found[0], predicted[1] / predicted[0])
+    return values
+
+
+def _exact(value: float, theory: float = float("nan")) -> Value:
+    return Value(float(value), float(value), float(value), float(theory))
+
+
+def _mean(values: list[Value]) -> Value:
+    engine = [value.engine for value in values]
+    return Value(float(np.mean(engine)), min(engine), max(engine), float(np.mean([value.theory for value in values])))
+
+
+def _quotient(table: pd.DataFrame, case: WalkerCase, upper: tuple[float, float], lower: tuple[float, float]) -> Value:
+    """A ratio of two speeds, each at a frequency in Hz and an acceleration in g."""
+
+    def at(drive: tuple[float, float]) -> tuple[float, float]:
+        frequency, peak = drive[0], drive[1] * published.GRAVITY
+        rows = table[(table["frequency"] == frequency) & np.isclose(table["peak_acceleration"], peak)]
+        return float(rows["velocity"].iloc[0]), _theory(dimers.driven(case, frequency, [peak])[0])
+
+    (over, over_theory), (under, under_theory) = at(upper), at(lower)
+    return _exact(over / under, over_theory / under_theory)
+
+
+def _fig3(sources: Sources) -> dict[str, Value]:
+    table, case = sources.table("fig3"), dimers.shipped()
+    values = {}
+    for r1, r2 in published.FIG3_FIT:
+        radii = (r1 * 1e-3, r2 * 1e-3)
+        rows = table[np.isclose(table["radius_1"], radii[0]) & np.isclose(table["radius_2"], radii[1])]
+        values[f"fig3_{r1:g}_{r2:g}"] = _speed(rows, theory=_theory(dimers.of_radii(case, radii, 0.5)))
+    symmetric = sources.table("alignment")
+    symmetric = symmetric[symmetric["sin_delta"].abs() < 1e-9]
+    values["fig3_symmetric"] = _speed(symmetric, theory=_theory(dimers.of_asymmetry(case, 0.0, 0.5)))
+    return values
+
+
+def _fig4(sources: Sources) -> dict[str, Value]:
+    values = {}
+    table = sources.table("fig4").sort_values("peak_acceleration")
+    for letter, (_, row), name in zip("ab", table.iterrows(), ("fig4a", "fig4b"), strict=True):
+        motion, rows = motion_of(load_case(name)), table.loc[[row.name]]
+        values[f"fig4{letter}_gamma"] = _exact(row["gamma0"])
+        values[f"fig4{letter}_velocity"] = _speed(rows, theory=float(motion.velocity[0]) * 1e3)
+        values[f"fig4{letter}_rotation"] = _speed(rows, "rotation_1", float(motion.rotation[0, 0]) * 1e3)
+        values[f"fig4{letter}_sliding"] = _speed(rows, "sliding_1", float(motion.sliding[0, 0]) * 1e3)
+    return values
+
+
+def _alignment(sources: Sources) -> dict[str, Value]:
+    table = sources.table("alignment")
+    finished = table[table["status"] == "finished"]
+    asymmetric = finished["sin_delta"].abs() > 1e-9
+    along = np.concatenate([misalignment(run) for run in finished["run"][asymmetric]])
+    across = np.concatenate([misalignment(run) for run in finished["run"][~asymmetric]])
+    largest_v = max(one.v for one in paper_drives().values())
+    nothing = float("nan")
+    return {
+        "alignment_asymmetric": Value(float(along.max()), float(along.min()), float(along.max())),
+        "alignment_symmetric": Value(float(across.min()), float(across.min()), float(across.max())),
+        "mathieu": Value(nothing, nothing, nothing, largest_v),
+        "mathieu_stable": Value(nothing, nothing, nothing, largest_stable_v()),
+    }
+
+
+def count(rows: list[Row], *, measured: bool) -> tuple[int, int]:
+    """How many rows agree, of how many: those in which the engine has a say, or the others."""
+    chosen = [row for row in rows if row.measured == measured]
+    return sum(row.agrees for row in chosen), len(chosen)
+
+
+def as_dict(rows: list[Row]) -> dict[str, object]:
+    """The comparison for JSON."""
+    agree, of = count(rows, measured=True)
+    return {"agree": agree, "of": of, "tolerance": AGREES, "numbers": [asdict(row) for row in rows]}
+
+
+_HEAD = """# Published numbers beside this project's
+
+{agree} of the {of} numbers in which the engine has a say agree, and {derived} of the {derived_of} that follow from
+beads and drive alone. To agree is to lie within what the paper says or, where it gives no spread, within
+{tolerance:.0%} of the published value (the paper's points and error bars are in its figures only). Parameters are the
+shipped ones, the same in all rows. Theory is Coulomb friction with the bridges' drag, nothing fitted. As in the paper, a
+velocity is the mean of six walkers, half of them facing each way, seen once a cycle (alignment: two walkers a start);
+brackets hold the slowest and the fastest, or the range over the frequencies where a number is one for all of them.
+Fig. 1a is a pile's and is not among them.
+
+| | published | engine | theory | ratio | agrees |
+|---|---|---|---|---|---|
+"""
+
+
+def as_markdown(rows: list[Row]) -> str:
+    """The comparison as a table, and below it what disagrees and why."""
+    (agree, of), (derived, derived_of) = (count(rows, measured=measured) for measured in (True, False))
+    text = _HEAD.format(agree=agree, of=of, derived=derived, derived_of=derived_of, tolerance=AGREES)
+    for row in rows:
+        unit = f" {row.unit}" if row.unit else ""
+        told = "in words" if row.published is None else f"{row.published:.4g}{unit}"
+        spread = ""
+        if row.low is not None and row.high is not None and row.high - row.low > 1e-3 * abs(row.high):
+            spread = f" ({_number(row.low)} … {_number(row.high)})"
+        ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
+        agrees = "yes" if row.agrees else "**no**"
+        text += (
+            f"| {row.what} | {told} | {_number(row.engine)}{spread} | {_number(row.theory)} | {ratio} | {agrees} |\n"
+        )
+    reasons: dict[str, list[str]] = {}
+    for row in rows:
+        if not row.agrees:
+            reasons.setdefault(row.why, []).append(row.what)
+    if reasons:
+        text += "\n## Why not\n\n"
+        text += "".join(f"- {'; '.join(names)}. {why}\n" for why, names in reasons.items())
+    return text
+
+
+def _number(value: float | None) -> str:
+    if value is None:
+        return ""
+    return f"{0.0 if abs(value) < 5e-4 else value:.3g}"

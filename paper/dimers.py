@@ -1,0 +1,46 @@
+"""The paper's walkers as cases for the theory, with the shipped parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from inputs.case import WalkerCase
+from inputs.dimer import dimer_of
+from inputs.reading import load_case
+from paper.published import GRAVITY
+
+FIG2 = "fig1b"
+"""The case whose beads, liquid and contacts Figs. 1b and 2 have."""
+
+
+def shipped(name: str = FIG2) -> WalkerCase:
+    """A shipped case."""
+    return load_case(name)
+
+
+def driven(case: WalkerCase, frequency: float, accelerations: Iterable[float]) -> list[WalkerCase]:
+    """A case at another frequency, Hz, and peak accelerations, m/s²."""
+    return [
+        replace(case, drive=replace(case.drive, frequency=float(frequency), peak_acceleration=float(peak)))
+        for peak in accelerations
+    ]
+
+
+def of_asymmetry(case: WalkerCase, sin_delta: float, gamma0: float) -> WalkerCase:
+    """A case with beads of the same mean radius and another asymmetry, driven at a Γ0."""
+    mean = dimer_of(case).mean_radius
+    return of_radii(case, (mean * (1.0 + sin_delta), mean * (1.0 - sin_delta)), gamma0)
+
+
+def of_radii(case: WalkerCase, radii: tuple[float, float], gamma0: float) -> WalkerCase:
+    """A case with other beads, radii in m, driven at a Γ0."""
+    dimer = replace(case, beads=replace(case.beads, radii=radii))
+    return replace(dimer, drive=replace(case.drive, peak_acceleration=dimer_of(dimer).peak_acceleration(gamma0)))
+
+
+def described(case: WalkerCase) -> str:
+    """Radii, drive and liquid of a case in a few words, for titles."""
+    radii = "/".join(f"{radius * 1e3:g}" for radius in case.beads.radii)
+    drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration / GRAVITY:.3g} g"
+    return f"R = {radii} mm, {drive}, {case.liquid.name}"

@@ -1,0 +1,135 @@
+"""All figures and the comparison, from the runs to the files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from inputs.errors import InputError, Problem
+from paper.alignment import fig_alignment
+from paper.comparison import as_dict, as_markdown, compare, count
+from paper.modes import fig_modes
+from paper.rotation import fig4
+from paper.sensitivity import fig_sensitivity
+from paper.sources import ProgressOf, Sources, make_sources
+from paper.strobe import fig1b
+from paper.velocity import fig2, fig3
+from postprocess.drawing import save_figure
+from runner.files import write_text
+from sweeps.conduct import Failure, Options
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS = ("png", "svg")
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure: how it is drawn, from which sweeps, and what it is."""
+
+    draw: Callable[[Sources], Figure]
+    sweeps: tuple[str, ...]
+    title: str
+
+
+FIGURES = {
+    "fig1b": Drawing(fig1b, ("alignment",), "Fig. 1b: strobed top views of a walker"),
+    "fig2": Drawing(fig2, ("fig2", "fig2-threshold"), "Fig. 2: velocity against peak acceleration"),
+    "fig3": Drawing(fig3, ("fig3",), "Fig. 3: velocity against asymmetry"),
+    "fig4": Drawing(fig4, ("fig4",), "Fig. 4: rotation of the beads through two cycles"),
+    "alignment": Drawing(fig_alignment, ("alignment",), "Alignment with the shaking axis and across it"),
+    "modes": Drawing(fig_modes, ("modes",), "Modes of motion"),
+    "sensitivity": Drawing(fig_sensitivity, ("sensitivity",), "What the disagreements hang on"),
+}
+COMPARISON = "comparison"
+_COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
+
+
+@dataclass(frozen=True)
+class Made:
+    """What was made.
+
+    Attributes
+    ----------
+    files
+        All of them.
+    failures
+        Points that failed and are left out, by sweep.
+    agree, compared
+        How many published numbers that the engine has a say in agree, of how many; 0 of 0 if they were not compared.
+    """
+
+    files: list[Path]
+    failures: dict[str, list[Failure]]
+    agree: int = 0
+    compared: int = 0
+
+
+def make_figures(
+    out: Path,
+    to: Path,
+    options: Options,
+    *,
+    only: Sequence[str] = (),
+    engine: str | None = None,
+    despite_audit: bool = False,
+    progress_of: ProgressOf | None = None,
+) -> Made:
+    """Run what is missing, draw the figures and write the comparison.
+
+    Parameters
+    ----------
+    out
+        Folder of the run directories.
+    to
+        Folder of the figures.
+    options, engine, despite_audit
+        As for `sweeps.run.run_sweep`.
+    only
+        Names of `FIGURES`, or ``comparison``; all if empty.
+    progress_of
+        As for `paper.sources.make_sources`.
+
+    Returns
+    -------
+    Made
+
+    Raises
+    ------
+    InputError
+        If there is no such figure, or a file is where a folder is to be.
+    runner.EngineFailure
+        If there is no engine, or its audit failed.
+    """
+    chosen = list(only) or [*FIGURES, COMPARISON]
+    for name in chosen:
+        if name not in (*FIGURES, COMPARISON):
+            raise InputError("--only", [Problem("", name, f"expected one of {', '.join((*FIGURES, COMPARISON))}")])
+    for option, folder in (("--out", out), ("--to", to)):
+        if folder.exists() and not folder.is_dir():
+            raise InputError(option, [Problem("", None, f"expected a folder, {folder} is a file")])
+    needed = {name: FIGURES[name].sweeps if name in FIGURES else _COMPARED for name in chosen}
+    sweeps = dict.fromkeys(sweep for names in needed.values() for sweep in names)
+    sources, failures = make_sources(
+        sweeps, out, options, engine=engine, despite_audit=despite_audit, progress_of=progress_of
+    )
+    files: list[Path] = []
+    for name in chosen:
+        if name in FIGURES:
+            drawing = FIGURES[name]
+            runs = sources.runs(*drawing.sweeps)
+            files += save_figure(drawing.draw(sources), to / name, runs, FORMATS, drawing.title)
+    failed = {name: points for name, points in failures.items() if points}
+    if COMPARISON not in chosen:
+        return Made(files, failed)
+    rows = compare(sources)
+    to.mkdir(parents=True, exist_ok=True)
+    texts = {".md": as_markdown(rows), ".json": json.dumps(as_dict(rows), indent=2, ensure_ascii=False) + "\n"}
+    for suffix, text in texts.items():
+        files.append((to / COMPARISON).with_suffix(suffix))
+        write_text(files[-1], text)
+    return Made(files, failed, *count(rows, measured=True))

@@ -1,0 +1,141 @@
+"""What the paper publishes of the walker as numbers: in its text and captions (the points of its figures are not)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+GRAVITY = 9.8
+"""The paper's g, m/s²."""
+FIT = {2.0: 0.30e-3, 3.0: 0.68e-3, 4.0: 1.23e-3, 5.0: 1.98e-3, 6.0: 2.96e-3}
+"""Fig. 2: the paper's fitted curve below the plateau, m/s, at peak accelerations in g."""
+FIG3_FIT = {
+    (0.25, 0.2): 1.11e-3,
+    (0.4, 0.3): 1.47e-3,
+    (0.3, 0.2): 2.20e-3,
+    (0.35, 0.2): 3.42e-3,
+    (0.4, 0.2): 4.88e-3,
+}
+"""Fig. 3: the same curve at Γ0 = 0.5, m/s, by the radii in mm."""
+PLATEAU = 6.0
+"""Peak acceleration in g at which the plateau of Fig. 2 begins; Γ0 ≈ 0.6."""
+FIG4_VELOCITY = (2.3e-3, 8.0e-3)
+"""Fig. 4a and b: mean velocity, m/s."""
+FIG4B_ROTATION, FIG4B_SLIDING = 13.3e-3, -5.3e-3
+"""Fig. 4b: mean rotation and sliding velocity of the large bead, m/s."""
+LARGEST_V, STABLE_V = 0.4, 0.45
+"""|V| of all that the paper investigated is below 0.4; small angles stay small up to 0.45."""
+
+
+@dataclass(frozen=True)
+class Published:
+    """A published number.
+
+    Attributes
+    ----------
+    key
+        Names it.
+    what
+        In words.
+    value
+        As published, in ``unit``; None where the paper states it in words only.
+    unit
+        Shown with it.
+    bounds
+        Between which a value is what the paper says, if it says so: the rounding of its digits is none.
+    hangs_on
+        A sentence: what a disagreement of the engine hangs on, as the sensitivity study and docs/physics.md find.
+    measured
+        Whether the engine has a say in it: Γ0 and Mathieu's V follow from the beads and the drive alone.
+    """
+
+    key: str
+    what: str
+    value: float | None
+    unit: str = "mm/s"
+    bounds: tuple[float, float] | None = None
+    hangs_on: str = ""
+    measured: bool = True
+
+
+_SPEED = (
+    "Speeds hang on friction and on the tangential drag of the bridges, neither of which the paper publishes: the "
+    "shape of its curve asks for more friction, and for a drag ten times the bridges' nominal one or more."
+)
+_ASYMMETRY = (
+    "At one Γ0 larger beads are shaken less, and Coulomb's friction lets them walk the slower; with a tangential drag "
+    "that limits sliding the speed depends on the asymmetry alone, and rises with it as published."
+)
+_FIG4B = (
+    "It hangs on friction: 0.1 gives 8.5 mm/s, rotation 10.8 and sliding -2.3 mm/s, and then the walker of Fig. 4a is "
+    "too fast; minimum separations up to 1 do not part the beads."
+)
+
+NUMBERS = (
+    *(
+        Published(f"fig2_{g:g}g", f"Fig. 2, fit at {g:g} g, 60 to 90 Hz", v * 1e3, hangs_on=_SPEED)
+        for g, v in FIT.items()
+    ),
+    *(
+        Published(
+            f"fig2_gamma_{g:g}g", f"Fig. 2, Γ0 at {g:g} g", value, "", (value - 5e-4, value + 5e-4), measured=False
+        )
+        for g, value in ((2.0, 0.191), (3.0, 0.286), (4.0, 0.381), (5.0, 0.476), (6.0, 0.572))
+    ),
+    Published(
+        "fig2_frequency",
+        "Fig. 2, v(90 Hz)/v(60 Hz) at 6 g: no significant dependence",
+        1.0,
+        "",
+        hangs_on="Where friction alone limits sliding, speeds go as 1/f; a tangential drag ten times the bridges' "
+        "nominal one removes nine tenths of that.",
+    ),
+    Published(
+        "fig2_plateau",
+        "Fig. 2, v(10 g)/v(6 g): a plateau from Γ0 ≈ 0.6 on",
+        1.0,
+        "",
+        hangs_on="Beyond 6 g walkers leave the axis and turn round. With a third of the viscosity, or three times the "
+        "rolling friction, they stay on it and their speeds level off, at 1.2 to 1.6.",
+    ),
+    Published(
+        "fig2_threshold",
+        "Fig. 2, inset: Γc, in words: a threshold that does not depend on the frequency",
+        None,
+        "",
+    ),
+    Published(
+        "fig2_threshold_frequency",
+        "Fig. 2, inset: Γc(90 Hz)/Γc(60 Hz): independent within its uncertainties",
+        1.0,
+        "",
+    ),
+    *(
+        Published(f"fig3_{r1:g}_{r2:g}", f"Fig. 3, fit for R = {r1:g}/{r2:g} mm", v * 1e3, hangs_on=_ASYMMETRY)
+        for (r1, r2), v in FIG3_FIT.items()
+    ),
+    Published("fig3_symmetric", "Fig. 3, a symmetric dimer does not walk", 0.0),
+    Published("fig4a_gamma", "Fig. 4a, Γ0", 0.74, "", (0.735 - 5e-4, 0.745), measured=False),
+    Published("fig4a_velocity", "Fig. 4a, velocity", 2.3, hangs_on=_SPEED),
+    Published("fig4a_sliding", "Fig. 4a, large bead's mean sliding: hardly any", 0.0),
+    Published("fig4b_gamma", "Fig. 4b, Γ0", 3.5, "", (3.45, 3.55), measured=False),
+    Published("fig4b_velocity", "Fig. 4b, velocity", 8.0, hangs_on=_FIG4B),
+    Published("fig4b_rotation", "Fig. 4b, large bead's mean rotation velocity", 13.3, hangs_on=_FIG4B),
+    Published("fig4b_sliding", "Fig. 4b, large bead's mean sliding velocity", -5.3, hangs_on=_FIG4B),
+    Published(
+        "alignment_asymmetric",
+        "Asymmetric dimers align with the shaking axis: largest angle to it at the end",
+        0.0,
+        "°",
+        (-10.0, 10.0),
+    ),
+    Published(
+        "alignment_symmetric",
+        "Symmetric dimers align across it: smallest angle to the axis at the end",
+        90.0,
+        "°",
+        (80.0, 90.0),
+    ),
+    Published("mathieu", "Largest V of the paper's drives, at most", LARGEST_V, "", (0.0, LARGEST_V), measured=False),
+    Published("mathieu_stable", "V up to which small angles stay small", STABLE_V, "", (0.445, 0.455), measured=False),
+)
+"""Every number that the paper publishes of walkers."""

@@ -1,0 +1,148 @@
+"""What the disagreements with the paper hang on: the shipped sweep ``sensitivity``, one parameter at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from paper import published
+from paper.sources import Sources
+from postprocess.drawing import new_figure
+from postprocess.tables import read_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PARAMETERS = {
+    "friction": "contact.friction.bead_wall",
+    "rolling friction": "contact.rolling_friction",
+    "minimum separation ratio": "contact.minimum_separation_ratio",
+    "liquid volume fraction": "liquid.volume_fraction",
+    "Young's modulus (MPa)": "contact.youngs_modulus",
+    "viscosity (mm²/s)": "liquid.kinematic_viscosity",
+}
+"""What is varied, and the column that says so (the friction of bead on bead goes with that of bead on wall)."""
+_TOGETHER = "all together"
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Something that the paper observes, as a number of a set of parameters.
+
+    Attributes
+    ----------
+    name
+        With its unit.
+    value
+        From the table of one set, a row an experiment, indexed by (mm of R1, Hz, g, start in degrees).
+    published
+        The paper's.
+    """
+
+    name: str
+    value: Callable[[pd.DataFrame], float]
+    published: float
+
+
+def _ratio(upper: tuple[float, ...], lower: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
+    return lambda table: float(table["velocity"][upper] / table["velocity"][lower])
+
+
+def _speed(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
+    return lambda table: float(table["velocity"][of]) * 1e3
+
+
+def misalignment(run: str | Path) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Angles of a run's walkers to the drive axis at the end, whichever way they face, degrees, each 0 to 90."""
+    ends = np.degrees(read_table(run, "walkers")["orientation_end"].to_numpy())
+    angles: np.ndarray[tuple[int], np.dtype[np.float64]] = np.abs((ends + 90.0) % 180.0 - 90.0)
+    return angles
+
+
+def _angle(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
+    return lambda table: float(misalignment(table["run"][of]).max())
+
+
+OBSERVATIONS = (
+    Observation("Fig. 2: v at 80 Hz, 4 g (mm/s)", _speed((0.3, 80.0, 4.0, 0.0)), published.FIT[4.0] * 1e3),
+    Observation("Fig. 4a: v (mm/s)", _speed((0.6, 80.0, 2.0, 0.0)), published.FIG4_VELOCITY[0] * 1e3),
+    Observation("Fig. 2: v(90 Hz)/v(60 Hz) at 6 g", _ratio((0.3, 90.0, 6.0, 0.0), (0.3, 60.0, 6.0, 0.0)), 1.0),
+    Observation("plateau: v(10 g)/v(6 g) at 60 Hz", _ratio((0.3, 60.0, 10.0, 0.0), (0.3, 60.0, 6.0, 0.0)), 1.0),
+    Observation("angle after a start at 60° (°)", _angle((0.3, 80.0, 4.0, 60.0)), 0.0),
+)
+
+
+def sensitivities(sources: Sources) -> pd.DataFrame:
+    """The observations for the shipped parameters and for each parameter lower and higher.
+
+    Returns
+    -------
+    DataFrame
+        A row a set of parameters, in the order of the sweep: ``parameter`` (``shipped``, one of `PARAMETERS`, or
+        ``all together``), ``value``, and a column an observation, NaN where a run of it is not finished.
+    """
+    import pandas as pd
+
+    table = sources.table("sensitivity").copy()
+    keys = [*PARAMETERS.values(), "contact.friction.bead_bead"]
+    shipped = table[keys].iloc[0]
+    rows = []
+    for values, group in table.groupby(keys, sort=False):
+        changed = [name for name, key in PARAMETERS.items() if group[key].iloc[0] != shipped[key]]
+        name = changed[0] if len(changed) == 1 else _TOGETHER if changed else "shipped"
+        value = values[keys.index(PARAMETERS[name])] if name in PARAMETERS else np.nan
+        experiments = group.set_index(
+            pd.MultiIndex.from_arrays(
+                [
+                    group["beads.radii[0]"],
+                    group["drive.frequency"],
+                    group["drive.peak_acceleration"],
+                    group["start.angle"],
+                ]
+            )
+        )
+        finished = bool((group["status"] == "finished").all())
+        found = {one.name: one.value(experiments) if finished else np.nan for one in OBSERVATIONS}
+        rows.append({"parameter": name, "value": value, **found})
+    return pd.DataFrame(rows)
+
+
+def fig_sensitivity(sources: Sources) -> Figure:
+    """A tornado plot: a panel an observation, a bar a parameter from its lower to its higher value."""
+    found = sensitivities(sources)
+    figure, axes = new_figure(12.0, 4.3, ncols=len(OBSERVATIONS), sharey=True)
+    for panel, observation in zip(axes, OBSERVATIONS, strict=True):
+        _tornado(panel, found, observation)
+    names = [_label(found, name) for name in PARAMETERS]
+    axes[0].set_yticks(range(len(names) + 1), [*names, "friction 0.3, 60 × viscosity,\nminimum separation 1"])
+    axes[0].invert_yaxis()
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=7)
+    return figure
+
+
+def _label(found: pd.DataFrame, parameter: str) -> str:
+    low, high = sorted(found["value"][found["parameter"] == parameter])
+    return f"{parameter}\n{low:g} … {high:g}"
+
+
+def _tornado(axes: Axes, found: pd.DataFrame, observation: Observation) -> None:
+    shipped = float(found[observation.name][found["parameter"] == "shipped"].iloc[0])
+    for place, name in enumerate(PARAMETERS):
+        rows = found[found["parameter"] == name].sort_values("value")
+        ends = rows[observation.name].to_numpy()
+        styles = zip(ends, (-0.17, 0.17), ("0.75", "0.35"), ("lower", "higher"), strict=True)
+        for end, offset, colour, label in styles:
+            told = label if place == 0 else None
+            axes.barh(place + offset, end - shipped, 0.32, shipped, fc=colour, ec="0.1", lw=0.5, label=told)
+    together = found[found["parameter"] == _TOGETHER][observation.name]
+    axes.plot(together, [len(PARAMETERS)] * len(together), "D", color="C2", ms=6, label="all together")
+    axes.axvline(shipped, color="0.1", lw=1.0, label="shipped")
+    axes.axvline(observation.published, color="C1", ls="--", lw=1.4, label="published")
+    axes.set_xlabel(observation.name, fontsize=7.5)
+    axes.grid(axis="y", visible=False)

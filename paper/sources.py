@@ -1,0 +1,93 @@
+"""The sweeps that the figures are made from: run where they are missing, read once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from inputs.sweep import load_sweep
+from postprocess.trajectory import Trajectory, read_trajectory
+from sweeps.conduct import Failure, Options, Progress
+from sweeps.run import run_sweep
+from sweeps.table import load
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+ProgressOf = Callable[[str], AbstractContextManager[Callable[[Progress], None]]]
+
+
+class Sources:
+    """Finished sweeps in a folder of run directories.
+
+    Parameters
+    ----------
+    out
+        The folder.
+    """
+
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self.table = lru_cache(maxsize=None)(self._table)
+        self.trajectory = lru_cache(maxsize=32)(self._trajectory)
+
+    def _table(self, sweep: str) -> pd.DataFrame:
+        """The table of a sweep, see `sweeps.table.load`, its run directories from where the process is."""
+        return load(self.out / sweep)
+
+    def _trajectory(self, run: str) -> Trajectory:
+        """The motion in a run directory."""
+        return read_trajectory(Path(run))
+
+    def runs(self, *sweeps: str) -> list[str]:
+        """Names of the finished runs of sweeps."""
+        tables = [self.table(sweep) for sweep in sweeps]
+        return [Path(run).name for table in tables for run in table["run"][table["status"] == "finished"]]
+
+
+def make_sources(
+    names: Iterable[str],
+    out: Path,
+    options: Options,
+    *,
+    engine: str | None = None,
+    despite_audit: bool = False,
+    progress_of: ProgressOf | None = None,
+) -> tuple[Sources, dict[str, list[Failure]]]:
+    """Run what is missing of shipped sweeps.
+
+    Parameters
+    ----------
+    names
+        Of the sweeps.
+    out, options, engine, despite_audit
+        As for `sweeps.run.run_sweep`.
+    progress_of
+        Gives, for the name of a sweep, a context whose value is told of its progress.
+
+    Returns
+    -------
+    sources
+        The sweeps.
+    failures
+        Of each sweep, the points that failed; figures leave them out.
+
+    Raises
+    ------
+    runner.EngineFailure
+        If there is no engine, or its audit failed.
+    """
+    failures = {}
+    for name in names:
+        sweep = load_sweep(name)
+        if progress_of is None:
+            _, failures[name] = run_sweep(sweep, out, options, engine=engine, despite_audit=despite_audit)
+            continue
+        with progress_of(name) as advance:
+            _, failures[name] = run_sweep(
+                sweep, out, options, engine=engine, despite_audit=despite_audit, on_progress=advance
+            )
+    return Sources(out), failures

@@ -1,0 +1,48 @@
+"""Fig. 1b: strobed top views of a walking dimer, 0.3 s apart."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from paper import dimers
+from paper.sources import Sources
+from postprocess.drawing import new_figure
+from postprocess.rendering import top_view
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+INTERVAL = 0.3
+"""Seconds between the paper's images."""
+_IMAGES = 6
+
+
+def fig1b(sources: Sources) -> Figure:
+    """The first walker of the alignment's dimers that start on the axis, seen from above."""
+    table = sources.table("alignment")
+    asymmetric = table[table["sin_delta"] > 1e-9]
+    trajectory = sources.trajectory(asymmetric.sort_values("start.angle")["run"].iloc[0])
+    case = trajectory.case
+    strobe = case.run.samples_per_cycle
+    apart = round(INTERVAL * case.drive.frequency) * strobe
+    frames = [number * apart for number in range(_IMAGES) if number * apart < len(trajectory.time)]
+    centre = trajectory.mass_centre[frames, 0] @ np.stack([trajectory.drive_axis, trajectory.across_axis], axis=-1)
+    reach = 2.4 * float(trajectory.radii.max())
+    along = (float(centre[:, 0].min()) - reach, float(centre[:, 0].max()) + reach)
+    half = 1.15 * float(trajectory.radii.max())
+    row = 5.4 * 1.12 * 2.0 * half / (along[1] - along[0])
+    figure, axes = new_figure(5.4, len(frames) * row + 0.9, nrows=len(frames), sharex=True)
+    for panel, frame, middle in zip(axes, frames, centre, strict=True):
+        across = (float(middle[1]) - half, float(middle[1]) + half)
+        picture = top_view(trajectory, 0, frame, along, across)
+        origin = float(centre[0, 0])
+        edges = [(along[0] - origin) * 1e3, (along[1] - origin) * 1e3, -half * 1e3, half * 1e3]
+        panel.imshow(picture, extent=edges, interpolation="bilinear")
+        panel.set(yticks=[], ylabel=f"{trajectory.time[frame]:.1f} s")
+        panel.axvline(0.0, color="white", lw=0.6, ls=":")
+        panel.grid(visible=False)
+    axes[-1].set_xlabel("along the shaking axis, from the mass centre at the start (mm)")
+    figure.suptitle(f"{dimers.described(case)}; an image every {apart // strobe} cycles", fontsize=9)
+    return figure

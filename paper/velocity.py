@@ -1,0 +1,154 @@
+"""Figs. 2 and 3: the walker's velocity against its drive and its asymmetry."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inputs.dimer import dimer_of
+from paper import dimers, published
+from paper.sources import Sources
+from postprocess.drawing import new_figure
+from sweeps.table import thresholds
+from theory.prediction import motion_of, threshold
+from theory.quasistatic import detachment, mean_velocity
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MARKERS = {60.0: "D", 70.0: "o", 80.0: "^", 90.0: "s"}
+"""The paper's symbols by frequency, Hz."""
+_FINE = 61
+_FIG2_TOP = 11.0
+"""Highest speed shown, mm/s: dry friction's at 60 Hz."""
+
+
+def fig2(sources: Sources) -> Figure:
+    """Velocity against peak acceleration at four frequencies, and the threshold of motion."""
+    table, case = sources.table("fig2"), dimers.shipped()
+    dimer = dimer_of(case)
+    figure, axes = new_figure(9.6, 4.6, ncols=2, sharey=True, width_ratios=[1.5, 1.0])
+    engine, dry = axes
+    top = float(table["peak_acceleration"].max()) / published.GRAVITY
+    peaks = np.linspace(0.02, top, _FINE) * published.GRAVITY
+    gammas = np.array([dimer.gamma0(peak) for peak in peaks])
+    paper = mean_velocity(gammas, dimer.sin_delta) * 1e3
+    for number, frequency in enumerate(sorted(table["frequency"].unique())):
+        rows = table[table["frequency"] == frequency]
+        colour = f"C{number}"
+        _points(engine, rows["peak_acceleration"] / published.GRAVITY, rows, MARKERS[frequency], colour, frequency)
+        cases = dimers.driven(case, frequency, peaks)
+        engine.plot(peaks / published.GRAVITY, motion_of(*cases).velocity * 1e3, "--", color=colour, lw=0.9)
+        slippery = motion_of(*cases, viscous=False).velocity * 1e3
+        dry.plot(peaks / published.GRAVITY, slippery, ":", lw=1.6, color=colour, label=f"{frequency:g} Hz")
+    for panel in axes:
+        panel.plot(peaks / published.GRAVITY, paper, color="0.45", lw=2.2, zorder=0)
+        panel.plot(list(published.FIT), np.array(list(published.FIT.values())) * 1e3, "*", color="0.45", ms=9, zorder=0)
+        above = panel.secondary_xaxis(
+            "top",
+            functions=(lambda g: g * dimer.gamma0(published.GRAVITY), lambda x: x / dimer.gamma0(published.GRAVITY)),
+        )
+        above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
+        panel.axhline(0.0, color="0.4", lw=0.6)
+        panel.set(xlabel=r"peak acceleration $a_0$ (g, 9.8 m/s²)", xlim=(0.0, top * 1.02), ylim=(-5.0, _FIG2_TOP))
+    engine.plot([], [], "--", color="0.2", lw=0.9, label="Coulomb friction and bridges")
+    engine.plot([], [], color="0.45", lw=2.2, marker="*", ms=9, label="paper's fit, κ = 0.033 s/mm")
+    engine.set_ylabel("velocity (mm/s)")
+    engine.legend(loc="lower left", title="engine, mean and range of 6", fontsize=7, title_fontsize=7)
+    dry.legend(loc="lower left", title="Coulomb friction, dry", fontsize=7, title_fontsize=7)
+    _threshold_inset(engine.inset_axes((0.13, 0.67, 0.36, 0.31)), sources)
+    figure.suptitle(f"{_beads(dimer.radii)}, {case.liquid.name}", fontsize=10)
+    return figure
+
+
+def _points(axes: Axes, x: pd.Series[float], rows: pd.DataFrame, marker: str, colour: str, frequency: object) -> None:
+    """Means with bars from the smallest to the largest of the walkers, as in the paper."""
+    mean, low, high = (rows[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
+    axes.errorbar(
+        x.to_numpy(),
+        mean,
+        yerr=[mean - low, high - mean],
+        fmt=marker,
+        color=colour,
+        ms=4,
+        lw=0.7,
+        mfc="white" if marker in "o^" else colour,
+        label=f"{frequency:g} Hz",
+    )
+
+
+def _threshold_inset(inset: Axes, sources: Sources) -> None:
+    """Γc by the paper's protocol: between the last drive that moved the walkers and the first that did not."""
+    ends = thresholds(sources.out / "fig2-threshold")
+    dimer = dimer_of(dimers.shipped())
+    for number, row in enumerate(ends.to_dict("records")):
+        frequency = row["drive.frequency"]
+        bounds = [dimer.gamma0(row[name] * published.GRAVITY) for name in ("at_rest", "moving")]
+        middle, half = sum(bounds) / 2.0, (bounds[1] - bounds[0]) / 2.0
+        inset.errorbar(frequency, middle, yerr=half, fmt=MARKERS[float(frequency)], color=f"C{number}", ms=4, lw=1.0)
+    case = dimers.shipped()
+    predicted = [threshold(one) for f in MARKERS for one in dimers.driven(case, f, [case.drive.peak_acceleration])]
+    inset.plot(list(MARKERS), predicted, "--", color="0.2", lw=0.9)
+    inset.set(ylim=(0.0, 0.1), xlim=(55.0, 95.0))
+    inset.tick_params(labelsize=6)
+    inset.set_xlabel("f (Hz)", fontsize=7, labelpad=1)
+    inset.set_ylabel(r"$\Gamma_\mathrm{c}$", fontsize=7, labelpad=1)
+
+
+def fig3(sources: Sources) -> Figure:
+    """Velocity against asymmetry at Γ0 = 0.5."""
+    table, case = sources.table("fig3"), dimers.shipped()
+    figure, axes = new_figure(5.6, 4.2)
+    sines = np.linspace(1e-3, 0.4, _FINE)
+    gamma0 = float(table["gamma0"].iloc[0])
+    axes.plot(sines, mean_velocity(gamma0, sines) * 1e3, color="0.45", lw=2.2, label="paper's fit, κ = 0.033 s/mm")
+    fitted = [((r1 - r2) / (r1 + r2), v * 1e3) for (r1, r2), v in published.FIG3_FIT.items()]
+    axes.plot(*zip(*fitted, strict=True), "*", color="0.45", ms=9)
+    for viscous, style, label in (
+        (True, "--", "Coulomb friction and bridges, mean R 0.25 mm"),
+        (False, ":", "Coulomb friction, dry, mean R 0.25 mm"),
+    ):
+        cases = [dimers.of_asymmetry(case, sine, gamma0) for sine in sines]
+        axes.plot(sines, motion_of(*cases, viscous=viscous).velocity * 1e3, style, color="0.1", lw=0.9, label=label)
+    same = [dimers.of_radii(case, (row["radius_1"], row["radius_2"]), gamma0) for _, row in table.iterrows()]
+    axes.plot(
+        table["sin_delta"], motion_of(*same).velocity * 1e3, "x", color="0.1", ms=6, label="the same, these beads"
+    )
+    mean, low, high = (table[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
+    axes.errorbar(table["sin_delta"], mean, yerr=[mean - low, high - mean], fmt="s", color="C2", ms=5, label="engine")
+    for _, row in table.iterrows():
+        pair = f"{row['radius_1'] * 1e3:g}/{row['radius_2'] * 1e3:g}"
+        axes.annotate(
+            pair,
+            (row["sin_delta"], row["velocity"] * 1e3),
+            (0, -14),
+            textcoords="offset points",
+            fontsize=7,
+            ha="center",
+        )
+    _mark_end(axes, gamma0)
+    axes.set(
+        xlabel=r"asymmetry $\sin\delta = (R_1 - R_2)/(R_1 + R_2)$",
+        ylabel="velocity (mm/s)",
+        xlim=(0.0, 0.41),
+        ylim=(0.0, None),
+        title=rf"$\Gamma_0$ = {gamma0:g}, {case.drive.frequency:g} Hz, {case.liquid.name}; R in mm",
+    )
+    axes.title.set_fontsize(10)
+    axes.legend(fontsize=7, loc="upper left")
+    return figure
+
+
+def _mark_end(axes: Axes, gamma0: float) -> None:
+    """Where the paper's model ends, if it does within the axes."""
+    sines = np.linspace(0.0, 0.41, 400)
+    ended = np.sqrt(0.5) * gamma0 >= detachment(sines).gamma
+    if ended.any():
+        axes.axvline(float(sines[np.argmax(ended)]), color="0.45", ls="-.", lw=0.8)
+
+
+def _beads(radii: tuple[float, float]) -> str:
+    return "R = " + "/".join(f"{radius * 1e3:g}" for radius in radii) + " mm"

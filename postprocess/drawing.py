@@ -1,0 +1,74 @@
+"""What all figures share: the style file, and how they are written, with what they were made from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_STYLE = Path(__file__).parent / "style.mplstyle"
+
+
+def new_figure(width: float, height: float, *, mosaic: Any = None, **options: Any) -> tuple[Figure, Any]:
+    """A figure in the project's style, without pyplot's global state.
+
+    Parameters
+    ----------
+    width, height
+        Inches.
+    mosaic
+        Of `matplotlib.figure.Figure.subplot_mosaic`; left out, ``subplots`` makes the axes.
+    options
+        Of either.
+
+    Returns
+    -------
+    figure, axes
+    """
+    import matplotlib.style
+    from matplotlib.figure import Figure
+
+    matplotlib.style.use(_STYLE)
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots(**options) if mosaic is None else figure.subplot_mosaic(mosaic, **options)
+
+
+def save_figure(
+    figure: Figure, path: Path, sources: Sequence[str], formats: Sequence[str] = ("png",), title: str = ""
+) -> list[Path]:
+    """Write a figure, in one or several formats, beside its place and rename it.
+
+    Parameters
+    ----------
+    figure
+        To write.
+    path
+        Where; the suffix is replaced by each format's.
+    sources
+        Names of the run directories that it shows, written into the file: they end in the hash of case and engine.
+    formats
+        ``png``, ``svg``.
+    title
+        Written into the file.
+
+    Returns
+    -------
+    list of Path
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    names = {"Title": title or path.stem, "Source": " ".join(dict.fromkeys(sources))}
+    extra: dict[str, dict[str, str | None]] = {
+        "png": {"Software": "granular-walkers"},
+        "svg": {"Creator": "granular-walkers", "Date": None},
+    }
+    written = []
+    for form in formats:
+        place = path.with_suffix(f".{form}")
+        beside = place.with_name(place.name + ".new")
+        figure.savefig(beside, format=form, metadata={**names, **extra[form]})
+        beside.replace(place)
+        written.append(place)
+    return written

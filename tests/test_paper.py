@@ -1,0 +1,199 @@
+"""The paper's figures and numbers beside ours, from shortened sweeps of the real engine."""
+
+import json
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+from inputs.axes import flatten, is_axis
+from inputs.errors import InputError
+from inputs.reading import read_toml
+from inputs.sweep import expand, shipped_sweeps
+from paper import published
+from paper.alignment import climber, paper_drives
+from paper.comparison import as_markdown, compare, count
+from paper.make import FIGURES, make_figures
+from paper.modes import MODES, classify
+from paper.sensitivity import OBSERVATIONS, PARAMETERS, sensitivities
+from paper.sources import Sources
+from postprocess.drawing import save_figure
+from sweeps.conduct import Options
+from sweeps.run import run_sweep
+from tests.conftest import PROGRAM
+from theory.quasistatic import mean_velocity
+
+SHORT = {"start.replicates": 2, "run.cycles": 12, "run.settling_cycles": 6}
+FEWER = {
+    "fig2": {
+        "drive.frequency": ["60 Hz", "90 Hz"],
+        "drive.peak_acceleration": ["2 g", "3 g", "4 g", "5 g", "6 g", "10 g"],
+    },
+    "fig2-threshold": {"drive.frequency": ["60 Hz", "90 Hz"]},
+    "fig3": {},
+    "fig4": {},
+    "alignment": {"start.angle": ["0 deg", "45 deg"]},
+    "modes": {"beads.sin_delta": [0.0, 0.2], "drive.gamma0": [0.05, 0.15, 0.5]},
+}
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory: pytest.TempPathFactory) -> Sources:
+    """The shipped sweeps with fewer points and cycles, under their names."""
+    out = tmp_path_factory.mktemp("paper")
+    for name, axes in FEWER.items():
+        given = read_toml(shipped_sweeps()[name])
+        given["set"] = {**flatten(given.get("set", {}), lambda _: False), **SHORT}
+        if name == "alignment":
+            given["set"] |= {"run.cycles": 50}  # three images 0.3 s apart
+        if "axes" in given:
+            given["axes"] = {**flatten(given["axes"], is_axis), **axes}
+        if "descend" in given:
+            given["descend"] |= {"from": "0.8 g", "step": "0.1 g"}
+        sweep = expand(given, source=name, name=name, folder=shipped_sweeps()[name].parent)
+        _, failures = run_sweep(sweep, out, Options(2))
+        assert not failures
+    return Sources(out)
+
+
+@pytest.fixture(scope="module")
+def sensitivity(tmp_path_factory: pytest.TempPathFactory) -> Sources:
+    """The shipped sensitivity study, three cycles a run."""
+    out = tmp_path_factory.mktemp("sensitivity")
+    given = read_toml(shipped_sweeps()["sensitivity"])
+    experiments = len(given["zip"][0]["run"]["cycles"])
+    given["zip"][0]["run"] = {"cycles": [3] * experiments, "settling_cycles": [1] * experiments}
+    _, failures = run_sweep(
+        expand(given, source="test", name="sensitivity", folder=shipped_sweeps()["sensitivity"].parent), out, Options(2)
+    )
+    assert not failures
+    return Sources(out)
+
+
+def test_the_published_fits_are_the_papers_model() -> None:
+    """To the digits given, from κ = 0.033 s/mm: Γ0 from the beads and the drive, Γ0 = 0.5 in Fig. 3."""
+    from inputs.dimer import dimer_of
+    from paper.dimers import shipped
+
+    dimer = dimer_of(shipped())
+    for g, speed in published.FIT.items():
+        ours = float(mean_velocity(dimer.gamma0(g * published.GRAVITY), dimer.sin_delta))
+        assert ours == pytest.approx(speed, abs=6e-6)
+    for (r1, r2), speed in published.FIG3_FIT.items():
+        assert float(mean_velocity(0.5, (r1 - r2) / (r1 + r2))) == pytest.approx(speed, abs=6e-6)
+
+
+def test_all_drives_of_the_paper_are_stable() -> None:
+    drives = paper_drives()
+    assert len(drives) == 11
+    assert all(one.stable and one.v < published.LARGEST_V for one in drives.values())
+    assert climber(large_bead_below=True).u == pytest.approx(-climber(large_bead_below=False).u)
+    assert climber(large_bead_below=True).u > 0.0
+
+
+def test_every_published_number_is_compared(sources: Sources) -> None:
+    rows = compare(sources)
+    assert [row.key for row in rows] == [number.key for number in published.NUMBERS]
+    for row in rows:
+        assert (row.engine is not None) or not row.measured
+        assert bool(row.why) != row.agrees
+        if row.ratio is not None:
+            ours = row.engine if row.engine is not None else row.theory
+            assert ours is not None and row.published is not None
+            assert row.ratio * row.published == pytest.approx(ours)
+    assert count(rows, measured=False) == (9, 9)
+    told = as_markdown(rows)
+    assert all(f"| {row.what} |" in told for row in rows)
+    assert all(line.count("|") == 7 for line in told.splitlines() if line.startswith("|"))
+
+
+def test_compared_numbers_are_those_of_the_runs(sources: Sources) -> None:
+    rows = {row.key: row for row in compare(sources)}
+    table = sources.table("fig2")
+    at_four = table[np.isclose(table["drive.peak_acceleration"], 4.0)]["velocity"] * 1e3
+    assert rows["fig2_4g"].engine == pytest.approx(at_four.mean())
+    assert rows["fig2_4g"].low == pytest.approx(at_four.min())
+    fig4 = sources.table("fig4").set_index("liquid.name")
+    assert rows["fig4b_rotation"].engine == pytest.approx(fig4["rotation_1"]["Si AK10"] * 1e3)
+    assert rows["fig4a_velocity"].engine == pytest.approx(fig4["velocity"]["Si AK5"] * 1e3)
+    # Six cycles are few, but the theory is for many: it does not know the shortened runs.
+    assert rows["fig4a_velocity"].theory == pytest.approx(2.35, abs=0.02)
+
+
+@pytest.mark.parametrize("name", sorted(set(FIGURES) - {"sensitivity"}))
+def test_figures_say_what_they_were_made_from(sources: Sources, tmp_path: Path, name: str) -> None:
+    drawing = FIGURES[name]
+    runs = sources.runs(*drawing.sweeps)
+    figure = drawing.draw(sources)
+    paths = save_figure(figure, tmp_path / name, runs, ("png", "svg"), drawing.title)
+    assert [path.name for path in paths] == [f"{name}.png", f"{name}.svg"]
+    picture = Image.open(paths[0])
+    assert picture.info["Source"].split() == list(dict.fromkeys(runs))
+    assert len(np.unique(np.asarray(picture.convert("L")))) > 20  # readable in grey
+    text = "".join(ElementTree.parse(paths[1]).getroot().itertext())
+    assert all(run in text for run in runs)
+    labels = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel())]
+    assert any(unit in label for label in labels for unit in ("(mm/s)", "(mm)", "(s)"))
+    assert not list(tmp_path.glob("*.new"))
+
+
+def test_the_sensitivity_study_covers_each_parameter_both_ways(sensitivity: Sources) -> None:
+    found = sensitivities(sensitivity)
+    assert list(found["parameter"]).count("shipped") == 1
+    for name in PARAMETERS:
+        lower, higher = sorted(found["value"][found["parameter"] == name])
+        assert lower < higher
+    assert found[[one.name for one in OBSERVATIONS]].notna().all().all()
+    figure = FIGURES["sensitivity"].draw(sensitivity)
+    assert len(figure.axes) == len(OBSERVATIONS)
+
+
+def test_modes_are_told_apart(sources: Sources) -> None:
+    rolling = {"velocity": 1e-3, "rotation_1": 1e-3, "sliding_1": 0.0, "open_1": 0.0, "open_2": 0.0, "open_3": 0.0}
+    rolling |= {"steady": 2, "walkers": 2, "turned_round": 0, "status": "finished"}
+    changes = [{"velocity": 0.0}, {}, {"sliding_1": -2e-4}, {"steady": 1}, {"open_3": 0.1}, {"turned_round": 1}]
+    modes = classify(pd.DataFrame([rolling | change for change in changes]))
+    assert [MODES[mode] for mode in modes] == [*MODES, "leaves the axis"]
+    assert classify(pd.DataFrame([rolling | {"status": "failed"}])).tolist() == [-1]
+    table = sources.table("modes").assign(mode=classify(sources.table("modes")))
+    at_rest = table[np.isclose(table["drive.gamma0"], 0.05)]
+    assert (at_rest["mode"] == 0).all()
+
+
+def test_the_program_draws_what_is_asked_for(in_folder: Path) -> None:
+    done = subprocess.run([PROGRAM, "figures", "--only", "fig4"], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["figures/fig4.png", "figures/fig4.svg"]
+    done = subprocess.run([PROGRAM, "figures", "--only", "fig9"], capture_output=True, text=True, check=False)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert "fig9" in done.stderr
+    (in_folder / "file").write_text("mine")
+    done = subprocess.run(
+        [PROGRAM, "figures", "--only", "fig4", "--to", "file"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert (in_folder / "file").read_text() == "mine"
+
+
+def test_a_run_that_failed_is_left_out_and_told(tmp_path: Path) -> None:
+    """An engine that is stopped after a tenth of a second."""
+    made = make_figures(tmp_path / "runs", tmp_path / "to", Options(2, time_limit=0.1), only=["fig3"])
+    assert {failure.reason for failure in made.failures["fig3"]} == {"TimeLimitExceeded"}
+    assert made.files[0].exists()
+
+
+def test_the_comparison_is_written_for_programs_too(sources: Sources, tmp_path: Path) -> None:
+    from paper.comparison import as_dict
+
+    rows = compare(sources)
+    contents = json.loads(json.dumps(as_dict(rows)))
+    assert len(contents["numbers"]) == len(rows)
+    assert contents["of"] == sum(row.measured for row in rows)
+
+
+def test_unknown_figures_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="fig7"):
+        make_figures(tmp_path / "runs", tmp_path / "to", Options(1), only=["fig7"])

@@ -1,0 +1,49 @@
+"""``walkers figures``: the paper's figures and published numbers, beside ours."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from walkers.commands.arguments import DespiteAudit, EngineName, Out
+from walkers.pipeline import DEFAULT_OUT
+
+To = Annotated[Path, typer.Option("--to", help="Folder of the figures.")]
+Only = Annotated[list[str] | None, typer.Option("--only", help="Name of a figure, or comparison; may be repeated.")]
+Jobs = Annotated[int | None, typer.Option("-j", "--jobs", min=1, help="Decks at once; all cores if left out.")]
+
+
+def command(
+    out: Out = DEFAULT_OUT,
+    to: To = Path("figures"),
+    only: Only = None,
+    jobs: Jobs = None,
+    engine: EngineName = None,
+    despite_audit: DespiteAudit = False,
+) -> int:
+    """Draw the paper's figures with engine, theory and published values; runs that are missing are made first."""
+    from paper.make import make_figures
+    from sweeps.conduct import Options
+    from sweeps.site import cores_here
+    from walkers.progress import progress_of_sweep
+
+    made = make_figures(
+        out,
+        to,
+        Options(jobs or cores_here()),
+        only=only or (),
+        engine=engine,
+        despite_audit=despite_audit,
+        progress_of=progress_of_sweep,
+    )
+    for sweep, failures in made.failures.items():
+        for failure in failures:
+            print(f"walkers: {sweep}: point {failure.point}, {failure.run}: {failure.message}", file=sys.stderr)
+    for file in made.files:
+        print(file)
+    if made.compared:
+        print(f"{made.agree} of {made.compared} published numbers agree: {to / 'comparison.md'}")
+    return 1 if made.failures else 0
