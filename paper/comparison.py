@@ -229,8 +229,8 @@ _HEAD = """# Published numbers beside this project's
 {agree} of the {of} numbers in which the engine has a say agree, and {derived} of the {derived_of} that follow from
 beads and drive alone. To agree is to lie within what the paper says or, where it gives no spread, within
 {tolerance:.0%} of the published value (the paper's points and error bars are in its figures only). Parameters are the
-shipped ones, the same in all rows. Theory is Coulomb friction with the bridges' drag, nothing fitted. As in the paper, a
-velocity is the mean of six walkers, half of them facing each way, seen once a cycle (alignment: two walkers a start);
+shipped ones, the same in all rows. Theory is Coulomb friction with the bridges' drag, nothing fitted. As in the paper,
+a velocity is the mean of six walkers, half of them facing each way, seen once a cycle (alignment: two walkers a start);
 brackets hold the slowest and the fastest, or the range over the frequencies where a number is one for all of them.
 Fig. 1a is a pile's and is not among them.
 
