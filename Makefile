@@ -9,7 +9,7 @@ SWEEP ?= fig2
 
 .PHONY: help
 help: ## List the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 .PHONY: walker
 walker: setup ## Run the walker of Fig. 1b (or CASE=...): velocity, pictures, ParaView files
@@ -45,6 +45,10 @@ audit: setup ## Prove what the installed engine does, against published formulas
 .PHONY: docs-audit
 docs-audit: setup ## Write docs/engine.md from an audit of the installed engine
 	@$(WALKERS) audit --markdown docs/engine.md
+
+.PHONY: docs-figures
+docs-figures: setup ## Write the figures and the comparison that docs/ shows
+	@$(WALKERS) figures --out $(OUT) --to docs/figures
 
 .PHONY: bench
 bench: setup ## Measure what docs/performance.md states

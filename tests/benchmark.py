@@ -15,8 +15,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from inputs import load_case
 from inputs.case import WalkerCase
+from theory.friction import Friction
+from theory.motion import Walker, walk
+from theory.prediction import friction_of
 from walkers import run_case
 
 _REPEATS = 3
@@ -71,11 +76,29 @@ def _step_microseconds(case: WalkerCase, out: Path) -> float:
     return min(loops) / case.run.steps * 1e6
 
 
+def measure_theory() -> None:
+    """How many walkers a second the theory integrates on one core, compiled."""
+    print("\n| friction | walkers a second |\n|---|---|")
+    case, count = load_case("fig1b"), 1000
+    walker, accelerations = Walker.of_case(case), np.linspace(5.0, 60.0, count)
+    laws = {
+        "the paper's, κ v F": Friction(linear=33.0),
+        "Coulomb and bridges": friction_of(case, viscous=True),
+        "Coulomb, dry": friction_of(case, viscous=False),
+    }
+    for name, friction in laws.items():
+        walk(walker, friction, case.drive.frequency, 5.0)
+        begin = time.perf_counter()
+        walk(walker, friction, case.drive.frequency, accelerations)
+        print(f"| {name} | {count / (time.perf_counter() - begin):.0f} |")
+
+
 def main() -> None:
     """Print the tables."""
     with tempfile.TemporaryDirectory() as folder:
         measure_program(Path(folder))
         measure_steps(Path(folder))
+    measure_theory()
 
 
 if __name__ == "__main__":
