@@ -107,7 +107,8 @@ class Run:
 class WalkerCase:
     """A dimer on a shaken wet substrate, resolved.
 
-    Attributes are SI; ``name`` and ``title`` do not determine the run and stay out of `determinants`.
+    A walker's substrate is level; a climber's is a wall, with the drive axis pointing up. Attributes are SI;
+    ``name`` and ``title`` do not determine the run and stay out of `determinants`.
     """
 
     name: str
@@ -120,6 +121,17 @@ class WalkerCase:
     start: Start
     run: Run
     gravity: float
+    kind: Literal["walker", "climber"] = "walker"
+
+    @property
+    def pressing_gravity(self) -> float:
+        """The part of gravity that presses the beads to the substrate, m/s²."""
+        return self.gravity if self.kind == "walker" else 0.0
+
+    @property
+    def axial_gravity(self) -> float:
+        """The part of gravity that pulls them down along the drive axis, m/s²."""
+        return self.gravity - self.pressing_gravity
 
     def determinants(self) -> dict[str, Any]:
         """Everything that the run's outcome depends on, as plain JSON types."""
@@ -129,7 +141,6 @@ class WalkerCase:
             for key, value in vars(self).items()
             if key not in ("name", "title")
         }
-        values["kind"] = "walker"
         values["beads"]["radii"] = list(self.beads.radii)
         return values
 
@@ -152,6 +163,7 @@ class WalkerCase:
             start=Start(**values["start"]),
             run=Run(**values["run"]),
             gravity=values["gravity"],
+            kind=values["kind"],
         )
 
     def renamed(self, name: str) -> WalkerCase:

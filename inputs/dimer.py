@@ -105,7 +105,7 @@ def contact_loads(case: WalkerCase) -> ContactLoads:
     modulus = forces.reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     # The wall stands twice in the deck, so that each of the two carries half of the load.
     sunk = [
-        forces.hertz_overlap(0.5 * (force + mass * case.gravity), radius, modulus)
+        forces.hertz_overlap(0.5 * (force + mass * case.pressing_gravity), radius, modulus)
         for force, mass, radius in zip(walls, dimer.masses, radii, strict=True)
     ]
     volumes = (at_wall[0], at_wall[1], between)
@@ -130,9 +130,9 @@ def reach(case: WalkerCase) -> float:
 
 def hop_height(case: WalkerCase) -> float:
     """Height that a bead thrown up at twice the substrate's peak velocity reaches, m (its reach without gravity)."""
-    if case.gravity == 0.0:
+    if case.pressing_gravity == 0.0:
         return reach(case)
-    return min((2.0 * case.drive.peak_velocity) ** 2 / (2.0 * case.gravity), reach(case))
+    return min((2.0 * case.drive.peak_velocity) ** 2 / (2.0 * case.pressing_gravity), reach(case))
 
 
 def horizontal_distance(radii: tuple[float, float], overlaps: tuple[float, float, float]) -> float:

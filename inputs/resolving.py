@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 from inputs import library
 from inputs.case import Beads, Contact, Drive, Liquid, Run, Start, WalkerCase
@@ -12,6 +13,11 @@ from inputs.schema import BeadsTable, LiquidTable, WalkerFile
 from inputs.timestep import fit_into_cycle, time_step_limits
 
 MOST_STEPS = 2**31 - 1
+_WAYS: dict[str, Literal["both", "right", "left"]] = {
+    **{"both": "both", "right": "right", "left": "left"},
+    **{"up": "right", "down": "left"},
+}
+"""What ``start.facing`` says; up and down are a climber's words."""
 
 
 class UnusableKeyError(Exception):
@@ -37,10 +43,11 @@ def resolve(file: WalkerFile, name: str) -> WalkerCase:
     dimer = Dimer(beads.radii, beads.density, liquid.surface_tension)
     drive = _drive(file, dimer)
     run = _run(file, dimer, contact, liquid, drive)
+    _check_climber(file)
     table = file.start
     start = Start(
         replicates=table.replicates,
-        facing=table.facing,
+        facing=_WAYS[table.facing],
         angle=table.angle,
         angle_spread=table.angle_spread,
         gap=table.gap,
@@ -49,8 +56,17 @@ def resolve(file: WalkerFile, name: str) -> WalkerCase:
         seed=table.seed,
     )
     gravity = file.environment.gravity
-    case = WalkerCase(name, file.title, beads, liquid, file.substrate.material, contact, drive, start, run, gravity)
+    case = WalkerCase(
+        name, file.title, beads, liquid, file.substrate.material, contact, drive, start, run, gravity, file.kind
+    )
     return _placed(case, table.spacing)
+
+
+def _check_climber(file: WalkerFile) -> None:
+    if file.kind == "walker" and file.start.facing in ("up", "down"):
+        raise UnusableKeyError("start.facing", 'expected "both", "right" or "left": climbers alone face up or down')
+    if file.kind == "climber" and file.drive.axis == "z":
+        raise UnusableKeyError("drive.axis", 'expected "x" or "y": the wall is the plane z = 0, and the axis goes up')
 
 
 def _known(key: str, name: str, names: tuple[str, ...], *, described: bool = False) -> str:

@@ -130,7 +130,7 @@ class StartTable(_Table):
     """``[start]``: how many walkers there are and how each begins."""
 
     replicates: Annotated[Whole, Field(ge=1, le=1000)] = 6
-    facing: Literal["both", "right", "left"] = "both"
+    facing: Literal["both", "right", "left", "up", "down"] = "both"
     angle: Angle = 0.0
     angle_spread: NonNegativeAngle = 0.017453292519943295
     gap: Annotated[SignedLength | None, BeforeValidator(_auto)] = None
@@ -157,9 +157,9 @@ class EnvironmentTable(_Table):
 
 
 class WalkerFile(_Table):
-    """A case file of a walker."""
+    """A case file of a walker on a level substrate, or of a climber: the same on a wall, the drive axis going up."""
 
-    kind: Literal["walker"] = "walker"
+    kind: Literal["walker", "climber"] = "walker"
     title: str = ""
     beads: BeadsTable
     liquid: LiquidTable

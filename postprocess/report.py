@@ -27,6 +27,7 @@ def describe_result(directory: Path, result: dict[str, Any], *, found: bool = Fa
     of_what = f"over {count} walkers" if count > 1 else "of the fit"
     doubt = f" (standard error {_speed(error)} {of_what})" if error is not None else ""
     toward = "toward the large bead" if result["sin_delta"] else "toward bead 1"
+    ways = ("up", "down") if result.get("kind") == "climber" else ("right", "left")  # older results have no kind
     steady = f"{result['steady']} of {result['walkers']} steady"
     sliding = ", ".join(f"{name} {_speed(result['sliding'][contact])}" for contact, name in _CONTACTS.items())
     lines = [
@@ -34,7 +35,7 @@ def describe_result(directory: Path, result: dict[str, Any], *, found: bool = Fa
         f"Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}" + (" (already run)" if found else ""),
         f"  velocity   {_speed(velocity['mean'])} mm/s, positive {toward}{doubt}",
         f"    smallest {_speed(velocity['smallest'])}, largest {_speed(velocity['largest'])}; {steady}",
-        f"    started facing right {_side(result['right_facing'])}, left {_side(result['left_facing'])}",
+        f"    started facing {ways[0]} {_side(result['right_facing'])}, {ways[1]} {_side(result['left_facing'])}",
         f"  rotation   bead 1 {_speed(rotation['bead_1'])}, bead 2 {_speed(rotation['bead_2'])} mm/s",
         f"  sliding    {sliding} mm/s",
         f"  orientation at the end {degrees(turned['smallest']):.2f}° to {degrees(turned['largest']):.2f}°",

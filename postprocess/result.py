@@ -140,6 +140,7 @@ def _result(trajectory: Trajectory, walkers: Columns) -> dict[str, Any]:
     velocity, facing = walkers["velocity"], walkers["facing"]
     return {
         "case": case.name,
+        "kind": case.kind,
         "units": "SI: m/s, rad, s",
         "velocity": _spread(velocity, float(walkers["standard_error"][0])),
         "right_facing": _spread(velocity[facing > 0]),

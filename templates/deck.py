@@ -9,7 +9,7 @@ from math import degrees, sqrt
 from typing import TYPE_CHECKING
 
 from inputs.case import Contact, WalkerCase
-from inputs.dimer import contact_loads, dimer_of, hop_height
+from inputs.dimer import contact_loads, dimer_of, hop_height, reach
 from templates.engine import ALL_REMEDIES, Remedies, contact_angle_setting, separation_cap, wall_mesh
 from templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
 from templates.placement import place_walkers
@@ -192,6 +192,7 @@ def compose(plan: Plan) -> Deck:
         separation_cap=separation_cap((bead.radius for bead in scene.beads), case.liquid.volume_fraction, angle),
         bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
         axis=axis,
+        down=vector_along("z", -1.0) if case.kind == "walker" else vector_along(drive.axis, -1.0),
         amplitude=[drive.amplitude * component for component in axis],
         peak_velocity=[drive.peak_velocity * component for component in axis],
         prescribed=plan.prescribed,
@@ -238,7 +239,7 @@ def _fastest(case: WalkerCase) -> float:
     """Ten times the substrate's peak velocity, plus a fall from the highest hop, plus what a bridge's pull can give."""
     loads = contact_loads(case)
     pull = sqrt(2.0 * max(loads.capillary) * max(loads.rupture) / min(dimer_of(case).masses))
-    fall = sqrt(2.0 * case.gravity * hop_height(case))
+    fall = sqrt(2.0 * case.gravity * (hop_height(case) if case.kind == "walker" else reach(case)))
     return 10.0 * case.drive.peak_velocity + fall + pull
 
 

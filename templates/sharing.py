@@ -35,7 +35,7 @@ def sharing_key(case: WalkerCase) -> Hashable:
         rolling_friction=float(case.contact.rolling_friction > 0.0),
     )
     liquid = replace(case.liquid, name=None, density=None)
-    return (liquid, contact, case.drive, case.run, case.gravity, case.beads.density, crowded)
+    return (case.kind, liquid, contact, case.drive, case.run, case.gravity, case.beads.density, crowded)
 
 
 def check_sharing(cases: Sequence[WalkerCase]) -> None:

@@ -110,7 +110,7 @@ BAD: dict[str, tuple[dict[str, Any], str, str, str]] = {
     "no replicates": ({"start": {"replicates": 0}}, "start.replicates", "0", "at least 1"),
     "half a replicate": ({"start": {"replicates": 1.5}}, "start.replicates", "1.5", "whole number"),
     "true replicates": ({"start": {"replicates": True}}, "start.replicates", "true", "whole number"),
-    "unknown facing": ({"start": {"facing": "up"}}, "start.facing", '"up"', "'both', 'right' or 'left'"),
+    "unknown facing": ({"start": {"facing": "north"}}, "start.facing", '"north"', "'both', 'right', 'left'"),
     "beads apart": ({"start": {"gap": "1 um"}}, "start.gap", '"1 um"', "zero or less"),
     "beads overlap": ({"start": {"gap": "-50 um"}}, "start.gap", '"-50 um"', "overlap"),
     "walkers overlap": ({"start": {"replicates": 2, "spacing": "0.5 mm"}}, "start.spacing", '"0.5 mm"', "overlap"),

@@ -65,7 +65,7 @@ class Walker:
     def of_case(cls, case: WalkerCase) -> Walker:
         """A case's walker with the capillary forces that its bridges have in the engine, and its weight."""
         dimer = dimer_of(case)
-        forces = np.array(contact_loads(case).capillary) + np.array([*dimer.masses, 0.0]) * case.gravity
+        forces = np.array(contact_loads(case).capillary) + np.array([*dimer.masses, 0.0]) * case.pressing_gravity
         return replace(cls.of_dimer(dimer), at_rest=(forces / dimer.capillary_scale)[:, None])
 
     @classmethod

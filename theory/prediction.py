@@ -62,6 +62,7 @@ def motion_of(*cases: WalkerCase, viscous: bool = True) -> Motion:
         friction_of(*cases, viscous=viscous),
         [case.drive.frequency for case in cases],
         [case.drive.peak_acceleration for case in cases],
+        steady_acceleration=[case.axial_gravity for case in cases],
     )
 
 
@@ -89,7 +90,9 @@ def threshold(case: WalkerCase, *, viscous: bool = True) -> float:
     for _ in range(_ROUNDS):
         trials = np.linspace(low, high, _TRIALS)
         accelerations = np.array([dimer.peak_acceleration(float(gamma)) for gamma in trials])
-        moves = np.abs(walk(walker, friction, case.drive.frequency, accelerations).velocity) > MOVING
+        pull = case.axial_gravity
+        motion = walk(walker, friction, case.drive.frequency, accelerations, steady_acceleration=pull)
+        moves = np.abs(motion.velocity) > MOVING
         if not moves.any():
             return float("nan")
         first = int(np.argmax(moves))
@@ -114,7 +117,7 @@ def predict(case: WalkerCase) -> dict[str, Any]:
     gamma0 = dimer.gamma0(case.drive.peak_acceleration)
     end = detachment(dimer.sin_delta)
     linear = float(mean_velocity(gamma0, dimer.sin_delta))
-    mathieu = alignment(dimer, case.drive.frequency, case.drive.peak_acceleration)
+    mathieu = alignment(dimer, case.drive.frequency, case.drive.peak_acceleration, -case.axial_gravity)
     models = {name: motion_of(case, viscous=viscous) for name, viscous in (("coulomb", False), ("viscous", True))}
     return {
         "gamma0": gamma0,

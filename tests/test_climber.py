@@ -1,0 +1,72 @@
+"""A dimer on a wall, shaken along it, against gravity."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from inputs import InputError, load_case, resolve_case
+from inputs.case import WalkerCase
+from postprocess.report import describe_result
+from postprocess.result import read_result
+from runner.binary import find_engine
+from runner.directory import run_place
+from sweeps.together import make_together
+from tests.conftest import document
+from theory.prediction import motion_of, predict
+
+FRICTIONS = {0.1: -2.2e-3, 0.2: 1.8e-3, 0.3: 5.9e-3}
+"""Climbing speeds in m/s, from a prototype deck of the same dimer."""
+
+
+def climber(friction: float = 0.3, **start: object) -> WalkerCase:
+    case = load_case("climber")
+    contact = replace(case.contact, friction_bead_wall=friction, friction_bead_bead=friction)
+    begin = replace(case.start, replicates=1, angle_spread=0.0, gap_spread=0.0, spacing=0.1, **start)  # type: ignore[arg-type]
+    return replace(case, contact=contact, start=begin)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Climbers of several kinds, side by side in as few decks as may be."""
+    case = climber()
+    symmetric = replace(case, beads=replace(case.beads, radii=(0.42625e-3, 0.42625e-3)))
+    cases = {str(friction): climber(friction) for friction in FRICTIONS}
+    cases |= {f"below {friction}": climber(friction, facing="left") for friction in (0.2, 0.3)}
+    cases["symmetric"] = symmetric
+    out = tmp_path_factory.mktemp("climbers")
+    engine = find_engine(None)
+    made = make_together(list(cases.values()), out, engine)
+    return {name: made.runs[run_place(case, engine, out).name].directory for name, case in cases.items()}
+
+
+@pytest.mark.parametrize("friction", list(FRICTIONS))
+def test_a_climber_climbs_if_friction_suffices(runs: dict[str, Path], friction: float) -> None:
+    velocity = read_result(runs[str(friction)])["velocity"]["mean"]
+    assert velocity == pytest.approx(FRICTIONS[friction], rel=0.03)
+    assert float(motion_of(climber(friction)).velocity[0]) == pytest.approx(velocity, rel=0.08)
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.3])
+def test_with_the_large_bead_below_it_falls(runs: dict[str, Path], friction: float) -> None:
+    result = read_result(runs[f"below {friction}"])
+    assert result["axial_velocity"]["left_facing"] < -5e-3
+
+
+def test_a_symmetric_dimer_falls(runs: dict[str, Path]) -> None:
+    assert read_result(runs["symmetric"])["axial_velocity"]["right_facing"] < -1e-3
+
+
+def test_the_report_of_a_climber_speaks_of_up_and_down(runs: dict[str, Path]) -> None:
+    directory = runs["0.3"]
+    assert "started facing up" in describe_result(directory, read_result(directory))
+
+
+def test_a_climbers_weight_pulls_along_the_axis() -> None:
+    case = climber()
+    assert (case.pressing_gravity, case.axial_gravity) == (0.0, case.gravity)
+    assert predict(case)["alignment"]["u"] < 0.0  # it stands on its head
+    with pytest.raises(InputError, match=r"drive\.axis"):
+        resolve_case(document(kind="climber", drive={"axis": "z"}))
+    with pytest.raises(InputError, match=r"start\.facing"):
+        resolve_case(document(start={"facing": "up"}))
