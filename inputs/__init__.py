@@ -5,6 +5,19 @@ The first room of the project: it knows nothing of the engine's language.
 
 from inputs.case import WalkerCase
 from inputs.errors import InputError, Problem, WalkersError
-from inputs.reading import load_case, resolve_case, shipped_cases
+from inputs.pile import PileCase
+from inputs.reading import load_any, load_case, load_pile, resolve_case, resolve_pile_case, shipped_cases
 
-__all__ = ["InputError", "Problem", "WalkerCase", "WalkersError", "load_case", "resolve_case", "shipped_cases"]
+__all__ = [
+    "InputError",
+    "PileCase",
+    "Problem",
+    "WalkerCase",
+    "WalkersError",
+    "load_any",
+    "load_case",
+    "load_pile",
+    "resolve_case",
+    "resolve_pile_case",
+    "shipped_cases",
+]

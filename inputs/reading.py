@@ -6,9 +6,9 @@ Whatever is wrong ends as one `InputError` that names the file, the key, the val
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -16,9 +16,13 @@ from inputs.case import WalkerCase
 from inputs.errors import InputError, Problem
 from inputs.library import suggestion
 from inputs.messages import problem_of, quoted
+from inputs.pile import PileCase
+from inputs.pile_file import PileFile, resolve_pile
 from inputs.resolving import UnusableKeyError, resolve
-from inputs.schema import WalkerFile
+from inputs.schema import Table, WalkerFile
 
+_File = TypeVar("_File", bound=Table)
+_Case = TypeVar("_Case")
 _SHIPPED = Path(__file__).parent / "cases"
 
 
@@ -28,7 +32,7 @@ def shipped_cases() -> dict[str, Path]:
 
 
 def load_case(case: str | Path) -> WalkerCase:
-    """Read and resolve a case.
+    """Read and resolve a case of a walker or a climber; `load_any` takes piles as well.
 
     Parameters
     ----------
@@ -47,6 +51,20 @@ def load_case(case: str | Path) -> WalkerCase:
     """
     path = find_input(case, shipped_cases(), "case")
     return resolve_case(read_toml(path), source=str(case), name=path.stem)
+
+
+def load_any(case: str | Path) -> WalkerCase | PileCase:
+    """Read and resolve a case of any kind; parameters and errors as for `load_case`."""
+    path = find_input(case, shipped_cases(), "case")
+    document = read_toml(path)
+    resolver = resolve_pile_case if document.get("kind") == "pile" else resolve_case
+    return resolver(document, source=str(case), name=path.stem)
+
+
+def load_pile(case: str | Path) -> PileCase:
+    """Read and resolve a case of a pile; parameters and errors as for `load_case`."""
+    path = find_input(case, shipped_cases(), "case")
+    return resolve_pile_case(read_toml(path), source=str(case), name=path.stem)
 
 
 def find_input(name: str | Path, shipped: Mapping[str, Path], kind: str) -> Path:
@@ -105,13 +123,24 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     InputError
         If anything in it cannot be used.
     """
+    return _resolved(WalkerFile, resolve, document, source, name)
+
+
+def resolve_pile_case(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> PileCase:
+    """`resolve_case` for a pile."""
+    return _resolved(PileFile, resolve_pile, document, source, name)
+
+
+def _resolved(
+    model: type[_File], resolver: Callable[[_File, str], _Case], document: Mapping[str, Any], source: str, name: str
+) -> _Case:
     try:
-        file = WalkerFile.model_validate(document)
+        file = model.model_validate(document)
     except ValidationError as error:
         problems = [problem_of(details, document) for details in error.errors()]
         raise InputError(source, problems) from error
     try:
-        return resolve(file, name)
+        return resolver(file, name)
     except ArithmeticError as error:
         raise InputError(source, [Problem("", None, f"the numbers do not go together ({error})")]) from error
     except UnusableKeyError as unusable:

@@ -9,7 +9,7 @@ from inputs import library
 from inputs.case import Beads, Contact, Drive, Liquid, Run, Start, WalkerCase
 from inputs.dimer import Dimer, contact_loads, horizontal_distance, reach
 from inputs.library import suggestion
-from inputs.schema import BeadsTable, LiquidTable, WalkerFile
+from inputs.schema import BeadsTable, ContactTable, LiquidTable, WalkerFile
 from inputs.timestep import fit_into_cycle, time_step_limits
 
 MOST_STEPS = 2**31 - 1
@@ -38,8 +38,8 @@ def resolve(file: WalkerFile, name: str) -> WalkerCase:
         If something is missing that the library does not know, or keys contradict each other.
     """
     beads = _beads(file)
-    liquid = _liquid(file.liquid)
-    contact = _contact(file)
+    liquid = resolve_liquid(file.liquid)
+    contact = resolve_contact(file.contact, beads.material, "substrate.material", file.substrate.material)
     dimer = Dimer(beads.radii, beads.density, liquid.surface_tension)
     drive = _drive(file, dimer)
     run = _run(file, dimer, contact, liquid, drive)
@@ -69,7 +69,7 @@ def _check_climber(file: WalkerFile) -> None:
         raise UnusableKeyError("drive.axis", 'expected "x" or "y": the wall is the plane z = 0, and the axis goes up')
 
 
-def _known(key: str, name: str, names: tuple[str, ...], *, described: bool = False) -> str:
+def known_name(key: str, name: str, names: tuple[str, ...], *, described: bool = False) -> str:
     """A name of the library; another one only if the case itself says all about it and it is no misspelling."""
     if name in names:
         return name
@@ -79,22 +79,32 @@ def _known(key: str, name: str, names: tuple[str, ...], *, described: bool = Fal
     return name
 
 
-def _describes_contacts(file: WalkerFile) -> bool:
-    friction = file.contact.friction
-    return None not in (friction.bead_bead, friction.bead_wall, file.contact.rolling_friction)
+def _describes_contacts(table: ContactTable) -> bool:
+    return None not in (table.friction.bead_bead, table.friction.bead_wall, table.rolling_friction)
 
 
 def _beads(file: WalkerFile) -> Beads:
     table = file.beads
-    if table.material is not None:
-        described = table.density is not None and _describes_contacts(file)
-        _known("beads.material", table.material, library.materials(), described=described)
-    density = table.density
-    if density is None and table.material is not None:
-        density = library.material(table.material)["density"]
+    density = density_of(table.material, table.density, file.contact)
+    return Beads(radii=_radii(table), density=density, material=table.material)
+
+
+def density_of(material: str | None, density: float | None, contact: ContactTable) -> float:
+    """Density of the beads, kg/m³: as given, or their material's.
+
+    Raises
+    ------
+    UnusableKeyError
+        If neither says it, or the material is not in the library and the case does not say all about it.
+    """
+    if material is not None:
+        described = density is not None and _describes_contacts(contact)
+        known_name("beads.material", material, library.materials(), described=described)
+    if density is None and material is not None:
+        density = library.material(material)["density"]
     if density is None:
         raise UnusableKeyError("beads.material", "missing; expected a material of the library, or a density")
-    return Beads(radii=_radii(table), density=density, material=table.material)
+    return density
 
 
 def _radii(table: BeadsTable) -> tuple[float, float]:
@@ -112,10 +122,17 @@ def _radii(table: BeadsTable) -> tuple[float, float]:
     return first, second
 
 
-def _liquid(table: LiquidTable) -> Liquid:
+def resolve_liquid(table: LiquidTable) -> Liquid:
+    """A liquid, the library's numbers filled in.
+
+    Raises
+    ------
+    UnusableKeyError
+        If a number is missing or said twice.
+    """
     known: dict[str, float] = {}
     if table.name is not None:
-        known = library.liquid(_known("liquid.name", table.name, library.liquids()))
+        known = library.liquid(known_name("liquid.name", table.name, library.liquids()))
     if table.kinematic_viscosity is not None and table.dynamic_viscosity is not None:
         raise UnusableKeyError(
             "liquid.dynamic_viscosity", "expected either kinematic_viscosity or dynamic_viscosity, not both"
@@ -134,9 +151,24 @@ def _liquid(table: LiquidTable) -> Liquid:
     return Liquid(tension, viscosity, density, table.volume_fraction, table.contact_angle, table.name)
 
 
-def _contact(file: WalkerFile) -> Contact:
-    table, bead, wall = file.contact, file.beads.material, file.substrate.material
-    _known("substrate.material", wall, library.materials(), described=_describes_contacts(file))
+def resolve_contact(table: ContactTable, bead: str | None, wall_key: str, wall: str) -> Contact:
+    """How beads of a material touch each other and a wall, the library's frictions filled in.
+
+    Parameters
+    ----------
+    table
+        What the case says.
+    bead, wall
+        Materials.
+    wall_key
+        The key that names the wall's.
+
+    Raises
+    ------
+    UnusableKeyError
+        If a material or a friction is not known.
+    """
+    known_name(wall_key, wall, library.materials(), described=_describes_contacts(table))
     on_bead, on_wall = library.surface_pair(bead, bead), library.surface_pair(bead, wall)
     known = {
         "friction.bead_bead": _first(table.friction.bead_bead, on_bead, "friction"),

@@ -58,16 +58,20 @@ ALTERNATIVES: dict[str, tuple[str, ...]] = {
 }
 """Keys that say the same in other words: a change of one puts the others out of force."""
 
+AUTO = BeforeValidator(_auto)
+"""Reads "auto" as None."""
 Number = Annotated[float, BeforeValidator(_plain_number), Field(allow_inf_nan=False)]
 Whole = Annotated[int, BeforeValidator(_whole_number)]
 Coefficient = Annotated[Number, Field(ge=0, le=1e3)]
 
 
-class _Table(BaseModel):
+class Table(BaseModel):
+    """A table of a file; unknown keys are refused."""
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class BeadsTable(_Table):
+class BeadsTable(Table):
     """``[beads]``: the radii, first the bead that leads (the large one, as in the paper), and what they are made of.
 
     The radii may also be given by their mean and the asymmetry parameter sin δ = (R1 - R2)/(R1 + R2).
@@ -80,7 +84,7 @@ class BeadsTable(_Table):
     density: Density | None = None
 
 
-class LiquidTable(_Table):
+class LiquidTable(Table):
     """``[liquid]``: a name from the library, or its numbers, or both (the numbers win)."""
 
     name: str | None = None
@@ -92,20 +96,20 @@ class LiquidTable(_Table):
     contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] = 0.0
 
 
-class SubstrateTable(_Table):
+class SubstrateTable(Table):
     """``[substrate]``."""
 
     material: str
 
 
-class FrictionTable(_Table):
+class FrictionTable(Table):
     """``[contact.friction]``: Coulomb coefficients; left out, the library's value for the two materials holds."""
 
     bead_bead: Coefficient | None = None
     bead_wall: Coefficient | None = None
 
 
-class ContactTable(_Table):
+class ContactTable(Table):
     """``[contact]``: the model of the contacts."""
 
     friction: FrictionTable = FrictionTable()
@@ -116,7 +120,7 @@ class ContactTable(_Table):
     minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] = 0.01
 
 
-class DriveTable(_Table):
+class DriveTable(Table):
     """``[drive]``: how the substrate is shaken; exactly one of ``peak_acceleration`` and ``gamma0``."""
 
     axis: Literal["x", "y", "z"] = "x"
@@ -126,23 +130,23 @@ class DriveTable(_Table):
     frame: Literal["lab", "container"] = "lab"
 
 
-class StartTable(_Table):
+class StartTable(Table):
     """``[start]``: how many walkers there are and how each begins."""
 
     replicates: Annotated[Whole, Field(ge=1, le=1000)] = 6
     facing: Literal["both", "right", "left", "up", "down"] = "both"
     angle: Angle = 0.0
     angle_spread: NonNegativeAngle = 0.017453292519943295
-    gap: Annotated[SignedLength | None, BeforeValidator(_auto)] = None
+    gap: Annotated[SignedLength | None, AUTO] = None
     gap_spread: Annotated[Number, Field(ge=0, lt=1)] = 0.2
-    spacing: Annotated[Length | None, BeforeValidator(_auto)] = None
+    spacing: Annotated[Length | None, AUTO] = None
     seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 1
 
 
-class RunTable(_Table):
+class RunTable(Table):
     """``[run]``: the time step, the length of the run and what is recorded."""
 
-    time_step: Annotated[Time | None, BeforeValidator(_auto)] = None
+    time_step: Annotated[Time | None, AUTO] = None
     allow_unstable: bool = False
     cycles: Annotated[Whole, Field(ge=2, le=1_000_000)] = 60
     settling_cycles: Annotated[Whole, Field(ge=0, le=1_000_000)] = 20
@@ -150,13 +154,13 @@ class RunTable(_Table):
     bridge_samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] = 1
 
 
-class EnvironmentTable(_Table):
+class EnvironmentTable(Table):
     """``[environment]``."""
 
     gravity: Acceleration = 9.81
 
 
-class WalkerFile(_Table):
+class WalkerFile(Table):
     """A case file of a walker on a level substrate, or of a climber: the same on a wall, the drive axis going up."""
 
     kind: Literal["walker", "climber"] = "walker"

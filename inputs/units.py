@@ -143,6 +143,7 @@ FREQUENCY = Kind("frequency", "Hz", "80 Hz", 1e6, 1e-2)
 ACCELERATION = Kind("acceleration", "m/s^2", "4 g", 1e6, 1e-9)
 SPEED = Kind("speed", "m/s", "0.02 mm/s", 1e4, 1e-12)
 TIME = Kind("time", "s", "2 us", 1.0, 1e-12)
+DURATION = Kind("duration", "s", "4 s", 1e4, 1e-6)
 ANGLE = Kind("angle", "rad", "10 deg", 1e3)
 DENSITY = Kind("density", "kg/m^3", "4.0 g/cm^3", 1e5, 1.0)
 SURFACE_TENSION = Kind("surface tension", "N/m", "19.2 mN/m", 10.0, 1e-9)
@@ -157,6 +158,7 @@ Frequency = Annotated[float, _validator(FREQUENCY, positive=True, zero=False)]
 Acceleration = Annotated[float, _validator(ACCELERATION, positive=True, zero=True)]
 Speed = Annotated[float, _validator(SPEED, positive=True, zero=False)]
 Time = Annotated[float, _validator(TIME, positive=True, zero=False)]
+Duration = Annotated[float, _validator(DURATION, positive=True, zero=False)]
 Angle = Annotated[float, _validator(ANGLE, positive=False, zero=True)]
 NonNegativeAngle = Annotated[float, _validator(ANGLE, positive=True, zero=True)]
 Density = Annotated[float, _validator(DENSITY, positive=True, zero=False)]

@@ -22,6 +22,7 @@ from typing import Any
 
 from inputs.case import WalkerCase
 from inputs.errors import Stopped, WalkersError
+from inputs.pile import PileCase
 from runner.audits import read_audit
 from runner.binary import Engine
 from runner.failures import DiskFull, RunBusy
@@ -49,8 +50,12 @@ def run_name(case: WalkerCase, deck: Deck, engine: Engine) -> str:
         "format": _FORMAT,
     }
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
-    name = re.sub(r"[^\w.+-]+", "_", case.name)[:_LONGEST_NAME]
-    return f"{name}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
+    return f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
+
+
+def name_of(case_name: str) -> str:
+    """A case's name as a run's begins with it."""
+    return re.sub(r"[^\w.+-]+", "_", case_name)[:_LONGEST_NAME]
 
 
 def run_place(case: WalkerCase, engine: Engine, out: Path) -> Path:
@@ -175,7 +180,7 @@ def make_run(case: WalkerCase, deck: Deck, engine: Engine, place: Path, locks: S
     except Stopped:
         raise
     except (WalkersError, OSError) as failure:
-        _record(part, failure)
+        record_failure(part, failure)
         raise
 
 
@@ -212,14 +217,15 @@ def write_deck(deck: Deck, directory: Path) -> None:
     write_json(directory / LAYOUT_NAME, deck.layout.as_dict())
 
 
-def _record(part: Path, failure: Exception) -> None:
+def record_failure(part: Path, failure: Exception) -> None:
+    """Leave word of a failure in the directory of an unfinished run."""
     said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
     with suppress(OSError):  # a full disk: the message reaches the user all the same
         write_json(part / FAILURE_NAME, said)
 
 
 def manifest(
-    case: WalkerCase, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path
+    case: WalkerCase | PileCase, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path
 ) -> dict[str, Any]:
     """What the manifest of a run says."""
     finished = time.time()

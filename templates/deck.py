@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from math import degrees, sqrt
+from math import degrees, inf, sqrt
 from typing import TYPE_CHECKING
 
 from inputs.case import Contact, WalkerCase
 from inputs.dimer import contact_loads, dimer_of, hop_height, reach
+from inputs.pile import PileCase
 from templates.engine import ALL_REMEDIES, Remedies, contact_angle_setting, separation_cap, wall_mesh
 from templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
 from templates.placement import place_walkers
@@ -74,6 +75,8 @@ class Recording:
     status_every: int
     bead_columns: tuple[str, ...] = BEAD_COLUMNS
     begin: int = 0
+    pair_bridge_columns: tuple[str, ...] = PAIR_BRIDGE_COLUMNS
+    wall_bridge_columns: tuple[str, ...] = WALL_BRIDGE_COLUMNS
 
 
 @dataclass(frozen=True)
@@ -102,9 +105,18 @@ class Plan:
         How the beads' surfaces touch, by `templates.scene.Bead.surface`; the case's own contact if left out.
     fastest
         A speed that no bead can reach, m/s; computed from the case if left out.
+    drive_from
+        Step at which the drive begins; None for a part before it.
+    skin
+        How far beyond contact neighbours are looked for, m; if left out, the smallest radius, and wide bins, which
+        suits few beads far apart.
+    title
+        What the deck is of, for those who read it.
+    tells_agitation
+        Whether the root mean square velocity of the beads is printed at the end.
     """
 
-    case: WalkerCase
+    case: WalkerCase | PileCase
     scene: Scene
     recording: Recording
     walkers: tuple[PlacedWalker, ...] = ()
@@ -114,6 +126,20 @@ class Plan:
     checkpoint: Checkpoint = NO_CHECKPOINT
     surfaces: tuple[Contact, ...] = ()
     fastest: float | None = None
+    drive_from: int | None = 0
+    skin: float | None = None
+    title: str = "Wet dimers on a shaken substrate"
+    tells_agitation: bool = False
+
+    @property
+    def shaken(self) -> bool:
+        """Whether the drive is on in the deck."""
+        return self.drive_from is not None
+
+    @property
+    def begins_to_shake(self) -> bool:
+        """Whether the drive begins where the deck does."""
+        return self.drive_from == self.recording.begin
 
 
 def render_deck(case: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Deck:
@@ -157,7 +183,7 @@ def walker_plan(*cases: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Plan:
         bridge_every=run.steps_per_cycle // run.bridge_samples_per_cycle,
         status_every=-(-run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
     )
-    fastest = max(_fastest(one) for one in cases)
+    fastest = max(fastest_of(one) for one in cases)
     return Plan(case, scene, recording, walkers, remedies, surfaces=surfaces_of(cases), fastest=fastest)
 
 
@@ -192,20 +218,28 @@ def compose(plan: Plan) -> Deck:
         separation_cap=separation_cap((bead.radius for bead in scene.beads), case.liquid.volume_fraction, angle),
         bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
         axis=axis,
-        down=vector_along("z", -1.0) if case.kind == "walker" else vector_along(drive.axis, -1.0),
+        down=[-int(component) for component in vector_along("z" if case.kind != "climber" else drive.axis)],
+        plan=plan,
         amplitude=[drive.amplitude * component for component in axis],
         peak_velocity=[drive.peak_velocity * component for component in axis],
         prescribed=plan.prescribed,
         ranks=plan.ranks,
         checkpoint=plan.checkpoint,
-        pair_bridge_terms=[f"c_pair_bridges[{number + 1}]" for number in range(len(layout.pair_bridge_columns))],
-        wall_bridge_terms=[f"c_wall_bridges[{number + 1}]" for number in range(len(layout.wall_bridge_columns))],
-        skin=min(bead.radius for bead in scene.beads),
-        bin_size=_bin_size(scene),
+        pair_bridge_terms=_terms("pair_bridges", layout.pair_bridge_columns, PAIR_BRIDGE_COLUMNS),
+        wall_bridge_terms=_terms("wall_bridges", layout.wall_bridge_columns, WALL_BRIDGE_COLUMNS),
+        skin=plan.skin or min(bead.radius for bead in scene.beads),
+        bin_size=None if plan.skin else _bin_size(scene),
     )  # fmt: skip
     files = {WALL_NAME: wall_mesh(scene.faces, max(scene.upper))}
-    fastest = plan.fastest if plan.fastest is not None else _fastest(case)
+    fastest = plan.fastest
+    if fastest is None:
+        fastest = fastest_of(case) if isinstance(case, WalkerCase) else inf
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest)
+
+
+def _terms(compute: str, columns: Sequence[str], all_columns: Sequence[str]) -> list[str]:
+    """What a dump writes for some of the columns that a compute has."""
+    return [f"c_{compute}[{all_columns.index(column) + 1}]" for column in columns]
 
 
 def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
@@ -224,7 +258,7 @@ def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
     ]
 
 
-def _contact_model(case: WalkerCase) -> str:
+def _contact_model(case: WalkerCase | PileCase) -> str:
     rolling = " rolling_friction cdt" if case.contact.rolling_friction > 0 else ""
     return f"hertz tangential history cohesion easo/capillary/viscous{rolling}"
 
@@ -235,7 +269,7 @@ def _bin_size(scene: Scene) -> float:
     return float(max(4.0 * max(bead.radius for bead in scene.beads), (width * depth * height / 2e4) ** (1.0 / 3.0)))
 
 
-def _fastest(case: WalkerCase) -> float:
+def fastest_of(case: WalkerCase) -> float:
     """Ten times the substrate's peak velocity, plus a fall from the highest hop, plus what a bridge's pull can give."""
     loads = contact_loads(case)
     pull = sqrt(2.0 * max(loads.capillary) * max(loads.rupture) / min(dimer_of(case).masses))
@@ -243,16 +277,18 @@ def _fastest(case: WalkerCase) -> float:
     return 10.0 * case.drive.peak_velocity + fall + pull
 
 
-def _layout(case: WalkerCase, scene: Scene, recording: Recording, walkers: tuple[PlacedWalker, ...]) -> Layout:
+def _layout(
+    case: WalkerCase | PileCase, scene: Scene, recording: Recording, walkers: tuple[PlacedWalker, ...]
+) -> Layout:
     return Layout(
         bead_dump="beads.bin",
         bead_columns=recording.bead_columns,
         sample_every=recording.sample_every,
         frames=(recording.steps - recording.begin) // recording.sample_every + 1,
         pair_bridge_dump="bridges.pairs.txt",
-        pair_bridge_columns=PAIR_BRIDGE_COLUMNS,
+        pair_bridge_columns=recording.pair_bridge_columns,
         wall_bridge_dump="bridges.walls.txt",
-        wall_bridge_columns=WALL_BRIDGE_COLUMNS,
+        wall_bridge_columns=recording.wall_bridge_columns,
         bridge_every=recording.bridge_every,
         bridge_frames=(recording.steps - recording.begin) // recording.bridge_every + 1,
         atoms=len(scene.riders) + len(scene.beads),

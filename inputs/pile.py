@@ -1,0 +1,169 @@
+"""A resolved pile: wet beads of two size classes in a shaken container. SI units, nothing left to look up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, is_dataclass, replace
+from math import pi
+from typing import Any, Literal
+
+from inputs.case import Contact, Drive, Liquid
+
+
+@dataclass(frozen=True)
+class Container:
+    """An upright container, open above, its floor the plane z = 0 about the origin.
+
+    Attributes
+    ----------
+    shape
+        ``box`` with a square cross-section, or ``cylinder``.
+    width
+        Inner side or diameter, m.
+    height
+        m; beads that leave it above are lost.
+    material
+        Of the walls.
+    """
+
+    shape: Literal["box", "cylinder"]
+    width: float
+    height: float
+    material: str
+
+    @property
+    def cross_section(self) -> float:
+        """Inner area, m²."""
+        return self.width**2 * (1.0 if self.shape == "box" else pi / 4.0)
+
+
+@dataclass(frozen=True)
+class PileBeads:
+    """The beads, by class.
+
+    Attributes
+    ----------
+    small, large
+        Radii of either class, m, each occurring equally often (the engine is given no distributions).
+    counts
+        Number of small and of large beads.
+    density
+        kg/m³.
+    material
+        Name, or None.
+    """
+
+    small: tuple[float, ...]
+    large: tuple[float, ...]
+    counts: tuple[int, int]
+    density: float
+    material: str | None
+
+    @property
+    def radii(self) -> list[float]:
+        """Radius of every bead, the small ones first, m."""
+        small, large = ([sizes[number % len(sizes)] for number in range(count)] for sizes, count in self.classes)
+        return small + large
+
+    @property
+    def classes(self) -> tuple[tuple[tuple[float, ...], int], tuple[tuple[float, ...], int]]:
+        """Radii and number of the small and of the large beads."""
+        return (self.small, self.counts[0]), (self.large, self.counts[1])
+
+    @property
+    def border(self) -> float:
+        """A radius between the two classes, m."""
+        return (max(self.small) + min(self.large)) / 2.0
+
+
+@dataclass(frozen=True)
+class PileRun:
+    """How long, how fine and in which parts.
+
+    Attributes
+    ----------
+    time_step
+        s.
+    steps_per_cycle
+        Of the drive.
+    cycles
+        Driven, after the settling.
+    cycles_per_part
+        The run is made in parts of so many cycles, each with a restart file at its end.
+    frames_per_cycle, cycles_per_frame
+        Beads and bridges are recorded this often a cycle, or once in so many cycles; one of them is 1.
+    settled_below
+        Root mean square velocity of the beads, m/s, below which the pile counts as settled.
+    longest_settling
+        s; the drive begins then at the latest.
+    ranks
+        MPI processes.
+    """
+
+    time_step: float
+    steps_per_cycle: int
+    cycles: int
+    cycles_per_part: int
+    frames_per_cycle: int
+    cycles_per_frame: int
+    settled_below: float
+    longest_settling: float
+    ranks: int
+
+    @property
+    def steps_per_frame(self) -> int:
+        """Steps between frames."""
+        return self.steps_per_cycle * self.cycles_per_frame // self.frames_per_cycle
+
+
+@dataclass(frozen=True)
+class PileCase:
+    """A wet bidisperse pile in a vertically shaken container, resolved.
+
+    ``name`` and ``title`` do not determine the run and stay out of `determinants`.
+    """
+
+    name: str
+    title: str
+    container: Container
+    beads: PileBeads
+    liquid: Liquid
+    contact: Contact
+    drive: Drive
+    seed: int
+    run: PileRun
+    gravity: float
+    kind: Literal["pile"] = "pile"
+
+    def determinants(self) -> dict[str, Any]:
+        """Everything that the run's outcome depends on, as plain JSON types."""
+        return {
+            key: _plain(dict(vars(value))) if is_dataclass(value) else value
+            for key, value in vars(self).items()
+            if key not in ("name", "title")
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        """The whole case as plain JSON types, SI units."""
+        return {"name": self.name, "title": self.title, **self.determinants()}
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> PileCase:
+        """Rebuild a case from `as_dict` (a run directory's ``case.json``)."""
+        beads = {**values["beads"], **{key: tuple(values["beads"][key]) for key in ("small", "large", "counts")}}
+        return cls(
+            **{key: values[key] for key in ("name", "title", "seed", "gravity", "kind")},
+            container=Container(**values["container"]),
+            beads=PileBeads(**beads),
+            liquid=Liquid(**values["liquid"]),
+            contact=Contact(**values["contact"]),
+            drive=Drive(**values["drive"]),
+            run=PileRun(**values["run"]),
+        )
+
+    def renamed(self, name: str) -> PileCase:
+        """The same case under another name."""
+        return replace(self, name=name)
+
+
+def _plain(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}

@@ -1,0 +1,190 @@
+"""Case files of piles: what they may say, and how they are resolved."""
+
+from __future__ import annotations
+
+from math import ceil, pi
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from inputs.case import Contact, Drive, Liquid
+from inputs.dimer import Dimer
+from inputs.pile import Container, PileBeads, PileCase, PileRun
+from inputs.resolving import UnusableKeyError, density_of, resolve_contact, resolve_liquid
+from inputs.schema import AUTO, ContactTable, EnvironmentTable, LiquidTable, Number, Table, Whole
+from inputs.timestep import TimeStepLimits, fit_into_cycle, time_step_limits
+from inputs.units import Acceleration, Density, Duration, Frequency, Length, Radius, Speed, Time
+
+MOST_BEADS = 20_000
+_PACKING = 0.55
+"""Packing fraction of a settled wet pile, for the count that fills a height."""
+
+
+class ContainerTable(Table):
+    """``[container]``: inner measures, open above."""
+
+    shape: Literal["box", "cylinder"] = "box"
+    width: Length
+    height: Length
+    material: str
+
+
+class PileBeadsTable(Table):
+    """``[beads]``: two classes, each a range of radii that is filled with ``sizes`` constant radii."""
+
+    small: tuple[Radius, Radius]
+    large: tuple[Radius, Radius]
+    small_share: Annotated[Number, Field(ge=0, le=1)] = 0.5
+    mixed_by: Literal["mass", "volume", "number"] = "mass"
+    sizes: Annotated[Whole, Field(ge=1, le=20)] = 4
+    count: Annotated[Whole, Field(ge=1, le=MOST_BEADS)] | None = None
+    fill_height: Length | None = None
+    material: str | None = None
+    density: Density | None = None
+
+
+class PileDriveTable(Table):
+    """``[drive]``: along the vertical."""
+
+    frequency: Frequency
+    peak_acceleration: Acceleration
+    frame: Literal["container", "lab"] = "container"
+
+
+class PileRunTable(Table):
+    """``[run]``."""
+
+    time_step: Annotated[Time | None, AUTO] = None
+    allow_unstable: bool = False
+    duration: Duration
+    part: Duration = 0.5
+    frames_per_second: Annotated[Number, Field(gt=0, le=1e6)] = 60.0
+    settled_below: Speed = 5e-3
+    longest_settling: Duration = 0.5
+    ranks: Annotated[Whole, Field(ge=1, le=64)] = 1
+
+
+class PileStartTable(Table):
+    """``[start]``: the seed of the beads' places."""
+
+    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 1
+
+
+class PileFile(Table):
+    """A case file of a pile."""
+
+    kind: Literal["pile"]
+    title: str = ""
+    container: ContainerTable
+    beads: PileBeadsTable
+    liquid: LiquidTable
+    contact: ContactTable = ContactTable()
+    drive: PileDriveTable
+    start: PileStartTable = PileStartTable()
+    run: PileRunTable
+    environment: EnvironmentTable = EnvironmentTable()
+
+
+def resolve_pile(file: PileFile, name: str) -> PileCase:
+    """Resolve a validated file.
+
+    Raises
+    ------
+    UnusableKeyError
+        If something is missing that the library does not know, or keys contradict each other.
+    """
+    beads = _beads(file)
+    wall = file.container.material
+    liquid = resolve_liquid(file.liquid)
+    contact = resolve_contact(file.contact, beads.material, "container.material", wall)
+    drive = Drive("z", file.drive.frequency, file.drive.peak_acceleration, file.drive.frame)
+    container = Container(file.container.shape, file.container.width, file.container.height, wall)
+    _check_room(beads, container)
+    run = _run(file.run, beads, contact, liquid, drive)
+    return PileCase(
+        name, file.title, container, beads, liquid, contact, drive, file.start.seed, run, file.environment.gravity
+    )
+
+
+def _sizes(key: str, bounds: tuple[float, float], number: int) -> tuple[float, ...]:
+    """The middles of equal shares of a range of radii, m."""
+    low, high = bounds
+    if low > high:
+        raise UnusableKeyError(f"beads.{key}", "expected the smaller radius first")
+    return tuple(dict.fromkeys(float(f"{low + (high - low) * (k + 0.5) / number:.12g}") for k in range(number)))
+
+
+def _beads(file: PileFile) -> PileBeads:
+    table = file.beads
+    small, large = (_sizes(key, getattr(table, key), table.sizes) for key in ("small", "large"))
+    if max(small) >= min(large):
+        raise UnusableKeyError("beads.large", "expected radii above those of the small beads")
+    density = density_of(table.material, table.density, file.contact)
+    if (table.count is None) == (table.fill_height is None):
+        raise UnusableKeyError("beads.count", "expected either a count or a fill_height")
+    volumes = [sum(4.0 / 3.0 * pi * radius**3 for radius in sizes) / len(sizes) for sizes in (small, large)]
+    share = table.small_share
+    if table.mixed_by != "number":  # one density: by mass is by volume
+        by_number = [share / volumes[0], (1.0 - share) / volumes[1]]
+        share = by_number[0] / sum(by_number)
+    count = table.count
+    if count is None:
+        shape, width = file.container.shape, file.container.width
+        area = Container(shape, width, file.container.height, "").cross_section
+        mean = share * volumes[0] + (1.0 - share) * volumes[1]
+        count = round(_PACKING * area * (table.fill_height or 0.0) / mean)
+        if not 1 <= count <= MOST_BEADS:
+            raise UnusableKeyError("beads.fill_height", f"that takes {count} beads; expected 1 to {MOST_BEADS}")
+    few = round(count * share)
+    return PileBeads(small, large, (few, count - few), density, table.material)
+
+
+def _check_room(beads: PileBeads, container: Container) -> None:
+    volume = sum(4.0 / 3.0 * pi * radius**3 for radius in beads.radii)
+    if container.width < 4.0 * max(beads.large):
+        raise UnusableKeyError("container.width", "expected at least two of the large beads side by side")
+    level = volume / (0.3 * container.cross_section)  # as loosely as they are placed at the start
+    if level > container.height:
+        needed = f"{level * 1e3:.3g} mm"
+        raise UnusableKeyError("container.height", f"too low for {sum(beads.counts)} beads; expected {needed} or more")
+
+
+def limits_of(beads: PileBeads, contact: Contact, liquid: Liquid, drive: Drive) -> TimeStepLimits:
+    """Limits of the time step: those of a large and a small bead on a wall.
+
+    Beads of a pile have more neighbours, and its viscous limit is lower; ``auto``'s share of the limit allows for it: a
+    glycerol pile at 0.4 of it is agitated as at a quarter of that step, within 0.1 %, and at 0.8 it heats up.
+    """
+    dimer = Dimer((max(beads.large), min(beads.small)), beads.density, liquid.surface_tension)
+    return time_step_limits(dimer, contact, liquid, drive)
+
+
+def _run(table: PileRunTable, beads: PileBeads, contact: Contact, liquid: Liquid, drive: Drive) -> PileRun:
+    limits = limits_of(beads, contact, liquid, drive)
+    exceeded = limits.exceeded_by(table.time_step) if table.time_step is not None else []
+    if exceeded and not table.allow_unstable:
+        allowed = min(limits.as_dict().values())
+        raise UnusableKeyError(
+            "run.time_step",
+            f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed * 1e6:.3g} us, "
+            '"auto", or allow_unstable = true',
+        )
+    largest = table.time_step if table.time_step is not None else limits.recommended()
+    wanted = drive.frequency / table.frames_per_second
+    per_cycle, cycles_per_frame = (round(1.0 / wanted), 1) if wanted < 1.0 else (1, round(wanted))
+    time_step, steps = fit_into_cycle(largest, drive.frequency, per_cycle)
+    # Parts end with a frame, so that each begins where the last one ended.
+    frames_per_part = max(1, round(table.part * drive.frequency / cycles_per_frame))
+    per_part = frames_per_part * cycles_per_frame
+    cycles = ceil(table.duration * drive.frequency / cycles_per_frame * (1.0 - 1e-12)) * cycles_per_frame
+    return PileRun(
+        time_step,
+        steps,
+        cycles,
+        min(per_part, cycles),
+        per_cycle,
+        cycles_per_frame,
+        table.settled_below,
+        table.longest_settling,
+        table.ranks,
+    )

@@ -1,0 +1,242 @@
+"""Runs made in parts: the pile's, which take long, each part from a restart file to the next.
+
+A run is made in ``NAME-HASH.part``, its parts in ``parts/0000``, ``parts/0001``, … there. A part that is being made is
+called ``0003.new`` and gets its name when it is whole; an interrupted run goes on after the last whole part. Since
+the parts are the same whether the run was interrupted or not, so is all that comes out of it, bit for bit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from inputs.errors import Stopped, WalkersError
+from inputs.pile import PileCase
+from runner.binary import Engine
+from runner.directory import (
+    CASE_NAME,
+    MANIFEST_NAME,
+    FinishedRun,
+    finished_run,
+    manifest,
+    move_into_place,
+    name_of,
+    record_failure,
+    recover,
+    unfinished,
+    write_deck,
+)
+from runner.failures import RunBusy
+from runner.files import read_json, settle, settle_entry, write_json
+from runner.launch import EngineReport, Progress, launch
+from runner.locks import locked
+from templates.deck import OUTPUT_NAME
+from templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Part, render_part
+
+PARTS = "parts"
+PART_NAME = "part.json"
+_SETTLING_SECONDS = 0.05
+"""Length of the parts in which a pile settles; at the end of each it is looked whether it has."""
+
+
+@dataclass(frozen=True)
+class PileProgress:
+    """How far a pile is: simulated time and wall time of this call (s), whether it is driven, share of the drive."""
+
+    simulated: float
+    elapsed: float
+    driven: bool
+    share: float
+
+
+def pile_place(case: PileCase, engine: Engine, out: Path) -> Path:
+    """Where the run of a pile belongs."""
+    first = Part(0, _settling_steps(case), None)
+    drive = Part(first.end, first.end + case.run.cycles_per_part * case.run.steps_per_cycle, first.end)
+    decks = [render_part(case, part) for part in (first, drive)]
+    determinants = {
+        "case": case.determinants(),
+        "decks": [deck.text for deck in decks],
+        "files": dict(decks[0].files),
+        "engine": engine.sha256,
+    }
+    text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
+    return out / f"{name_of(case.name)}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+
+
+def run_pile(
+    case: PileCase,
+    engine: Engine,
+    out: Path,
+    *,
+    force: bool = False,
+    on_progress: Callable[[PileProgress], None] | None = None,
+    time_limit: float | None = None,
+) -> tuple[FinishedRun, bool]:
+    """Run a pile, or go on with it.
+
+    Parameters
+    ----------
+    case, engine
+        What is run.
+    out
+        Folder of the run directories; made if need be.
+    force
+        Begin anew, also if the run is there.
+    on_progress
+        Called a few times a second.
+    time_limit
+        Wall time in s for each part.
+
+    Returns
+    -------
+    run
+        Its parts are in ``parts/``.
+    found
+        Whether it was there before.
+
+    Raises
+    ------
+    RunBusy
+        If another process is making the same run.
+    EngineFailure
+        If the engine fails; the parts before stay, and the next call goes on after them.
+    """
+    place = pile_place(case, engine, out)
+    out.mkdir(parents=True, exist_ok=True)
+    with locked([place]) as ours:
+        if place not in ours:
+            raise RunBusy(unfinished(place))
+        recover(place)
+        there = finished_run(place)
+        if there is not None and not force:
+            return there, True
+        made = unfinished(place)
+        if force:
+            shutil.rmtree(made, ignore_errors=True)
+        try:
+            return _make(_Making(case, engine, made, list(ours.values()), on_progress, time_limit), place), False
+        except Stopped:
+            raise
+        except (WalkersError, OSError) as failure:
+            record_failure(made, failure)
+            raise
+
+
+class _Making:
+    """A run that is being made or gone on with."""
+
+    def __init__(
+        self,
+        case: PileCase,
+        engine: Engine,
+        directory: Path,
+        locks: Sequence[int],
+        on_progress: Callable[[PileProgress], None] | None,
+        time_limit: float | None,
+    ) -> None:
+        self.case, self.engine, self.directory, self.locks = case, engine, directory, locks
+        self.on_progress, self.time_limit = on_progress, time_limit
+        self.begin = time.perf_counter()
+        directory.mkdir(exist_ok=True)
+        (directory / PARTS).mkdir(exist_ok=True)
+        write_json(directory / CASE_NAME, case.as_dict())
+        self.done = [read_json(path / PART_NAME) for path in part_directories(directory)]
+
+    def make(self, part: Part) -> dict[str, Any]:
+        """Make a part, unless it is there, and say what it was."""
+        number = len(self.done)
+        place = self.directory / PARTS / f"{number:04d}"
+        new = place.with_name(place.name + ".new")
+        shutil.rmtree(new, ignore_errors=True)
+        new.mkdir()
+        deck = render_part(self.case, part)
+        write_deck(deck, new)
+        if part.begin:
+            shutil.copyfile(place.with_name(f"{number - 1:04d}") / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
+        report = launch(
+            deck, new, self.engine, on_progress=self._tell(part), time_limit=self.time_limit, keep_open=self.locks
+        )
+        (new / PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
+        said = {**vars(part), **vars(report), "root_mean_square_velocity": _agitation(new)}
+        write_json(new / PART_NAME, said)
+        settle(new)
+        new.rename(place)
+        settle_entry(place.parent)
+        # The restart before the last one is kept, should the last one prove bad.
+        if number > 1:
+            (place.with_name(f"{number - 2:04d}") / RESTART_NAME).unlink(missing_ok=True)
+        self.done.append(said)
+        return said
+
+    def _tell(self, part: Part) -> Callable[[Progress], None]:
+        run, tell = self.case.run, self.on_progress
+
+        def advance(progress: Progress) -> None:
+            if tell is None:
+                return
+            step = max(progress.step, part.begin)
+            driven = 0 if part.drive_from is None else step - part.drive_from
+            share = driven / (run.cycles * run.steps_per_cycle)
+            elapsed = time.perf_counter() - self.begin
+            tell(PileProgress(step * run.time_step, elapsed, part.drive_from is not None, share))
+
+        return advance
+
+
+def _settling_steps(case: PileCase) -> int:
+    frame = case.run.steps_per_frame
+    return max(1, round(_SETTLING_SECONDS / case.run.time_step / frame)) * frame
+
+
+def _make(making: _Making, place: Path) -> FinishedRun:
+    case, run = making.case, making.case.run
+    started = time.time()
+    while (start := _settled_at(making)) is None:
+        begin = making.done[-1]["end"] if making.done else 0
+        making.make(Part(begin, begin + _settling_steps(case), None))
+    end = start + run.cycles * run.steps_per_cycle
+    while (begin := making.done[-1]["end"]) < end:
+        making.make(Part(begin, min(begin + run.cycles_per_part * run.steps_per_cycle, end), start))
+    seconds = [sum(part[name] for part in making.done) for name in ("wall_seconds", "loop_seconds")]
+    report = EngineReport(making.done[0]["version"], seconds[0], seconds[1], end)
+    said = manifest(case, place.name, making.engine, report, started=started, directory=making.directory)
+    settling = {"drive_from": start, "settled": making.done[_first_driven(making) - 1]["root_mean_square_velocity"]}
+    write_json(making.directory / MANIFEST_NAME, {**said, **settling, "parts": len(making.done)})
+    move_into_place(making.directory, place)
+    return FinishedRun(place)
+
+
+def _first_driven(making: _Making) -> int:
+    driven = [number for number, part in enumerate(making.done) if part["drive_from"] is not None]
+    return driven[0] if driven else len(making.done)
+
+
+def _settled_at(making: _Making) -> int | None:
+    """Step at which the drive begins: the end of the first part that leaves the pile at rest, or the last allowed."""
+    run = making.case.run
+    for part in making.done:
+        if part["drive_from"] is not None:
+            return int(part["drive_from"])
+        at_rest = part["root_mean_square_velocity"] < run.settled_below
+        if at_rest or part["end"] * run.time_step >= run.longest_settling:
+            return int(part["end"])
+    return None
+
+
+def _agitation(directory: Path) -> float:
+    """Root mean square velocity of the beads at the end of a part, by mass, m/s: the deck has it printed last."""
+    told = re.findall(rb"^root mean square velocity (\S+)", (directory / OUTPUT_NAME).read_bytes(), re.MULTILINE)
+    return float(told[-1])
+
+
+def part_directories(directory: Path) -> list[Path]:
+    """The whole parts of a run, in their order."""
+    return sorted(path for path in (directory / PARTS).glob("[0-9]*") if not path.suffix)

@@ -1,0 +1,118 @@
+"""Decks of piles: the beads' places at the start, the container, and the parts that a run is made in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import inf
+
+from inputs.pile import PileCase
+from templates.deck import Checkpoint, Deck, Plan, Recording, compose
+from templates.scene import Bead, Face, Point, Scene
+
+RESTART_NAME = "state.restart"
+PREVIOUS_RESTART_NAME = "previous.restart"
+BEAD_COLUMNS = ("id", "type", "radius", "x", "y", "z", "vx", "vy", "vz")
+PAIR_COLUMNS = ("id1", "id2", "fx", "fy", "fz", "overlap")
+WALL_COLUMNS = ("x", "y", "z", "triangle", "id", "fx", "fy", "fz")
+_SKIN = 2e-4
+"""m; between 0.1 and 0.3 mm it makes no difference of more than some per cent to the time of a step."""
+_LOOSE = 1.03
+"""Pitch of the places at the start, in diameters of the largest bead."""
+_STATUS_LINES_PER_CYCLE = 2
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a run: from a step to a step, from a restart file (unless it is the first) to the next.
+
+    ``drive_from`` is the step at which the drive begins; None while the pile settles.
+    """
+
+    begin: int
+    end: int
+    drive_from: int | None
+
+
+def faces_of(case: PileCase) -> tuple[Face, ...]:
+    """The floor first, then the side walls; centroids off the middle, where ranks may meet."""
+    half, aside = case.container.width / 2.0, 0.0137 * case.container.width
+    level = case.container.height / 4.0
+    return (
+        Face("z", 1, (aside, 0.0, 0.0)),
+        Face("x", 1, (-half, 0.0, level)),
+        Face("x", -1, (half, 0.0, level)),
+        Face("y", 1, (aside, -half, level)),
+        Face("y", -1, (aside, half, level)),
+    )
+
+
+def render_part(case: PileCase, part: Part) -> Deck:
+    """Render the deck of a part."""
+    run = case.run
+    recording = Recording(
+        steps=part.end,
+        sample_every=run.steps_per_frame,
+        bridge_every=run.steps_per_frame,
+        status_every=-(-run.steps_per_cycle // _STATUS_LINES_PER_CYCLE),
+        bead_columns=BEAD_COLUMNS,
+        begin=part.begin,
+        pair_bridge_columns=PAIR_COLUMNS,
+        wall_bridge_columns=WALL_COLUMNS,
+    )
+    return compose(
+        Plan(
+            case,
+            place_pile(case),
+            recording,
+            ranks=run.ranks,
+            checkpoint=Checkpoint(write=RESTART_NAME, read=PREVIOUS_RESTART_NAME if part.begin else None),
+            fastest=inf if part.drive_from is None else 20.0 * case.drive.peak_velocity,
+            drive_from=part.drive_from,
+            skin=_SKIN,
+            title="A wet bidisperse pile in a shaken container",
+            tells_agitation=True,
+        )
+    )
+
+
+@lru_cache(maxsize=4)
+def place_pile(case: PileCase) -> Scene:
+    """Beads on a loose lattice, the sizes shuffled and the places jittered by the case's seed, to fall and settle.
+
+    Riders come first: for each MPI rank one a face, under the floor of its part of the box.
+    """
+    faces, ranks = faces_of(case), case.run.ranks
+    half = case.container.width / 2.0
+    largest = max(case.beads.large + case.beads.small)
+    edge, below = half + 2e-4, 4.0 * largest
+    lower: Point = (-edge, -edge, -(len(faces) + 2) * below)
+    upper: Point = (edge, edge, case.container.height)
+    width = (upper[0] - lower[0]) / ranks
+    riders = tuple(
+        (lower[0] + (rank + 0.5) * width, 0.0, -(number + 1.5) * below)
+        for rank in range(ranks)
+        for number in range(len(faces))
+    )
+    places = _places(case, largest)
+    beads = tuple(Bead(len(riders) + 1 + number, place, radius) for number, (place, radius) in enumerate(places))
+    return Scene(beads, faces, riders, lower, upper)
+
+
+def _places(case: PileCase, largest: float) -> list[tuple[Point, float]]:
+    """Centre and radius of each bead."""
+    from numpy.random import default_rng
+
+    draw = default_rng(case.seed)
+    radii = [float(radius) for radius in draw.permutation(case.beads.radii)]
+    across = int(case.container.width / (2.0 * _LOOSE * largest))
+    pitch = case.container.width / across
+    places: list[tuple[Point, float]] = []
+    for number, radius in enumerate(radii):
+        layer, place = divmod(number, across * across)
+        row, column = divmod(place, across)
+        shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * (pitch / 2.0 - radius)
+        x, y = ((index + 0.5) * pitch - case.container.width / 2.0 for index in (row, column))
+        height = (layer + 0.5) * 2.0 * _LOOSE * largest
+        places.append(((x + float(shift[0]), y + float(shift[1]), height), radius))
+    return places
