@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inputs.dimer import Dimer, dimer_of
+from inputs.dimer import dimer_of
 from inputs.reading import load_case
 from paper import dimers, published
 from paper.sources import Sources
@@ -31,9 +31,9 @@ _SMALL = 0.15
 
 def fig_alignment(sources: Sources) -> Figure:
     """ψ(t) of asymmetric and symmetric dimers, its beginning beside theory, and the chart of stability."""
-    table = sources.table("alignment")
+    table = sources.finished("alignment")
     figure, axes = new_figure(9.6, 7.0, mosaic=[["asymmetric", "symmetric"], ["beginning", "chart"]])
-    shown = {"asymmetric": table["sin_delta"] > 1e-9, "symmetric": table["sin_delta"] <= 1e-9}
+    shown = {"asymmetric": ~dimers.symmetric(table), "symmetric": dimers.symmetric(table)}
     for name, chosen in shown.items():
         for _, row in table[chosen].iterrows():
             _turns(axes[name], sources.trajectory(row["run"]), row["start.angle"])
@@ -41,7 +41,8 @@ def fig_alignment(sources: Sources) -> Figure:
     axes["symmetric"].set_title("symmetric: across the axis, ψ = ±90°")
     axes["asymmetric"].set_yticks(np.arange(-540, 541, 180))
     axes["symmetric"].set_yticks(np.arange(-180, 181, 90))
-    axes["asymmetric"].legend(title="started at", fontsize=7, title_fontsize=7, ncols=2, loc="center right")
+    handles, labels = axes["asymmetric"].get_legend_handles_labels()
+    figure.legend(handles, labels, title="started at", fontsize=7, title_fontsize=7, loc="outside right center")
     asymmetric = table[shown["asymmetric"]]
     for _, row in asymmetric[asymmetric["start.angle"].isin(_BEGINNINGS)].iterrows():
         _beginning(axes["beginning"], sources.trajectory(row["run"]), row["start.angle"])
@@ -50,9 +51,8 @@ def fig_alignment(sources: Sources) -> Figure:
     axes["beginning"].legend(fontsize=7)
     axes["beginning"].set_title("the first cycles, one facing each way")
     _chart(axes["chart"])
-    case = sources.trajectory(table["run"].iloc[0]).case
-    drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration / published.GRAVITY:g} g, {case.liquid.name}"
-    figure.suptitle(f"R = 0.3/0.2 mm and 0.25/0.25 mm, {drive}", fontsize=10)
+    kinds = dict.fromkeys(dimers.described(sources.trajectory(run).case) for run in table["run"])
+    figure.suptitle("; ".join(kinds), fontsize=10)
     return figure
 
 
@@ -101,10 +101,10 @@ def paper_drives() -> dict[str, Alignment]:
 
 
 def climber(large_bead_below: bool) -> Alignment:
-    """U and V of a dimer of the pile's glass beads on a wall, shaken and pulled along it."""
-    glass = Dimer((0.545e-3, 0.3075e-3), 2500.0, 61e-3)
-    weight = published.GRAVITY if large_bead_below else -published.GRAVITY
-    return alignment(glass, 170.0, 16.2 * published.GRAVITY, weight)
+    """U and V of the shipped climber, shaken and pulled along its wall."""
+    case = load_case("climber")
+    weight = case.axial_gravity if large_bead_below else -case.axial_gravity
+    return alignment(dimer_of(case), case.drive.frequency, case.drive.peak_acceleration, weight)
 
 
 def _chart(axes: Axes) -> None:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
 from inputs.reading import load_case
 from paper.published import GRAVITY
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FIG2 = "fig1b"
 """The case whose beads, liquid and contacts Figs. 1b and 2 have."""
@@ -17,6 +21,11 @@ FIG2 = "fig1b"
 def shipped(name: str = FIG2) -> WalkerCase:
     """A shipped case."""
     return load_case(name)
+
+
+def symmetric(table: pd.DataFrame) -> pd.Series[bool]:
+    """Which points of a sweep have beads of one size."""
+    return table["sin_delta"].abs() < 1e-9
 
 
 def driven(case: WalkerCase, frequency: float, accelerations: Iterable[float]) -> list[WalkerCase]:

@@ -14,7 +14,7 @@ from paper.comparison import as_dict, as_markdown, compare, count
 from paper.modes import fig_modes
 from paper.rotation import fig4
 from paper.sensitivity import fig_sensitivity
-from paper.sources import ProgressOf, Sources, make_sources
+from paper.sources import NothingFinishedError, ProgressOf, Sources, make_sources
 from paper.strobe import fig1b
 from paper.velocity import fig2, fig3
 from postprocess.drawing import save_figure
@@ -59,12 +59,15 @@ class Made:
         All of them.
     failures
         Points that failed and are left out, by sweep.
+    left_out
+        Figures of which nothing could be drawn, and why.
     agree, compared
-        How many published numbers that the engine has a say in agree, of how many; 0 of 0 if they were not compared.
+        How many published numbers that test the engine agree, of how many; 0 of 0 if they were not compared.
     """
 
     files: list[Path]
     failures: dict[str, list[Failure]]
+    left_out: dict[str, str]
     agree: int = 0
     compared: int = 0
 
@@ -118,18 +121,22 @@ def make_figures(
         sweeps, out, options, engine=engine, despite_audit=despite_audit, progress_of=progress_of
     )
     files: list[Path] = []
+    left_out: dict[str, str] = {}
     for name in chosen:
         if name in FIGURES:
             drawing = FIGURES[name]
-            runs = sources.runs(*drawing.sweeps)
-            files += save_figure(drawing.draw(sources), to / name, runs, FORMATS, drawing.title)
+            try:
+                runs = sources.runs(*drawing.sweeps)
+                files += save_figure(drawing.draw(sources), to / name, runs, FORMATS, drawing.title)
+            except NothingFinishedError as missing:
+                left_out[name] = str(missing)
     failed = {name: points for name, points in failures.items() if points}
     if COMPARISON not in chosen:
-        return Made(files, failed)
+        return Made(files, failed, left_out)
     rows = compare(sources)
     to.mkdir(parents=True, exist_ok=True)
     texts = {".md": as_markdown(rows), ".json": json.dumps(as_dict(rows), indent=2, ensure_ascii=False) + "\n"}
     for suffix, text in texts.items():
         files.append((to / COMPARISON).with_suffix(suffix))
         write_text(files[-1], text)
-    return Made(files, failed, *count(rows, measured=True))
+    return Made(files, failed, left_out, *count(rows, measured=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,8 @@ from inputs.dimer import dimer_of
 from paper import dimers
 from paper.sources import Sources
 from postprocess.drawing import new_figure
+from postprocess.gait import gait, settled_samples
+from theory.motion import translation
 from theory.prediction import MOVING, motion_of
 from theory.quasistatic import detachment
 
@@ -19,35 +22,55 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from postprocess.trajectory import Trajectory
     from theory.motion import Motion
 
+FloatArray = npt.NDArray[np.float64]
 REST = 2e-6
 """A walker slower than this, m/s, is at rest."""
 SLIDES = 0.1
-"""The large bead slides if its mean sliding velocity is more than this share of its mean rotation velocity."""
+"""The large bead slides if its sliding velocity is more than this share of its rotation velocity, in the rms."""
 MODES = ("at rest", "large bead rolls", "large bead rolls and slides", "leaves the axis", "detached")
 _MARKERS = ("x", "o", "s", "v", "*")
 
 
-def classify(table: pd.DataFrame) -> npt.NDArray[np.int64]:
-    """The mode of each point of a sweep, a place in `MODES`; -1 where it is not finished.
+def sliding_share(trajectory: Trajectory) -> float:
+    """Sliding over rotation velocity of the large beads after the settling cycles, root mean squares."""
+    motion, samples = gait(trajectory), settled_samples(trajectory)
+    return _share(motion.sliding[samples][..., 0].ravel(), motion.rotation[samples][..., 0].ravel())
+
+
+def _share(sliding: FloatArray, rotation: FloatArray) -> float:
+    largest = float(np.sqrt(np.mean(rotation**2)))
+    return float(np.sqrt(np.mean(sliding**2))) / largest if largest > REST else 0.0
+
+
+def classify(table: pd.DataFrame, shares: Sequence[float]) -> npt.NDArray[np.int64]:
+    """The mode of each point of a sweep, a place in `MODES`.
 
     Detached goes before all others: a contact open in some of the samples. Then at rest: velocity and the large bead's
-    sliding below `REST`. Then leaves the axis: not all replicates steady, or some turned round. What is left rolls, or
-    slides by more than `SLIDES` of its rotation as well.
+    mean sliding below `REST`. Then leaves the axis: not all replicates steady, or some turned round. What is left
+    rolls, or slides as well (`SLIDES`).
+
+    Parameters
+    ----------
+    table
+        Finished points.
+    shares
+        Their `sliding_share`.
     """
     opened = table[["open_1", "open_2", "open_3"]].max(axis=1) > 0.0
     still = (table["velocity"].abs() < REST) & (table["sliding_1"].abs() < REST)
     astray = (table["steady"] < table["walkers"]) | (table["turned_round"] > 0)
-    slides = table["sliding_1"].abs() > SLIDES * table["rotation_1"].abs()
-    modes = np.select([opened, still, astray, slides], [4, 0, 3, 2], default=1)
-    return np.where(table["status"] == "finished", modes, -1)
+    modes: npt.NDArray[np.int64] = np.select([opened, still, astray, np.asarray(shares) > SLIDES], [4, 0, 3, 2], 1)
+    return modes
 
 
 def fig_modes(sources: Sources) -> Figure:
     """Γ0 against sin δ: the engine's modes as symbols, velocity as lightness, the models' borders as lines."""
-    table = sources.table("modes")
-    modes, speed = classify(table), table["velocity"].to_numpy() * 1e3
+    table = sources.finished("modes")
+    shares = [sliding_share(sources.trajectory(run)) for run in table["run"]]
+    modes, speed = classify(table, shares), table["velocity"].to_numpy() * 1e3
     figure, axes = new_figure(7.2, 5.0)
     shades = {"cmap": "cividis", "vmin": 0.0, "vmax": float(np.nanmax(speed))}
     scale = None
@@ -73,7 +96,7 @@ def fig_modes(sources: Sources) -> Figure:
 def _borders(axes: Axes, top: float) -> None:
     """Where Coulomb friction and the bridges say that the walker starts, slides, detaches; the quasi-static end."""
     case = dimers.shipped()
-    sines = np.linspace(0.0, 0.4, 33)
+    sines = np.linspace(0.005, 0.4, 33)
     gammas = np.concatenate([np.linspace(0.02, 0.4, 58)[:-1], np.linspace(0.4, 1.15 * top, 14)])
     grid = [dimers.of_asymmetry(case, float(sine), float(gamma)) for sine in sines for gamma in gammas]
     borders = _borders_of(motion_of(*grid), gammas)
@@ -81,13 +104,15 @@ def _borders(axes: Axes, top: float) -> None:
         told = f"theory: {name}" if np.isfinite(gamma).any() else f"theory: {name}: nowhere below {gammas[-1]:.2g}"
         axes.plot(sines, gamma, style, color="0.1", lw=1.3, label=told)
     end = np.sqrt(2.0) * detachment(sines).gamma
-    axes.plot(sines, end, ":", color="0.1", lw=1.6, label="theory: detaches, quasi-static ±Γ0/√2")
+    axes.plot(sines, end, ":", color="0.1", lw=1.6, label="paper's model, quasi-static ±Γ0/√2: detaches")
 
 
 def _borders_of(motion: Motion, gammas: npt.NDArray[np.float64]) -> dict[str, npt.NDArray[np.float64]]:
     """For each asymmetry the smallest Γ0 at which a walker moves, its large bead slides, a contact opens."""
+    velocity = translation(motion.series)
+    shares = [_share(*pair) for pair in zip(motion.series[0], velocity - motion.series[0], strict=True)]
     moves = (np.abs(motion.sliding[0]) > MOVING) | (np.abs(motion.velocity) > MOVING)
-    slides = np.abs(motion.sliding[0]) > np.maximum(SLIDES * np.abs(motion.rotation[0]), MOVING)
+    slides = moves & (np.array(shares) > SLIDES)
     found = {}
     for name, condition in (("Γc", moves), ("slides", slides), ("detaches", motion.opened)):
         rows = condition.reshape(-1, len(gammas))

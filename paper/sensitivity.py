@@ -51,11 +51,21 @@ class Observation:
 
 
 def _ratio(upper: tuple[float, ...], lower: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
-    return lambda table: float(table["velocity"][upper] / table["velocity"][lower])
+    return lambda table: steady_speed(table["run"][upper]) / steady_speed(table["run"][lower])
 
 
 def _speed(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
-    return lambda table: float(table["velocity"][of]) * 1e3
+    return lambda table: steady_speed(table["run"][of]) * 1e3
+
+
+def steady_speed(run: str | Path) -> float:
+    """Mean velocity of those walkers of a run that are steady and have not turned round, m/s; NaN if there is none.
+
+    Mean velocities of walkers that leave the axis say how long the run was, rather than how they walk.
+    """
+    walkers = read_table(run, "walkers")
+    kept = walkers[walkers["steady"] & (walkers["orientation_end"].abs() < np.pi / 4.0)]
+    return float(kept["velocity"].mean()) if len(kept) else np.nan
 
 
 def misalignment(run: str | Path) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -69,11 +79,21 @@ def _angle(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
     return lambda table: float(misalignment(table["run"][of]).max())
 
 
+def _astray(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
+    def share(table: pd.DataFrame) -> float:
+        ends = read_table(table["run"][of], "walkers")
+        return 100.0 * float((ends["orientation_end"].abs() >= np.pi / 4.0).mean())
+
+    return share
+
+
+_STRONG = (0.3, 60.0, 10.0, 0.0)
 OBSERVATIONS = (
     Observation("Fig. 2: v at 80 Hz, 4 g (mm/s)", _speed((0.3, 80.0, 4.0, 0.0)), published.FIT[4.0] * 1e3),
     Observation("Fig. 4a: v (mm/s)", _speed((0.6, 80.0, 2.0, 0.0)), published.FIG4_VELOCITY[0] * 1e3),
     Observation("Fig. 2: v(90 Hz)/v(60 Hz) at 6 g", _ratio((0.3, 90.0, 6.0, 0.0), (0.3, 60.0, 6.0, 0.0)), 1.0),
-    Observation("plateau: v(10 g)/v(6 g) at 60 Hz", _ratio((0.3, 60.0, 10.0, 0.0), (0.3, 60.0, 6.0, 0.0)), 1.0),
+    Observation("plateau: v(10 g)/v(6 g) at 60 Hz", _ratio(_STRONG, (0.3, 60.0, 6.0, 0.0)), 1.0),
+    Observation("walkers astray at 60 Hz, 10 g (%)", _astray(_STRONG), 0.0),
     Observation("angle after a start at 60° (°)", _angle((0.3, 80.0, 4.0, 60.0)), 0.0),
 )
 
@@ -85,7 +105,8 @@ def sensitivities(sources: Sources) -> pd.DataFrame:
     -------
     DataFrame
         A row a set of parameters, in the order of the sweep: ``parameter`` (``shipped``, one of `PARAMETERS`, or
-        ``all together``), ``value``, and a column an observation, NaN where a run of it is not finished.
+        ``all together``), ``value``, and a column an observation: NaN where a run of it is not finished, and for speeds
+        of which no walker is left on the axis.
     """
     import pandas as pd
 
@@ -107,20 +128,27 @@ def sensitivities(sources: Sources) -> pd.DataFrame:
                 ]
             )
         )
-        finished = bool((group["status"] == "finished").all())
-        found = {one.name: one.value(experiments) if finished else np.nan for one in OBSERVATIONS}
+        experiments = experiments[experiments["status"] == "finished"]
+        found = {one.name: _value(one, experiments) for one in OBSERVATIONS}
         rows.append({"parameter": name, "value": value, **found})
     return pd.DataFrame(rows)
+
+
+def _value(observation: Observation, experiments: pd.DataFrame) -> float:
+    try:
+        return observation.value(experiments)
+    except KeyError:  # a run that it needs is missing
+        return np.nan
 
 
 def fig_sensitivity(sources: Sources) -> Figure:
     """A tornado plot: a panel an observation, a bar a parameter from its lower to its higher value."""
     found = sensitivities(sources)
-    figure, axes = new_figure(12.0, 4.3, ncols=len(OBSERVATIONS), sharey=True)
+    figure, axes = new_figure(13.0, 4.3, ncols=len(OBSERVATIONS), sharey=True)
     for panel, observation in zip(axes, OBSERVATIONS, strict=True):
         _tornado(panel, found, observation)
     names = [_label(found, name) for name in PARAMETERS]
-    axes[0].set_yticks(range(len(names) + 1), [*names, "friction 0.3, 60 × viscosity,\nminimum separation 1"])
+    axes[0].set_yticks(range(len(names) + 1), [*names, "friction 0.3 and 17 ×\nthe tangential drag"])
     axes[0].invert_yaxis()
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=7)
     return figure
@@ -133,16 +161,23 @@ def _label(found: pd.DataFrame, parameter: str) -> str:
 
 def _tornado(axes: Axes, found: pd.DataFrame, observation: Observation) -> None:
     shipped = float(found[observation.name][found["parameter"] == "shipped"].iloc[0])
+    known = bool(np.isfinite(shipped))
     for place, name in enumerate(PARAMETERS):
         rows = found[found["parameter"] == name].sort_values("value")
         ends = rows[observation.name].to_numpy()
         styles = zip(ends, (-0.17, 0.17), ("0.75", "0.35"), ("lower", "higher"), strict=True)
         for end, offset, colour, label in styles:
             told = label if place == 0 else None
+            if not known:  # bars have nothing to begin at
+                axes.plot(end, place + offset, "o", color=colour, mec="0.1", ms=6)
+                continue
             axes.barh(place + offset, end - shipped, 0.32, shipped, fc=colour, ec="0.1", lw=0.5, label=told)
     together = found[found["parameter"] == _TOGETHER][observation.name]
     axes.plot(together, [len(PARAMETERS)] * len(together), "D", color="C2", ms=6, label="all together")
-    axes.axvline(shipped, color="0.1", lw=1.0, label="shipped")
+    if known:
+        axes.axvline(shipped, color="0.1", lw=1.0, label="shipped")
+    else:
+        axes.set_title("shipped: none on the axis", fontsize=7)
     axes.axvline(observation.published, color="C1", ls="--", lw=1.4, label="published")
     axes.set_xlabel(observation.name, fontsize=7.5)
     axes.grid(axis="y", visible=False)

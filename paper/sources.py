@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from inputs.errors import WalkersError
 from inputs.sweep import load_sweep
 from postprocess.trajectory import Trajectory, read_trajectory
 from sweeps.conduct import Failure, Options, Progress
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ProgressOf = Callable[[str], AbstractContextManager[Callable[[Progress], None]]]
+
+
+class NothingFinishedError(WalkersError):
+    """A sweep of which nothing is there to be shown."""
 
 
 class Sources:
@@ -42,10 +47,23 @@ class Sources:
         """The motion in a run directory."""
         return read_trajectory(Path(run))
 
+    def finished(self, sweep: str) -> pd.DataFrame:
+        """The points of a sweep that are finished.
+
+        Raises
+        ------
+        NothingFinishedError
+            If there is none.
+        """
+        table = self.table(sweep)
+        done = table[table["status"] == "finished"]
+        if done.empty:
+            raise NothingFinishedError(f"no point of the sweep {sweep} is finished")
+        return done
+
     def runs(self, *sweeps: str) -> list[str]:
         """Names of the finished runs of sweeps."""
-        tables = [self.table(sweep) for sweep in sweeps]
-        return [Path(run).name for table in tables for run in table["run"][table["status"] == "finished"]]
+        return [Path(run).name for sweep in sweeps for run in self.finished(sweep)["run"]]
 
 
 def make_sources(
@@ -83,10 +101,7 @@ def make_sources(
     failures = {}
     for name in names:
         sweep = load_sweep(name)
-        if progress_of is None:
-            _, failures[name] = run_sweep(sweep, out, options, engine=engine, despite_audit=despite_audit)
-            continue
-        with progress_of(name) as advance:
+        with progress_of(name) if progress_of else nullcontext() as advance:
             _, failures[name] = run_sweep(
                 sweep, out, options, engine=engine, despite_audit=despite_audit, on_progress=advance
             )

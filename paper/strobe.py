@@ -21,8 +21,8 @@ _IMAGES = 6
 
 def fig1b(sources: Sources) -> Figure:
     """The first walker of the alignment's dimers that start on the axis, seen from above."""
-    table = sources.table("alignment")
-    asymmetric = table[table["sin_delta"] > 1e-9]
+    table = sources.finished("alignment")
+    asymmetric = table[~dimers.symmetric(table)]
     trajectory = sources.trajectory(asymmetric.sort_values("start.angle")["run"].iloc[0])
     case = trajectory.case
     strobe = case.run.samples_per_cycle

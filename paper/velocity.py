@@ -21,14 +21,20 @@ if TYPE_CHECKING:
 
 MARKERS = {60.0: "D", 70.0: "o", 80.0: "^", 90.0: "s"}
 """The paper's symbols by frequency, Hz."""
+_DASHES = ("-", (0, (6, 2)), (0, (3, 2)), (0, (1, 1.5)))
+"""From the lowest frequency to the highest."""
 _FINE = 61
 _FIG2_TOP = 11.0
 """Highest speed shown, mm/s: dry friction's at 60 Hz."""
 
 
+_ASIDE = {"D": -0.06, "o": -0.02, "^": 0.02, "s": 0.06}
+"""g by which symbols stand aside, so that their bars do not hide each other."""
+
+
 def fig2(sources: Sources) -> Figure:
     """Velocity against peak acceleration at four frequencies, and the threshold of motion."""
-    table, case = sources.table("fig2"), dimers.shipped()
+    table, case = sources.finished("fig2"), dimers.shipped()
     dimer = dimer_of(case)
     figure, axes = new_figure(9.6, 4.6, ncols=2, sharey=True, width_ratios=[1.5, 1.0])
     engine, dry = axes
@@ -38,12 +44,12 @@ def fig2(sources: Sources) -> Figure:
     paper = mean_velocity(gammas, dimer.sin_delta) * 1e3
     for number, frequency in enumerate(sorted(table["frequency"].unique())):
         rows = table[table["frequency"] == frequency]
-        colour = f"C{number}"
+        colour, dashes = f"C{number}", _DASHES[number % len(_DASHES)]
         _points(engine, rows["peak_acceleration"] / published.GRAVITY, rows, MARKERS[frequency], colour, frequency)
         cases = dimers.driven(case, frequency, peaks)
-        engine.plot(peaks / published.GRAVITY, motion_of(*cases).velocity * 1e3, "--", color=colour, lw=0.9)
+        engine.plot(peaks / published.GRAVITY, motion_of(*cases).velocity * 1e3, ls=dashes, color=colour, lw=0.9)
         slippery = motion_of(*cases, viscous=False).velocity * 1e3
-        dry.plot(peaks / published.GRAVITY, slippery, ":", lw=1.6, color=colour, label=f"{frequency:g} Hz")
+        dry.plot(peaks / published.GRAVITY, slippery, ls=dashes, lw=1.2, color=colour, label=f"{frequency:g} Hz")
     for panel in axes:
         panel.plot(peaks / published.GRAVITY, paper, color="0.45", lw=2.2, zorder=0)
         panel.plot(list(published.FIT), np.array(list(published.FIT.values())) * 1e3, "*", color="0.45", ms=9, zorder=0)
@@ -54,10 +60,10 @@ def fig2(sources: Sources) -> Figure:
         above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
         panel.axhline(0.0, color="0.4", lw=0.6)
         panel.set(xlabel=r"peak acceleration $a_0$ (g, 9.8 m/s²)", xlim=(0.0, top * 1.02), ylim=(-5.0, _FIG2_TOP))
-    engine.plot([], [], "--", color="0.2", lw=0.9, label="Coulomb friction and bridges")
+    engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction and bridges")
     engine.plot([], [], color="0.45", lw=2.2, marker="*", ms=9, label="paper's fit, κ = 0.033 s/mm")
     engine.set_ylabel("velocity (mm/s)")
-    engine.legend(loc="lower left", title="engine, mean and range of 6", fontsize=7, title_fontsize=7)
+    engine.legend(loc="lower left", title="symbols: engine, mean and range of 6", fontsize=7, title_fontsize=7)
     dry.legend(loc="lower left", title="Coulomb friction, dry", fontsize=7, title_fontsize=7)
     _threshold_inset(engine.inset_axes((0.13, 0.67, 0.36, 0.31)), sources)
     figure.suptitle(f"{_beads(dimer.radii)}, {case.liquid.name}", fontsize=10)
@@ -68,7 +74,7 @@ def _points(axes: Axes, x: pd.Series[float], rows: pd.DataFrame, marker: str, co
     """Means with bars from the smallest to the largest of the walkers, as in the paper."""
     mean, low, high = (rows[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
     axes.errorbar(
-        x.to_numpy(),
+        x.to_numpy() + _ASIDE[marker],
         mean,
         yerr=[mean - low, high - mean],
         fmt=marker,
@@ -82,11 +88,11 @@ def _points(axes: Axes, x: pd.Series[float], rows: pd.DataFrame, marker: str, co
 
 def _threshold_inset(inset: Axes, sources: Sources) -> None:
     """Γc by the paper's protocol: between the last drive that moved the walkers and the first that did not."""
+    sources.finished("fig2-threshold")
     ends = thresholds(sources.out / "fig2-threshold")
-    dimer = dimer_of(dimers.shipped())
     for number, row in enumerate(ends.to_dict("records")):
         frequency = row["drive.frequency"]
-        bounds = [dimer.gamma0(row[name] * published.GRAVITY) for name in ("at_rest", "moving")]
+        bounds = [row["gamma0_at_rest"], row["gamma0_moving"]]
         middle, half = sum(bounds) / 2.0, (bounds[1] - bounds[0]) / 2.0
         inset.errorbar(frequency, middle, yerr=half, fmt=MARKERS[float(frequency)], color=f"C{number}", ms=4, lw=1.0)
     case = dimers.shipped()
@@ -100,7 +106,7 @@ def _threshold_inset(inset: Axes, sources: Sources) -> None:
 
 def fig3(sources: Sources) -> Figure:
     """Velocity against asymmetry at Γ0 = 0.5."""
-    table, case = sources.table("fig3"), dimers.shipped()
+    table, case = sources.finished("fig3"), dimers.shipped()
     figure, axes = new_figure(5.6, 4.2)
     sines = np.linspace(1e-3, 0.4, _FINE)
     gamma0 = float(table["gamma0"].iloc[0])
@@ -115,7 +121,12 @@ def fig3(sources: Sources) -> Figure:
         axes.plot(sines, motion_of(*cases, viscous=viscous).velocity * 1e3, style, color="0.1", lw=0.9, label=label)
     same = [dimers.of_radii(case, (row["radius_1"], row["radius_2"]), gamma0) for _, row in table.iterrows()]
     axes.plot(
-        table["sin_delta"], motion_of(*same).velocity * 1e3, "x", color="0.1", ms=6, label="the same, these beads"
+        table["sin_delta"],
+        motion_of(*same).velocity * 1e3,
+        "x",
+        color="0.1",
+        ms=6,
+        label="Coulomb friction and bridges, these beads",
     )
     mean, low, high = (table[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
     axes.errorbar(table["sin_delta"], mean, yerr=[mean - low, high - mean], fmt="s", color="C2", ms=5, label="engine")

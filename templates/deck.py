@@ -295,6 +295,7 @@ def _layout(
         steps=recording.steps,
         time_step=case.run.time_step,
         rider=1 if scene.riders else 0,
+        riders=len(scene.riders),
         walkers=walkers,
     )
 

@@ -130,9 +130,9 @@ def test_shipped_sweeps_are_the_papers() -> None:
     assert (min(accelerations), max(accelerations)) == (0.5, 10.0)
     assert {case.start.replicates for case in fig2} == {6}
     fig3 = _cases(load_sweep("fig3"))
-    assert [round(dimer_of(case).sin_delta, 3) for case in fig3] == [0.111, 0.143, 0.2, 0.273, 0.333]
+    assert [round(dimer_of(case).sin_delta, 3) for case in fig3] == [0.0, 0.111, 0.143, 0.2, 0.273, 0.333]
     assert all(dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(0.5) for case in fig3)
-    assert len({case.drive.peak_acceleration for case in fig3}) == 5
+    assert len({case.drive.peak_acceleration for case in fig3}) == 6
     turned = _cases(load_sweep("alignment"))
     assert {round(np.degrees(case.start.angle)) for case in turned} == set(range(0, 91, 15))
     assert {dimer_of(case).sin_delta == 0 for case in turned} == {True, False}

@@ -107,6 +107,28 @@ def test_a_static_coefficient_raises_the_threshold() -> None:
     assert second > 1.5 * first
 
 
+def test_a_symmetric_dimer_goes_nowhere() -> None:
+    case = load_case("symmetric")
+    assert float(motion_of(case, viscous=False).velocity[0]) == 0.0
+    assert np.isnan(threshold(case))
+
+
+def test_the_papers_law_has_no_solution_at_strong_drives() -> None:
+    """Friction κ v F grows with the normal force that it causes itself."""
+    found = walk(Walker.of_dimer(RUBY), Friction(linear=33.0), 80.0, np.array([40.0, 200.0]))
+    assert found.solved.tolist() == [True, False]
+    assert np.isnan(found.velocity).tolist() == [False, True]
+
+
+def test_stribeck_friction_converges_in_the_step() -> None:
+    walker, friction = Walker.of_dimer(RUBY), Friction(kinetic=0.07, static=0.14, stribeck_velocity=1e-2)
+    accelerations = np.linspace(20.0, 70.0, 40)
+    fine, coarse = (walk(walker, friction, 80.0, accelerations, steps_per_cycle=steps) for steps in (1024, 128))
+    repeated = fine.periodic & coarse.periodic
+    assert repeated.mean() > 0.5
+    assert np.median(np.abs(fine.velocity - coarse.velocity)[repeated]) < 2e-5
+
+
 def test_many_walkers_are_what_each_is_alone() -> None:
     accelerations = np.linspace(5.0, 80.0, 12)
     friction, walker = Friction.coulomb(0.1, 0.05), Walker.of_dimer(RUBY)

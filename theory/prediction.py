@@ -82,9 +82,12 @@ def threshold(case: WalkerCase, *, viscous: bool = True) -> float:
     Returns
     -------
     float
-        To a part in ten thousand of the range in which contacts stay closed; NaN if it does not move there.
+        To a part in ten thousand of the range in which contacts stay closed; NaN if it does not move there, and for a
+        symmetric dimer.
     """
     _check(case)
+    if dimer_of(case).sin_delta == 0.0:
+        return float("nan")
     dimer, walker, friction = dimer_of(case), Walker.of_case(case), friction_of(case, viscous=viscous)
     low, high = 0.0, float(detachment(dimer.sin_delta).gamma)
     for _ in range(_ROUNDS):
@@ -147,6 +150,8 @@ def _number(value: float) -> float | None:
 
 
 def _reason(motion: Motion) -> str | None:
+    if not motion.solved[0]:
+        return "the forces have no solution"
     if not motion.opened[0]:
         return None
     return f"{CONTACTS[int(np.argmin(motion.smallest_normal_force[:, 0]))]} would open"

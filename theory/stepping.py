@@ -13,8 +13,8 @@ _TOLERANCE = 1e-8
 """Of the friction forces, in units of 4πγR̄."""
 _SLIDING, _PARALLEL, _NORMAL, _MODE = range(4)
 """Rows of a walker's state: sliding velocities, friction forces, normal forces, and 0, ±1: sticking, sliding."""
-_RIGHT, _KINETIC, _START, _FREE = range(3, 7)
-"""Rows of what is worked with, after a matrix: right side, μ(v), velocities that a stage starts from and coasts to."""
+_RIGHT, _START, _FREE = range(3, 6)
+"""Rows of what is worked with, after a matrix: right side, velocities that a stage starts from and coasts to."""
 _FIRST = 1.0 - np.sqrt(0.5)
 """Length of either stage of an L-stable step of second order (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006)."""
 _FINER = 8
@@ -28,7 +28,7 @@ _FAST = 3e-3
 @njit(cache=True)
 def integrate(
     walkers: FloatArray, law: FloatArray, drive: FloatArray, cycles: int, steps: int
-) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_], FloatArray]:
+) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_], npt.NDArray[np.bool_], FloatArray]:
     """Walk N walkers from rest.
 
     Parameters
@@ -49,28 +49,39 @@ def integrate(
     least : ndarray, shape (3, N)
         Smallest normal forces in it.
     repeated : ndarray of bool, shape (N,)
-        Whether the last two cycles agree.
+        Whether the last two cycles agree; where they do not, means are over the later half of all cycles.
+    solved : ndarray of bool, shape (N,)
+        Whether friction forces that obey the law were found at every step.
     series : ndarray, shape (N, steps, 3)
         Sliding velocities through the last cycle.
     """
     count = walkers.shape[0]
     means, leasts = np.zeros((3, count)), np.zeros((3, count))
-    repeated = np.zeros(count, np.bool_)
+    repeated, solved = np.zeros(count, np.bool_), np.ones(count, np.bool_)
     series = np.zeros((count, steps, 3))
-    after, work = np.zeros((4, 3)), np.zeros((7, 3))
+    after, work = np.zeros((4, 3)), np.zeros((6, 3))
     for of in range(count):
         state, totals = np.zeros((4, 3)), np.full((2, 3), np.inf)
-        for _ in range(cycles):
+        later = np.zeros(3)
+        for cycle in range(cycles):
             before = totals[0].copy()
             totals[0], totals[1] = 0.0, np.inf
             for step in range(steps):
-                _advance(walkers[of], law[of], drive[of], step / steps, 1.0 / steps, state, totals, after, work)
+                begin, length = step / steps, 1.0 / steps
+                if not _advance(walkers[of], law[of], drive[of], begin, length, state, totals, after, work):
+                    solved[of] = False
+                    break
                 series[of, step] = state[_SLIDING]
+            if not solved[of]:
+                break
+            if cycle >= cycles // 2:
+                later += totals[0] / (cycles - cycles // 2)
             if np.abs(totals[0] - before).max() < _REPEATED * max(1.0, np.abs(totals[0]).max() / _FAST):
                 repeated[of] = True
                 break
-        means[:, of], leasts[:, of] = totals[0], totals[1]
-    return means, leasts, repeated, series
+        means[:, of] = totals[0] if repeated[of] else later
+        leasts[:, of] = totals[1]
+    return means, leasts, repeated, solved, series
 
 
 @njit(cache=True)
@@ -84,8 +95,11 @@ def _advance(  # noqa: PLR0913, PLR0917
     totals: FloatArray,
     after: FloatArray,
     work: FloatArray,
-) -> None:
-    """One step of time, in shorter ones where a contact begins to stick or to slip; state and totals in place."""
+) -> bool:
+    """One step of time, in shorter ones where a contact begins to stick or to slip; state and totals in place.
+
+    Whether friction forces were found all the way.
+    """
     tick, width = 0, _TICKS
     while tick < _TICKS:
         now, part = begin + tick / _TICKS * length, width / _TICKS * length
@@ -93,14 +107,16 @@ def _advance(  # noqa: PLR0913, PLR0917
         for at in range(3):
             start[at] = state[_SLIDING, at]
             after[_SLIDING, at], after[_PARALLEL, at] = state[_SLIDING, at], state[_PARALLEL, at]
-        _stage(walker, law, drive, now, _FIRST * part, after, work)
+        found = _stage(walker, law, drive, now, _FIRST * part, after, work)
         # The second stage starts from where the slope of the first one leads.
         for at in range(3):
             start[at] += (1.0 - _FIRST) / _FIRST * (after[_SLIDING, at] - state[_SLIDING, at])
-        _stage(walker, law, drive, now + (1.0 - _FIRST) * part, _FIRST * part, after, work)
-        if width > 1 and _differ(after[_MODE], state[_MODE]):
+        found &= _stage(walker, law, drive, now + (1.0 - _FIRST) * part, _FIRST * part, after, work)
+        if width > 1 and (not found or _differ(after[_MODE], state[_MODE])):
             width //= _FINER
             continue
+        if not found:
+            return False
         for at in range(3):
             totals[0, at] += part / 2.0 * (state[_SLIDING, at] + after[_SLIDING, at])
             totals[1, at] = min(totals[1, at], after[_NORMAL, at])
@@ -109,6 +125,7 @@ def _advance(  # noqa: PLR0913, PLR0917
         tick += width
         if width < _TICKS and tick % (width * _FINER) == 0:
             width *= _FINER
+    return True
 
 
 @njit(cache=True)
@@ -125,32 +142,31 @@ def _stage(
     length: float,
     state: FloatArray,
     work: FloatArray,
-) -> None:
+) -> bool:
     """An implicit Euler step of a part of a cycle from the sliding velocities in work; its end replaces the state."""
     seconds = length / drive[0]
     push = seconds * (drive[1] * np.cos(2.0 * np.pi * (begin + length)) + drive[2])
     free = work[_FREE]
     for at in range(3):
         free[at] = work[_START, at] - (push if at < 2 else 0.0)
-    _settle(walker, seconds, law, state, work)
+    solved = _settle(walker, seconds, law, state, work)
     for at in range(3):
         slips = state[_MODE, at] != 0.0
         state[_SLIDING, at] = free[at] - seconds * _row(walker, at, state[_PARALLEL]) if slips else 0.0
         state[_NORMAL, at] = walker[6, at] + _row(walker, 3 + at, state[_PARALLEL])
+    return solved
 
 
 @njit(cache=True)
-def _settle(walker: FloatArray, seconds: float, law: FloatArray, state: FloatArray, work: FloatArray) -> None:
+def _settle(walker: FloatArray, seconds: float, law: FloatArray, state: FloatArray, work: FloatArray) -> bool:
     """Find the friction forces and modes at the end of a stage, in place, by a semi-smooth Newton method.
+
+    Whether they were found.
 
     A contact sticks if the force that would hold it is within the limit, else it slips (Alart and Curnier, Comput.
     Methods Appl. Mech. Eng. 92 (1991) 353).
     """
-    parallel, rows, right, free, kinetic = state[_PARALLEL], work[:3], work[_RIGHT], work[_FREE], work[_KINETIC]
-    for at in range(3):
-        kinetic[at] = law[0, at]
-        if law[1, at] != law[0, at]:
-            kinetic[at] += (law[1, at] - law[0, at]) * np.exp(-((state[_SLIDING, at] / law[2, at]) ** 2))
+    parallel, rows, right, free = state[_PARALLEL], work[:3], work[_RIGHT], work[_FREE]
     for _ in range(_NEWTON_STEPS):
         for at in range(3):
             normal = max(walker[6, at] + _row(walker, 3 + at, parallel), 0.0)
@@ -165,17 +181,24 @@ def _settle(walker: FloatArray, seconds: float, law: FloatArray, state: FloatArr
             else:
                 side = np.sign(wanted)
                 state[_MODE, at] = side
+                fade = law[1, at] - law[0, at]
+                if fade != 0.0:
+                    fade *= np.exp(-((speed / law[2, at]) ** 2))
+                kinetic = law[0, at] + fade
                 drag = normal * law[3, at] + law[4, at]
-                slope = side * kinetic[at] + law[3, at] * speed
+                slope = side * kinetic + law[3, at] * speed
+                # How the force at a normal force falls with the speed, after Stribeck, and grows with it by the drag.
+                steep = drag - 2.0 * side * normal * fade * speed / law[2, at] ** 2
                 for by in range(3):
-                    rows[at, by] = drag * seconds * walker[at, by] - slope * walker[3 + at, by]
+                    rows[at, by] = steep * seconds * walker[at, by] - slope * walker[3 + at, by]
                 rows[at, at] += 1.0
-                right[at] = side * kinetic[at] * normal + drag * speed - parallel[at]
+                right[at] = side * kinetic * normal + drag * speed - parallel[at]
         change = _solved(rows, right)
         for at in range(3):
             parallel[at] += change[at]
         if max(abs(change[0]), abs(change[1]), abs(change[2])) < _TOLERANCE:
-            break
+            return True
+    return False
 
 
 @njit(cache=True)

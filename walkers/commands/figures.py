@@ -42,8 +42,10 @@ def command(
     for sweep, failures in made.failures.items():
         for failure in failures:
             print(f"walkers: {sweep}: point {failure.point}, {failure.run}: {failure.message}", file=sys.stderr)
+    for figure, reason in made.left_out.items():
+        print(f"walkers: {figure} is left out: {reason}", file=sys.stderr)
     for file in made.files:
         print(file)
     if made.compared:
         print(f"{made.agree} of {made.compared} published numbers agree: {to / 'comparison.md'}")
-    return 1 if made.failures else 0
+    return 1 if made.failures or made.left_out else 0
