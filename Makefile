@@ -25,6 +25,13 @@ sweep: setup ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.tom
 	@$(WALKERS) sweep $(SWEEP) --out $(OUT) $(if $(SITE),--site $(SITE)) $(if $(JOBS),--jobs $(JOBS)); status=$$?; \
 	  [ $$status -gt 1 ] || $(WALKERS) table $(OUT)/$(basename $(notdir $(SWEEP))); exit $$status
 
+.PHONY: pile
+pile: setup ## Shake the small pile (or CASE=pile-fig1a): what climbed, pictures; goes on where it was interrupted
+	@$(WALKERS) run $(if $(filter pile%,$(CASE)),$(CASE),pile-small) --out $(OUT)
+	@echo "pictures:"
+	@$(WALKERS) plot $(if $(filter pile%,$(CASE)),$(CASE),pile-small) --out $(OUT) | sed 's/^/  /'
+	@$(WALKERS) render $(if $(filter pile%,$(CASE)),$(CASE),pile-small) --out $(OUT) | sed 's/^/  /'
+
 .PHONY: figures
 figures: setup ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)
 	@$(WALKERS) figures --out $(OUT) $(if $(JOBS),--jobs $(JOBS))

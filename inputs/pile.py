@@ -20,7 +20,7 @@ class Container:
     width
         Inner side or diameter, m.
     height
-        m; beads that leave it above are lost.
+        m; the walls of the simulation go on above it, to twice that height, where beads are lost.
     material
         Of the walls.
     """

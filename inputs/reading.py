@@ -123,6 +123,9 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     InputError
         If anything in it cannot be used.
     """
+    if document.get("kind") == "pile":
+        problem = Problem("kind", '"pile"', 'expected "walker" or "climber": piles are run, measured and drawn only')
+        raise InputError(source, [problem])
     return _resolved(WalkerFile, resolve, document, source, name)
 
 

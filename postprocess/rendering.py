@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from postprocess.dump import FloatArray
+from postprocess.pile import PileMotion
 from postprocess.trajectory import Trajectory, read_trajectory
 
 if TYPE_CHECKING:
@@ -129,6 +131,50 @@ def top_view(
     plotter.camera_position = [(0.0, 0.0, 10.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
     plotter.camera.parallel_projection = True
     plotter.camera.parallel_scale = (across[1] - across[0]) / 2.0 * 1e3
+    picture: npt.NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
+    plotter.close()
+    return picture
+
+
+def side_view(motion: PileMotion, frame: int, coloured: Collection[int], top: float) -> npt.NDArray[np.uint8]:
+    """A pile seen along y, without perspective.
+
+    Parameters
+    ----------
+    motion
+        Of the pile.
+    frame
+        When.
+    coloured
+        Beads shown in another colour.
+    top
+        Height up to which the box is shown, m.
+
+    Returns
+    -------
+    ndarray, shape (height, width, 3)
+        Red, green, blue; 40 pixels to a millimetre, from wall to wall and from the floor up.
+    """
+    _prefer_egl()
+    import pyvista as pv
+
+    width = motion.case.container.width
+    size = [round(extent * 40e3) for extent in (width, top)]
+    plotter = pv.Plotter(off_screen=True, window_size=size, lighting="light kit")
+    plotter.background_color = pv.Color("white")
+    chosen = np.zeros(len(motion.radius), dtype=bool)
+    chosen[list(coloured)] = True
+    kinds = ((motion.large & ~chosen, "#8c9aa5"), (~motion.large & ~chosen, "#c9d2d8"))
+    for beads, colour in (*kinds, (chosen & motion.large, _RUBY[0]), (chosen & ~motion.large, _RUBY[1])):
+        if beads.any():
+            cloud = pv.PolyData(motion.position[frame, beads] * 1e3)
+            cloud["diameter"] = 2e3 * motion.radius[beads]
+            ball = pv.Sphere(radius=0.5, theta_resolution=24, phi_resolution=24)
+            plotter.add_mesh(cloud.glyph(scale="diameter", geom=ball, orient=False), color=colour, specular=0.4)
+    middle = (0.0, 0.0, top / 2.0 * 1e3)
+    plotter.camera_position = [(0.0, -1e2, middle[2]), middle, (0.0, 0.0, 1.0)]
+    plotter.camera.parallel_projection = True
+    plotter.camera.parallel_scale = top / 2.0 * 1e3
     picture: npt.NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
     plotter.close()
     return picture

@@ -5,7 +5,7 @@ Written with pyarrow alone (pandas takes a third of a second to import); read in
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,7 +73,57 @@ BRIDGES = {
 }
 """``bridges.parquet``: a row a bridge and frame."""
 
-TABLES = {"trajectory": TRAJECTORY, "walkers": WALKERS, "bridges": BRIDGES}
+BED = {
+    "time": ("s", "from the begin of the drive; negative while the pile settles"),
+    "surface": ("m", "height of the bulk's surface: median over x-y cells of the highest bead top"),
+    "surface_low": ("m", "the same, 10th percentile"),
+    "surface_high": ("m", "the same, 90th percentile"),
+    "brazil_nut": ("", "(mean height of large beads - of small ones) / (2 mean height)"),
+    "brazil_nut_of_bulk": ("", "the same without the beads that are free of the bulk"),
+    "mean_square_velocity": ("m^2/s^2", "of the beads, relative to the container"),
+    "coordination": ("", "bridges between beads a bead, touching or open"),
+    "touching": ("", "bridges between beads that touch"),
+    "opened": ("", "bridges between beads that do not"),
+    "mean_force": ("N", "of the bridges between beads"),
+    "bulk": ("", "beads in the bulk"),
+    "clusters": ("", "clusters that are free of the bulk and held to a side wall"),
+    "highest": ("m", "height of the topmost bead of these; the surface where there is none"),
+}
+"""``bed.parquet``: a row a frame of a pile."""
+
+CLUSTERS = {
+    "track": ("", "number of the cluster, followed through time"),
+    "first": ("s", "when it was first free of the bulk and held to a side wall"),
+    "last": ("s", "when it was so last"),
+    "begin": ("s", "of its greatest gain of height"),
+    "end": ("s", "of that gain"),
+    "gain": ("m", "greatest gain of height of its leader"),
+    "speed": ("m/s", "slope of the leader's height against time within it"),
+    "standard_error": ("m/s", "of the fit of the speed"),
+    "climbed": ("", "whether that counts as a climb"),
+    "leader": ("", "number of the topmost bead at the end of the gain, from 0"),
+    "leader_large": ("", "whether it is of the large class"),
+    "height": ("m", "of the leader then"),
+    "above_surface": ("m", "of the leader then, above the bulk's surface"),
+    "size": ("", "beads then"),
+    "large": ("", "large beads then"),
+    "wall": ("", "the side wall that held it then (the lowest number of several), from 1"),
+    "merged_into": ("", "number of the track that took it over, -1 if none did"),
+}
+"""``clusters.parquet``: a row a cluster of a pile."""
+
+PROFILE = {
+    "height": ("m", "middle of a layer"),
+    "packing_fraction": ("", "volume of beads over that of the container, mean over the second half of the drive"),
+}
+"""``profile.parquet``: a row a layer of a pile."""
+
+WALKER_TABLES = ("trajectory", "walkers", "bridges")
+PILE_TABLES = ("bed", "clusters", "profile")
+TABLES = {
+    **{"trajectory": TRAJECTORY, "walkers": WALKERS, "bridges": BRIDGES},
+    **{"bed": BED, "clusters": CLUSTERS, "profile": PROFILE},
+}
 
 
 def write_table(directory: Path, name: str, columns: Mapping[str, npt.NDArray[Any]]) -> None:
@@ -114,9 +164,9 @@ def write_table(directory: Path, name: str, columns: Mapping[str, npt.NDArray[An
     beside.replace(directory / f"{name}.parquet")
 
 
-def intact(directory: Path) -> bool:
-    """Whether all tables of a run directory are there and whole: parquet begins and ends with the same four bytes."""
-    for name in TABLES:
+def intact(directory: Path, names: Iterable[str] = WALKER_TABLES) -> bool:
+    """Whether tables of a run directory are there and whole: parquet begins and ends with the same four bytes."""
+    for name in names:
         path = directory / f"{name}.parquet"
         if not path.is_file() or path.stat().st_size < 12:
             return False
@@ -148,7 +198,8 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     directory
         The run directory.
     name
-        ``trajectory``, ``walkers`` or ``bridges``; their columns are described in `TABLES`.
+        ``trajectory``, ``walkers`` or ``bridges``, of a pile ``bed``, ``clusters`` or ``profile``; their columns are
+        described in `TABLES`.
 
     Returns
     -------

@@ -91,8 +91,8 @@ class BeadsLost(EngineFailure):
     def __init__(self, lost: int, step: int, directory: Path) -> None:
         self.lost = lost
         super().__init__(
-            f"{lost} bead(s) left the simulation box before step {step}: walkers went further than the box is wide; "
-            "a larger start.spacing or a shorter run keeps them in",
+            f"{lost} bead(s) left the simulation box before step {step}: walkers went further than the box is wide (a "
+            "larger start.spacing or a shorter run keeps them in), or a pile's beads left over the rim",
             directory,
         )
 

@@ -38,12 +38,10 @@ from runner.files import read_json, settle, settle_entry, write_json
 from runner.launch import EngineReport, Progress, launch
 from runner.locks import locked
 from templates.deck import OUTPUT_NAME
-from templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Part, render_part
+from templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Part, render_part, settling_steps
 
 PARTS = "parts"
 PART_NAME = "part.json"
-_SETTLING_SECONDS = 0.05
-"""Length of the parts in which a pile settles; at the end of each it is looked whether it has."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ class PileProgress:
 
 def pile_place(case: PileCase, engine: Engine, out: Path) -> Path:
     """Where the run of a pile belongs."""
-    first = Part(0, _settling_steps(case), None)
+    first = Part(0, settling_steps(case), None)
     drive = Part(first.end, first.end + case.run.cycles_per_part * case.run.steps_per_cycle, first.end)
     decks = [render_part(case, part) for part in (first, drive)]
     determinants = {
@@ -191,17 +189,12 @@ class _Making:
         return advance
 
 
-def _settling_steps(case: PileCase) -> int:
-    frame = case.run.steps_per_frame
-    return max(1, round(_SETTLING_SECONDS / case.run.time_step / frame)) * frame
-
-
 def _make(making: _Making, place: Path) -> FinishedRun:
     case, run = making.case, making.case.run
     started = time.time()
     while (start := _settled_at(making)) is None:
         begin = making.done[-1]["end"] if making.done else 0
-        making.make(Part(begin, begin + _settling_steps(case), None))
+        making.make(Part(begin, begin + settling_steps(case), None))
     end = start + run.cycles * run.steps_per_cycle
     while (begin := making.done[-1]["end"]) < end:
         making.make(Part(begin, min(begin + run.cycles_per_part * run.steps_per_cycle, end), start))

@@ -77,7 +77,7 @@ def _stiffness_ratio(case: WalkerCase) -> float | None:
 def describe(summary: dict[str, Any]) -> str:
     """The summary as text."""
     parts = [
-        _text_of_case(summary["case"]),
+        text_of_case(summary["case"]),
         _text_of_dimer(summary),
         _text_of_contacts(summary),
         _text_of_step(summary),
@@ -85,7 +85,8 @@ def describe(summary: dict[str, Any]) -> str:
     return "\n".join(parts)
 
 
-def _text_of_case(case: dict[str, Any]) -> str:
+def text_of_case(case: dict[str, Any]) -> str:
+    """A resolved case, a line a table."""
     lines = [f"{case['name']}: {case['title']}".rstrip(": ")]
     for table, values in case.items():
         if isinstance(values, dict):

@@ -20,6 +20,8 @@ _SKIN = 2e-4
 _LOOSE = 1.03
 """Pitch of the places at the start, in diameters of the largest bead."""
 _STATUS_LINES_PER_CYCLE = 2
+SETTLING_SECONDS = 0.05
+"""Length of the parts in which a pile settles; at the end of each it is looked whether it has."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,17 @@ def render_part(case: PileCase, part: Part) -> Deck:
     )
 
 
+def settling_steps(case: PileCase) -> int:
+    """Steps of a part in which the pile settles."""
+    frame = case.run.steps_per_frame
+    return max(1, round(SETTLING_SECONDS / case.run.time_step / frame)) * frame
+
+
+def render_first_part(case: PileCase) -> Deck:
+    """The deck that a run begins with: the beads fall and settle."""
+    return render_part(case, Part(0, settling_steps(case), None))
+
+
 @lru_cache(maxsize=4)
 def place_pile(case: PileCase) -> Scene:
     """Beads on a loose lattice, the sizes shuffled and the places jittered by the case's seed, to fall and settle.
@@ -87,7 +100,8 @@ def place_pile(case: PileCase) -> Scene:
     largest = max(case.beads.large + case.beads.small)
     edge, below = half + 2e-4, 4.0 * largest
     lower: Point = (-edge, -edge, -(len(faces) + 2) * below)
-    upper: Point = (edge, edge, case.container.height)
+    # Climbers may rise above the rim: the walls go on, and no bead is lost there before it has fallen off for long.
+    upper: Point = (edge, edge, 2.0 * case.container.height)
     width = (upper[0] - lower[0]) / ranks
     riders = tuple(
         (lower[0] + (rank + 0.5) * width, 0.0, -(number + 1.5) * below)

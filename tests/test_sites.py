@@ -12,8 +12,8 @@ import pytest
 from inputs import InputError
 from sweeps.site import load_site, pilots
 from sweeps.table import load
-from tests.conftest import PROGRAM, document, engines_in, to_toml
-from tests.test_sweeps import SLOW, TINY, contents_of, wait_for
+from tests.conftest import PROGRAM, document, engines_in, to_toml, wait_for
+from tests.test_sweeps import SLOW, TINY, contents_of
 
 SLURM = 'scheduler = "slurm"\ncores = 16\n'
 

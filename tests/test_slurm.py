@@ -10,8 +10,8 @@ import pytest
 
 from sweeps.table import load
 from tests.cluster import slurm_cluster, why_not
-from tests.conftest import PROGRAM, document, to_toml
-from tests.test_sweeps import contents_of, wait_for
+from tests.conftest import PROGRAM, document, to_toml, wait_for
+from tests.test_sweeps import contents_of
 
 SITE = """
 scheduler = "slurm"

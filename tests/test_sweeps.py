@@ -28,10 +28,11 @@ from runner.ensemble import finished_place
 from runner.failures import WalkersMet
 from sweeps.conduct import Options
 from sweeps.run import run_sweep
+from sweeps.site import cores_here
 from sweeps.table import load, thresholds
 from sweeps.together import make_together
 from sweeps.worker import Task, work
-from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml
+from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml, wait_for
 
 TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
 SLOW = {"time_step": "2 us", "cycles": 400, "settling_cycles": 2, "samples_per_cycle": 5}
@@ -55,15 +56,6 @@ def _sweep(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
 
 def _start(*arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen([PROGRAM, "sweep", *arguments], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-
-
-def wait_for(condition: Callable[[], Any], seconds: float = 60.0) -> Any:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if found := condition():
-            return found
-        time.sleep(0.02)
-    raise AssertionError("waited in vain")
 
 
 def contents_of(out: Path) -> dict[str, dict[str, bytes]]:
@@ -499,15 +491,18 @@ def test_a_sweep_that_is_killed_twenty_times(
     """
     name = sweep_file(text=text, run={**TINY, "cycles": 10, "settling_cycles": 2})
     engine, launches = counting_engine
+    begin = time.perf_counter()
     undisturbed = _sweep(name, "--engine", engine, "--out", "undisturbed")
     assert undisturbed.returncode == 0
+    # Two decks' worth of the time that this machine takes now.
+    longest = 2.0 * (time.perf_counter() - begin) * cores_here() / len(launches())
     draw = random.Random(20)
     finished: set[str] = set()
     for _ in range(20):
         begun = len(launches())
         program = _start(name, "--engine", engine)
         wait_for(lambda begun=begun, program=program: len(launches()) > begun or program.poll() is not None)
-        time.sleep(draw.uniform(0.0, 0.9))
+        time.sleep(draw.uniform(0.0, longest))
         if draw.random() < 0.3 and (engines := engines_in(in_folder)):
             os.kill(draw.choice(engines), signal.SIGKILL)
             time.sleep(0.05)

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inputs.errors import InputError, Problem
+from inputs.errors import InputError, Problem, WalkersError
 
 if TYPE_CHECKING:
     from inputs.case import WalkerCase
+    from inputs.pile import PileCase
     from runner.directory import FinishedRun
     from runner.launch import Progress
+    from runner.parts import PileProgress
 
 DEFAULT_OUT = Path("runs")
 
@@ -100,8 +102,33 @@ def _result_of(run: FinishedRun) -> dict[str, Any]:
     return current_result(run.directory)
 
 
+def run_pile_case(
+    case: PileCase,
+    out: Path = DEFAULT_OUT,
+    *,
+    engine: str | None = None,
+    force: bool = False,
+    on_progress: Callable[[PileProgress], None] | None = None,
+    time_limit: float | None = None,
+    despite_audit: bool = False,
+) -> Outcome:
+    """Run a pile, or go on with it, and measure it; parameters and errors as for `run_case`.
+
+    ``time_limit`` is for each part of the run.
+    """
+    from postprocess.pile_result import current_pile_result
+    from runner.binary import find_engine
+    from runner.parts import run_pile
+    from sweeps.together import check_audit
+
+    binary = find_engine(engine)
+    check_audit(binary, despite_audit)
+    run, found = run_pile(case, binary, out, force=force, on_progress=on_progress, time_limit=time_limit)
+    return Outcome(run, current_pile_result(run.directory), found)
+
+
 def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
-    """Find a finished run.
+    """Find a finished run of a walker, a climber or a pile.
 
     Parameters
     ----------
@@ -117,8 +144,7 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
     runner.EngineFailure
         If a case is given and there is no engine to look it up for.
     """
-    from runner.directory import finished_run, run_place
-    from runner.ensemble import finished_place
+    from runner.directory import finished_run
 
     path = Path(run)
     if path.is_dir():
@@ -128,14 +154,54 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
                 str(run), [Problem("", None, "not a finished run: expected a folder with a manifest.json")]
             )
     else:
-        from inputs.reading import load_case
-        from runner.binary import find_engine
-
-        there = finished_place(out, run_place(load_case(path), find_engine(), out).name)
+        there = _place_of(path, out)
         found = finished_run(there) if there else None
         if found is None:
             raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
-    return _readable(found)
+    return _readable_pile(found) if is_pile(found.directory) else _readable(found)
+
+
+def _place_of(case: Path, out: Path) -> Path | None:
+    from inputs.pile import PileCase
+    from inputs.reading import load_any
+    from runner.binary import find_engine
+    from runner.directory import run_place
+    from runner.ensemble import finished_place
+    from runner.parts import pile_place
+
+    loaded = load_any(case)
+    if isinstance(loaded, PileCase):
+        return pile_place(loaded, find_engine(), out)
+    return finished_place(out, run_place(loaded, find_engine(), out).name)
+
+
+def described(directory: Path, result: dict[str, Any], *, found: bool = False) -> str:
+    """A result as text, whatever it is of."""
+    if result.get("kind") == "pile":
+        from postprocess.pile_result import describe_pile
+
+        return describe_pile(directory, result, found=found)
+    from postprocess.report import describe_result
+
+    return describe_result(directory, result, found=found)
+
+
+def is_pile(directory: Path) -> bool:
+    """Whether a run directory is a pile's."""
+    from runner.parts import PARTS
+
+    return (directory / PARTS).is_dir()
+
+
+def _readable_pile(run: FinishedRun) -> FinishedRun:
+    """A pile's run, if its description can be read; its tables are made anew if need be."""
+    from postprocess.pile_result import current_pile_result
+
+    try:
+        current_pile_result(run.directory)
+    except (OSError, ValueError, KeyError, TypeError, WalkersError) as error:
+        raise InputError(str(run.directory), [Problem("", None, f"the run cannot be read ({error})")]) from error
+    return run
 
 
 def _readable(run: FinishedRun) -> FinishedRun:

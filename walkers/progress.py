@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from inputs.case import WalkerCase
+    from inputs.pile import PileCase
     from runner.launch import Progress
+    from runner.parts import PileProgress
     from sweeps.conduct import Progress as SweepProgress
 
 _FIRST_LINE_SECONDS = 1.0
@@ -77,6 +79,33 @@ def _lines(case: WalkerCase) -> Callable[[Progress], None]:
         )
 
     return advance
+
+
+@contextmanager
+def progress_of_pile(case: PileCase) -> Iterator[Callable[[PileProgress], None]]:
+    """Yield a function that shows how far a run of a pile is."""
+    if sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import BarColumn, TextColumn
+        from rich.progress import Progress as Bar
+
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[told]}"))
+        with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task(case.name, total=1.0, told="")
+            yield lambda progress: bar.update(task, completed=progress.share, told=_told_of_pile(progress))
+        return
+    is_due = _rarely()
+
+    def advance(progress: PileProgress) -> None:
+        if is_due(progress.elapsed):
+            print(f"{case.name}: {_told_of_pile(progress)}", file=sys.stderr, flush=True)
+
+    yield advance
+
+
+def _told_of_pile(progress: PileProgress) -> str:
+    doing = f"{100 * progress.share:.0f} % of the drive" if progress.driven else "settling"
+    return f"{doing}, {progress.simulated:.2f} s simulated"
 
 
 @contextmanager

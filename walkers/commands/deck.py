@@ -15,12 +15,15 @@ Folder = Annotated[
 
 
 def command(case: Case, to: Folder = None) -> None:
-    """Print the LIGGGHTS deck of a case, or write it with its files."""
+    """Print the LIGGGHTS deck of a case (of a pile, that in which it settles), or write it with its files."""
     from inputs.errors import InputError, Problem
-    from inputs.reading import load_case
+    from inputs.pile import PileCase
+    from inputs.reading import load_any
     from templates.deck import DECK_NAME, render_deck
+    from templates.pile import render_first_part
 
-    deck = render_deck(load_case(case))
+    loaded = load_any(case)
+    deck = render_first_part(loaded) if isinstance(loaded, PileCase) else render_deck(loaded)
     if to is None:
         print(deck.text, end="")
         return

@@ -10,10 +10,9 @@ from walkers.pipeline import DEFAULT_OUT
 
 def command(run: Run, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
     """Print the result of a finished run."""
-    from postprocess.report import describe_result
     from postprocess.result import read_result
-    from walkers.pipeline import find_run
+    from walkers.pipeline import described, find_run
 
     directory = find_run(run, out).directory
     result = read_result(directory)
-    print(json.dumps(result, indent=2) if as_json else describe_result(directory, result))
+    print(json.dumps(result, indent=2) if as_json else described(directory, result))

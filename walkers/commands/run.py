@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -26,27 +26,25 @@ def command(
     despite_audit: DespiteAudit = False,
 ) -> int:
     """Run cases, unless they have been run, and print their results (with --json an object a line)."""
-    from inputs.reading import load_case
-    from postprocess.report import describe_result
+    from inputs.pile import PileCase
+    from inputs.reading import load_any
     from runner.failures import EngineFailure
-    from walkers.pipeline import run_case
-    from walkers.progress import progress_of
+    from walkers.pipeline import described, run_case, run_pile_case
+    from walkers.progress import progress_of, progress_of_pile
 
-    loaded = [load_case(case) for case in cases]  # a mistake in the last file shows before the first run starts
+    loaded = [load_any(case) for case in cases]  # a mistake in the last file shows before the first run starts
     check_out(out)
     failed = 0
     for case in loaded:
         try:
-            with progress_of(case) as advance:
-                outcome = run_case(
-                    case,
-                    out,
-                    engine=engine,
-                    force=force,
-                    on_progress=advance,
-                    time_limit=limit,
-                    despite_audit=despite_audit,
-                )
+            options: dict[str, Any] = {"engine": engine, "force": force, "time_limit": limit}
+            options["despite_audit"] = despite_audit
+            if isinstance(case, PileCase):
+                with progress_of_pile(case) as tell:
+                    outcome = run_pile_case(case, out, on_progress=tell, **options)
+            else:
+                with progress_of(case) as advance:
+                    outcome = run_case(case, out, on_progress=advance, **options)
         except EngineFailure as failure:
             print(f"walkers: {case.name}: {failure}", file=sys.stderr)
             failed += 1
@@ -54,5 +52,5 @@ def command(
         if as_json:
             print(json.dumps({**outcome.result, "run": str(outcome.run.directory), "found": outcome.found}))
         else:
-            print(describe_result(outcome.run.directory, outcome.result, found=outcome.found))
+            print(described(outcome.run.directory, outcome.result, found=outcome.found))
     return 1 if failed else 0

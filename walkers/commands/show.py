@@ -9,8 +9,15 @@ from walkers.commands.arguments import Case, Json
 
 def command(case: Case, as_json: Json = False) -> None:
     """Show a case in SI units with its forces, its time step and its cost."""
-    from inputs.reading import load_case
+    from inputs.pile import PileCase
+    from inputs.reading import load_any
+    from runner.pile_summary import describe_pile_case, summarise_pile
     from runner.summary import describe, summarise
 
-    summary = summarise(load_case(case))
+    loaded = load_any(case)
+    if isinstance(loaded, PileCase):
+        pile = summarise_pile(loaded)
+        print(json.dumps(pile, indent=2, ensure_ascii=False) if as_json else describe_pile_case(pile))
+        return
+    summary = summarise(loaded)
     print(json.dumps(summary, indent=2, ensure_ascii=False) if as_json else describe(summary))

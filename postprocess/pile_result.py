@@ -1,0 +1,214 @@
+"""From a pile's run directory to its tables and its result: what the bed did, which clusters climbed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from postprocess.bed import Bed, bed_of, packing_profile
+from postprocess.bridges import Columns
+from postprocess.clusters import Climb, Definition, Track, bulk_of, components, follow, held_clusters, judge
+from postprocess.pile import PileMotion, read_bridges, read_pile
+from postprocess.result import RESULT_NAME, read_result
+from postprocess.tables import PILE_TABLES, intact, write_table
+from runner.files import write_json
+
+_LAYERS = 0.5
+"""Thickness of the layers of the packing profile, in diameters of the largest bead."""
+
+
+@dataclass(frozen=True)
+class PileAnalysis:
+    """Everything that is measured of a pile.
+
+    Attributes
+    ----------
+    motion
+        Of the beads.
+    beds
+        One a frame.
+    tracks, climbs
+        The clusters that were free and held, and what each of them did.
+    definition
+        What counted as a climb.
+    """
+
+    motion: PileMotion
+    beds: list[Bed]
+    tracks: list[Track]
+    climbs: list[Climb]
+    definition: Definition
+
+
+def analyse(directory: str | Path, definition: Definition | None = None) -> PileAnalysis:
+    """Measure a pile, finished or not.
+
+    Parameters
+    ----------
+    directory
+        A run directory with its parts.
+    definition
+        What counts as a climb.
+
+    Raises
+    ------
+    postprocess.dump.DumpError
+        If a dump cannot be read.
+    """
+    rule = definition or Definition()
+    motion = read_pile(directory)
+    beds: list[Bed] = []
+    clusters = []
+    for frame, bridges in enumerate(read_bridges(motion)):
+        labels = components(len(motion.radius), bridges)
+        position, velocity = motion.position[frame], motion.velocity[frame]
+        bulk = bulk_of(labels)
+        beds.append(bed_of(position, velocity, motion.radius, motion.large, bulk, bridges, motion.case.container))
+        # While the pile falls and settles, most of it is free of the rest.
+        clusters.append(list(held_clusters(labels, bridges)) if motion.time[frame] >= 0.0 else [])
+    tracks = follow(motion.time, clusters, rule)
+    climbs = [judge(track, motion.time, motion.position[:, :, 2], motion.large, rule) for track in tracks]
+    return PileAnalysis(motion, beds, tracks, climbs, rule)
+
+
+def tabulate_pile(directory: str | Path, definition: Definition | None = None) -> dict[str, Any]:
+    """Write the tables and ``result.json`` of a pile.
+
+    Parameters
+    ----------
+    directory, definition
+        As for `analyse`.
+
+    Returns
+    -------
+    dict
+        The result, as in ``result.json``: SI units.
+    """
+    directory = Path(directory)
+    found = analyse(directory, definition)
+    write_table(directory, "bed", _bed_columns(found))
+    write_table(directory, "clusters", _cluster_columns(found))
+    write_table(directory, "profile", _profile_columns(found.motion))
+    outcome = _result(found)
+    write_json(directory / RESULT_NAME, outcome)
+    return outcome
+
+
+def current_pile_result(directory: str | Path) -> dict[str, Any]:
+    """The result of a pile; tabulated anew if it or a table is gone or damaged."""
+    directory = Path(directory)
+    try:
+        result = read_result(directory)
+        if result.keys() >= {"climbs", "surface", "definition"} and intact(directory, PILE_TABLES):
+            return result
+    except (OSError, ValueError):
+        pass
+    return tabulate_pile(directory)
+
+
+def _bed_columns(found: PileAnalysis) -> Columns:
+    held = np.zeros(len(found.beds), dtype=np.int64)
+    highest = np.array([bed.surface for bed in found.beds])
+    for track in found.tracks:
+        for frame, members in zip(track.frames, track.members, strict=True):
+            held[frame] += 1
+            highest[frame] = max(highest[frame], found.motion.position[frame, list(members), 2].max())
+    columns = {name: np.array([getattr(bed, name) for bed in found.beds]) for name in vars(found.beds[0])}
+    return {"time": found.motion.time, **columns, "clusters": held, "highest": highest}
+
+
+def _cluster_columns(found: PileAnalysis) -> Columns:
+    time, tracks, climbs = found.motion.time, found.tracks, found.climbs
+
+    def column(values: list[Any], kind: npt.DTypeLike) -> npt.NDArray[Any]:
+        return np.array(values, dtype=kind)
+
+    surface = np.array([bed.surface for bed in found.beds])
+    at_end = np.searchsorted(time, [climb.end for climb in climbs])
+    columns: Columns = {
+        "track": np.arange(len(tracks), dtype=np.int64),
+        "first": column([time[track.frames[0]] for track in tracks], np.float64),
+        "last": column([time[track.frames[-1]] for track in tracks], np.float64),
+        "leader_large": column([found.motion.large[climb.leader] for climb in climbs], np.bool_),
+        "above_surface": column([climb.height for climb in climbs], np.float64) - surface[at_end],
+        "wall": column([min(climb.walls, default=-1) for climb in climbs], np.int64),
+        "merged_into": column([-1 if track.merged_into is None else track.merged_into for track in tracks], np.int64),
+    }
+    for name in ("begin", "end", "gain", "speed", "standard_error", "height"):
+        columns[name] = column([getattr(climb, name) for climb in climbs], np.float64)
+    for name in ("leader", "size", "large"):
+        columns[name] = column([getattr(climb, name) for climb in climbs], np.int64)
+    columns["climbed"] = column([climb.climbed for climb in climbs], np.bool_)
+    return columns
+
+
+def _profile_columns(motion: PileMotion) -> Columns:
+    driven = motion.time >= motion.time[-1] / 2.0
+    layer = _LAYERS * 2.0 * float(motion.radius.max())
+    height, fraction = packing_profile(motion.position[driven], motion.radius, motion.case.container, layer)
+    return {"height": height, "packing_fraction": fraction}
+
+
+def _result(found: PileAnalysis) -> dict[str, Any]:
+    motion, beds = found.motion, found.beds
+    case = motion.case
+    start = int(np.searchsorted(motion.time, 0.0))
+    return {
+        "case": case.name,
+        "kind": case.kind,
+        "units": "SI: m, s, m/s",
+        "beads": len(motion.radius),
+        "large": int(motion.large.sum()),
+        "frequency": case.drive.frequency,
+        "peak_acceleration": case.drive.peak_acceleration,
+        "driven": float(max(motion.time[-1], 0.0)),
+        "settling": float(-motion.time[0]),
+        "surface": {"start": beds[start].surface, "end": beds[-1].surface},
+        "brazil_nut": {"start": beds[start].brazil_nut, "end": beds[-1].brazil_nut},
+        "clusters": len(found.tracks),
+        "climbs": [
+            {
+                "begin": climb.begin,
+                "end": climb.end,
+                "gain": climb.gain,
+                "speed": climb.speed,
+                "standard_error": climb.standard_error if np.isfinite(climb.standard_error) else None,
+                "leader_large": bool(motion.large[climb.leader]),
+                "height": climb.height,
+                "size": climb.size,
+                "large": climb.large,
+                "walls": list(climb.walls),
+            }
+            for climb in found.climbs
+            if climb.climbed
+        ],
+        "definition": vars(found.definition),
+    }
+
+
+def describe_pile(directory: Path, result: dict[str, Any], *, found: bool = False) -> str:
+    """The result of a pile in a few lines: did it climb, when, how fast, who led; mm and mm/s."""
+    surface, nuts = result["surface"], result["brazil_nut"]
+    lines = [
+        f"{result['case']}: {result['beads']} beads ({result['large']} large), {result['frequency']:g} Hz, "
+        f"a0 = {result['peak_acceleration']:.4g} m/s²" + (" (already run)" if found else ""),
+        f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling",
+        f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
+        f"  segregation (z of large - z of small)/2z: {nuts['start']:.3f} at the start, {nuts['end']:.3f} at the end",
+        f"  clusters   {result['clusters']} came free of the pile and were held to a wall",
+        f"  climbs     {len(result['climbs']) or 'none'}",
+    ]
+    for climb in result["climbs"]:
+        error = climb["standard_error"]
+        doubt = f" ± {error * 1e3:.2g}" if error is not None else ""
+        leader = "large" if climb["leader_large"] else "small"
+        lines.append(
+            f"    {climb['begin']:.2f} to {climb['end']:.2f} s: {climb['gain'] * 1e3:.2f} mm up to "
+            f"{climb['height'] * 1e3:.2f} mm at {climb['speed'] * 1e3:.2f}{doubt} mm/s, led by a {leader} bead, "
+            f"{climb['size']} beads ({climb['large']} large)"
+        )
+    return "\n".join([*lines, f"  run        {directory}"])

@@ -1,0 +1,173 @@
+"""Climbs of made-up trajectories: what counts, what does not, and what becomes of clusters that meet or part."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from inputs.pile import Container
+from postprocess.bed import packing_profile, segregation
+from postprocess.clusters import Climb, Definition, Track, bulk_of, components, follow, held_clusters, judge
+from postprocess.pile import Bridges
+
+BULK = list(range(20))
+TIME = np.arange(0.0, 4.0, 0.02)
+FRAMES = len(TIME)
+SIDE = 3
+
+
+def chain(beads: list[int]) -> list[tuple[int, int]]:
+    return list(pairwise(beads))
+
+
+def frame(pairs: list[tuple[int, int]], walls: dict[int, int]) -> Bridges:
+    beads = np.array([*chain(BULK), *pairs], dtype=np.int64).reshape(-1, 2)
+    ones = np.ones(len(beads))
+    return Bridges(
+        beads, ones, -ones, np.array(list(walls), dtype=np.int64), np.array(list(walls.values()), dtype=np.int64)
+    )
+
+
+class Scene:
+    """24 beads, 20 of them the bulk; the others do what a test says."""
+
+    def __init__(self) -> None:
+        self.height = np.zeros((FRAMES, 24))
+        self.height[:, BULK] = np.linspace(0.0, 4e-3, 20)
+        self.height[:, 20:] = 5e-3
+        self.large = np.zeros(24, dtype=bool)
+        self.large[20] = True
+        # Bead 20 leads 21, held to the wall; 22 and 23 stay on the bulk.
+        self.pairs = [[(20, 21), (22, 19), (23, 19)] for _ in TIME]
+        self.walls: list[dict[int, int]] = [{20: SIDE, 0: SIDE, 1: 0} for _ in TIME]
+
+    def climbs(self, definition: Definition | None = None) -> tuple[list[Track], list[Climb]]:
+        rule = definition or Definition()
+        clusters = []
+        for pairs, walls in zip(self.pairs, self.walls, strict=True):
+            bridges = frame(pairs, walls)
+            clusters.append(list(held_clusters(components(24, bridges), bridges)))
+        tracks = follow(TIME, clusters, rule)
+        return tracks, [judge(track, TIME, self.height, self.large, rule) for track in tracks]
+
+
+def test_a_rising_cluster_climbs() -> None:
+    scene = Scene()
+    scene.height[:, 20] += 3e-3 * TIME
+    scene.height[:, 21] += 3e-3 * TIME - 8e-4
+    (track,), (climb,) = scene.climbs()
+    assert climb.climbed
+    assert climb.gain == pytest.approx(3e-3 * TIME[-1])
+    assert climb.speed == pytest.approx(3e-3, rel=1e-9)
+    assert (climb.leader, climb.size, climb.large, climb.walls) == (20, 2, 1, (SIDE,))
+    assert len(track.frames) == FRAMES
+
+
+def test_a_column_that_sinks_does_not() -> None:
+    scene = Scene()
+    scene.height[:, 20:22] += 8e-3 - 1e-3 * TIME[:, None]
+    _, (climb,) = scene.climbs()
+    assert not climb.climbed
+    assert climb.gain < 1e-4
+
+
+def test_a_bead_thrown_into_the_air_does_not() -> None:
+    scene = Scene()
+    scene.height[:, 20:22] += (40e-3 * TIME - 10e-3 * TIME**2)[:, None]
+    for walls in scene.walls:
+        del walls[20]
+    assert scene.climbs() == ([], [])
+
+
+def test_what_rises_with_the_pile_does_not() -> None:
+    scene = Scene()
+    scene.height[:, 20:22] += 3e-3 * TIME[:, None]
+    for pairs in scene.pairs:
+        pairs.append((21, 19))  # the tail stays on the pile
+    assert scene.climbs() == ([], [])
+
+
+@pytest.mark.parametrize(("seconds", "tracks"), [(0.06, 1), (0.3, 2)])
+def test_a_tail_that_brushes_the_pile_does_not_end_a_climb(seconds: float, tracks: int) -> None:
+    scene = Scene()
+    scene.height[:, 20:22] += 3e-3 * TIME[:, None]
+    brushing = (TIME >= 2.0) & (2.0 + seconds > TIME)
+    for number in np.flatnonzero(brushing):
+        scene.pairs[number].append((21, 19))
+    found, climbs = scene.climbs()
+    assert len(found) == tracks
+    assert all(climb.climbed for climb in climbs)
+    if tracks == 1:
+        assert climbs[0].gain == pytest.approx(3e-3 * TIME[-1])
+
+
+def test_two_climb_at_once() -> None:
+    scene = Scene()
+    scene.pairs = [[(20, 21), (22, 23)] for _ in TIME]
+    for walls in scene.walls:
+        walls[22] = SIDE + 1
+    scene.height[:, 20:22] += 3e-3 * TIME[:, None]
+    scene.height[:, 22:24] += 1e-3 * TIME[:, None]
+    _, climbs = scene.climbs()
+    assert sorted(climb.speed for climb in climbs) == pytest.approx([1e-3, 3e-3])
+    assert {climb.walls for climb in climbs} == {(SIDE,), (SIDE + 1,)}
+
+
+def test_two_that_meet_go_on_as_one() -> None:
+    scene = Scene()
+    meet = FRAMES // 2
+    scene.pairs = [[(20, 21), (22, 23), *([(21, 22)] if number >= meet else [])] for number in range(FRAMES)]
+    for walls in scene.walls:
+        walls[22] = SIDE
+    scene.height[:, 20:] += 3e-3 * TIME[:, None]
+    tracks, climbs = scene.climbs()
+    assert len(tracks) == 2
+    assert sorted(len(track.frames) for track in tracks) == [meet, FRAMES]
+    (ended,) = [track for track in tracks if track.merged_into is not None]
+    assert len(ended.frames) == meet
+    assert max(climb.size for climb in climbs) == 4
+
+
+def test_one_that_parts_is_followed_by_its_beads() -> None:
+    scene = Scene()
+    part = FRAMES // 2
+    scene.pairs = [[(20, 21), (21, 22), *([(22, 23)] if number < part else [])] for number in range(FRAMES)]
+    for walls in scene.walls:
+        walls[23] = SIDE
+    scene.height[:, 20:] += 3e-3 * TIME[:, None]
+    tracks, _ = scene.climbs()
+    assert [len(track.frames) for track in tracks] == [FRAMES, FRAMES - part]
+    assert tracks[0].members[-1] == {20, 21, 22}
+
+
+def test_a_fall_ends_a_climb_at_its_top() -> None:
+    scene = Scene()
+    up = np.minimum(3e-3 * TIME, 6e-3 - 2e-3 * (TIME - 2.0))
+    scene.height[:, 20:22] += up[:, None]
+    _, (climb,) = scene.climbs()
+    assert climb.climbed
+    assert climb.end == pytest.approx(2.0, abs=0.03)
+    assert climb.gain == pytest.approx(6e-3, rel=0.02)
+
+
+def test_the_bulk_is_the_component_of_most_beads() -> None:
+    labels = components(24, frame([(20, 21)], {}))
+    assert np.flatnonzero(bulk_of(labels)).tolist() == BULK
+
+
+def test_the_packing_profile_holds_all_of_the_beads() -> None:
+    draw = np.random.default_rng(1)
+    radius = draw.uniform(3e-4, 6e-4, 50)
+    position = draw.uniform(1e-3, 9e-3, (3, 50, 3))
+    container = Container("box", 5e-3, 20e-3, "glass")
+    height, fraction = packing_profile(position, radius, container, 2e-4)
+    volume = float((fraction * container.cross_section * 2e-4).sum())
+    assert volume == pytest.approx(float((4.0 / 3.0 * np.pi * radius**3).sum()), rel=1e-9)
+    assert height[0] == pytest.approx(1e-4)
+
+
+def test_the_brazil_nut_index_is_one_with_all_small_beads_on_the_floor() -> None:
+    large = np.array([True, True, False, False])
+    assert segregation(np.array([2.0, 2.0, 0.0, 0.0]), large) == pytest.approx(1.0)
+    assert segregation(np.array([1.0, 2.0, 2.0, 1.0]), large) == pytest.approx(0.0)
+    assert segregation(np.ones(3), np.zeros(3, dtype=bool)) == 0.0

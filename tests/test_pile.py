@@ -1,0 +1,240 @@
+"""Piles by the real engine: settled, shaken, interrupted, on two ranks, in both frames, and what is read from them."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from inputs import InputError, PileCase, load_pile, resolve_pile_case, shipped_cases
+from postprocess.pile import FLOOR, read_bridges, read_pile
+from postprocess.pile_result import current_pile_result, tabulate_pile
+from postprocess.tables import PILE_TABLES, TABLES, read_table
+from runner.binary import find_engine
+from runner.failures import EngineError, RunBusy
+from runner.parts import part_directories, pile_place, run_pile
+from tests.conftest import PROGRAM, engines_in, wait_for
+
+
+def document(**changes: dict[str, Any]) -> dict[str, Any]:
+    tables = tomllib.loads(shipped_cases()["pile-ci"].read_text())
+    for table, values in changes.items():
+        tables.setdefault(table, {}).update(values)
+    return tables
+
+
+def small(**changes: dict[str, Any]) -> PileCase:
+    return resolve_pile_case(document(**changes), name="pile-ci")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("piles")
+    finished, found = run_pile(load_pile("pile-ci"), find_engine(None), out)
+    assert not found
+    tabulate_pile(finished.directory)
+    return finished.directory
+
+
+def test_a_pile_settles_is_shaken_and_is_whole(run: Path) -> None:
+    case, motion = load_pile("pile-ci"), read_pile(run)
+    manifest = json.loads((run / "manifest.json").read_text())
+    assert manifest["settled"] < case.run.settled_below or manifest["drive_from"] * case.run.time_step >= 0.1
+    assert len(motion.radius) == sum(case.beads.counts)
+    assert sorted(motion.radius) == pytest.approx(sorted(case.beads.radii))
+    assert int(motion.large.sum()) == case.beads.counts[1]
+    assert motion.time[0] < 0.0
+    assert motion.time[-1] == pytest.approx(case.run.cycles / case.drive.frequency)
+    every = case.run.steps_per_frame * case.run.time_step
+    np.testing.assert_allclose(np.diff(motion.time), every)
+    # All beads are within the container, but for overlaps, and on its floor.
+    room = case.container.width / 2.0 - motion.radius[:, None] + 1e-5
+    assert (np.abs(motion.position[..., :2]) <= room).all()
+    assert (motion.position[..., 2] >= motion.radius - 1e-5).all()
+    assert motion.position[-1, :, 2].max() < 8e-3
+
+
+def test_the_drive_shakes_the_pile(run: Path) -> None:
+    motion = read_pile(run)
+    agitation = (motion.velocity**2).sum(axis=2).mean(axis=1)
+    start = int(np.searchsorted(motion.time, 0.0))
+    assert agitation[start] < 1e-3**2
+    assert agitation[start + 3 :].min() > 3e-2**2
+
+
+def test_bridges_are_the_engines(run: Path) -> None:
+    motion = read_pile(run)
+    frames = list(read_bridges(motion))
+    assert len(frames) == len(motion.time)
+    bridges = frames[-1]
+    position, radius = motion.position[-1], motion.radius
+    apart = np.linalg.norm(position[bridges.beads[:, 0]] - position[bridges.beads[:, 1]], axis=1)
+    np.testing.assert_allclose(bridges.gap, apart - radius[bridges.beads].sum(axis=1), atol=1e-9)
+    on_floor = bridges.wall_beads[bridges.walls == FLOOR]
+    assert len(on_floor) == len(set(on_floor.tolist())) > 3
+    assert (position[on_floor, 2] - radius[on_floor] < 2e-4).all()
+
+
+def test_tables_of_a_pile(run: Path) -> None:
+    motion = read_pile(run)
+    for name in PILE_TABLES:
+        assert list(read_table(run, name).columns) == list(TABLES[name])
+    bed = read_table(run, "bed")
+    assert len(bed) == len(motion.time)
+    assert bed["coordination"].iloc[-1] > 2.0
+    profile = read_table(run, "profile")
+    assert 0.2 < profile["packing_fraction"].max() < 0.75
+
+
+def test_an_interrupted_pile_goes_on_bit_for_bit(run: Path, tmp_path: Path) -> None:
+    """Killed while it makes its second part, and the engine alone while it makes the third."""
+    case = load_pile("pile-ci")
+    place = pile_place(case, find_engine(None), tmp_path)
+    unfinished = place.with_name(place.name + ".part")
+    command = [PROGRAM, "run", "pile-ci", "--out", str(tmp_path)]
+    for parts in (1, 2):
+        program = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        wait_for(lambda parts=parts: len(part_directories(unfinished)) >= parts and engines_in(unfinished))
+        if parts == 1:
+            program.kill()
+        else:
+            for engine in engines_in(unfinished):
+                os.kill(engine, signal.SIGKILL)
+        program.wait()
+        assert program.returncode != 0
+        wait_for(lambda: not engines_in(unfinished))
+    assert not place.exists()
+    subprocess.run(command, check=True, capture_output=True)
+    assert [path.name for path in part_directories(place)] == [path.name for path in part_directories(run)]
+    for here, there in zip(part_directories(place), part_directories(run), strict=True):
+        for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"):
+            assert (here / name).read_bytes() == (there / name).read_bytes()
+    for name in PILE_TABLES:
+        assert read_table(place, name).equals(read_table(run, name))
+
+
+def test_restart_files_are_kept_for_the_last_two_parts_only(run: Path) -> None:
+    kept = [path.name for path in part_directories(run) if (path / "state.restart").exists()]
+    assert kept == [path.name for path in part_directories(run)][-2:]
+
+
+def test_a_pile_is_run_once_at_a_time(tmp_path: Path) -> None:
+    program = subprocess.Popen([PROGRAM, "run", "pile-ci", "--out", str(tmp_path)], stderr=subprocess.DEVNULL)
+    case, engine = load_pile("pile-ci"), find_engine(None)
+    place = pile_place(case, engine, tmp_path)
+    try:
+        wait_for(lambda: part_directories(place.with_name(place.name + ".part")))
+        with pytest.raises(RunBusy):
+            run_pile(case, engine, tmp_path)
+    finally:
+        program.kill()
+        program.wait()
+
+
+@pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
+def test_two_ranks_make_the_same_kind_of_pile(run: Path, tmp_path: Path) -> None:
+    finished, _ = run_pile(small(run={"ranks": 2, "duration": "0.1 s"}), find_engine(None), tmp_path)
+    one, two = (current_pile_result(directory) for directory in (run, finished.directory))
+    assert two["surface"]["start"] == pytest.approx(one["surface"]["start"], rel=0.05)
+    assert two["beads"] == one["beads"]
+
+
+def test_both_frames_shake_alike(run: Path, tmp_path: Path) -> None:
+    """Chaotic trajectories part, their agitation does not."""
+    case = small(drive={"frame": "lab"})
+    finished, _ = run_pile(case, find_engine(None), tmp_path)
+
+    def agitation(directory: Path, *, lab: bool) -> float:
+        motion = read_pile(directory)
+        velocity = motion.velocity.copy()
+        if lab:  # frames are a whole number of cycles apart: the walls move at full speed in each
+            velocity[..., 2] -= case.drive.peak_velocity
+        driven = motion.time > 0.03
+        return float((velocity[driven] ** 2).sum(axis=2).mean())
+
+    assert agitation(finished.directory, lab=True) == pytest.approx(agitation(run, lab=False), rel=0.25)
+
+
+def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    case, engine = load_pile("pile-ci"), find_engine(None)
+    place = pile_place(case, engine, tmp_path)
+    from runner import parts
+
+    honest = parts.render_part
+
+    def broken(case: PileCase, part: parts.Part) -> Any:
+        deck = honest(case, part)
+        return deck if part.drive_from is None else replace(deck, text=deck.text.replace("nve/sphere", "nve/cube"))
+
+    monkeypatch.setattr(parts, "render_part", broken)
+    monkeypatch.setattr(parts, "pile_place", lambda *_: place)
+    with pytest.raises(EngineError, match="nve/cube"):
+        run_pile(case, engine, tmp_path)
+    monkeypatch.undo()
+    unfinished = place.with_name(place.name + ".part")
+    assert json.loads((unfinished / "failure.json").read_text())["reason"] == "EngineError"
+    kept = {path: path.stat().st_mtime_ns for path in part_directories(unfinished)}
+    assert kept
+    finished, _ = run_pile(case, engine, tmp_path)
+    assert {finished.directory / "parts" / path.name for path in kept} <= set(part_directories(finished.directory))
+
+
+BAD: dict[str, tuple[dict[str, dict[str, Any]], str]] = {
+    "no count": ({"beads": {"count": None}}, "beads.count"),
+    "both": ({"beads": {"fill_height": "3 mm"}}, "beads.count"),
+    "classes": ({"beads": {"large": ["0.29 mm", "0.4 mm"]}}, "beads.large"),
+    "range": ({"beads": {"small": ["0.32 mm", "0.3 mm"]}}, "beads.small"),
+    "narrow": ({"container": {"width": "1.5 mm"}}, "container.width"),
+    "low": ({"container": {"height": "2 mm"}}, "container.height"),
+    "step": ({"run": {"time_step": "6 us"}}, "run.time_step"),
+    "friction": ({"contact": {"friction": {}}}, "contact.friction.bead_bead"),
+    "unknown": ({"container": {"depth": "3 mm"}}, "container.depth"),
+    "material": ({"container": {"material": "glas"}, "contact": {"friction": {}}}, "container.material"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_pile_is_told_by_its_key(name: str) -> None:
+    changes, key = BAD[name]
+    tables = document(**changes)
+    tables["beads"] = {inner: value for inner, value in tables["beads"].items() if value is not None}
+    with pytest.raises(InputError, match=key.replace(".", r"\.")):
+        resolve_pile_case(tables, source="bad.toml", name="bad")
+
+
+def test_a_fill_height_gives_a_count() -> None:
+    tables = document()
+    del tables["beads"]["count"]
+    tables["beads"]["fill_height"] = "2 mm"
+    by_height = resolve_pile_case(tables, name="filled")
+    # A packing fraction of 0.55, with beads of 0.24 mm³ in the mean.
+    assert 60 <= sum(by_height.beads.counts) <= 90
+
+
+def test_shares_by_mass_and_by_number() -> None:
+    by_mass = load_pile("pile-fig1a")
+    volumes = [sum(4.0 / 3.0 * np.pi * r**3 for r in sizes) / len(sizes) for sizes, _ in by_mass.beads.classes]
+    (_, few), (_, many) = by_mass.beads.classes
+    assert few * volumes[0] == pytest.approx(many * volumes[1], rel=0.01)
+    assert small(beads={"mixed_by": "number"}).beads.counts == (30, 30)
+
+
+def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
+    def told(*command: str) -> str:
+        return subprocess.run([PROGRAM, *command], capture_output=True, text=True, check=True).stdout
+
+    assert "climbs  " in told("result", str(run))
+    assert told("plot", str(run), "--to", "here").strip() == "here/climb.png"
+    assert told("render", str(run), "--to", "here/box.png", "--images", "2").strip() == "here/box.png"
+    assert "60 beads" in told("run", "pile-ci", "--out", str(run.parent))
+    assert f"{small().beads.counts[0]} small and {small().beads.counts[1]} large beads" in told("show", "pile-ci")
+    assert "Not yet" in told("deck", "pile-ci")
+    refused = subprocess.run([PROGRAM, "theory", "pile-ci"], capture_output=True, text=True, check=False)
+    assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
