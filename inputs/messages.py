@@ -121,17 +121,17 @@ def _all_keys(file: type[BaseModel], prefix: str = "") -> list[str]:
 
 
 @cache
-def _case_keys() -> frozenset[str]:
-    return frozenset(_all_keys(WalkerFile))
+def _case_keys(file: type[BaseModel]) -> frozenset[str]:
+    return frozenset(_all_keys(file))
 
 
-def suggested_key(key: str) -> str | None:
-    """What to say of a dotted key of a case if there is no such key; None if there is."""
-    if key in _case_keys():
+def suggested_key(key: str, file: type[BaseModel] = WalkerFile) -> str | None:
+    """What to say of a dotted key of a kind of case file if there is no such key; None if there is."""
+    if key in _case_keys(file):
         return None
-    if _table_at(key.split("."), WalkerFile):
+    if _table_at(key.split("."), file):
         return "is a table of a case; expected one of its keys"
-    return _unknown_key(key.split("."), WalkerFile, "a case")
+    return _unknown_key(key.split("."), file, "a case")
 
 
 def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:

@@ -21,6 +21,7 @@ from inputs.pile_file import PileFile, resolve_pile
 from inputs.resolving import UnusableKeyError, resolve
 from inputs.schema import Table, WalkerFile
 
+AnyCase = WalkerCase | PileCase
 _File = TypeVar("_File", bound=Table)
 _Case = TypeVar("_Case")
 _SHIPPED = Path(__file__).parent / "cases"
@@ -53,12 +54,10 @@ def load_case(case: str | Path) -> WalkerCase:
     return resolve_case(read_toml(path), source=str(case), name=path.stem)
 
 
-def load_any(case: str | Path) -> WalkerCase | PileCase:
+def load_any(case: str | Path) -> AnyCase:
     """Read and resolve a case of any kind; parameters and errors as for `load_case`."""
     path = find_input(case, shipped_cases(), "case")
-    document = read_toml(path)
-    resolver = resolve_pile_case if document.get("kind") == "pile" else resolve_case
-    return resolver(document, source=str(case), name=path.stem)
+    return resolve_any(read_toml(path), source=str(case), name=path.stem)
 
 
 def load_pile(case: str | Path) -> PileCase:
@@ -129,6 +128,12 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     return _resolved(WalkerFile, resolve, document, source, name)
 
 
+def resolve_any(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> AnyCase:
+    """`resolve_case` for a case of any kind."""
+    resolver = resolve_pile_case if document.get("kind") == "pile" else resolve_case
+    return resolver(document, source=source, name=name)
+
+
 def resolve_pile_case(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> PileCase:
     """`resolve_case` for a pile."""
     return _resolved(PileFile, resolve_pile, document, source, name)
@@ -140,7 +145,7 @@ def _resolved(
     try:
         file = model.model_validate(document)
     except ValidationError as error:
-        problems = [problem_of(details, document) for details in error.errors()]
+        problems = [problem_of(details, document, model) for details in error.errors()]
         raise InputError(source, problems) from error
     try:
         return resolver(file, name)

@@ -35,11 +35,11 @@ from inputs.axes import (
     written,
     zipped,
 )
-from inputs.case import WalkerCase
 from inputs.errors import InputError, Problem
 from inputs.messages import problem_of, quoted, suggested_key
-from inputs.reading import find_input, read_toml, resolve_case, shipped_cases
-from inputs.schema import ALTERNATIVES, Whole
+from inputs.pile_file import PileFile
+from inputs.reading import AnyCase, find_input, read_toml, resolve_any, shipped_cases
+from inputs.schema import ALTERNATIVES, Table, WalkerFile, Whole
 from inputs.units import Speed
 
 _SHIPPED = Path(__file__).parent / "sweeps"
@@ -133,7 +133,7 @@ class Sweep:
     rows: Sequence[tuple[Value, ...]]
     descent: Descent | None
 
-    def cases(self) -> Iterator[WalkerCase]:
+    def cases(self) -> Iterator[AnyCase]:
         """The case of each point, resolved.
 
         Raises
@@ -148,7 +148,7 @@ class Sweep:
                 document = changed(self.document, dict(zip(self.keys, row, strict=True)))
             except UnusableAxisError as unusable:
                 raise InputError(where, [Problem(unusable.key, None, unusable.expected)]) from unusable
-            yield resolve_case(document, source=where, name=self.case_name)
+            yield resolve_any(document, source=where, name=self.case_name)
 
 
 def shipped_sweeps() -> dict[str, Path]:
@@ -201,9 +201,10 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
     try:
         keys, rows, units, descent = _points(file)
         settings = flatten(file.set, lambda _: False)
+        given = read_toml(base)
         for key in (*settings, *keys):
-            _check_key(key)
-        tables = changed(read_toml(base), settings)
+            _check_key(key, PileFile if given.get("kind") == "pile" else WalkerFile)
+        tables = changed(given, settings)
         changed(tables, dict(zip(keys, rows[0], strict=True)))
     except UnusableAxisError as unusable:
         value = quoted({"value": unusable.value}, ["value"]) if unusable.value is not None else None
@@ -233,11 +234,11 @@ def _base(case: str, source: str, folder: Path) -> Path:
         raise InputError(source, [Problem("case", f'"{case}"', error.problems[0].expected)]) from error
 
 
-def _check_key(key: str) -> None:
+def _check_key(key: str, file: type[Table]) -> None:
     match = _INDEXED.fullmatch(key)
     if "" in key.split("."):
         raise UnusableAxisError(key, None, "is no key of a case")
-    unknown = suggested_key(match["key"] if match else key)
+    unknown = suggested_key(match["key"] if match else key, file)
     if unknown is not None:
         raise UnusableAxisError(key, None, unknown)
 

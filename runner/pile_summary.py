@@ -9,11 +9,22 @@ from inputs.pile import PileCase
 from inputs.pile_file import limits_of
 from inputs.timestep import AUTO_FRACTIONS
 from inputs.units import ACCELERATION_OF_ONE_G
+from runner.cost import START_UP_SECONDS
 from runner.summary import text_of_case
+from templates.pile import settling_steps
 
 _BEAD_STEPS_PER_SECOND = 2.6e6
 """On one core of a 2020s x86 server: 13,100 steps a second with 200 beads."""
 _GAIN_PER_RANK = 0.9
+
+
+def predicted_pile_seconds(case: PileCase) -> float:
+    """Wall time in s of a pile's run, settling included."""
+    run = case.run
+    steps = run.cycles * run.steps_per_cycle + 3 * settling_steps(case)
+    speed = _BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1))
+    parts = 3 + -(-run.cycles // run.cycles_per_part)
+    return START_UP_SECONDS * parts + steps * sum(case.beads.counts) / speed
 
 
 def summarise_pile(case: PileCase) -> dict[str, Any]:
@@ -22,7 +33,6 @@ def summarise_pile(case: PileCase) -> dict[str, Any]:
     limits = limits_of(case.beads, case.contact, case.liquid, case.drive).as_dict()
     volume = sum(4.0 / 3.0 * pi * radius**3 for radius in radii)
     steps = run.cycles * run.steps_per_cycle
-    speed = _BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1))
     return {
         "case": case.as_dict(),
         "beads": {
@@ -42,7 +52,7 @@ def summarise_pile(case: PileCase) -> dict[str, Any]:
             "simulated_seconds": steps * run.time_step,
             "frames": run.cycles * run.frames_per_cycle // run.cycles_per_frame,
             "parts": -(-run.cycles // run.cycles_per_part),
-            "predicted_seconds": steps * len(radii) / speed,
+            "predicted_seconds": predicted_pile_seconds(case),
         },
     }
 

@@ -14,16 +14,16 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from inputs.case import WalkerCase
 from inputs.errors import WalkersError
+from inputs.reading import AnyCase
 from runner.binary import Engine
 from runner.ensemble import remove_remains
 from runner.locks import is_locked
+from sweeps.kinds import sharing_of
 from sweeps.packing import LONGEST_SECONDS, PlannedDeck, halves, pack, unfinished_parts
 from sweeps.record import SweepRecord, chains, states, velocity_of
 from sweeps.site import Site, pilots, threads
 from sweeps.worker import STOPS, Report, SweepStopped, Task, work
-from templates.sharing import sharing_key
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -63,6 +63,10 @@ class Options:
     def decks_at_once(self) -> int:
         """How many decks run at once, here or on the site."""
         return self.site.workers if self.site else self.workers
+
+    def for_ranks(self, ranks: int) -> Options:
+        """The same for decks of so many MPI processes each: fewer of them at once here, so that each has its cores."""
+        return replace(self, workers=max(1, self.workers // ranks))
 
     @property
     def longest_seconds(self) -> float:
@@ -126,7 +130,7 @@ class _Job:
 
 def conduct(
     record: SweepRecord,
-    cases: Sequence[WalkerCase],
+    cases: Sequence[AnyCase],
     engine: Engine,
     options: Options,
     on_progress: Callable[[Progress], None] | None = None,
@@ -209,7 +213,7 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[_Workers]:
 
 
 def batches(
-    record: SweepRecord, cases: Sequence[WalkerCase], stopped: Callable[[int], bool]
+    record: SweepRecord, cases: Sequence[AnyCase], stopped: Callable[[int], bool]
 ) -> list[Generator[list[int], None, None]]:
     """The order in which points may be made.
 
@@ -230,7 +234,7 @@ def batches(
         return [(numbers for numbers in [list(range(len(cases)))])]
     together: dict[Any, list[list[int]]] = {}
     for chain in chains(record):
-        together.setdefault(sharing_key(cases[chain[0]]), []).append(chain)
+        together.setdefault(sharing_of(cases[chain[0]]), []).append(chain)
 
     def descend(descents: list[list[int]]) -> Generator[list[int], None, None]:
         for step in range(len(descents[0])):
@@ -248,14 +252,14 @@ class _Conductor:
     def __init__(
         self,
         record: SweepRecord,
-        cases: Sequence[WalkerCase],
+        cases: Sequence[AnyCase],
         engine: Engine,
         options: Options,
         workers: _Workers,
         on_progress: Callable[[Progress], None] | None,
     ) -> None:
         self.record, self.options, self.parsl, self.engine = record, options, workers, engine
-        self.cases: Mapping[int, WalkerCase] = dict(enumerate(cases))
+        self.cases: Mapping[int, AnyCase] = dict(enumerate(cases))
         self.on_progress = on_progress or (lambda _: None)
         known = zip(record.runs, states(record), strict=True)
         finished = [(run, state.directory) for run, state in known if state.status == "finished"]

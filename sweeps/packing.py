@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
 
-from inputs.case import WalkerCase
-from runner.cost import predicted_seconds
-from templates.sharing import sharing_key
+from inputs.reading import AnyCase
+from sweeps.kinds import replicates_of, seconds_of, sharing_of
 
 MOST_WALKERS = 96
 """In a deck; with 96 the share of the deck's own cost is down to 4 %."""
@@ -35,7 +34,7 @@ class PlannedDeck:
     seconds: float
 
 
-def pack(cases: Mapping[int, WalkerCase], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
+def pack(cases: Mapping[int, AnyCase], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
     """Pack points into decks.
 
     Parameters
@@ -54,7 +53,7 @@ def pack(cases: Mapping[int, WalkerCase], workers: int, longest_seconds: float =
     """
     groups: dict[Hashable, list[int]] = {}
     for number, case in cases.items():
-        groups.setdefault(sharing_key(case), []).append(number)
+        groups.setdefault(sharing_of(case), []).append(number)
     together = list(groups.values())
     singles = [_deck([number], cases).seconds for number in cases]
     if len(together) == len(cases):
@@ -72,14 +71,14 @@ def pack(cases: Mapping[int, WalkerCase], workers: int, longest_seconds: float =
     return sorted(plans[good], key=lambda deck: -deck.seconds)
 
 
-def _parted(group: Sequence[int], cases: Mapping[int, WalkerCase], longest: float) -> list[PlannedDeck]:
+def _parted(group: Sequence[int], cases: Mapping[int, AnyCase], longest: float) -> list[PlannedDeck]:
     """A group in the fewest decks that keep to the bounds; a point by itself may exceed them."""
-    most_replicates = max(cases[number].start.replicates for number in group)
+    most_replicates = max(replicates_of(cases[number]) for number in group)
 
     def allowed(parts: int) -> bool:
         points = ceil(len(group) / parts)
         walkers = points * most_replicates
-        seconds = predicted_seconds(cases[group[0]], walkers)  # a group shares the number of steps
+        seconds = seconds_of(cases[group[0]], walkers)  # a group shares the number of steps
         return points == 1 or (points <= MOST_POINTS and walkers <= MOST_WALKERS and seconds <= longest)
 
     fewest = bisect_left(range(1, len(group)), True, key=allowed) + 1
@@ -92,9 +91,9 @@ def _parts(group: Sequence[int], count: int) -> list[Sequence[int]]:
     return [group[start:end] for start, end in pairwise(edges)]
 
 
-def _deck(points: Sequence[int], cases: Mapping[int, WalkerCase]) -> PlannedDeck:
-    walkers = sum(cases[number].start.replicates for number in points)
-    return PlannedDeck(tuple(points), predicted_seconds(cases[points[0]], walkers))
+def _deck(points: Sequence[int], cases: Mapping[int, AnyCase]) -> PlannedDeck:
+    walkers = sum(replicates_of(cases[number]) for number in points)
+    return PlannedDeck(tuple(points), seconds_of(cases[points[0]], walkers))
 
 
 def makespan(seconds: Iterable[float], workers: int) -> float:
@@ -107,7 +106,7 @@ def makespan(seconds: Iterable[float], workers: int) -> float:
 
 
 def unfinished_parts(
-    points: Sequence[int], cases: Mapping[int, WalkerCase], is_finished: Callable[[int], bool]
+    points: Sequence[int], cases: Mapping[int, AnyCase], is_finished: Callable[[int], bool]
 ) -> list[PlannedDeck]:
     """What is left of a deck: itself, or those of its halves, halves of halves …, of which nothing is finished.
 

@@ -13,31 +13,18 @@ from pathlib import Path
 from typing import Any
 
 from inputs.axes import plain
-from inputs.case import WalkerCase
-from inputs.dimer import dimer_of
 from inputs.errors import InputError, Problem, WalkersError
+from inputs.reading import AnyCase
 from inputs.sweep import Descent, Sweep
 from runner.binary import Engine
-from runner.directory import FAILURE_NAME, run_place, unfinished
+from runner.directory import FAILURE_NAME, unfinished
 from runner.ensemble import FOLDER, finished_places
 from runner.files import read_json, write_json
 from runner.locks import is_locked
+from sweeps.kinds import DERIVED, current_result_of, derived_of, kind_of, place_of, velocity_in
 
 RECORD_NAME = "sweep.json"
 _FORMAT = 1
-
-DERIVED = {
-    "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄)"),
-    "sin_delta": ("", "asymmetry parameter (R1 - R2)/(R1 + R2)"),
-    "mass_asymmetry": ("", "μ = (m1 - m2)/M"),
-    "frequency": ("Hz", "of the drive"),
-    "peak_acceleration": ("m/s^2", "of the substrate"),
-    "peak_velocity": ("m/s", "of the substrate"),
-    "amplitude": ("m", "of the substrate's displacement"),
-    "radius_1": ("m", "of bead 1"),
-    "radius_2": ("m", "of bead 2"),
-}
-"""What follows from a point's case: unit and meaning."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +42,13 @@ class SweepRecord:
     values
         Of each point, one a key.
     derived
-        Of each point, one a column of `DERIVED`.
+        Of each point, one a column of `sweeps.kinds.DERIVED`.
     runs
         Name of each point's run.
     descent
         How the points depend on each other, if they do.
+    kind
+        Of the cases, ``walker`` (and climber) or ``pile``.
     """
 
     directory: Path
@@ -70,6 +59,7 @@ class SweepRecord:
     derived: Sequence[Sequence[float]]
     runs: Sequence[str]
     descent: Descent | None
+    kind: str = "walker"
 
     @property
     def out(self) -> Path:
@@ -77,29 +67,16 @@ class SweepRecord:
         return self.directory.parent
 
 
-def derived_of(case: WalkerCase) -> list[float]:
-    """The columns of `DERIVED`."""
-    dimer, drive = dimer_of(case), case.drive
-    return [
-        dimer.gamma0(drive.peak_acceleration),
-        dimer.sin_delta,
-        dimer.mass_asymmetry,
-        drive.frequency,
-        drive.peak_acceleration,
-        drive.peak_velocity,
-        drive.amplitude,
-        *case.beads.radii,
-    ]
-
-
-def describe_sweep(sweep: Sweep, cases: Sequence[WalkerCase], engine: Engine, out: Path) -> SweepRecord:
+def describe_sweep(sweep: Sweep, cases: Sequence[AnyCase], engine: Engine, out: Path) -> SweepRecord:
     """The record of a sweep whose points have been resolved.
 
     Raises
     ------
     InputError
-        If a sweep cannot have that name.
+        If a sweep cannot have that name, or piles are to descend.
     """
+    if sweep.descent is not None and any(kind_of(case) == "pile" for case in cases):
+        raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
     if sweep.name == FOLDER:
         raise InputError(sweep.source, [Problem("", None, f"a sweep cannot be called {FOLDER}: rename the file")])
     return SweepRecord(
@@ -109,8 +86,9 @@ def describe_sweep(sweep: Sweep, cases: Sequence[WalkerCase], engine: Engine, ou
         units=dict(zip(sweep.keys, sweep.units, strict=True)),
         values=[[_plain(value) for value in row] for row in sweep.rows],
         derived=[derived_of(case) for case in cases],
-        runs=[run_place(case, engine, out).name for case in cases],
+        runs=[place_of(case, engine, out).name for case in cases],
         descent=sweep.descent,
+        kind=kind_of(cases[0]) if cases else "walker",
     )
 
 
@@ -130,7 +108,8 @@ def write_record(record: SweepRecord) -> None:
             "title": record.title,
             "units": dict(record.units),
             "descent": vars(descent) if descent else None,
-            "derived": list(DERIVED),
+            "kind": record.kind,
+            "derived": list(DERIVED[record.kind]),
             "points": [
                 {"values": list(values), "derived": list(derived), "run": run}
                 for values, derived, run in zip(record.values, record.derived, record.runs, strict=True)
@@ -160,6 +139,7 @@ def read_record(directory: str | Path) -> SweepRecord:
             derived=[point["derived"] for point in points],
             runs=[point["run"] for point in points],
             descent=Descent(**contents["descent"]) if contents["descent"] else None,
+            kind=contents.get("kind", "walker"),  # of before there were piles
         )
     except FileNotFoundError as error:
         told = f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"
@@ -228,7 +208,7 @@ def chains(record: SweepRecord) -> list[list[int]]:
 def velocity_of(directory: Path) -> float:
     """Mean velocity of a finished run, m/s; NaN if its files are damaged."""
     try:
-        return float(result_in(directory)["velocity"]["mean"])
+        return velocity_in(result_in(directory))
     except DamagedRunError:
         return nan
 
@@ -245,9 +225,7 @@ def result_in(directory: Path) -> dict[str, Any]:
     DamagedRunError
         If it can neither be read nor be made anew from the dumps.
     """
-    from postprocess.result import current_result
-
     try:
-        return current_result(directory)
+        return current_result_of(directory)
     except (OSError, ValueError, KeyError, TypeError, IndexError, WalkersError) as error:
         raise DamagedRunError(f"{directory} is damaged ({error}): delete it to have it made again") from error

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from inputs.case import WalkerCase
+from inputs.reading import AnyCase
 from inputs.sweep import Sweep
 from runner.binary import Engine, find_engine
-from runner.cost import predicted_seconds
 from sweeps.conduct import Failure, Options, Progress, conduct
+from sweeps.kinds import ranks_of, seconds_of
 from sweeps.packing import PlannedDeck, makespan, pack, unfinished_parts
 from sweeps.record import SweepRecord, describe_sweep, states, write_record
 from sweeps.together import check_audit
@@ -39,7 +39,7 @@ class SweepPlan:
     """
 
     record: SweepRecord
-    cases: Sequence[WalkerCase]
+    cases: Sequence[AnyCase]
     engine: Engine
     decks: Sequence[PlannedDeck]
     statuses: Sequence[str]
@@ -59,7 +59,7 @@ class SweepPlan:
     def core_seconds_apart(self) -> float:
         """What the same points would cost with one deck a point, s."""
         missing = {point for deck in self.decks for point in deck.points}
-        return sum(predicted_seconds(self.cases[point]) for point in missing)
+        return sum(seconds_of(self.cases[point]) for point in missing)
 
     def as_text(self) -> str:
         """The plan in a few lines."""
@@ -102,6 +102,7 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     """
     binary = find_engine(engine)
     cases = list(sweep.cases())
+    options = options.for_ranks(max(map(ranks_of, cases)))
     record = describe_sweep(sweep, cases, binary, out)
     statuses = [state.status for state in states(record)]
     numbered = dict(enumerate(cases))
@@ -157,4 +158,5 @@ def run_sweep(
     write_record(plan.record)
     if not plan.decks:
         return plan.record, []
+    options = options.for_ranks(max(map(ranks_of, plan.cases)))
     return plan.record, conduct(plan.record, plan.cases, plan.engine, options, on_progress)

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from inputs.errors import InputError, Problem
-from postprocess.tables import WALKERS
 from runner.files import write_bytes
+from sweeps.kinds import DERIVED, RESULTS, columns_of
 from sweeps.record import (
-    DERIVED,
     DamagedRunError,
     PointState,
     SweepRecord,
@@ -24,23 +23,6 @@ from sweeps.record import (
 if TYPE_CHECKING:
     import pandas as pd
 
-RESULTS = {
-    "velocity": ("m/s", "mean over the walkers, along the heading, positive toward the large bead"),
-    "smallest": ("m/s", "velocity of the slowest walker"),
-    "largest": ("m/s", "velocity of the fastest walker; the paper's error bar is largest minus smallest"),
-    "standard_error": ("m/s", "of the velocity"),
-    "right_facing": ("m/s", "mean velocity of the walkers that started facing right"),
-    "left_facing": ("m/s", "mean velocity of the walkers that started facing left"),
-    # Means over the walkers of what the table of a run says of each.
-    **{name: WALKERS[name] for name in WALKERS if name.startswith(("rotation_", "sliding_", "open_"))},
-    "orientation_end": ("rad", "mean orientation at the end"),
-    "walkers": ("", "replicates"),
-    "steady": ("", "how many of them are steady"),
-    "turned_round": ("", "how many of them turned by more than 90 degrees"),
-    "walkers_met": ("", "whether two of them came near each other"),
-}
-"""Columns that a finished run gives: unit and meaning."""
-
 STATE = {
     "status": ("", "finished, failed, running or missing"),
     "lost": ("", "number of beads that left the simulation box, so that there is no result"),
@@ -48,6 +30,7 @@ STATE = {
     "run": ("", "run directory, from where the table was made; of a failed point what is left of it"),
 }
 
+_INPUTS = {name for columns in DERIVED.values() for name in columns}
 _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
     *("standard_error", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2", "open_3"),
@@ -70,7 +53,8 @@ def load(directory: str | Path) -> pd.DataFrame:
     -------
     DataFrame
         A row a point, in the order of the sweep; a descent's points below its end are left out. Columns are ``point``,
-        the keys that vary (in the unit of the sweep file), `sweeps.record.DERIVED`, `RESULTS` and `STATE` (SI units).
+        the keys that vary (in the unit of the sweep file), and (SI units) `sweeps.kinds.DERIVED`,
+        `sweeps.kinds.RESULTS` and `STATE`.
         ``attrs["units"]`` maps columns to units, ``attrs["meanings"]`` to what they are. Numbers of points that are
         not finished are NaN.
 
@@ -83,7 +67,7 @@ def load(directory: str | Path) -> pd.DataFrame:
 
     record = read_record(directory)
     rows = [_row(record, number, state) for number, state in enumerate(states(record)) if state.status != "not needed"]
-    described = {**_varied(record), **DERIVED, **RESULTS, **STATE}
+    described = {**_varied(record), **DERIVED[record.kind], **RESULTS[record.kind], **STATE}
     frame = pd.DataFrame(rows, columns=["point", *described])
     frame.attrs["units"] = {"point": "", **{name: unit for name, (unit, _) in described.items()}}
     frame.attrs["meanings"] = {"point": "number of the point", **{name: told for name, (_, told) in described.items()}}
@@ -105,8 +89,8 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
     row: dict[str, Any] = {"point": number}
     for key, value in zip(record.units, record.values[number], strict=True):
         row |= {f"{key}[{part}]": one for part, one in enumerate(value)} if isinstance(value, list) else {key: value}
-    row |= dict(zip(DERIVED, record.derived[number], strict=True))
-    row |= dict.fromkeys(RESULTS, nan) | {
+    row |= dict(zip(DERIVED[record.kind], record.derived[number], strict=True))
+    row |= dict.fromkeys(RESULTS[record.kind], nan) | {
         "status": state.status,
         "lost": state.lost,
         "reason": state.reason or "",
@@ -115,22 +99,9 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
     if state.status != "finished" or state.directory is None:
         return row
     try:
-        return row | _result(state.directory)
+        return row | columns_of(result_in(state.directory))
     except DamagedRunError:
         return row | {"status": "failed", "reason": DamagedRunError.__name__}
-
-
-def _result(directory: Path) -> dict[str, Any]:
-    result = result_in(directory)
-    velocity = result["velocity"]
-    return {
-        "velocity": velocity["mean"],
-        **{name: velocity[name] for name in ("smallest", "largest", "standard_error")},
-        **{name: result[name]["mean"] for name in ("right_facing", "left_facing", "orientation_end")},
-        **{f"rotation_{bead}": result["rotation"][f"bead_{bead}"] for bead in (1, 2)},
-        **{f"{what}_{at}": result[what][f"contact_{at}"] for what in ("sliding", "open") for at in (1, 2, 3)},
-        **{name: result[name] for name in ("walkers", "steady", "turned_round", "walkers_met")},
-    }
 
 
 def encoded(frame: pd.DataFrame, form: str) -> bytes:
@@ -164,7 +135,7 @@ def short_text(frame: pd.DataFrame) -> str:
     shown = frame.drop(columns=[name for name in frame.columns if name in _LEFT_OUT])
     units = dict(frame.attrs.get("units", {}))
     for name, unit in units.items():
-        if name in shown and unit == "m/s" and name in RESULTS:
+        if name in shown and unit == "m/s" and name not in _INPUTS:
             shown[name], units[name] = shown[name].astype(float) * 1e3, "mm/s"
     shown.columns = pd.Index([f"{name} ({units[name]})" if units.get(name) else name for name in shown.columns])
     return str(shown.to_string(index=False, float_format=lambda value: f"{value:.4g}", na_rep="-"))

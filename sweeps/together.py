@@ -8,13 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from inputs.case import WalkerCase
+from inputs.pile import PileCase
+from inputs.reading import AnyCase
 from runner.audits import read_audit
 from runner.binary import Engine
 from runner.directory import FinishedRun, finished_run, make_run, run_place
 from runner.ensemble import finished_place, make_ensemble
-from runner.failures import AuditFailed, UnauditedEngineWarning
+from runner.failures import AuditFailed, RunBusy, UnauditedEngineWarning
 from runner.launch import Progress, launch
 from runner.locks import locked
+from runner.parts import pile_place, run_pile
 from templates.deck import render_deck, render_shared_deck
 
 
@@ -35,6 +38,9 @@ class Made:
     runs: Mapping[str, FinishedRun]
     found: frozenset[str]
     busy: frozenset[str]
+
+
+_NONE = Made({}, frozenset(), frozenset())
 
 
 def make_together(
@@ -79,6 +85,40 @@ def make_together(
             locks = [ours[place] for place in missing]
             runs |= _make(missing, out, engine, locks, on_progress, time_limit)
     return Made(runs, found, busy)
+
+
+def make_any(
+    cases: Sequence[AnyCase],
+    out: Path,
+    engine: Engine,
+    on_progress: Callable[[object], None],
+    time_limit: float | None,
+) -> Made:
+    """`make_together` for cases of any kind: piles are made one by one, and go on where they were interrupted."""
+    walkers = [case for case in cases if isinstance(case, WalkerCase)]
+    made = make_together(walkers, out, engine, on_progress=on_progress, time_limit=time_limit) if walkers else _NONE
+    for case in cases:
+        if isinstance(case, PileCase):
+            made = _with(made, _make_pile(case, out, engine, on_progress, time_limit))
+    return made
+
+
+def _make_pile(
+    case: PileCase, out: Path, engine: Engine, on_progress: Callable[[object], None], time_limit: float | None
+) -> Made:
+    from postprocess.pile_result import current_pile_result
+
+    name = pile_place(case, engine, out).name
+    try:
+        run, found = run_pile(case, engine, out, on_progress=on_progress, time_limit=time_limit)
+    except RunBusy:
+        return Made({}, frozenset(), frozenset({name}))
+    current_pile_result(run.directory)
+    return Made({name: run}, frozenset({name} if found else ()), frozenset())
+
+
+def _with(one: Made, other: Made) -> Made:
+    return Made({**one.runs, **other.runs}, one.found | other.found, one.busy | other.busy)
 
 
 def _finished(out: Path, name: str) -> FinishedRun | None:

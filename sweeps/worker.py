@@ -7,13 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from inputs.case import WalkerCase
 from inputs.errors import Stopped, WalkersError
+from inputs.reading import AnyCase
 from runner.binary import find_engine
-from runner.directory import run_place
 from runner.failures import EngineDiffers, EngineFailure, ProgramDiffers
-from runner.launch import Progress
-from sweeps.together import make_together
+from sweeps.kinds import current_result_of, place_of, velocity_in
+from sweeps.together import make_any
 
 STOPS: dict[str, threading.Event] = {}
 """Of the sweeps that this process conducts, by `Task.sweep`: set to end their engines and to let none begin."""
@@ -45,7 +44,7 @@ class Task:
 
     sweep: str
     runs: tuple[str, ...]
-    cases: tuple[WalkerCase, ...]
+    cases: tuple[AnyCase, ...]
     out: Path
     engine: str
     sha256: str
@@ -79,7 +78,7 @@ def work(task: Task) -> Report:
     """Make the runs of a task's cases. Never raises what is known to happen: see `Report`."""
     stop = STOPS.get(task.sweep, threading.Event())
 
-    def look(_: Progress) -> None:
+    def look(_: object) -> None:
         if stop.is_set():
             raise SweepStopped("stopped")
 
@@ -94,17 +93,14 @@ def work(task: Task) -> Report:
         return Report(failure=type(error).__name__, message=str(error))
 
 
-def _made(task: Task, look: Callable[[Progress], None]) -> Report:
-    from postprocess.result import current_result
-
+def _made(task: Task, look: Callable[[object], None]) -> Report:
     engine = find_engine(task.engine)
     if engine.sha256 != task.sha256:
         raise EngineDiffers(engine.path)
-    if task.runs != tuple(run_place(case, engine, task.out).name for case in task.cases):
+    if task.runs != tuple(place_of(case, engine, task.out).name for case in task.cases):
         raise ProgramDiffers
-    made = make_together(task.cases, task.out, engine, on_progress=look, time_limit=task.time_limit)
+    made = make_any(task.cases, task.out, engine, look, task.time_limit)
     finished = {
-        name: (str(run.directory), float(current_result(run.directory)["velocity"]["mean"]))
-        for name, run in made.runs.items()
+        name: (str(run.directory), velocity_in(current_result_of(run.directory))) for name, run in made.runs.items()
     }
     return Report(finished=finished, busy=tuple(sorted(made.busy)))

@@ -14,13 +14,19 @@ import numpy as np
 import pytest
 
 from inputs import InputError, PileCase, load_pile, resolve_pile_case, shipped_cases
+from inputs.sweep import expand
 from postprocess.pile import FLOOR, read_bridges, read_pile
 from postprocess.pile_result import current_pile_result, tabulate_pile
 from postprocess.tables import PILE_TABLES, TABLES, read_table
 from runner.binary import find_engine
 from runner.failures import EngineError, RunBusy
 from runner.parts import part_directories, pile_place, run_pile
-from tests.conftest import PROGRAM, engines_in, wait_for
+from sweeps.climbing import describe_climbs, piles_in, summarise_climbs
+from sweeps.conduct import Options
+from sweeps.record import states
+from sweeps.run import plan_sweep, run_sweep
+from sweeps.table import load
+from tests.conftest import PROGRAM, engines_in, to_toml, wait_for
 
 
 def document(**changes: dict[str, Any]) -> dict[str, Any]:
@@ -238,3 +244,46 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     assert "Not yet" in told("deck", "pile-ci")
     refused = subprocess.run([PROGRAM, "theory", "pile-ci"], capture_output=True, text=True, check=False)
     assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
+
+
+def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
+    """Two starts and an interruption; the table has a pile's columns."""
+    tables = document(run={"duration": "0.06 s"})
+    (tmp_path / "base.toml").write_text(to_toml(tables))
+    sweep = expand({"case": "base.toml", "axes": {"start.seed": [1, 2]}}, source="test", name="test", folder=tmp_path)
+    out = tmp_path / "runs"
+    record, failures = run_sweep(sweep, out, Options(2))
+    assert not failures
+    assert [state.status for state in states(record)] == ["finished", "finished"]
+    frame = load(record.directory)
+    assert (frame["beads"] == 60).all()
+    assert (frame["climbs"] == 0).all()
+    assert frame["surface_end"].between(1e-3, 9e-3).all()
+    assert frame["run"].nunique() == 2
+    again, _ = run_sweep(sweep, out, Options(2))
+    assert [state.status for state in states(again)] == ["finished", "finished"]
+    found = summarise_climbs(piles_in(record.directory))
+    assert (found["runs"], found["climbed"], found["climbs"]) == (2, 0, 0)
+    low, high = found["interval"]
+    assert low == 0.0
+    assert high == pytest.approx(1.0 - 0.025**0.5)  # none of two, Clopper and Pearson
+    assert "0 of 2 runs climbed" in describe_climbs(found)
+    with pytest.raises(InputError, match="descend"):
+        sweep = expand(
+            {
+                "case": "base.toml",
+                "descend": {
+                    "key": "drive.peak_acceleration",
+                    "from": "3 g",
+                    "to": "1 g",
+                    "step": "1 g",
+                    "until_below": "1 mm/s",
+                },
+            },
+            source="test",
+            name="down",
+            folder=tmp_path,
+        )
+        plan_sweep(sweep, out, Options(1))
+    with pytest.raises(InputError, match=r"container\.depth"):
+        expand({"case": "base.toml", "axes": {"container.depth": [1]}}, source="test", name="no", folder=tmp_path)

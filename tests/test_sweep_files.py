@@ -121,7 +121,17 @@ def test_a_descent_is_the_last_axis_downward(make: Make) -> None:
 
 
 def test_shipped_sweeps_are_the_papers() -> None:
-    expected = {"alignment", "fig2", "fig2-threshold", "fig3", "fig4", "modes", "sensitivity"}
+    expected = {
+        "alignment",
+        "fig2",
+        "fig2-threshold",
+        "fig3",
+        "fig4",
+        "modes",
+        "pile-climb",
+        "pile-seeds",
+        "sensitivity",
+    }
     assert set(shipped_sweeps()) == expected
     fig2 = _cases(load_sweep("fig2"))
     assert len(fig2) == 80

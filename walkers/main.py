@@ -10,7 +10,22 @@ from typing import Any, NoReturn, TextIO
 
 import typer
 
-from walkers.commands import audit, deck, figures, plot, render, result, run, show, status, sweep, table, theory, vtk
+from walkers.commands import (
+    audit,
+    climb,
+    deck,
+    figures,
+    plot,
+    render,
+    result,
+    run,
+    show,
+    status,
+    sweep,
+    table,
+    theory,
+    vtk,
+)
 
 app = typer.Typer(
     name="walkers",
@@ -19,7 +34,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (show, deck, run, result, plot, vtk, render, theory, sweep, status, table, figures, audit):
+for command in (show, deck, run, result, plot, vtk, render, theory, sweep, status, table, climb, figures, audit):
     app.command(name=command.__name__.rsplit(".", 1)[-1])(command.command)
 
 

@@ -1,0 +1,99 @@
+"""How often, how soon, how fast and led by whom: climbs over the runs of piles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inputs.errors import InputError, Problem
+from runner.directory import finished_run
+from runner.parts import PARTS
+from sweeps.kinds import current_result_of
+from sweeps.record import RECORD_NAME, read_record, states
+
+_CONFIDENCE = 0.95
+
+
+def piles_in(directory: Path) -> list[Path]:
+    """The finished runs of piles of a sweep, or in a folder, or the run itself.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if (directory / RECORD_NAME).exists():
+        found = [state.directory for state in states(read_record(directory)) if state.directory is not None]
+    elif (directory / PARTS).is_dir():
+        found = [directory]
+    else:
+        found = sorted(path.parent for path in directory.glob(f"*/{PARTS}"))
+    finished = [path for path in found if finished_run(path) is not None and (path / PARTS).is_dir()]
+    if not finished:
+        raise InputError(str(directory), [Problem("", None, "expected a finished run of a pile, or a folder or sweep")])
+    return finished
+
+
+def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
+    """Climbs over several runs.
+
+    Parameters
+    ----------
+    runs
+        Run directories of piles.
+    within
+        Seconds of drive; climbs that begin later do not count, and runs that are shorter are left out.
+
+    Returns
+    -------
+    dict
+        ``runs``, ``climbed`` (runs with a climb), ``probability`` with its binomial ``interval`` (95 %, Clopper and
+        Pearson 1934), ``climbs``, ``onsets`` (s, of the first climb of each run), ``speeds`` (m/s), ``sizes``,
+        ``led_by_large``.
+    """
+    from scipy.stats import binomtest
+
+    results = [current_result_of(run) for run in runs]
+    seconds = within if within is not None else min(result["driven"] for result in results)
+    results = [result for result in results if result["driven"] >= seconds * (1.0 - 1e-6)]
+    counted = [[climb for climb in result["climbs"] if climb["begin"] <= seconds] for result in results]
+    climbed = sum(bool(climbs) for climbs in counted)
+    every = [climb for climbs in counted for climb in climbs]
+    chance = binomtest(climbed, len(results)) if results else None
+    interval = chance.proportion_ci(_CONFIDENCE) if chance else None
+    return {
+        "within": seconds,
+        "runs": len(results),
+        "climbed": climbed,
+        "probability": climbed / len(results) if results else None,
+        "interval": [float(interval.low), float(interval.high)] if interval else None,
+        "climbs": len(every),
+        "onsets": [min(climb["begin"] for climb in climbs) for climbs in counted if climbs],
+        "speeds": [climb["speed"] for climb in every],
+        "sizes": [climb["size"] for climb in every],
+        "led_by_large": sum(climb["leader_large"] for climb in every),
+    }
+
+
+def describe_climbs(found: dict[str, Any]) -> str:
+    """`summarise_climbs` as text; mm/s."""
+    if not found["runs"]:
+        return f"no run is as long as {found['within']:g} s"
+    low, high = found["interval"]
+    lines = [
+        f"{found['climbed']} of {found['runs']} runs climbed within {found['within']:.3g} s: probability "
+        f"{found['probability']:.2f} ({low:.2f} to {high:.2f} with {_CONFIDENCE:.0%} confidence)"
+    ]
+    if found["climbs"]:
+        speeds, onsets = np.array(found["speeds"]) * 1e3, np.array(found["onsets"])
+        sizes = ", ".join(f"{size}: {found['sizes'].count(size)}" for size in sorted(set(found["sizes"])))
+        lines += [
+            f"  climbs     {found['climbs']}, {found['led_by_large']} led by a large bead",
+            f"  onset      {onsets.min():.2f} to {onsets.max():.2f} s, median {np.median(onsets):.2f} s",
+            f"  speed      {speeds.min():.2f} to {speeds.max():.2f} mm/s, median {np.median(speeds):.2f} mm/s",
+            f"  clusters   beads: how many   {sizes}",
+        ]
+    return "\n".join(lines)

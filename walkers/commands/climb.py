@@ -1,0 +1,22 @@
+"""``walkers climb``: climbs over several piles."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from walkers.commands.arguments import Json
+
+Directory = Annotated[Path, typer.Argument(metavar="DIR", help="A sweep of piles, a folder of runs, or one run.")]
+Within = Annotated[float | None, typer.Option("--within", min=0.0, help="Seconds of drive; all of the shortest run.")]
+
+
+def command(directory: Directory, within: Within = None, as_json: Json = False) -> None:
+    """Print how often piles climbed, how soon, how fast, and led by whom."""
+    from sweeps.climbing import describe_climbs, piles_in, summarise_climbs
+
+    found = summarise_climbs(piles_in(directory), within)
+    print(json.dumps(found, indent=2) if as_json else describe_climbs(found))
