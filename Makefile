@@ -31,6 +31,8 @@ pile: setup ## Shake the small pile (or CASE=pile-fig1a): what climbed, pictures
 	@echo "pictures:"
 	@$(WALKERS) plot $(if $(filter pile%,$(CASE)),$(CASE),pile-small) --out $(OUT) | sed 's/^/  /'
 	@$(WALKERS) render $(if $(filter pile%,$(CASE)),$(CASE),pile-small) --out $(OUT) | sed 's/^/  /'
+	@echo "for ParaView:"
+	@$(WALKERS) vtk $(if $(filter pile%,$(CASE)),$(CASE),pile-small) --every 2 --out $(OUT) | sed 's/^/  /'
 
 .PHONY: figures
 figures: setup ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)

@@ -143,6 +143,8 @@ def _check_room(beads: PileBeads, container: Container) -> None:
     volume = sum(4.0 / 3.0 * pi * radius**3 for radius in beads.radii)
     if container.width < 4.0 * max(beads.large):
         raise UnusableKeyError("container.width", "expected at least two of the large beads side by side")
+    if container.shape == "cylinder" and container.width < 8.0 * max(beads.large):
+        raise UnusableKeyError("container.width", "expected at least four of the large beads across a cylinder")
     level = volume / (0.3 * container.cross_section)  # as loosely as they are placed at the start
     if level > container.height:
         needed = f"{level * 1e3:.3g} mm"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -64,20 +64,57 @@ def write_vtk(
     if not as_placed:
         trajectory = gathered(trajectory)
     bridges = read_table(directory, "bridges")
-    place = (destination or directory / FOLDER_NAME).resolve()
+    stride = 1 if every_sample else trajectory.case.run.samples_per_cycle
+    frames = (_frame(trajectory, bridges, frame) for frame in range(0, len(trajectory.time), stride))
+    return write_series(destination or directory / FOLDER_NAME, COLLECTION_NAME, frames, vtu=vtu)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a frame shows: its time in s, its number, and from the numbers of the parts to their names and meshes."""
+
+    time: float
+    number: int
+    meshes: Mapping[int, tuple[str, pv.PolyData]]
+
+
+def write_series(destination: Path, name: str, frames: Iterable[Frame], *, vtu: bool = False) -> Path:
+    """Write frames as ``.vtp`` with a ``.pvd`` in seconds, beside the folder and rename it.
+
+    Parameters
+    ----------
+    destination
+        Folder to write, replaced if it holds nothing but files of this function.
+    name
+        Of the ``.pvd``.
+    frames
+        In the order of time.
+    vtu
+        Also write part 0 as ``.vtu`` (through meshio).
+
+    Raises
+    ------
+    InputError
+        If the folder holds anything else than such files.
+    """
+    place = destination.resolve()
     _check_replaceable(place)
     place.parent.mkdir(parents=True, exist_ok=True)
     beside = Path(tempfile.mkdtemp(prefix=f".{place.name}-", dir=place.parent))
     beside.chmod(0o755)
-    stride = 1 if every_sample else trajectory.case.run.samples_per_cycle
     entries: list[_Entry] = []
-    for frame in range(0, len(trajectory.time), stride):
-        entries += _write_frame(beside, trajectory, bridges, frame, vtu)
-    _write_collection(beside / COLLECTION_NAME, entries)
+    for frame in frames:
+        for part, (kind, mesh) in frame.meshes.items():
+            file = f"{kind}_{frame.number:06d}.vtp"
+            mesh.save(beside / file, binary=True)
+            entries.append(_Entry(frame.time, part, file))
+            if vtu and part == 0:
+                _write_vtu((beside / file).with_suffix(".vtu"), mesh)
+    _write_collection(beside / name, entries)
     if place.exists():
         shutil.rmtree(place)
     beside.rename(place)
-    return (destination or directory / FOLDER_NAME) / COLLECTION_NAME
+    return destination / name
 
 
 def _check_replaceable(place: Path) -> None:
@@ -109,24 +146,15 @@ class _Entry:
     file: str
 
 
-def _write_frame(folder: Path, trajectory: Trajectory, bridges: pd.DataFrame, frame: int, vtu: bool) -> list[_Entry]:
-    time = float(trajectory.time[frame])
-    beads = beads_at(trajectory, frame)
+def _frame(trajectory: Trajectory, bridges: pd.DataFrame, frame: int) -> Frame:
     meshes: dict[int, tuple[str, pv.PolyData]] = {
-        0: ("beads", beads),
+        0: ("beads", beads_at(trajectory, frame)),
         1: ("substrate", substrate_at(trajectory, frame)),
     }
     joined = bridges_at(trajectory, bridges, frame)
     if joined is not None:
         meshes[2] = ("bridges", joined)
-    entries = []
-    for part, (name, mesh) in meshes.items():
-        file = f"{name}_{frame:06d}.vtp"
-        mesh.save(folder / file, binary=True)
-        entries.append(_Entry(time, part, file))
-    if vtu:
-        _write_vtu(folder / f"beads_{frame:06d}.vtu", beads)
-    return entries
+    return Frame(float(trajectory.time[frame]), frame, meshes)
 
 
 def _in_frame_of_run(trajectory: Trajectory, frame: int) -> FloatArray:
@@ -177,8 +205,6 @@ def bridges_at(trajectory: Trajectory, bridges: pd.DataFrame, frame: int) -> pv.
     A line joins two centres, or a centre and the point of the substrate below it. None if the engine reported no
     bridges in that frame.
     """
-    import pyvista as pv
-
     half_step = 0.5 * trajectory.layout.time_step
     rows = bridges[np.abs(bridges["time"] - trajectory.time[frame]) < half_step]
     if rows.empty:
@@ -193,12 +219,19 @@ def bridges_at(trajectory: Trajectory, bridges: pd.DataFrame, frame: int) -> pv.
         (centres[first], centres[second] if second else centres[first] * floor)
         for first, second in zip(rows["bead_1"], rows["bead_2"], strict=True)
     ]
-    numbers = np.arange(2 * len(ends)).reshape(-1, 2)
-    lines = np.hstack([np.full((len(ends), 1), 2), numbers]).ravel()
-    mesh = pv.PolyData(np.array(ends).reshape(-1, 3), lines=lines)
+    mesh = lines_between(np.array(ends))
     for name in ("gap", "normal_force", "touching", "contact", "walker"):
         mesh.cell_data[name] = rows[name].to_numpy().astype(np.float64)
     return mesh
+
+
+def lines_between(ends: FloatArray) -> pv.PolyData:
+    """Lines between pairs of points, shape (K, 2, 3)."""
+    import pyvista as pv
+
+    numbers = np.arange(2 * len(ends)).reshape(-1, 2)
+    lines = np.hstack([np.full((len(ends), 1), 2), numbers]).ravel()
+    return pv.PolyData(np.ascontiguousarray(ends.reshape(-1, 3)), lines=lines)
 
 
 def _write_vtu(path: Path, beads: pv.PolyData) -> None:

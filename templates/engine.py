@@ -12,7 +12,7 @@ from itertools import combinations_with_replacement
 from math import degrees, sqrt
 
 from inputs import forces
-from templates.scene import AXES, Face
+from templates.scene import AXES, Face, turned
 
 
 @dataclass(frozen=True)
@@ -240,9 +240,10 @@ def face_triangle(face: Face, size: float) -> str:
     first, second = ((index + 1) % 3, (index + 2) % 3)[:: face.side]
     corners = []
     for along, up in ((-1.0, -0.6), (1.0, -0.6), (0.0, 1.2)):
-        corner = list(face.centroid)
-        corner[first] += along * size
-        corner[second] += up * size
+        offset = [0.0, 0.0, 0.0]
+        offset[first], offset[second] = along * size, up * size
+        away = turned((offset[0], offset[1], offset[2]), face.turn)
+        corner = [middle + shift for middle, shift in zip(face.centroid, away, strict=True)]
         corners.append("      vertex " + " ".join(repr(float(value)) for value in corner) + "\n")
     normal = " ".join(repr(value) for value in face.normal)
     return f"  facet normal {normal}\n    outer loop\n{''.join(corners)}    endloop\n  endfacet\n"

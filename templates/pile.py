@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import inf
+from math import cos, hypot, inf, pi, sin
 
 from inputs.pile import PileCase
 from templates.deck import Checkpoint, Deck, Plan, Recording, compose
@@ -20,6 +20,8 @@ _SKIN = 2e-4
 _LOOSE = 1.03
 """Pitch of the places at the start, in diameters of the largest bead."""
 _STATUS_LINES_PER_CYCLE = 2
+SIDES = 24
+"""Of the prism that stands for a cylinder: its edges are 0.9 % of the radius farther out than its faces."""
 SETTLING_SECONDS = 0.05
 """Length of the parts in which a pile settles; at the end of each it is looked whether it has."""
 
@@ -37,11 +39,18 @@ class Part:
 
 
 def faces_of(case: PileCase) -> tuple[Face, ...]:
-    """The floor first, then the side walls; centroids off the middle, where ranks may meet."""
+    """The floor first, then the side walls; centroids off the middle, where ranks may meet.
+
+    A cylinder is a prism around it: its faces touch it, and beads never meet an edge from outside.
+    """
     half, aside = case.container.width / 2.0, 0.0137 * case.container.width
     level = case.container.height / 4.0
+    floor = Face("z", 1, (aside, 0.0, 0.0))
+    if case.container.shape == "cylinder":
+        turns = [2.0 * pi * (number + 0.5) / SIDES for number in range(SIDES)]
+        return (floor, *(Face("x", -1, (half * cos(turn), half * sin(turn), level), turn) for turn in turns))
     return (
-        Face("z", 1, (aside, 0.0, 0.0)),
+        floor,
         Face("x", 1, (-half, 0.0, level)),
         Face("x", -1, (half, 0.0, level)),
         Face("y", 1, (aside, -half, level)),
@@ -119,14 +128,23 @@ def _places(case: PileCase, largest: float) -> list[tuple[Point, float]]:
 
     draw = default_rng(case.seed)
     radii = [float(radius) for radius in draw.permutation(case.beads.radii)]
-    across = int(case.container.width / (2.0 * _LOOSE * largest))
-    pitch = case.container.width / across
+    width, reach = case.container.width, case.container.width / 2.0
+    across = int(width / (2.0 * _LOOSE * largest))
+    pitch = width / across
+    grid = [
+        ((row + 0.5) * pitch - reach, (column + 0.5) * pitch - reach)
+        for row in range(across)
+        for column in range(across)
+    ]
+    if case.container.shape == "cylinder":
+        grid = [(x, y) for x, y in grid if hypot(x, y) <= reach - _LOOSE * largest]
     places: list[tuple[Point, float]] = []
     for number, radius in enumerate(radii):
-        layer, place = divmod(number, across * across)
-        row, column = divmod(place, across)
-        shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * (pitch / 2.0 - radius)
-        x, y = ((index + 0.5) * pitch - case.container.width / 2.0 for index in (row, column))
+        layer, place = divmod(number, len(grid))
+        x, y = grid[place]
+        # Within its cell; in a cylinder less, for its wall cuts cells.
+        free = pitch / 2.0 - radius if case.container.shape == "box" else _LOOSE * largest - radius
+        shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * free / (1.0 if case.container.shape == "box" else 2.0)
         height = (layer + 0.5) * 2.0 * _LOOSE * largest
         places.append(((x + float(shift[0]), y + float(shift[1]), height), radius))
     return places

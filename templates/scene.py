@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import cos, sin
 from typing import Literal
 
 Point = tuple[float, float, float]
@@ -24,16 +25,20 @@ class Bead:
 
 @dataclass(frozen=True)
 class Face:
-    """A flat wall: the axis that it is normal to, the side to which its normal points, its centroid (m)."""
+    """A flat wall: the axis that it is normal to, the side to which its normal points, its centroid (m).
+
+    ``turn`` (rad) turns an upright one about the vertical.
+    """
 
     axis: Axis
     side: Literal[1, -1]
     centroid: Point
+    turn: float = 0.0
 
     @property
     def normal(self) -> Point:
         """Unit vector into the space where the beads are."""
-        return vector_along(self.axis, float(self.side))
+        return turned(vector_along(self.axis, float(self.side)), self.turn)
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,14 @@ class Scene:
     riders: tuple[Point, ...]
     lower: Point
     upper: Point
+
+
+def turned(vector: Point, angle: float) -> Point:
+    """A vector turned about the vertical, rad."""
+    if angle == 0.0:
+        return vector
+    x, y, z = vector
+    return (x * cos(angle) - y * sin(angle), x * sin(angle) + y * cos(angle), z)
 
 
 def without_riders(scene: Scene) -> Scene:

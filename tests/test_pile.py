@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pyvista as pv
 
 from inputs import InputError, PileCase, load_pile, resolve_pile_case, shipped_cases
 from inputs.sweep import expand
@@ -239,6 +240,20 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     assert "climbs  " in told("result", str(run))
     assert told("plot", str(run), "--to", "here").strip() == "here/climb.png"
     assert told("render", str(run), "--to", "here/box.png", "--images", "2").strip() == "here/box.png"
+    collection = told("vtk", str(run), "--every", "4", "--to", "here/vtk").strip()
+    assert collection == "here/vtk/pile.pvd"
+    reader = pv.get_reader(in_folder / collection)
+    motion = read_pile(run)
+    driven = np.flatnonzero(motion.time >= 0.0)[::4]
+    np.testing.assert_allclose(reader.time_values, motion.time[driven], atol=1e-12)
+    beads = pv.read(in_folder / "here" / "vtk" / f"beads_{driven[1]:06d}.vtp")
+    np.testing.assert_allclose(beads.points, motion.position[driven[1]], rtol=1e-6, atol=1e-9)
+    np.testing.assert_array_equal(beads["radius"], motion.radius)
+    assert set(np.unique(beads["is_climber"])) <= {0, 1}
+    assert pv.read(in_folder / "here" / "vtk" / f"bridges_{driven[1]:06d}.vtp").n_lines > 50
+    container = pv.read(in_folder / "here" / "vtk" / f"container_{driven[1]:06d}.vtp")
+    assert container.n_cells == 5
+    assert container.bounds[4] == 0.0
     assert "60 beads" in told("run", "pile-ci", "--out", str(run.parent))
     assert f"{small().beads.counts[0]} small and {small().beads.counts[1]} large beads" in told("show", "pile-ci")
     assert "Not yet" in told("deck", "pile-ci")
@@ -287,3 +302,15 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
         plan_sweep(sweep, out, Options(1))
     with pytest.raises(InputError, match=r"container\.depth"):
         expand({"case": "base.toml", "axes": {"container.depth": [1]}}, source="test", name="no", folder=tmp_path)
+
+
+def test_a_cylinder_holds_its_beads(tmp_path: Path) -> None:
+    case = small(container={"shape": "cylinder", "width": "5 mm"}, run={"duration": "0.05 s"})
+    finished, _ = run_pile(case, find_engine(None), tmp_path)
+    motion = read_pile(finished.directory)
+    out = np.linalg.norm(motion.position[..., :2], axis=2) + motion.radius
+    # The faces of the prism touch the cylinder; its edges are 0.9 % farther out.
+    assert 0.95 * 2.5e-3 < out[motion.time >= 0.0].max() < 1.009 * 2.5e-3 + 1e-5
+    bridges = list(read_bridges(motion))[-1]
+    sides = bridges.walls[bridges.walls != FLOOR]
+    assert len(np.unique(sides)) > 5

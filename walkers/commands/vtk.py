@@ -15,6 +15,7 @@ Folder = Annotated[
 ]
 EverySample = Annotated[bool, typer.Option("--every-sample", help="All samples instead of one frame a cycle.")]
 AsPlaced = Annotated[bool, typer.Option("--as-placed", help="Walkers where the deck has them, not side by side.")]
+Every = Annotated[int, typer.Option("--every", min=1, help="Of a pile: one of so many frames.")]
 Vtu = Annotated[bool, typer.Option("--vtu", help="Also write the beads as .vtu.")]
 
 
@@ -25,10 +26,15 @@ def command(
     every_sample: EverySample = False,
     as_placed: AsPlaced = False,
     vtu: Vtu = False,
+    every: Every = 1,
 ) -> None:
     """Write beads, bridges and substrate as .vtp with a .pvd in seconds."""
     from postprocess.paraview import write_vtk
-    from walkers.pipeline import find_run
+    from postprocess.pile_paraview import write_pile_vtk
+    from walkers.pipeline import find_run, is_pile
 
     directory = find_run(run, out).directory
+    if is_pile(directory):
+        print(write_pile_vtk(directory, every=every, vtu=vtu, destination=to))
+        return
     print(write_vtk(directory, every_sample=every_sample, vtu=vtu, as_placed=as_placed, destination=to))
