@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, is_dataclass, replace
-from math import pi
+from math import hypot, pi
 from typing import Any, Literal
 
 from inputs.case import Contact, Drive, Liquid
@@ -73,6 +73,23 @@ class PileBeads:
     def border(self) -> float:
         """A radius between the two classes, m."""
         return (max(self.small) + min(self.large)) / 2.0
+
+
+LOOSE = 1.03
+"""Pitch of the places at the start, in diameters of the largest bead."""
+
+
+def lattice(beads: PileBeads, container: Container) -> tuple[list[tuple[float, float]], float]:
+    """Where beads begin: the places of a layer (m, from the axis), and the height of all layers (m)."""
+    largest, reach = max(beads.large + beads.small), container.width / 2.0
+    across = int(container.width / (2.0 * LOOSE * largest))
+    pitch = container.width / max(across, 1)
+    line = [(index + 0.5) * pitch - reach for index in range(across)]
+    grid = [(x, y) for x in line for y in line]
+    if container.shape == "cylinder":
+        grid = [(x, y) for x, y in grid if hypot(x, y) <= reach - LOOSE * largest]
+    layers = -(-sum(beads.counts) // max(len(grid), 1))
+    return grid, layers * 2.0 * LOOSE * largest
 
 
 @dataclass(frozen=True)

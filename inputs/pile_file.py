@@ -9,8 +9,8 @@ from pydantic import Field
 
 from inputs.case import Contact, Drive, Liquid
 from inputs.dimer import Dimer
-from inputs.pile import Container, PileBeads, PileCase, PileRun
-from inputs.resolving import UnusableKeyError, density_of, resolve_contact, resolve_liquid
+from inputs.pile import Container, PileBeads, PileCase, PileRun, lattice
+from inputs.resolving import MOST_STEPS, UnusableKeyError, density_of, resolve_contact, resolve_liquid
 from inputs.schema import AUTO, ContactTable, EnvironmentTable, LiquidTable, Number, Table, Whole
 from inputs.timestep import TimeStepLimits, fit_into_cycle, time_step_limits
 from inputs.units import Acceleration, Density, Duration, Frequency, Length, Radius, Speed, Time
@@ -140,14 +140,13 @@ def _beads(file: PileFile) -> PileBeads:
 
 
 def _check_room(beads: PileBeads, container: Container) -> None:
-    volume = sum(4.0 / 3.0 * pi * radius**3 for radius in beads.radii)
     if container.width < 4.0 * max(beads.large):
         raise UnusableKeyError("container.width", "expected at least two of the large beads side by side")
     if container.shape == "cylinder" and container.width < 8.0 * max(beads.large):
         raise UnusableKeyError("container.width", "expected at least four of the large beads across a cylinder")
-    level = volume / (0.3 * container.cross_section)  # as loosely as they are placed at the start
-    if level > container.height:
-        needed = f"{level * 1e3:.3g} mm"
+    level = lattice(beads, container)[1]
+    if level > 2.0 * container.height:  # walls and simulation go on to there
+        needed = f"{level / 2.0 * 1e3:.3g} mm"
         raise UnusableKeyError("container.height", f"too low for {sum(beads.counts)} beads; expected {needed} or more")
 
 
@@ -179,6 +178,8 @@ def _run(table: PileRunTable, beads: PileBeads, contact: Contact, liquid: Liquid
     frames_per_part = max(1, round(table.part * drive.frequency / cycles_per_frame))
     per_part = frames_per_part * cycles_per_frame
     cycles = ceil(table.duration * drive.frequency / cycles_per_frame * (1.0 - 1e-12)) * cycles_per_frame
+    if steps * (cycles + ceil((table.longest_settling + 1.0) * drive.frequency)) > MOST_STEPS:
+        raise UnusableKeyError("run.duration", "too long: the engine counts steps up to 2^31")
     return PileRun(
         time_step,
         steps,

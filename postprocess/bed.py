@@ -22,16 +22,17 @@ class Bed:
     surface, surface_low, surface_high : float
         Median, 10th and 90th percentile over x-y cells of the height of each cell's highest bead top in the bulk, m.
     brazil_nut, brazil_nut_of_bulk : float
-        Mean height of the large beads minus that of the small ones, over twice the mean height of all; of all beads,
-        and of the bulk alone.
+        Mean height of the large beads minus that of the small ones, over the sum of the two; of all beads, and of the
+        bulk alone.
     mean_square_velocity : float
-        m²/s², relative to the container.
+        m²/s², relative to the container, at the phase at which frames are taken (at 0 several times below the mean over
+        a cycle).
     coordination : float
         Bridges between beads, touching or open, twice, over beads.
     touching, opened : int
         Bridges between beads that touch and that do not.
     mean_force : float
-        Of the bridges between beads, N.
+        Normal force of the bridges between beads, positive where they pull together, N.
     bulk : int
         Beads in the bulk.
     """
@@ -101,10 +102,11 @@ def surface_cells(position: FloatArray, radius: FloatArray, container: Container
 
 
 def segregation(height: FloatArray, large: npt.NDArray[np.bool_]) -> float:
-    """The Brazil-nut index: (⟨z⟩ of the large beads - ⟨z⟩ of the small ones) / (2 ⟨z⟩); 0 if a class is missing."""
+    """The Brazil-nut index: ⟨z⟩ of the large beads minus ⟨z⟩ of the small ones, over their sum; 0 without a class."""
     if not large.any() or large.all():
         return 0.0
-    return float((height[large].mean() - height[~large].mean()) / (2.0 * height.mean()))
+    above, below = float(height[large].mean()), float(height[~large].mean())
+    return (above - below) / (above + below)
 
 
 def packing_profile(
@@ -129,8 +131,10 @@ def packing_profile(
     """
     top = float((position[..., 2] + radius).max())
     edges = np.arange(0.0, top + layer, layer)
-    # Volume of a sphere below an edge that lies h above its centre.
-    h = np.clip(edges[:, None, None] - position[None, ..., 2], -radius, radius)
-    below = np.pi * (2.0 / 3.0 * radius**3 + radius**2 * h - h**3 / 3.0)
-    volumes = np.diff(below.mean(axis=1).sum(axis=1))
+    below = np.zeros(len(edges))
+    for frame in position:
+        # Volume of a sphere below an edge that lies h above its centre.
+        h = np.clip(edges[:, None] - frame[:, 2], -radius, radius)
+        below += (np.pi * (2.0 / 3.0 * radius**3 + radius**2 * h - h**3 / 3.0)).sum(axis=1) / len(position)
+    volumes = np.diff(below)
     return (edges[1:] + edges[:-1]) / 2.0, volumes / (container.cross_section * layer)

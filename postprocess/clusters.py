@@ -1,13 +1,14 @@
 """Clusters that are free of the pile, followed through time, and what counts as a climb.
 
-A *cluster* is a connected component of the beads' bridges (touching or open) other than the pile's bulk, the
-component of most beads. It is *held* if a bridge joins one of its beads to a side wall. A *track* is a cluster followed
-by its beads: from frame to frame it is the one that shares most of them. What is no cluster for a moment only, because
-its tail brushes the pile or it lets go of the wall, for no longer than `Definition.brush`, stays the same track.
+A *cluster* is a connected component of the beads' bridges (touching or open) of at least two beads that is *free*
+of the pile's bulk: the component of most beads, and all that is bridged to the floor. It is *held* if a bridge joins
+one of its beads to a side wall. A *track* is a cluster followed by its beads: from frame to frame it is the one that
+shares most of them. What is no cluster for a moment only, because its tail brushes the pile or it lets go of the wall,
+for no longer than `Definition.brush`, stays the same track.
 
-A *climb* is height gained while free and held: a track whose topmost bead at the end of the gain rose by at least
-`Definition.least_gain` within the track. A column that detaches high and sinks gains none; a bead thrown into the air
-is not held.
+A *climb* is height gained while free and held: a track whose leader, one of its topmost beads, rose by at least
+`Definition.least_gain` between frames that follow each other and in both of which the cluster was free and held. A
+column that detaches high and sinks gains none; a bead thrown into the air is not held, nor is what flies for a moment.
 """
 
 from __future__ import annotations
@@ -22,6 +23,10 @@ from postprocess.pile import FLOOR, Bridges
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+
+
+_FEWEST_BEADS = 2
+_FEWEST_FRAMES = 3
 
 
 @dataclass(frozen=True)
@@ -76,9 +81,10 @@ def components(count: int, bridges: Bridges) -> IntArray:
     return labels
 
 
-def bulk_of(labels: IntArray) -> npt.NDArray[np.bool_]:
-    """Which beads belong to the component of most beads, shape (N,)."""
-    bulk: npt.NDArray[np.bool_] = labels == np.bincount(labels).argmax()
+def bulk_of(labels: IntArray, bridges: Bridges) -> npt.NDArray[np.bool_]:
+    """Which beads belong to the component of most beads or to one that is bridged to the floor, shape (N,)."""
+    on_floor = labels[bridges.wall_beads[bridges.walls == FLOOR]]
+    bulk: npt.NDArray[np.bool_] = np.isin(labels, [np.bincount(labels).argmax(), *on_floor])
     return bulk
 
 
@@ -86,9 +92,11 @@ def held_clusters(labels: IntArray, bridges: Bridges) -> Iterator[tuple[frozense
     """The clusters that are free and held in a frame: their beads and the side walls that hold them."""
     side = bridges.walls != FLOOR
     beads, walls = bridges.wall_beads[side], bridges.walls[side]
-    bulk = bulk_of(labels)
+    bulk = bulk_of(labels, bridges)
     for label in np.unique(labels[beads[~bulk[beads]]]):
         members = np.flatnonzero(labels == label)
+        if len(members) < _FEWEST_BEADS:
+            continue
         holding = walls[np.isin(beads, members)]
         yield frozenset(members.tolist()), frozenset(holding.tolist())
 
@@ -165,9 +173,10 @@ class Climb:
     gain : float
         m.
     speed, standard_error : float
-        Slope of the leader's height against time within it, m/s, and the error of the fit.
+        Slope of the leader's height against time within it, m/s, and the error of that fit: heights of neighbouring
+        frames go together, so that it is a lower bound of what is not known of the speed.
     leader : int
-        The topmost bead at its end.
+        The bead that gained most among those that were topmost at the end or at one of ten moments before.
     height : float
         Of the leader at the end, m.
     size, large : int
@@ -215,9 +224,12 @@ def judge(
     for leader in {max(members, key=lambda bead: height[frame, bead]) for frame, members in _ends(track)}:
         places = [place for place, members in enumerate(track.members) if leader in members]
         z = height[[track.frames[place] for place in places], leader]
-        lowest = np.minimum.accumulate(z)
-        end = int(np.argmax(z - lowest))
-        found = (float(z[end] - lowest[end]), leader, places[int(np.argmin(z[: end + 1]))], places[end])
+        # Height gained: what is gained while it is no cluster does not count.
+        adjacent = np.diff([track.frames[place] for place in places]) == 1
+        gained = np.concatenate([[0.0], np.cumsum(np.where(adjacent, np.diff(z), np.minimum(np.diff(z), 0.0)))])
+        lowest = np.minimum.accumulate(gained)
+        end = int(np.argmax(gained - lowest))
+        found = (float(gained[end] - lowest[end]), leader, places[int(np.argmin(gained[: end + 1]))], places[end])
         best = found if best is None else max(best, found)
     if best is None:
         raise ValueError("a track without a frame")
@@ -236,7 +248,7 @@ def judge(
         size=len(members),
         large=int(large[list(members)].sum()),
         walls=tuple(sorted(track.walls[end])),
-        climbed=gain >= definition.least_gain,
+        climbed=gain >= definition.least_gain and len(span) >= _FEWEST_FRAMES,
     )
 
 

@@ -63,7 +63,7 @@ class Bridges:
     beads : ndarray of int, shape (K, 2)
         Numbers of the two beads, from 0.
     force : ndarray, shape (K,)
-        Magnitude of the net force (capillary, viscous and elastic), N.
+        Net normal force (capillary, viscous and elastic), positive where it pulls the two together, N.
     gap : ndarray, shape (K,)
         m, negative where they touch.
     wall_beads, walls : ndarray of int, shape (M,)
@@ -97,71 +97,110 @@ def read_pile(directory: str | Path) -> PileMotion:
     parts = part_directories(directory)
     if not parts:
         raise DumpError(f"{directory}: no part of the run is finished yet")
-    start = next((int(said["drive_from"]) for said in map(_part, parts) if said["drive_from"] is not None), None)
+    told = [_part(part) for part in parts]
+    start = next((one["drive_from"] for one in told if one["drive_from"] is not None), None)
     steps: list[int] = []
     rows: list[FloatArray] = []
+    riders: list[FloatArray] = []
     frames: list[tuple[Path, int]] = []
-    for part in parts:
-        layout = Layout.from_dict(read_json(part / LAYOUT_NAME))
-        dump = BinaryDump(part / layout.bead_dump, layout.bead_columns)
+    for part, one in zip(parts, told, strict=True):
+        if one["begin"] != (steps[-1] if steps else 0):
+            raise DumpError(f"{part}: the part before it is missing")
+        layout, dump = _dump_of(part)
+        if dump.truncated or not len(dump.steps) or dump.steps[-1] != one["end"]:
+            raise DumpError(f"{part}: its dump is incomplete")
         for number, step in enumerate(dump.steps):
             if steps and step <= steps[-1]:
                 continue  # the last frame of the part before
+            frame = dump.frame(number)
+            if len(frame) != layout.riders + sum(case.beads.counts):
+                raise DumpError(f"{part}: {len(frame)} rows, expected riders and {sum(case.beads.counts)} beads")
             steps.append(int(step))
-            rows.append(dump.frame(number)[layout.riders :])
+            riders.append(frame[0])  # ids are dumped in their order, the riders first
+            rows.append(frame[layout.riders :])
             frames.append((part, number))
-    # Ids are dumped in their order, the riders first.
-    data = np.stack(rows)
-    column, layout_columns = dump.column, dump.columns
-    x, vx = layout_columns.index("x"), layout_columns.index("vx")
-    radius = data[0, :, column("radius")]
+    data, walls = np.stack(rows), np.stack(riders)
+    x, vx = dump.column("x"), dump.column("vx")
+    radius = data[0, :, dump.column("radius")]
     time = (np.array(steps, dtype=np.float64) - (start if start is not None else steps[-1])) * case.run.time_step
+    # In the laboratory frame the riders move with the walls, in the container's they rest.
+    shift, speed = walls[:, None, x : x + 3] - walls[0, x : x + 3], walls[:, None, vx : vx + 3]
     return PileMotion(
         case,
         time,
-        data[:, :, x : x + 3],
-        data[:, :, vx : vx + 3],
+        data[:, :, x : x + 3] - shift,
+        data[:, :, vx : vx + 3] - speed,
         radius,
         radius > case.beads.border,
-        int(data[0, 0, column("id")]),
+        int(data[0, 0, dump.column("id")]),
         frames,
     )
 
 
 def _part(directory: Path) -> dict[str, Any]:
-    return read_json(directory / PART_NAME)
+    try:
+        said = read_json(directory / PART_NAME)
+        return {name: said[name] for name in ("begin", "end", "drive_from")}
+    except (OSError, ValueError, KeyError) as error:
+        raise DumpError(f"{directory / PART_NAME}: cannot be read ({error})") from error
+
+
+def _dump_of(part: Path) -> tuple[Layout, BinaryDump]:
+    try:
+        layout = Layout.from_dict(read_json(part / LAYOUT_NAME))
+        return layout, BinaryDump(part / layout.bead_dump, layout.bead_columns)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DumpError(f"{part}: cannot be read ({error})") from error
 
 
 def read_bridges(motion: PileMotion) -> Iterator[Bridges]:
-    """The bridges of each frame of a motion, in their order."""
+    """The bridges of each frame of a motion, in their order.
+
+    Raises
+    ------
+    DumpError
+        If a dump cannot be read.
+    """
+    frame = -1
     for part in dict.fromkeys(part for part, _ in motion.frames):
         wanted = [number for place, number in motion.frames if place == part]
         layout = Layout.from_dict(read_json(part / LAYOUT_NAME))
         pairs = _local_frames(part / layout.pair_bridge_dump, len(layout.pair_bridge_columns))
         walls = _local_frames(part / layout.wall_bridge_dump, len(layout.wall_bridge_columns))
         pair, wall = layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
-        for number, (between, against) in enumerate(zip(pairs, walls, strict=True)):
+        for number, (between, against) in enumerate(zip(pairs, walls, strict=False)):
             if number not in wanted:
                 continue
-            force = np.linalg.norm(between[:, pair("fx") : pair("fx") + 3], axis=1)
+            frame += 1
+            force = between[:, pair("fx") : pair("fx") + 3]
             # Neighbours without a bridge are reported too, with no force.
-            real, held = force > 0.0, np.any(against[:, wall("fx") : wall("fx") + 3] != 0.0, axis=1)
+            real, held = np.any(force != 0.0, axis=1), np.any(against[:, wall("fx") : wall("fx") + 3] != 0.0, axis=1)
             ids = between[real][:, [pair("id1"), pair("id2")]].astype(np.int64) - motion.first_id
             on_wall = against[held][:, [wall("id"), wall("triangle")]].astype(np.int64)
             # Every wall stands twice in the deck.
             on_wall = np.unique(on_wall, axis=0).reshape(-1, 2)
             gap = -between[real, pair("overlap")]
-            yield Bridges(ids, force[real], gap, on_wall[:, 0] - motion.first_id, on_wall[:, 1])
+            # The tangential part of what the engine reports is wrong (templates.engine): along the line of centres.
+            arm = motion.position[frame, ids[:, 1]] - motion.position[frame, ids[:, 0]]
+            pull = np.einsum("kx,kx->k", force[real], arm) / np.linalg.norm(arm, axis=1)
+            yield Bridges(ids, pull, gap, on_wall[:, 0] - motion.first_id, on_wall[:, 1])
 
 
 def _local_frames(path: Path, columns: int) -> Iterator[FloatArray]:
     """Rows of each frame of a local dump, shape (rows, columns)."""
-    with path.open("rb") as file:
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise DumpError(f"{path}: cannot be read ({error.strerror})") from error
+    with file:
         while line := file.readline():
             if not line.startswith(b"ITEM: TIMESTEP"):
                 raise DumpError(f"{path}: not a local dump")
             head = [file.readline() for _ in range(_HEAD_LINES - 1)]
-            count = int(head[2])
+            try:
+                count = int(head[2])
+            except ValueError as error:
+                raise DumpError(f"{path}: no header") from error
             body = b"".join(file.readline() for _ in range(count))
             values = np.fromstring(body, dtype=np.float64, sep=" ")
             if len(values) != count * columns:

@@ -50,7 +50,9 @@ def _climb_figure(found: PileAnalysis) -> Figure:
     axes["index"].set_ylabel("Brazil-nut\nindex")
     axes["index"].legend(fontsize=7)
     axes["agitation"].semilogy(time, [max(bed.mean_square_velocity, 1e-12) for bed in found.beds], color="C0")
-    axes["agitation"].set(xlabel="time from the begin of the drive (s)", ylabel="mean square\nvelocity (m²/s²)")
+    axes["agitation"].set(
+        xlabel="time from the begin of the drive (s)", ylabel="mean square\nvelocity, strobed\n(m²/s²)"
+    )
     figure.suptitle(
         f"{case.title or case.name}\n{sum(case.beads.counts)} beads, {case.drive.frequency:g} Hz, "
         f"{case.drive.peak_acceleration:.4g} m/s²",
@@ -98,7 +100,7 @@ def render_series(directory: Path, destination: Path | None = None, *, images: i
     frames = np.unique(np.linspace(start, len(motion.time) - 1, images).round().astype(int))
     top = 1.05 * float((motion.position[start:, :, 2] + motion.radius).max())
     width = motion.case.container.width
-    across = 1.5 * max(0.6, 3.0 * width / top)  # inches a picture
+    across = max(0.8, 4.0 * width / top + 0.3)  # inches a picture, which is four inches high
     figure, axes = new_figure(1.0 + across * len(frames), 5.0, ncols=len(frames), sharey=True)
     for panel, frame in zip(np.atleast_1d(axes), frames, strict=True):
         picture = side_view(motion, frame, _climbers(found, int(frame)), top)

@@ -66,7 +66,7 @@ def analyse(directory: str | Path, definition: Definition | None = None) -> Pile
     for frame, bridges in enumerate(read_bridges(motion)):
         labels = components(len(motion.radius), bridges)
         position, velocity = motion.position[frame], motion.velocity[frame]
-        bulk = bulk_of(labels)
+        bulk = bulk_of(labels, bridges)
         beds.append(bed_of(position, velocity, motion.radius, motion.large, bulk, bridges, motion.case.container))
         # While the pile falls and settles, most of it is free of the rest.
         clusters.append(list(held_clusters(labels, bridges)) if motion.time[frame] >= 0.0 else [])
@@ -103,7 +103,8 @@ def current_pile_result(directory: str | Path) -> dict[str, Any]:
     directory = Path(directory)
     try:
         result = read_result(directory)
-        if result.keys() >= {"climbs", "surface", "definition"} and intact(directory, PILE_TABLES):
+        usual = result.get("definition") == vars(Definition())
+        if usual and result.keys() >= {"climbs", "surface"} and intact(directory, PILE_TABLES):
             return result
     except (OSError, ValueError):
         pass
@@ -135,7 +136,7 @@ def _cluster_columns(found: PileAnalysis) -> Columns:
         "last": column([time[track.frames[-1]] for track in tracks], np.float64),
         "leader_large": column([found.motion.large[climb.leader] for climb in climbs], np.bool_),
         "above_surface": column([climb.height for climb in climbs], np.float64) - surface[at_end],
-        "wall": column([min(climb.walls, default=-1) for climb in climbs], np.int64),
+        "walls": column([len(climb.walls) for climb in climbs], np.int64),
         "merged_into": column([-1 if track.merged_into is None else track.merged_into for track in tracks], np.int64),
     }
     for name in ("begin", "end", "gain", "speed", "standard_error", "height"):
@@ -175,7 +176,7 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
                 "begin": climb.begin,
                 "end": climb.end,
                 "gain": climb.gain,
-                "speed": climb.speed,
+                "speed": climb.speed if np.isfinite(climb.speed) else None,
                 "standard_error": climb.standard_error if np.isfinite(climb.standard_error) else None,
                 "leader_large": bool(motion.large[climb.leader]),
                 "height": climb.height,
@@ -198,17 +199,17 @@ def describe_pile(directory: Path, result: dict[str, Any], *, found: bool = Fals
         f"a0 = {result['peak_acceleration']:.4g} m/s²" + (" (already run)" if found else ""),
         f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling",
         f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
-        f"  segregation (z of large - z of small)/2z: {nuts['start']:.3f} at the start, {nuts['end']:.3f} at the end",
-        f"  clusters   {result['clusters']} came free of the pile and were held to a wall",
+        f"  segregation (z of large - z of small)/sum: {nuts['start']:.3f} at the start, {nuts['end']:.3f} at the end",
+        f"  clusters   {result['clusters']} were free of the pile and held to a wall for a while",
         f"  climbs     {len(result['climbs']) or 'none'}",
     ]
     for climb in result["climbs"]:
-        error = climb["standard_error"]
-        doubt = f" ± {error * 1e3:.2g}" if error is not None else ""
+        speed = "-" if climb["speed"] is None else f"{climb['speed'] * 1e3:.2f}"
+        where = "in a corner" if len(climb["walls"]) > 1 else "on a wall"
         leader = "large" if climb["leader_large"] else "small"
         lines.append(
             f"    {climb['begin']:.2f} to {climb['end']:.2f} s: {climb['gain'] * 1e3:.2f} mm up to "
-            f"{climb['height'] * 1e3:.2f} mm at {climb['speed'] * 1e3:.2f}{doubt} mm/s, led by a {leader} bead, "
+            f"{climb['height'] * 1e3:.2f} mm {where} at {speed} mm/s, led by a {leader} bead, "
             f"{climb['size']} beads ({climb['large']} large)"
         )
     return "\n".join([*lines, f"  run        {directory}"])

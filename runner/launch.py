@@ -125,9 +125,13 @@ def check_room(folder: Path, needed: int) -> None:
 
 
 def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]) -> subprocess.Popen[bytes]:
-    # Debian's mpirun refuses root and more ranks than cores unless told otherwise.
+    # Unless told otherwise mpirun refuses root, more ranks than cores, and binds all decks to the same cores.
     mortal = _MORTAL if shutil.which(_MORTAL[0]) else ()
-    parallel = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), *mortal] if ranks > 1 else []
+    parallel = (
+        ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), *mortal]
+        if ranks > 1
+        else []
+    )
     with (directory / OUTPUT_NAME).open("wb") as output:
         return subprocess.Popen(
             [*mortal, *parallel, *_LINE_BUFFERED, str(engine.path), "-log", "none", "-in", DECK_NAME],

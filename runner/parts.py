@@ -22,6 +22,7 @@ from inputs.pile import PileCase
 from runner.binary import Engine
 from runner.directory import (
     CASE_NAME,
+    FAILURE_NAME,
     MANIFEST_NAME,
     FinishedRun,
     finished_run,
@@ -117,8 +118,8 @@ def run_pile(
         if there is not None and not force:
             return there, True
         made = unfinished(place)
-        if force:
-            shutil.rmtree(made, ignore_errors=True)
+        if force and made.exists():
+            shutil.rmtree(made)
         try:
             return _make(_Making(case, engine, made, list(ours.values()), on_progress, time_limit), place), False
         except Stopped:
@@ -146,7 +147,8 @@ class _Making:
         directory.mkdir(exist_ok=True)
         (directory / PARTS).mkdir(exist_ok=True)
         write_json(directory / CASE_NAME, case.as_dict())
-        self.done = [read_json(path / PART_NAME) for path in part_directories(directory)]
+        (directory / FAILURE_NAME).unlink(missing_ok=True)
+        self.done = [_read_part(path) for path in part_directories(directory)]
 
     def make(self, part: Part) -> dict[str, Any]:
         """Make a part, unless it is there, and say what it was."""
@@ -202,6 +204,8 @@ def _make(making: _Making, place: Path) -> FinishedRun:
     report = EngineReport(making.done[0]["version"], seconds[0], seconds[1], end)
     said = manifest(case, place.name, making.engine, report, started=started, directory=making.directory)
     settling = {"drive_from": start, "settled": making.done[_first_driven(making) - 1]["root_mean_square_velocity"]}
+    for left in [making.directory / "result.json", *making.directory.glob("*.parquet")]:
+        left.unlink(missing_ok=True)  # of somebody who looked before the end
     write_json(making.directory / MANIFEST_NAME, {**said, **settling, "parts": len(making.done)})
     move_into_place(making.directory, place)
     return FinishedRun(place)
@@ -222,6 +226,21 @@ def _settled_at(making: _Making) -> int | None:
         if at_rest or part["end"] * run.time_step >= run.longest_settling:
             return int(part["end"])
     return None
+
+
+def _read_part(directory: Path) -> dict[str, Any]:
+    try:
+        said = read_json(directory / PART_NAME)
+        if said["end"] > said["begin"] and "drive_from" in said:
+            return said
+        raise ValueError("begin, end or drive_from make no sense")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        told = f"{directory} is damaged ({error}): delete {directory.parent.parent} to have the run made again"
+        raise DamagedPart(told) from error
+
+
+class DamagedPart(WalkersError):
+    """A part of an unfinished run that cannot be gone on from."""
 
 
 def _agitation(directory: Path) -> float:

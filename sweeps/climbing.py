@@ -11,8 +11,7 @@ import numpy as np
 from inputs.errors import InputError, Problem
 from runner.directory import finished_run
 from runner.parts import PARTS
-from sweeps.kinds import current_result_of
-from sweeps.record import RECORD_NAME, read_record, states
+from sweeps.record import RECORD_NAME, read_record, result_in, states
 
 _CONFIDENCE = 0.95
 
@@ -31,14 +30,21 @@ def piles_in(directory: Path) -> list[Path]:
         found = [directory]
     else:
         found = sorted(path.parent for path in directory.glob(f"*/{PARTS}"))
-    finished = [path for path in found if finished_run(path) is not None and (path / PARTS).is_dir()]
+    # The same run may have two names; the hash at their end is one.
+    finished = list(
+        {
+            path.name.rpartition("-")[2]: path
+            for path in found
+            if finished_run(path) is not None and (path / PARTS).is_dir()
+        }.values()
+    )
     if not finished:
         raise InputError(str(directory), [Problem("", None, "expected a finished run of a pile, or a folder or sweep")])
     return finished
 
 
 def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
-    """Climbs over several runs.
+    """Climbs over several runs of one kind: their probability is one only if they differ by their seeds alone.
 
     Parameters
     ----------
@@ -52,11 +58,11 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
     dict
         ``runs``, ``climbed`` (runs with a climb), ``probability`` with its binomial ``interval`` (95 %, Clopper and
         Pearson 1934), ``climbs``, ``onsets`` (s, of the first climb of each run), ``speeds`` (m/s), ``sizes``,
-        ``led_by_large``.
+        ``led_by_large``, ``in_corners``.
     """
     from scipy.stats import binomtest
 
-    results = [current_result_of(run) for run in runs]
+    results = [result_in(run) for run in runs]
     seconds = within if within is not None else min(result["driven"] for result in results)
     results = [result for result in results if result["driven"] >= seconds * (1.0 - 1e-6)]
     counted = [[climb for climb in result["climbs"] if climb["begin"] <= seconds] for result in results]
@@ -72,7 +78,8 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
         "interval": [float(interval.low), float(interval.high)] if interval else None,
         "climbs": len(every),
         "onsets": [min(climb["begin"] for climb in climbs) for climbs in counted if climbs],
-        "speeds": [climb["speed"] for climb in every],
+        "speeds": [climb["speed"] for climb in every if climb["speed"] is not None],
+        "in_corners": sum(len(climb["walls"]) > 1 for climb in every),
         "sizes": [climb["size"] for climb in every],
         "led_by_large": sum(climb["leader_large"] for climb in every),
     }
@@ -91,7 +98,8 @@ def describe_climbs(found: dict[str, Any]) -> str:
         speeds, onsets = np.array(found["speeds"]) * 1e3, np.array(found["onsets"])
         sizes = ", ".join(f"{size}: {found['sizes'].count(size)}" for size in sorted(set(found["sizes"])))
         lines += [
-            f"  climbs     {found['climbs']}, {found['led_by_large']} led by a large bead",
+            f"  climbs     {found['climbs']}, led by a large bead {found['led_by_large']}, "
+            f"in a corner {found['in_corners']}",
             f"  onset      {onsets.min():.2f} to {onsets.max():.2f} s, median {np.median(onsets):.2f} s",
             f"  speed      {speeds.min():.2f} to {speeds.max():.2f} mm/s, median {np.median(speeds):.2f} mm/s",
             f"  clusters   beads: how many   {sizes}",

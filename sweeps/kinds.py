@@ -59,7 +59,7 @@ _PILE_RESULTS = {
     "speed": ("m/s", "mean of their speeds"),
     "highest": ("m", "height that the highest of them reached"),
     "led_by_large": ("", "how many of them were led by a large bead"),
-    "clusters": ("", "clusters that came free of the pile and were held to a wall"),
+    "clusters": ("", "clusters that were free of the pile and held to a wall for a while"),
     "surface_end": ("m", "height of the pile's surface at the end"),
     "brazil_nut_end": ("", "Brazil-nut index at the end"),
     "settling": ("s", "before the drive"),
@@ -151,10 +151,11 @@ def columns_of(result: dict[str, Any]) -> dict[str, Any]:
 
 def _pile_columns(result: dict[str, Any]) -> dict[str, Any]:
     climbs = result["climbs"]
+    speeds = [climb["speed"] for climb in climbs if climb["speed"] is not None]
     return {
         "climbs": len(climbs),
         "onset": min((climb["begin"] for climb in climbs), default=nan),
-        "speed": sum(climb["speed"] for climb in climbs) / len(climbs) if climbs else nan,
+        "speed": sum(speeds) / len(speeds) if speeds else nan,
         "highest": max((climb["height"] for climb in climbs), default=nan),
         "led_by_large": sum(climb["leader_large"] for climb in climbs),
         "clusters": result["clusters"],

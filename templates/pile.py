@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import cos, hypot, inf, pi, sin
+from math import cos, pi, sin, sqrt
 
-from inputs.pile import PileCase
+from inputs.forces import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
+from inputs.pile import LOOSE, PileCase, lattice
 from templates.deck import Checkpoint, Deck, Plan, Recording, compose
 from templates.scene import Bead, Face, Point, Scene
 
@@ -17,8 +18,6 @@ PAIR_COLUMNS = ("id1", "id2", "fx", "fy", "fz", "overlap")
 WALL_COLUMNS = ("x", "y", "z", "triangle", "id", "fx", "fy", "fz")
 _SKIN = 2e-4
 """m; between 0.1 and 0.3 mm it makes no difference of more than some per cent to the time of a step."""
-_LOOSE = 1.03
-"""Pitch of the places at the start, in diameters of the largest bead."""
 _STATUS_LINES_PER_CYCLE = 2
 SIDES = 24
 """Of the prism that stands for a cylinder: its edges are 0.9 % of the radius farther out than its faces."""
@@ -78,13 +77,24 @@ def render_part(case: PileCase, part: Part) -> Deck:
             recording,
             ranks=run.ranks,
             checkpoint=Checkpoint(write=RESTART_NAME, read=PREVIOUS_RESTART_NAME if part.begin else None),
-            fastest=inf if part.drive_from is None else 20.0 * case.drive.peak_velocity,
+            fastest=_fastest(case),
             drive_from=part.drive_from,
             skin=_SKIN,
             title="A wet bidisperse pile in a shaken container",
             tells_agitation=True,
         )
     )
+
+
+def _fastest(case: PileCase) -> float:
+    """Twenty times the container's peak velocity, plus a fall through the box, plus what a bridge's pull gives, m/s."""
+    liquid, small = case.liquid, min(case.beads.small + case.beads.large)
+    mass = 4.0 / 3.0 * pi * small**3 * case.beads.density
+    volume = bridge_volume_at_wall(small, liquid.volume_fraction)
+    pull = capillary_force_at_wall(liquid.surface_tension, small, volume, liquid.contact_angle)
+    reach = rupture_distance(volume, liquid.contact_angle)
+    fall = sqrt(2.0 * case.gravity * 2.0 * case.container.height)
+    return 20.0 * case.drive.peak_velocity + fall + sqrt(2.0 * pull * reach / mass)
 
 
 def settling_steps(case: PileCase) -> int:
@@ -128,23 +138,15 @@ def _places(case: PileCase, largest: float) -> list[tuple[Point, float]]:
 
     draw = default_rng(case.seed)
     radii = [float(radius) for radius in draw.permutation(case.beads.radii)]
-    width, reach = case.container.width, case.container.width / 2.0
-    across = int(width / (2.0 * _LOOSE * largest))
-    pitch = width / across
-    grid = [
-        ((row + 0.5) * pitch - reach, (column + 0.5) * pitch - reach)
-        for row in range(across)
-        for column in range(across)
-    ]
-    if case.container.shape == "cylinder":
-        grid = [(x, y) for x, y in grid if hypot(x, y) <= reach - _LOOSE * largest]
+    grid, _ = lattice(case.beads, case.container)
+    pitch = case.container.width / int(case.container.width / (2.0 * LOOSE * largest))
     places: list[tuple[Point, float]] = []
     for number, radius in enumerate(radii):
         layer, place = divmod(number, len(grid))
         x, y = grid[place]
         # Within its cell; in a cylinder less, for its wall cuts cells.
-        free = pitch / 2.0 - radius if case.container.shape == "box" else _LOOSE * largest - radius
+        free = pitch / 2.0 - radius if case.container.shape == "box" else LOOSE * largest - radius
         shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * free / (1.0 if case.container.shape == "box" else 2.0)
-        height = (layer + 0.5) * 2.0 * _LOOSE * largest
+        height = (layer + 0.5) * 2.0 * LOOSE * largest
         places.append(((x + float(shift[0]), y + float(shift[1]), height), radius))
     return places

@@ -98,7 +98,8 @@ def test_a_tail_that_brushes_the_pile_does_not_end_a_climb(seconds: float, track
     assert len(found) == tracks
     assert all(climb.climbed for climb in climbs)
     if tracks == 1:
-        assert climbs[0].gain == pytest.approx(3e-3 * TIME[-1])
+        # What it rose while it was on the pile does not count.
+        assert climbs[0].gain == pytest.approx(3e-3 * (TIME[-1] - seconds - 0.02))
 
 
 def test_two_climb_at_once() -> None:
@@ -131,13 +132,13 @@ def test_two_that_meet_go_on_as_one() -> None:
 def test_one_that_parts_is_followed_by_its_beads() -> None:
     scene = Scene()
     part = FRAMES // 2
-    scene.pairs = [[(20, 21), (21, 22), *([(22, 23)] if number < part else [])] for number in range(FRAMES)]
+    scene.pairs = [[(20, 21), (22, 23), *([(21, 22)] if number < part else [])] for number in range(FRAMES)]
     for walls in scene.walls:
         walls[23] = SIDE
     scene.height[:, 20:] += 3e-3 * TIME[:, None]
     tracks, _ = scene.climbs()
     assert [len(track.frames) for track in tracks] == [FRAMES, FRAMES - part]
-    assert tracks[0].members[-1] == {20, 21, 22}
+    assert {tracks[0].members[-1], tracks[1].members[-1]} == {frozenset({20, 21}), frozenset({22, 23})}
 
 
 def test_a_fall_ends_a_climb_at_its_top() -> None:
@@ -152,7 +153,27 @@ def test_a_fall_ends_a_climb_at_its_top() -> None:
 
 def test_the_bulk_is_the_component_of_most_beads() -> None:
     labels = components(24, frame([(20, 21)], {}))
-    assert np.flatnonzero(bulk_of(labels)).tolist() == BULK
+    assert np.flatnonzero(bulk_of(labels, frame([(20, 21)], {}))).tolist() == BULK
+    floor = frame([(20, 21)], {20: 0})
+    assert np.flatnonzero(bulk_of(labels, floor)).tolist() == [*BULK, 20, 21]
+
+
+def test_a_hop_between_two_holds_does_not_count() -> None:
+    """Held at the begin and again a tenth of a second later, 4 mm higher."""
+    scene = Scene()
+    for number, walls in enumerate(scene.walls):
+        if number not in (0, 4):
+            del walls[20]
+    scene.height[4:, 20:22] += 4e-3
+    _, climbs = scene.climbs()
+    assert not any(climb.climbed for climb in climbs)
+
+
+def test_a_single_bead_is_no_cluster() -> None:
+    scene = Scene()
+    scene.pairs = [[(22, 19), (23, 19), (21, 19)] for _ in TIME]
+    scene.height[:, 20] += 3e-3 * TIME
+    assert scene.climbs() == ([], [])
 
 
 def test_the_packing_profile_holds_all_of_the_beads() -> None:
@@ -169,5 +190,6 @@ def test_the_packing_profile_holds_all_of_the_beads() -> None:
 def test_the_brazil_nut_index_is_one_with_all_small_beads_on_the_floor() -> None:
     large = np.array([True, True, False, False])
     assert segregation(np.array([2.0, 2.0, 0.0, 0.0]), large) == pytest.approx(1.0)
+    assert segregation(np.array([2.0, 0.0, 0.0, 0.0]), np.array([True, False, False, False])) == pytest.approx(1.0)
     assert segregation(np.array([1.0, 2.0, 2.0, 1.0]), large) == pytest.approx(0.0)
     assert segregation(np.ones(3), np.zeros(3, dtype=bool)) == 0.0

@@ -53,7 +53,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_pile_settles_is_shaken_and_is_whole(run: Path) -> None:
     case, motion = load_pile("pile-ci"), read_pile(run)
     manifest = json.loads((run / "manifest.json").read_text())
-    assert manifest["settled"] < case.run.settled_below or manifest["drive_from"] * case.run.time_step >= 0.1
+    assert manifest["settled"] < case.run.settled_below
     assert len(motion.radius) == sum(case.beads.counts)
     assert sorted(motion.radius) == pytest.approx(sorted(case.beads.radii))
     assert int(motion.large.sum()) == case.beads.counts[1]
@@ -158,15 +158,64 @@ def test_both_frames_shake_alike(run: Path, tmp_path: Path) -> None:
     case = small(drive={"frame": "lab"})
     finished, _ = run_pile(case, find_engine(None), tmp_path)
 
-    def agitation(directory: Path, *, lab: bool) -> float:
+    def agitation(directory: Path) -> float:
         motion = read_pile(directory)
-        velocity = motion.velocity.copy()
-        if lab:  # frames are a whole number of cycles apart: the walls move at full speed in each
-            velocity[..., 2] -= case.drive.peak_velocity
-        driven = motion.time > 0.03
-        return float((velocity[driven] ** 2).sum(axis=2).mean())
+        return float((motion.velocity[motion.time > 0.03] ** 2).sum(axis=2).mean())
 
-    assert agitation(finished.directory, lab=True) == pytest.approx(agitation(run, lab=False), rel=0.25)
+    assert agitation(finished.directory) == pytest.approx(agitation(run), rel=0.3)
+    assert read_pile(finished.directory).position[..., 2].min() > 2.9e-4
+
+
+def test_the_laboratory_frame_is_taken_off_at_any_phase(tmp_path: Path) -> None:
+    """The lowest beads lie on the floor throughout the cycle."""
+    case = small(drive={"frame": "lab"}, run={"duration": "0.03 s", "frames_per_second": 680.0})
+    finished, _ = run_pile(case, find_engine(None), tmp_path)
+    motion = read_pile(finished.directory)
+    assert case.run.frames_per_cycle == 4
+    lowest = (motion.position[..., 2] - motion.radius).min(axis=1)
+    assert np.abs(lowest).max() < 0.2 * case.drive.amplitude
+
+
+def test_settling_ends_at_last(tmp_path: Path) -> None:
+    case = small(run={"settled_below": "1 nm/s", "longest_settling": "0.05 s", "duration": "0.01 s"})
+    finished, _ = run_pile(case, find_engine(None), tmp_path)
+    assert finished.manifest["settled"] > case.run.settled_below
+    assert finished.manifest["drive_from"] * case.run.time_step == pytest.approx(0.05, rel=0.2)
+
+
+def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
+    def broken(name: str) -> Path:
+        place = tmp_path / f"{name}-{run.name}"
+        shutil.copytree(run, place)
+        return place
+
+    gap, cut, said, lines = (broken(name) for name in ("gap", "cut", "said", "lines"))
+    shutil.rmtree(part_directories(gap)[1])
+    dump = part_directories(cut)[1] / "beads.bin"
+    dump.write_bytes(dump.read_bytes()[:-100])
+    (part_directories(said)[1] / "part.json").write_text("{")
+    text = part_directories(lines)[1] / "bridges.walls.txt"
+    text.write_text(text.read_text()[:-200])
+    for place in (gap, cut, said, lines):
+        for command in ("plot", "vtk"):
+            done = subprocess.run([PROGRAM, command, str(place)], capture_output=True, text=True, check=False)
+            assert done.returncode in (1, 2)
+            assert len(done.stderr.splitlines()) == 1, done.stderr
+
+
+def test_looking_before_the_end_leaves_nothing_stale(tmp_path: Path) -> None:
+    case, engine = load_pile("pile-ci"), find_engine(None)
+    place = pile_place(case, engine, tmp_path)
+    unfinished = place.with_name(place.name + ".part")
+    program = subprocess.Popen([PROGRAM, "run", "pile-ci", "--out", str(tmp_path)], stderr=subprocess.DEVNULL)
+    wait_for(lambda: part_directories(unfinished))
+    program.kill()
+    program.wait()
+    (unfinished / "failure.json").write_text("{}")
+    assert tabulate_pile(unfinished)["driven"] == 0.0
+    finished, _ = run_pile(case, engine, tmp_path)
+    assert current_pile_result(finished.directory)["driven"] > 0.1
+    assert not (finished.directory / "failure.json").exists()
 
 
 def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -200,6 +249,7 @@ BAD: dict[str, tuple[dict[str, dict[str, Any]], str]] = {
     "range": ({"beads": {"small": ["0.32 mm", "0.3 mm"]}}, "beads.small"),
     "narrow": ({"container": {"width": "1.5 mm"}}, "container.width"),
     "low": ({"container": {"height": "2 mm"}}, "container.height"),
+    "long": ({"run": {"duration": "9000 s"}}, "run.duration"),
     "step": ({"run": {"time_step": "6 us"}}, "run.time_step"),
     "friction": ({"contact": {"friction": {}}}, "contact.friction.bead_bead"),
     "unknown": ({"container": {"depth": "3 mm"}}, "container.depth"),

@@ -118,11 +118,13 @@ def run_pile_case(
     """
     from postprocess.pile_result import current_pile_result
     from runner.binary import find_engine
-    from runner.parts import run_pile
+    from runner.directory import finished_run
+    from runner.parts import pile_place, run_pile
     from sweeps.together import check_audit
 
     binary = find_engine(engine)
-    check_audit(binary, despite_audit)
+    if force or finished_run(pile_place(case, binary, out)) is None:
+        check_audit(binary, despite_audit)
     run, found = run_pile(case, binary, out, force=force, on_progress=on_progress, time_limit=time_limit)
     return Outcome(run, current_pile_result(run.directory), found)
 

@@ -36,4 +36,5 @@ def command(case: Case, to: Folder = None) -> None:
             str(to), [Problem("", None, f"expected a folder that can be made ({error.strerror})")]
         ) from error
     write_deck(deck, to)
-    print(f"{to / DECK_NAME}    run it there with: liggghts -in {DECK_NAME} > engine.log")
+    ranks = f"mpirun -n {deck.layout.ranks} " if deck.layout.ranks > 1 else ""
+    print(f"{to / DECK_NAME}    run it there with: {ranks}liggghts -in {DECK_NAME} > engine.log")
