@@ -307,6 +307,11 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     assert "60 beads" in told("run", "pile-ci", "--out", str(run.parent))
     assert f"{small().beads.counts[0]} small and {small().beads.counts[1]} large beads" in told("show", "pile-ci")
     assert "Not yet" in told("deck", "pile-ci")
+    for option in (["render", "--walker", "1"], ["vtk", "--every-sample"], ["vtk", "--as-placed"]):
+        refused = subprocess.run(
+            [PROGRAM, option[0], str(run), *option[1:]], capture_output=True, text=True, check=False
+        )
+        assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
     refused = subprocess.run([PROGRAM, "theory", "pile-ci"], capture_output=True, text=True, check=False)
     assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
 

@@ -23,6 +23,8 @@ def command(run: Run, out: Out = DEFAULT_OUT, to: Picture = None, walker: Walker
 
     found = find_run(run, out)
     if is_pile(found.directory):
+        if walker:
+            raise InputError("--walker", [Problem("", None, "a pile has none")])
         from postprocess.pile_figures import render_series
 
         for path in render_series(found.directory, to, images=images):

@@ -13,7 +13,9 @@ from walkers.pipeline import DEFAULT_OUT
 
 Cases = Annotated[list[str], typer.Argument(metavar="CASE...", help="Case files, or names of shipped cases.")]
 Force = Annotated[bool, typer.Option("--force", help="Run again even if the run is there.")]
-Limit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Stop a run after this many seconds.")]
+Limit = Annotated[
+    float | None, typer.Option("--limit", min=0.0, help="Stop a run (of a pile: a part) after this many seconds.")
+]
 
 
 def command(
