@@ -8,21 +8,30 @@ from typing import Any
 
 import numpy as np
 
+from inputs.axes import flatten
 from inputs.errors import InputError, Problem
-from runner.directory import finished_run
+from runner.directory import CASE_NAME, finished_run
+from runner.files import read_json
 from runner.parts import PARTS
 from sweeps.record import RECORD_NAME, read_record, result_in, states
 
 _CONFIDENCE = 0.95
+_NO_CONDITION = ("name", "title", "seed")
+"""Keys of a case that are none of a condition under which a pile is shaken."""
 
 
-def piles_in(directory: Path) -> list[Path]:
-    """The finished runs of piles of a sweep, or in a folder, or the run itself.
+def piles_in(directory: Path) -> dict[str, list[Path]]:
+    """The finished runs of piles of a sweep, or in a folder, or the run itself, by what they have in common.
+
+    Returns
+    -------
+    dict
+        From what distinguishes them, the seed aside, to the runs; each run once, whatever names it has.
 
     Raises
     ------
     InputError
-        If there is none.
+        If there is none, or one cannot be read.
     """
     if (directory / RECORD_NAME).exists():
         found = [state.directory for state in states(read_record(directory)) if state.directory is not None]
@@ -30,21 +39,33 @@ def piles_in(directory: Path) -> list[Path]:
         found = [directory]
     else:
         found = sorted(path.parent for path in directory.glob(f"*/{PARTS}"))
-    # The same run may have two names; the hash at their end is one.
-    finished = list(
-        {
-            path.name.rpartition("-")[2]: path
-            for path in found
-            if finished_run(path) is not None and (path / PARTS).is_dir()
-        }.values()
-    )
+    finished = {
+        path.name.rpartition("-")[2]: path
+        for path in found
+        if finished_run(path) is not None and (path / PARTS).is_dir()
+    }
     if not finished:
         raise InputError(str(directory), [Problem("", None, "expected a finished run of a pile, or a folder or sweep")])
-    return finished
+    try:
+        cases = {path: flatten(read_json(path / CASE_NAME), lambda _: False) for path in finished.values()}
+    except (OSError, ValueError) as error:
+        raise InputError(str(directory), [Problem("", None, f"a case cannot be read ({error})")]) from error
+    first = next(iter(cases.values()))
+    differ = [
+        key for key in first if key not in _NO_CONDITION and len({str(case.get(key)) for case in cases.values()}) > 1
+    ]
+    groups: dict[str, list[Path]] = {}
+    for path, case in cases.items():
+        groups.setdefault(", ".join(f"{key} = {_short(case.get(key))}" for key in differ), []).append(path)
+    return groups
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
-    """Climbs over several runs of one kind: their probability is one only if they differ by their seeds alone.
+    """Climbs over several runs that differ by their seeds alone.
 
     Parameters
     ----------

@@ -332,12 +332,21 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     assert frame["run"].nunique() == 2
     again, _ = run_sweep(sweep, out, Options(2))
     assert [state.status for state in states(again)] == ["finished", "finished"]
-    found = summarise_climbs(piles_in(record.directory))
+    ((label, runs),) = piles_in(record.directory).items()
+    assert label == ""
+    found = summarise_climbs(runs)
     assert (found["runs"], found["climbed"], found["climbs"]) == (2, 0, 0)
     low, high = found["interval"]
     assert low == 0.0
     assert high == pytest.approx(1.0 - 0.025**0.5)  # none of two, Clopper and Pearson
     assert "0 of 2 runs climbed" in describe_climbs(found)
+    slower = resolve_pile_case({**tables, "drive": {**tables["drive"], "peak_acceleration": "20 g"}}, name="slower")
+    run_pile(slower, find_engine(None), out)
+    apart = piles_in(out)
+    assert sorted(len(runs) for runs in apart.values()) == [1, 2]
+    assert all("drive.peak_acceleration = " in label for label in apart)
+    told = subprocess.run([PROGRAM, "climb", str(out)], capture_output=True, text=True, check=True).stdout
+    assert told.count("runs climbed") == 2
     with pytest.raises(InputError, match="descend"):
         sweep = expand(
             {

@@ -18,5 +18,9 @@ def command(directory: Directory, within: Within = None, as_json: Json = False) 
     """Print how often piles climbed, how soon, how fast, and led by whom."""
     from sweeps.climbing import describe_climbs, piles_in, summarise_climbs
 
-    found = summarise_climbs(piles_in(directory), within)
-    print(json.dumps(found, indent=2) if as_json else describe_climbs(found))
+    found = {label: summarise_climbs(runs, within) for label, runs in piles_in(directory).items()}
+    if as_json:
+        print(json.dumps(found, indent=2, ensure_ascii=False))
+        return
+    for label, climbs in found.items():
+        print("\n".join([*([label] if label else []), describe_climbs(climbs)]))
