@@ -31,6 +31,7 @@ from runner.directory import (
     name_of,
     record_failure,
     recover,
+    room_on_disk,
     unfinished,
     write_deck,
 )
@@ -38,11 +39,13 @@ from runner.failures import RunBusy
 from runner.files import read_json, settle, settle_entry, write_json
 from runner.launch import EngineReport, Progress, launch
 from runner.locks import locked
-from templates.deck import OUTPUT_NAME
+from templates.deck import OUTPUT_NAME, Deck
 from templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Part, render_part, settling_steps
 
 PARTS = "parts"
 PART_NAME = "part.json"
+_LEAST_BYTES = 300
+"""Of a whole restart file, an atom: 500 were seen."""
 
 
 @dataclass(frozen=True)
@@ -151,29 +154,39 @@ class _Making:
         self.done = [_read_part(path) for path in part_directories(directory)]
 
     def make(self, part: Part) -> dict[str, Any]:
-        """Make a part, unless it is there, and say what it was."""
+        """Make the next part and say what it was."""
         number = len(self.done)
         place = self.directory / PARTS / f"{number:04d}"
         new = place.with_name(place.name + ".new")
         shutil.rmtree(new, ignore_errors=True)
-        new.mkdir()
         deck = render_part(self.case, part)
+        with room_on_disk(new, deck):
+            said = self._made(part, deck, new, number)
+            settle(new)
+            new.rename(place)
+            settle_entry(place.parent)
+        # The restart before the last one is kept, should the last one prove bad.
+        if number > 1:
+            (place.with_name(f"{number - 2:04d}") / RESTART_NAME).unlink(missing_ok=True)
+        self.done.append(said)
+        return said
+
+    def _made(self, part: Part, deck: Deck, new: Path, number: int) -> dict[str, Any]:
+        """Run the deck of a part in a fresh directory."""
+        new.mkdir()
         write_deck(deck, new)
         if part.begin:
-            shutil.copyfile(place.with_name(f"{number - 1:04d}") / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
+            shutil.copyfile(new.with_name(f"{number - 1:04d}") / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
         report = launch(
             deck, new, self.engine, on_progress=self._tell(part), time_limit=self.time_limit, keep_open=self.locks
         )
         (new / PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
         said = {**vars(part), **vars(report), "root_mean_square_velocity": _agitation(new)}
+        restart = new / RESTART_NAME
+        size = restart.stat().st_size if restart.exists() else 0
+        if size < _LEAST_BYTES * deck.layout.atoms:  # the engine does not look whether there was room for it
+            raise DamagedPart(f"{restart} is incomplete ({size} bytes): is the disk full?")
         write_json(new / PART_NAME, said)
-        settle(new)
-        new.rename(place)
-        settle_entry(place.parent)
-        # The restart before the last one is kept, should the last one prove bad.
-        if number > 1:
-            (place.with_name(f"{number - 2:04d}") / RESTART_NAME).unlink(missing_ok=True)
-        self.done.append(said)
         return said
 
     def _tell(self, part: Part) -> Callable[[Progress], None]:
