@@ -44,8 +44,8 @@ from templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Part, render_par
 
 PARTS = "parts"
 PART_NAME = "part.json"
-_LEAST_BYTES = 300
-"""Of a whole restart file, an atom: 500 were seen."""
+_LEAST_BYTES = 150
+"""Of a restart file, an atom: whole ones had 300 to 580."""
 
 
 @dataclass(frozen=True)
