@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass
 from math import hypot, pi
 from typing import Any, Literal
 
@@ -176,10 +176,6 @@ class PileCase:
             drive=Drive(**values["drive"]),
             run=PileRun(**values["run"]),
         )
-
-    def renamed(self, name: str) -> PileCase:
-        """The same case under another name."""
-        return replace(self, name=name)
 
 
 def _plain(values: dict[str, Any]) -> dict[str, Any]:

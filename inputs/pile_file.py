@@ -10,7 +10,14 @@ from pydantic import Field
 from inputs.case import Contact, Drive, Liquid
 from inputs.dimer import Dimer
 from inputs.pile import Container, PileBeads, PileCase, PileRun, lattice
-from inputs.resolving import MOST_STEPS, UnusableKeyError, density_of, resolve_contact, resolve_liquid
+from inputs.resolving import (
+    MOST_STEPS,
+    UnusableKeyError,
+    density_of,
+    largest_time_step,
+    resolve_contact,
+    resolve_liquid,
+)
 from inputs.schema import AUTO, ContactTable, EnvironmentTable, LiquidTable, Number, Table, Whole
 from inputs.timestep import TimeStepLimits, fit_into_cycle, time_step_limits
 from inputs.units import Acceleration, Density, Duration, Frequency, Length, Radius, Speed, Time
@@ -162,15 +169,7 @@ def limits_of(beads: PileBeads, contact: Contact, liquid: Liquid, drive: Drive) 
 
 def _run(table: PileRunTable, beads: PileBeads, contact: Contact, liquid: Liquid, drive: Drive) -> PileRun:
     limits = limits_of(beads, contact, liquid, drive)
-    exceeded = limits.exceeded_by(table.time_step) if table.time_step is not None else []
-    if exceeded and not table.allow_unstable:
-        allowed = min(limits.as_dict().values())
-        raise UnusableKeyError(
-            "run.time_step",
-            f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed * 1e6:.3g} us, "
-            '"auto", or allow_unstable = true',
-        )
-    largest = table.time_step if table.time_step is not None else limits.recommended()
+    largest = largest_time_step(table.time_step, limits, allow_unstable=table.allow_unstable)
     wanted = drive.frequency / table.frames_per_second
     per_cycle, cycles_per_frame = (round(1.0 / wanted), 1) if wanted < 1.0 else (1, round(wanted))
     time_step, steps = fit_into_cycle(largest, drive.frequency, per_cycle)

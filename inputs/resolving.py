@@ -10,7 +10,7 @@ from inputs.case import Beads, Contact, Drive, Liquid, Run, Start, WalkerCase
 from inputs.dimer import Dimer, contact_loads, horizontal_distance, reach
 from inputs.library import suggestion
 from inputs.schema import BeadsTable, ContactTable, LiquidTable, WalkerFile
-from inputs.timestep import fit_into_cycle, time_step_limits
+from inputs.timestep import TimeStepLimits, fit_into_cycle, time_step_limits
 
 MOST_STEPS = 2**31 - 1
 _WAYS: dict[str, Literal["both", "right", "left"]] = {
@@ -221,15 +221,7 @@ def _run(file: WalkerFile, dimer: Dimer, contact: Contact, liquid: Liquid, drive
             "run.bridge_samples_per_cycle", f"expected a divisor of samples_per_cycle = {table.samples_per_cycle}"
         )
     limits = time_step_limits(dimer, contact, liquid, drive)
-    exceeded = limits.exceeded_by(table.time_step) if table.time_step is not None else []
-    if exceeded and not table.allow_unstable:
-        allowed = min(limits.as_dict().values())
-        raise UnusableKeyError(
-            "run.time_step",
-            f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed * 1e6:.3g} us, "
-            '"auto", or allow_unstable = true',
-        )
-    largest = table.time_step if table.time_step is not None else limits.recommended()
+    largest = largest_time_step(table.time_step, limits, allow_unstable=table.allow_unstable)
     time_step, steps = fit_into_cycle(largest, drive.frequency, table.samples_per_cycle)
     if steps * table.cycles > MOST_STEPS:
         most = MOST_STEPS // steps
@@ -237,6 +229,27 @@ def _run(file: WalkerFile, dimer: Dimer, contact: Contact, liquid: Liquid, drive
     return Run(
         time_step, steps, table.cycles, table.settling_cycles, table.samples_per_cycle, table.bridge_samples_per_cycle
     )
+
+
+def largest_time_step(given: float | None, limits: TimeStepLimits, *, allow_unstable: bool) -> float:
+    """The step that a case gives, or the one that ``"auto"`` takes, s.
+
+    Raises
+    ------
+    UnusableKeyError
+        If a given one is beyond a limit and the case does not insist.
+    """
+    if given is None:
+        return limits.recommended()
+    exceeded = limits.exceeded_by(given)
+    if exceeded and not allow_unstable:
+        allowed = min(limits.as_dict().values())
+        raise UnusableKeyError(
+            "run.time_step",
+            f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed * 1e6:.3g} us, "
+            '"auto", or allow_unstable = true',
+        )
+    return given
 
 
 def _placed(case: WalkerCase, spacing: float | None) -> WalkerCase:

@@ -13,9 +13,8 @@ from paper import dimers
 from paper.sources import Sources
 from postprocess.drawing import new_figure
 from postprocess.gait import gait, settled_samples
-from theory.motion import translation
 from theory.prediction import MOVING, motion_of
-from theory.quasistatic import detachment
+from theory.quasistatic import detachment, translation
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -60,6 +60,11 @@ class Published:
     measured: bool = True
 
 
+def _in_mm(speed: float) -> float:
+    """A published speed, m/s, in mm/s with the digits that it was published with."""
+    return round(speed * 1e3, 6)
+
+
 _SPEED = (
     "Speeds hang on friction and on the tangential drag of the bridges, neither of which the paper publishes; its "
     "curve rises later and more steeply, as with more friction and some fifteen times the bridges' nominal drag."
@@ -83,7 +88,7 @@ _TURNED = (
 # are ours.
 NUMBERS = (
     *(
-        Published(f"fig2_{g:g}g", f"Fig. 2, fit at {g:g} g, 60 to 90 Hz", v * 1e3, hangs_on=_SPEED)
+        Published(f"fig2_{g:g}g", f"Fig. 2, fit at {g:g} g, 60 to 90 Hz", _in_mm(v), hangs_on=_SPEED)
         for g, v in FIT.items()
     ),
     *(
@@ -123,17 +128,25 @@ NUMBERS = (
         hangs_on=_THRESHOLD,
     ),
     *(
-        Published(f"fig3_{r1:g}_{r2:g}", f"Fig. 3, fit for R = {r1:g}/{r2:g} mm", v * 1e3, hangs_on=_ASYMMETRY)
+        Published(f"fig3_{r1:g}_{r2:g}", f"Fig. 3, fit for R = {r1:g}/{r2:g} mm", _in_mm(v), hangs_on=_ASYMMETRY)
         for (r1, r2), v in FIG3_FIT.items()
     ),
     Published("fig3_symmetric", "Fig. 3, a symmetric dimer does not walk", 0.0, hangs_on=_TURNED),
     Published("fig4a_gamma", "Fig. 4a, Γ0", 0.74, "", (0.7345, 0.745), measured=False),
-    Published("fig4a_velocity", "Fig. 4a, velocity (sets the shipped friction)", 2.3, hangs_on=_SPEED, measured=False),
+    Published(
+        "fig4a_velocity",
+        "Fig. 4a, velocity (sets the shipped friction)",
+        _in_mm(FIG4_VELOCITY[0]),
+        hangs_on=_SPEED,
+        measured=False,
+    ),
     Published("fig4a_sliding", "Fig. 4a, large bead's mean sliding: hardly any", 0.0, hangs_on=_SPEED),
     Published("fig4b_gamma", "Fig. 4b, Γ0", 3.5, "", (3.45, 3.55), measured=False),
-    Published("fig4b_velocity", "Fig. 4b, velocity", 8.0, hangs_on=_FIG4B),
-    Published("fig4b_rotation", "Fig. 4b, large bead's mean rotation velocity", 13.3, hangs_on=_FIG4B),
-    Published("fig4b_sliding", "Fig. 4b, large bead's mean sliding velocity", -5.3, hangs_on=_FIG4B),
+    Published("fig4b_velocity", "Fig. 4b, velocity", _in_mm(FIG4_VELOCITY[1]), hangs_on=_FIG4B),
+    Published(
+        "fig4b_rotation", "Fig. 4b, large bead's mean rotation velocity", _in_mm(FIG4B_ROTATION), hangs_on=_FIG4B
+    ),
+    Published("fig4b_sliding", "Fig. 4b, large bead's mean sliding velocity", _in_mm(FIG4B_SLIDING), hangs_on=_FIG4B),
     Published(
         "alignment_asymmetric",
         "Asymmetric dimers align with the shaking axis: largest angle to it at the end",

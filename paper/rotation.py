@@ -12,8 +12,8 @@ from paper import dimers, published
 from paper.sources import Sources
 from postprocess.drawing import new_figure
 from postprocess.gait import gait
-from theory.motion import translation
 from theory.prediction import motion_of
+from theory.quasistatic import translation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

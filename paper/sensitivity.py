@@ -29,6 +29,8 @@ PARAMETERS = {
 }
 """What is varied, and the column that says so (the friction of bead on bead goes with that of bead on wall)."""
 _TOGETHER = "all together"
+_ASTRAY = np.pi / 4.0
+"""A walker that ends at a larger angle, rad, from where it was to face has left the axis."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ def steady_speed(run: str | Path) -> float:
     Mean velocities of walkers that leave the axis say how long the run was, rather than how they walk.
     """
     walkers = read_table(run, "walkers")
-    kept = walkers[walkers["steady"] & (walkers["orientation_end"].abs() < np.pi / 4.0)]
+    kept = walkers[walkers["steady"] & (walkers["orientation_end"].abs() < _ASTRAY)]
     return float(kept["velocity"].mean()) if len(kept) else np.nan
 
 
@@ -82,7 +84,7 @@ def _angle(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
 def _astray(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
     def share(table: pd.DataFrame) -> float:
         ends = read_table(table["run"][of], "walkers")
-        return 100.0 * float((ends["orientation_end"].abs() >= np.pi / 4.0).mean())
+        return 100.0 * float((ends["orientation_end"].abs() >= _ASTRAY).mean())
 
     return share
 

@@ -69,6 +69,10 @@ class Track:
     walls: list[frozenset[int]] = field(default_factory=list)
     merged_into: int | None = None
 
+    def members_at(self, frame: int) -> frozenset[int]:
+        """Its beads in a frame; none where it was not free and held."""
+        return self.members[self.frames.index(frame)] if frame in self.frames else frozenset()
+
 
 def components(count: int, bridges: Bridges) -> IntArray:
     """Number of the connected component of each bead, shape (count,)."""

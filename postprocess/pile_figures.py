@@ -118,7 +118,5 @@ def _climbers(found: PileAnalysis, frame: int) -> set[int]:
         bead
         for track, climb in zip(found.tracks, found.climbs, strict=True)
         if climb.climbed
-        for at, members in zip(track.frames, track.members, strict=True)
-        if at == frame
-        for bead in members
+        for bead in track.members_at(frame)
     }

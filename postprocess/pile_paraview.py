@@ -74,8 +74,7 @@ def beads_of(found: PileAnalysis, frame: int, bridges: Bridges) -> pv.PolyData:
     count = len(motion.radius)
     track, climber = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
     for number, (one, climb) in enumerate(zip(found.tracks, found.climbs, strict=True)):
-        if frame in one.frames:
-            members = list(one.members[one.frames.index(frame)])
+        if members := list(one.members_at(frame)):
             track[members] = number
             climber[members] = int(climb.climbed)
     mesh = pv.PolyData(motion.position[frame].copy())

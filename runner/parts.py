@@ -264,6 +264,11 @@ def _agitation(directory: Path) -> float:
     return float(told[-1])
 
 
+def is_pile(directory: Path) -> bool:
+    """Whether a run directory is a pile's."""
+    return (directory / PARTS).is_dir()
+
+
 def part_directories(directory: Path) -> list[Path]:
     """The whole parts of a run, in their order."""
     return sorted(path for path in (directory / PARTS).glob("[0-9]*") if not path.suffix)

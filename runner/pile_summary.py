@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from math import isfinite, pi
+from math import pi
 from typing import Any
 
 from inputs.pile import PileCase
 from inputs.pile_file import limits_of
-from inputs.timestep import AUTO_FRACTIONS
 from inputs.units import ACCELERATION_OF_ONE_G
 from runner.cost import START_UP_SECONDS
-from runner.summary import text_of_case
+from runner.summary import lines_of_limits, step_against, text_of_case
 from templates.pile import settling_steps
 
 _BEAD_STEPS_PER_SECOND = 2.6e6
@@ -30,7 +29,7 @@ def predicted_pile_seconds(case: PileCase) -> float:
 def summarise_pile(case: PileCase) -> dict[str, Any]:
     """Everything that ``walkers show`` prints of a pile, SI units."""
     run, radii = case.run, case.beads.radii
-    limits = limits_of(case.beads, case.contact, case.liquid, case.drive).as_dict()
+    limits = limits_of(case.beads, case.contact, case.liquid, case.drive)
     volume = sum(4.0 / 3.0 * pi * radius**3 for radius in radii)
     steps = run.cycles * run.steps_per_cycle
     return {
@@ -42,11 +41,7 @@ def summarise_pile(case: PileCase) -> dict[str, Any]:
             "mass": volume * case.beads.density,
             "liquid": volume * case.liquid.volume_fraction,
         },
-        "time_step": {
-            "step": run.time_step,
-            "limits": {name: limit if isfinite(limit) else None for name, limit in limits.items()},
-            "share": {name: run.time_step / limit for name, limit in limits.items()},
-        },
+        "time_step": step_against(run.time_step, limits),
         "run": {
             "steps": steps,
             "simulated_seconds": steps * run.time_step,
@@ -66,13 +61,8 @@ def describe_pile_case(summary: dict[str, Any]) -> str:
         f"{beads['volume'] * 1e9:.4g} µL with {beads['liquid'] * 1e9:.3g} µL of liquid",
         f"drive      a0 = {drive['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g",
         f"time step  {step['step'] * 1e6:.5g} µs",
-    ]
-    for name, limit in step["limits"].items():
-        shown = f"{limit * 1e6:.4g} µs" if limit is not None else "none"
-        share = f"{step['share'][name]:.3f} of it (auto: up to {AUTO_FRACTIONS[name]:g})"
-        lines.append(f"  {name:10} limit {shown:>10}, the step is {share}")
-    lines.append(
+        *lines_of_limits(step),
         f"run        {run['steps']} steps after the settling, {run['simulated_seconds']:.4g} s, in {run['parts']} "
-        f"parts with {run['frames']} frames, about {run['predicted_seconds'] / 60.0:.1f} min"
-    )
+        f"parts with {run['frames']} frames, about {run['predicted_seconds'] / 60.0:.1f} min",
+    ]
     return "\n".join(lines)

@@ -9,7 +9,7 @@ from inputs import library
 from inputs.case import WalkerCase
 from inputs.dimer import contact_loads, dimer_of
 from inputs.forces import capillary_force_limit_at_wall
-from inputs.timestep import AUTO_FRACTIONS, time_step_limits
+from inputs.timestep import AUTO_FRACTIONS, TimeStepLimits, time_step_limits
 from inputs.units import ACCELERATION_OF_ONE_G
 from runner.cost import predicted_seconds
 
@@ -26,7 +26,7 @@ def summarise(case: WalkerCase) -> dict[str, Any]:
         (limits, the chosen step and its share of each), ``run`` (steps, frames, predicted seconds).
     """
     dimer, loads, run = dimer_of(case), contact_loads(case), case.run
-    limits = time_step_limits(dimer, case.contact, case.liquid, case.drive).as_dict()
+    limits = time_step_limits(dimer, case.contact, case.liquid, case.drive)
     planes = [capillary_force_limit_at_wall(case.liquid.surface_tension, radius) for radius in case.beads.radii]
     return {
         "case": case.as_dict(),
@@ -52,11 +52,7 @@ def summarise(case: WalkerCase) -> dict[str, Any]:
             }
             for number, name in enumerate(_CONTACTS)
         ],
-        "time_step": {
-            "step": run.time_step,
-            "limits": {name: limit if isfinite(limit) else None for name, limit in limits.items()},
-            "share": {name: run.time_step / limit for name, limit in limits.items()},
-        },
+        "time_step": step_against(run.time_step, limits),
         "run": {
             "steps_per_cycle": run.steps_per_cycle,
             "steps": run.steps,
@@ -64,6 +60,16 @@ def summarise(case: WalkerCase) -> dict[str, Any]:
             "samples": run.cycles * run.samples_per_cycle + 1,
             "predicted_seconds": predicted_seconds(case),
         },
+    }
+
+
+def step_against(time_step: float, limits: TimeStepLimits) -> dict[str, Any]:
+    """A time step (s) with the limits, None where one does not apply, and its share of each."""
+    known = limits.as_dict()
+    return {
+        "step": time_step,
+        "limits": {name: limit if isfinite(limit) else None for name, limit in known.items()},
+        "share": {name: time_step / limit for name, limit in known.items()},
     }
 
 
@@ -134,12 +140,19 @@ def _text_of_contacts(summary: dict[str, Any]) -> str:
 def _text_of_step(summary: dict[str, Any]) -> str:
     step, run = summary["time_step"], summary["run"]
     lines = [f"time step  {step['step'] * 1e6:.5g} µs, {run['steps_per_cycle']} a cycle"]
-    for name, limit in step["limits"].items():
-        shown = f"{limit * 1e6:.4g} µs" if limit is not None else "none"
-        share = f"{step['share'][name]:.3f} of it (auto: up to {AUTO_FRACTIONS[name]:g})"
-        lines.append(f"  {name:10} limit {shown:>10}, the step is {share}")
+    lines += lines_of_limits(step)
     lines.append(
         f"run        {run['steps']} steps, {run['simulated_seconds']:.4g} s simulated, {run['samples']} samples, "
         f"about {run['predicted_seconds']:.1f} s on one core"
     )
     return "\n".join(lines)
+
+
+def lines_of_limits(step: dict[str, Any]) -> list[str]:
+    """What `step_against` says, a line a limit."""
+    lines = []
+    for name, limit in step["limits"].items():
+        shown = f"{limit * 1e6:.4g} µs" if limit is not None else "none"
+        share = f"{step['share'][name]:.3f} of it (auto: up to {AUTO_FRACTIONS[name]:g})"
+        lines.append(f"  {name:10} limit {shown:>10}, the step is {share}")
+    return lines

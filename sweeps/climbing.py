@@ -12,7 +12,7 @@ from inputs.axes import flatten
 from inputs.errors import InputError, Problem
 from runner.directory import CASE_NAME, finished_run
 from runner.files import read_json
-from runner.parts import PARTS
+from runner.parts import PARTS, is_pile
 from sweeps.record import RECORD_NAME, read_record, result_in, states
 
 _CONFIDENCE = 0.95
@@ -35,14 +35,12 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
     """
     if (directory / RECORD_NAME).exists():
         found = [state.directory for state in states(read_record(directory)) if state.directory is not None]
-    elif (directory / PARTS).is_dir():
+    elif is_pile(directory):
         found = [directory]
     else:
         found = sorted(path.parent for path in directory.glob(f"*/{PARTS}"))
     finished = {
-        path.name.rpartition("-")[2]: path
-        for path in found
-        if finished_run(path) is not None and (path / PARTS).is_dir()
+        path.name.rpartition("-")[2]: path for path in found if finished_run(path) is not None and is_pile(path)
     }
     if not finished:
         raise InputError(str(directory), [Problem("", None, "expected a finished run of a pile, or a folder or sweep")])

@@ -14,7 +14,7 @@ from postprocess.tables import WALKERS
 from runner.binary import Engine
 from runner.cost import predicted_seconds
 from runner.directory import run_place
-from runner.parts import PARTS, pile_place
+from runner.parts import is_pile, pile_place
 from runner.pile_summary import predicted_pile_seconds
 from templates.sharing import sharing_key
 
@@ -126,7 +126,7 @@ def current_result_of(directory: Path) -> dict[str, Any]:
     from postprocess.pile_result import current_pile_result
     from postprocess.result import current_result
 
-    return (current_pile_result if (directory / PARTS).is_dir() else current_result)(directory)
+    return (current_pile_result if is_pile(directory) else current_result)(directory)
 
 
 def velocity_in(result: dict[str, Any]) -> float:

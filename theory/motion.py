@@ -18,7 +18,7 @@ import numpy.typing as npt
 from inputs.case import WalkerCase
 from inputs.dimer import Dimer, contact_loads, dimer_of
 from theory.friction import Friction
-from theory.quasistatic import forces_at_rest, inertia_matrix, normal_force_matrix
+from theory.quasistatic import forces_at_rest, inertia_matrix, normal_force_matrix, translation
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -162,12 +162,6 @@ def walk(
         solved=solved,
         series=np.moveaxis(series, -1, 0),
     )
-
-
-def translation(sliding: FloatArray) -> FloatArray:
-    """Velocity of the walker from its sliding velocities, the first axis of which is the contacts'."""
-    velocity: FloatArray = (sliding[0] + sliding[1] - sliding[2]) / 2.0
-    return velocity
 
 
 def _rows_of(walker: Walker, count: int) -> FloatArray:

@@ -118,6 +118,12 @@ def detachment(sin_delta: npt.ArrayLike) -> Detachment:
     return Detachment(limits.min(axis=-1), limits.argmin(axis=-1))
 
 
+def translation(sliding: FloatArray) -> FloatArray:
+    """Velocity of the walker from its sliding velocities, the first axis of which is the contacts'."""
+    velocity: FloatArray = (sliding[0] + sliding[1] - sliding[2]) / 2.0
+    return velocity
+
+
 def mean_velocity(
     gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike, friction: float = FRICTION_OF_THE_PAPER
 ) -> FloatArray:
@@ -144,7 +150,7 @@ def mean_velocity(
         parallel = sign * _QUASISTATIC * gamma[..., None] * unit
         normal = rest + np.einsum("...ij,...j->...i", matrix, parallel)
         sliding = parallel / (friction * np.where(normal > 0.0, normal, np.nan))
-        sides.append((sliding[..., 0] + sliding[..., 1] - sliding[..., 2]) / 2.0)
+        sides.append(translation(np.moveaxis(sliding, -1, 0)))
     mean: FloatArray = (sides[0] + sides[1]) / 2.0
     return mean
 

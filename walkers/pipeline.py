@@ -147,6 +147,7 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
         If a case is given and there is no engine to look it up for.
     """
     from runner.directory import finished_run
+    from runner.parts import is_pile
 
     path = Path(run)
     if path.is_dir():
@@ -164,17 +165,12 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
 
 
 def _place_of(case: Path, out: Path) -> Path | None:
-    from inputs.pile import PileCase
     from inputs.reading import load_any
     from runner.binary import find_engine
-    from runner.directory import run_place
     from runner.ensemble import finished_place
-    from runner.parts import pile_place
+    from sweeps.kinds import place_of
 
-    loaded = load_any(case)
-    if isinstance(loaded, PileCase):
-        return pile_place(loaded, find_engine(), out)
-    return finished_place(out, run_place(loaded, find_engine(), out).name)
+    return finished_place(out, place_of(load_any(case), find_engine(), out).name)
 
 
 def described(directory: Path, result: dict[str, Any], *, found: bool = False) -> str:
@@ -186,13 +182,6 @@ def described(directory: Path, result: dict[str, Any], *, found: bool = False) -
     from postprocess.report import describe_result
 
     return describe_result(directory, result, found=found)
-
-
-def is_pile(directory: Path) -> bool:
-    """Whether a run directory is a pile's."""
-    from runner.parts import PARTS
-
-    return (directory / PARTS).is_dir()
 
 
 def _readable_pile(run: FinishedRun) -> FinishedRun:

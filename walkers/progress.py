@@ -85,14 +85,8 @@ def _lines(case: WalkerCase) -> Callable[[Progress], None]:
 def progress_of_pile(case: PileCase) -> Iterator[Callable[[PileProgress], None]]:
     """Yield a function that shows how far a run of a pile is."""
     if sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import BarColumn, TextColumn
-        from rich.progress import Progress as Bar
-
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[told]}"))
-        with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task(case.name, total=1.0, told="")
-            yield lambda progress: bar.update(task, completed=progress.share, told=_told_of_pile(progress))
+        with _told_bar(case.name) as show:
+            yield lambda progress: show(1.0, progress.share, _told_of_pile(progress))
         return
     is_due = _rarely()
 
@@ -120,6 +114,13 @@ def progress_of_sweep(name: str) -> Iterator[Callable[[SweepProgress], None]]:
 
 @contextmanager
 def _sweep_bar(name: str) -> Iterator[Callable[[SweepProgress], None]]:
+    with _told_bar(name) as show:
+        yield lambda progress: show(progress.points, progress.done + progress.failed, _told(progress))
+
+
+@contextmanager
+def _told_bar(name: str) -> Iterator[Callable[[float, float, str], None]]:
+    """Yield a function that shows a bar, given its whole, how much of it is done, and words beside it."""
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn
     from rich.progress import Progress as Bar
@@ -127,11 +128,7 @@ def _sweep_bar(name: str) -> Iterator[Callable[[SweepProgress], None]]:
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[told]}"))
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(name, total=None, told="")
-
-        def advance(progress: SweepProgress) -> None:
-            bar.update(task, total=progress.points, completed=progress.done + progress.failed, told=_told(progress))
-
-        yield advance
+        yield lambda whole, done, told: bar.update(task, total=whole, completed=done, told=told)
 
 
 def _sweep_lines(name: str) -> Callable[[SweepProgress], None]:

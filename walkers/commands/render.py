@@ -19,7 +19,8 @@ def command(run: Run, out: Out = DEFAULT_OUT, to: Picture = None, walker: Walker
     """Render a walker or a pile at several times (off-screen, no X server)."""
     from inputs.errors import InputError, Problem
     from postprocess.rendering import render_run
-    from walkers.pipeline import find_run, is_pile
+    from runner.parts import is_pile
+    from walkers.pipeline import find_run
 
     found = find_run(run, out)
     if is_pile(found.directory):

@@ -32,7 +32,8 @@ def command(
     from inputs.errors import InputError, Problem
     from postprocess.paraview import write_vtk
     from postprocess.pile_paraview import write_pile_vtk
-    from walkers.pipeline import find_run, is_pile
+    from runner.parts import is_pile
+    from walkers.pipeline import find_run
 
     directory = find_run(run, out).directory
     if is_pile(directory) and (every_sample or as_placed):
