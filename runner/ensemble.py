@@ -78,6 +78,8 @@ class OpenEnsemble:
         said = manifest(first, self.place.name, self.engine, report, started=self.started, directory=self.directory)
         write_json(self.directory / MANIFEST_NAME, {**said, "shared_deck": {**shared, "names": list(self.cases)}})
         move_into_place(self.directory, self.place)
+        for name in self.cases:  # what was left of a run that was once made alone, and killed
+            shutil.rmtree(unfinished(self.place.parent.parent / name), ignore_errors=True)
         return {name: FinishedRun(self.place / name) for name in self.cases}
 
 
