@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, is_dataclass
-from math import hypot, pi
+from math import hypot, inf, pi
 from typing import Any, Literal
 
 from inputs.case import Contact, Drive, Liquid
@@ -43,13 +43,17 @@ class PileBeads:
     Attributes
     ----------
     small, large
-        Radii of either class, m, each occurring equally often (the engine is given no distributions).
+        Radii of either class, m, each occurring equally often (the engine is given no distributions), unless the beads
+        are placed: then the different radii, and ``large`` may be empty.
     counts
         Number of small and of large beads.
     density
         kg/m³.
     material
         Name, or None.
+    placed
+        x, y, z (m, from the middle of the floor) and radius (m) of every bead, where they are placed one by one instead
+        of poured.
     """
 
     small: tuple[float, ...]
@@ -57,10 +61,13 @@ class PileBeads:
     counts: tuple[int, int]
     density: float
     material: str | None
+    placed: tuple[tuple[float, float, float, float], ...] = ()
 
     @property
     def radii(self) -> list[float]:
-        """Radius of every bead, the small ones first, m."""
+        """Radius of every bead, m: the small ones first, or in the order in which they are placed."""
+        if self.placed:
+            return [bead[3] for bead in self.placed]
         small, large = ([sizes[number % len(sizes)] for number in range(count)] for sizes, count in self.classes)
         return small + large
 
@@ -71,8 +78,8 @@ class PileBeads:
 
     @property
     def border(self) -> float:
-        """A radius between the two classes, m."""
-        return (max(self.small) + min(self.large)) / 2.0
+        """A radius between the two classes, m; infinite where there is but one."""
+        return (max(self.small) + min(self.large)) / 2.0 if self.large else inf
 
 
 LOOSE = 1.03
@@ -153,11 +160,14 @@ class PileCase:
 
     def determinants(self) -> dict[str, Any]:
         """Everything that the run's outcome depends on, as plain JSON types."""
-        return {
+        told = {
             key: _plain(dict(vars(value))) if is_dataclass(value) else value
             for key, value in vars(self).items()
             if key not in ("name", "title")
         }
+        if not self.beads.placed:
+            del told["beads"]["placed"]
+        return told
 
     def as_dict(self) -> dict[str, Any]:
         """The whole case as plain JSON types, SI units."""
@@ -167,6 +177,7 @@ class PileCase:
     def from_dict(cls, values: dict[str, Any]) -> PileCase:
         """Rebuild a case from `as_dict` (a run directory's ``case.json``)."""
         beads = {**values["beads"], **{key: tuple(values["beads"][key]) for key in ("small", "large", "counts")}}
+        beads["placed"] = tuple(tuple(bead) for bead in beads.get("placed", ()))
         return cls(
             **{key: values[key] for key in ("name", "title", "seed", "gravity", "kind")},
             container=Container(**values["container"]),

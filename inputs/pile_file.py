@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, pi
+from math import ceil, dist, hypot, pi
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -20,11 +20,13 @@ from inputs.resolving import (
 )
 from inputs.schema import AUTO, ContactTable, EnvironmentTable, LiquidTable, Number, Table, Whole
 from inputs.timestep import TimeStepLimits, fit_into_cycle, time_step_limits
-from inputs.units import Acceleration, Density, Duration, Frequency, Length, Radius, Speed, Time
+from inputs.units import Acceleration, Density, Duration, Frequency, Length, Radius, SignedLength, Speed, Time
 
 MOST_BEADS = 20_000
 _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the count that fills a height."""
+_OVERLAP = 0.01
+"""Radii by which placed beads may overlap with each other and the walls."""
 
 
 class ContainerTable(Table):
@@ -36,11 +38,19 @@ class ContainerTable(Table):
     material: str
 
 
-class PileBeadsTable(Table):
-    """``[beads]``: two classes, each a range of radii that is filled with ``sizes`` constant radii."""
+class PlacedBeadTable(Table):
+    """One of ``[[beads.placed]]``: a bead and where it begins, from the middle of the floor."""
 
-    small: tuple[Radius, Radius]
-    large: tuple[Radius, Radius]
+    radius: Radius
+    at: tuple[SignedLength, SignedLength, SignedLength]
+
+
+class PileBeadsTable(Table):
+    """``[beads]``: two classes, each a range of radii filled with ``sizes`` constant radii; or single beads."""
+
+    small: tuple[Radius, Radius] | None = None
+    large: tuple[Radius, Radius] | None = None
+    placed: Annotated[list[PlacedBeadTable], Field(max_length=MOST_BEADS)] | None = None
     small_share: Annotated[Number, Field(ge=0, le=1)] = 0.5
     mixed_by: Literal["mass", "volume", "number"] = "mass"
     sizes: Annotated[Whole, Field(ge=1, le=20)] = 4
@@ -106,7 +116,7 @@ def resolve_pile(file: PileFile, name: str) -> PileCase:
     contact = resolve_contact(file.contact, beads.material, "container.material", wall)
     drive = Drive("z", file.drive.frequency, file.drive.peak_acceleration, file.drive.frame)
     container = Container(file.container.shape, file.container.width, file.container.height, wall)
-    _check_room(beads, container)
+    (_check_places if beads.placed else _check_room)(beads, container)
     run = _run(file.run, beads, contact, liquid, drive)
     return PileCase(
         name, file.title, container, beads, liquid, contact, drive, file.start.seed, run, file.environment.gravity
@@ -121,9 +131,46 @@ def _sizes(key: str, bounds: tuple[float, float], number: int) -> tuple[float, .
     return tuple(dict.fromkeys(float(f"{low + (high - low) * (k + 0.5) / number:.12g}") for k in range(number)))
 
 
+def _placed(file: PileFile) -> PileBeads:
+    """Beads that are placed one by one; those above the middle of the radii are the large ones."""
+    table = file.beads
+    for key in ("small", "large", "count", "fill_height"):
+        if getattr(table, key) is not None:
+            raise UnusableKeyError(f"beads.{key}", "expected none where the beads are placed one by one (beads.placed)")
+    if not table.placed:
+        raise UnusableKeyError("beads.placed", "expected at least one bead")
+    placed = tuple((*bead.at, bead.radius) for bead in table.placed)
+    radii = sorted({bead[3] for bead in placed})
+    middle = (radii[0] + radii[-1]) / 2.0
+    small = tuple(radius for radius in radii if radius <= middle)
+    large = tuple(radius for radius in radii if radius > middle)
+    many = sum(bead[3] > middle for bead in placed)
+    density = density_of(table.material, table.density, file.contact)
+    return PileBeads(small, large, (len(placed) - many, many), density, table.material, placed)
+
+
+def _check_places(beads: PileBeads, container: Container) -> None:
+    """Beads within the container that do not overlap by more than a hundredth of a radius."""
+    half = container.width / 2.0
+    for number, (x, y, z, radius) in enumerate(beads.placed):
+        slack = _OVERLAP * radius
+        across = max(abs(x), abs(y)) if container.shape == "box" else hypot(x, y)
+        if across + radius > half + slack or z < radius - slack or z + radius > container.height:
+            raise UnusableKeyError(f"beads.placed[{number}].at", "expected a bead within the container")
+        for other in range(number):
+            *there, size = beads.placed[other]
+            if dist((x, y, z), there) < radius + size - _OVERLAP * min(radius, size):
+                raise UnusableKeyError(f"beads.placed[{number}].at", f"overlaps with beads.placed[{other}]")
+
+
 def _beads(file: PileFile) -> PileBeads:
     table = file.beads
-    small, large = (_sizes(key, getattr(table, key), table.sizes) for key in ("small", "large"))
+    if table.placed is not None:
+        return _placed(file)
+    if table.small is None or table.large is None:
+        key = "small" if table.small is None else "large"
+        raise UnusableKeyError(f"beads.{key}", "expected a range of radii (or beads.placed)")
+    small, large = _sizes("small", table.small, table.sizes), _sizes("large", table.large, table.sizes)
     if max(small) >= min(large):
         raise UnusableKeyError("beads.large", "expected radii above those of the small beads")
     density = density_of(table.material, table.density, file.contact)
@@ -163,7 +210,7 @@ def limits_of(beads: PileBeads, contact: Contact, liquid: Liquid, drive: Drive) 
     Beads of a pile have more neighbours, and its viscous limit is lower; ``auto``'s share of the limit allows for it: a
     glycerol pile at 0.4 of it is agitated as at a quarter of that step, within 0.1 %, and at 0.8 it heats up.
     """
-    dimer = Dimer((max(beads.large), min(beads.small)), beads.density, liquid.surface_tension)
+    dimer = Dimer((max(beads.large or beads.small), min(beads.small)), beads.density, liquid.surface_tension)
     return time_step_limits(dimer, contact, liquid, drive)
 
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from inputs.forces import bridge_volume_at_wall, bridge_volume_between_beads
 from inputs.pile import Container
-from postprocess.pile import Bridges
+from postprocess.pile import Bridges, PileMotion
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -33,6 +34,8 @@ class Bed:
         Bridges between beads that touch and that do not.
     mean_force : float
         Normal force of the bridges between beads, positive where they pull together, N.
+    liquid_in_bridges : float
+        Sum of the volumes of all bridges, to walls too, m³ (`liquid_of_beads`).
     bulk : int
         Beads in the bulk.
     """
@@ -47,33 +50,29 @@ class Bed:
     touching: int
     opened: int
     mean_force: float
+    liquid_in_bridges: float
     bulk: int
 
 
-def bed_of(
-    position: FloatArray,
-    velocity: FloatArray,
-    radius: FloatArray,
-    large: npt.NDArray[np.bool_],
-    bulk: npt.NDArray[np.bool_],
-    bridges: Bridges,
-    container: Container,
-) -> Bed:
+def bed_of(motion: PileMotion, frame: int, bulk: npt.NDArray[np.bool_], bridges: Bridges, liquid: FloatArray) -> Bed:
     """The state of a pile in a frame.
 
     Parameters
     ----------
-    position, velocity : ndarray, shape (N, 3)
-    radius : ndarray, shape (N,)
-    large, bulk : ndarray of bool, shape (N,)
-        Class, and whether a bead belongs to the bulk.
+    motion, frame
+        Of the pile; and which frame.
+    bulk : ndarray of bool, shape (N,)
+        Whether a bead belongs to the bulk.
     bridges
         Of the frame.
-    container
-        Its cross-section is cut into cells of about four large radii.
+    liquid : ndarray, shape (N,)
+        Of `liquid_of_beads`.
     """
+    position, radius, large = motion.position[frame], motion.radius, motion.large
+    container = motion.case.container  # its cross-section is cut into cells of about four large radii
     tops = surface_cells(position[bulk], radius[bulk], container, 4.0 * float(radius.max()))
-    low, middle, high = (float(value) for value in np.percentile(tops, (10.0, 50.0, 90.0)))
+    # With no bulk the floor is the surface.
+    low, middle, high = (float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0)))
     touching = int((bridges.gap <= 0.0).sum())
     return Bed(
         surface=middle,
@@ -81,13 +80,30 @@ def bed_of(
         surface_high=high,
         brazil_nut=segregation(position[:, 2], large),
         brazil_nut_of_bulk=segregation(position[bulk, 2], large[bulk]),
-        mean_square_velocity=float(np.mean(np.sum(velocity**2, axis=1))),
+        mean_square_velocity=float(np.mean(np.sum(motion.velocity[frame] ** 2, axis=1))),
         coordination=2.0 * len(bridges.beads) / len(position),
         touching=touching,
         opened=len(bridges.gap) - touching,
         mean_force=float(bridges.force.mean()) if len(bridges.force) else 0.0,
+        liquid_in_bridges=float(liquid.sum()),
         bulk=int(bulk.sum()),
     )
+
+
+def liquid_of_beads(radius: FloatArray, volume_fraction: float, bridges: Bridges) -> FloatArray:
+    """Liquid in the bridges of each bead, m³, shape (N,): half of that of each of its bridges, all of that at walls.
+
+    The engine gives a bridge its volume from the films of the two beads, whatever other bridges these have (Shi and
+    McCarthy 2008): the liquid of a frame is what its bridges hold, and more than there is where bridges are many.
+    """
+    sizes, which = np.unique(radius, return_inverse=True)
+    between = np.array([[bridge_volume_between_beads(one, other, volume_fraction) for other in sizes] for one in sizes])
+    at_wall = np.array([bridge_volume_at_wall(size, volume_fraction) for size in sizes])
+    liquid = np.zeros(len(radius))
+    pairs = bridges.beads
+    np.add.at(liquid, pairs, between[which[pairs[:, 0]], which[pairs[:, 1]]][:, None] / 2.0)
+    np.add.at(liquid, bridges.wall_beads, at_wall[which[bridges.wall_beads]])
+    return liquid
 
 
 def surface_cells(position: FloatArray, radius: FloatArray, container: Container, cell: float) -> FloatArray:
@@ -110,14 +126,16 @@ def segregation(height: FloatArray, large: npt.NDArray[np.bool_]) -> float:
 
 
 def packing_profile(
-    position: FloatArray, radius: FloatArray, container: Container, layer: float
-) -> tuple[FloatArray, FloatArray]:
-    """Packing fraction against height, averaged over frames.
+    position: FloatArray, radius: FloatArray, liquid: FloatArray, container: Container, layer: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Packing fraction and liquid against height, averaged over frames.
 
     Parameters
     ----------
     position : ndarray, shape (F, N, 3)
     radius : ndarray, shape (N,)
+    liquid : ndarray, shape (F, N)
+        Of `liquid_of_beads`; it is taken to be where the bead's centre is.
     container
         Gives the cross-section.
     layer
@@ -127,7 +145,8 @@ def packing_profile(
     -------
     height : ndarray, shape (L,)
         Middles of the layers, m.
-    fraction : ndarray, shape (L,)
+    fraction, liquid_fraction : ndarray, shape (L,)
+        Volumes of beads and of bridges over that of the layer.
     """
     top = float((position[..., 2] + radius).max())
     edges = np.arange(0.0, top + layer, layer)
@@ -136,5 +155,6 @@ def packing_profile(
         # Volume of a sphere below an edge that lies h above its centre.
         h = np.clip(edges[:, None] - frame[:, 2], -radius, radius)
         below += (np.pi * (2.0 / 3.0 * radius**3 + radius**2 * h - h**3 / 3.0)).sum(axis=1) / len(position)
-    volumes = np.diff(below)
-    return (edges[1:] + edges[:-1]) / 2.0, volumes / (container.cross_section * layer)
+    wet = np.histogram(position[..., 2], bins=edges, weights=liquid)[0] / len(position)
+    room = container.cross_section * layer
+    return (edges[1:] + edges[:-1]) / 2.0, np.diff(below) / room, wet / room

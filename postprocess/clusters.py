@@ -23,10 +23,13 @@ from postprocess.pile import FLOOR, Bridges
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
-
+Cluster = tuple[frozenset[int], frozenset[int]]
+"""The beads of a cluster in a frame and the side walls that hold it."""
 
 _FEWEST_BEADS = 2
 _FEWEST_FRAMES = 3
+_MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
+"""Shares of a climb from whose speeds the error of its speed is taken."""
 
 
 @dataclass(frozen=True)
@@ -85,18 +88,22 @@ def components(count: int, bridges: Bridges) -> IntArray:
     return labels
 
 
-def bulk_of(labels: IntArray, bridges: Bridges) -> npt.NDArray[np.bool_]:
-    """Which beads belong to the component of most beads or to one that is bridged to the floor, shape (N,)."""
+def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> npt.NDArray[np.bool_]:
+    """Which beads belong to the component of most beads or to one that is bridged to the floor, shape (N,).
+
+    Without a ``heap``, where beads were placed one by one, the component of most beads may be a cluster on a wall: then
+    the floor alone decides.
+    """
     on_floor = labels[bridges.wall_beads[bridges.walls == FLOOR]]
-    bulk: npt.NDArray[np.bool_] = np.isin(labels, [np.bincount(labels).argmax(), *on_floor])
+    most = [np.bincount(labels).argmax()] if heap else []
+    bulk: npt.NDArray[np.bool_] = np.isin(labels, [*most, *on_floor])
     return bulk
 
 
-def held_clusters(labels: IntArray, bridges: Bridges) -> Iterator[tuple[frozenset[int], frozenset[int]]]:
+def held_clusters(labels: IntArray, bridges: Bridges, bulk: npt.NDArray[np.bool_]) -> Iterator[Cluster]:
     """The clusters that are free and held in a frame: their beads and the side walls that hold them."""
     side = bridges.walls != FLOOR
     beads, walls = bridges.wall_beads[side], bridges.walls[side]
-    bulk = bulk_of(labels, bridges)
     for label in np.unique(labels[beads[~bulk[beads]]]):
         members = np.flatnonzero(labels == label)
         if len(members) < _FEWEST_BEADS:
@@ -105,9 +112,7 @@ def held_clusters(labels: IntArray, bridges: Bridges) -> Iterator[tuple[frozense
         yield frozenset(members.tolist()), frozenset(holding.tolist())
 
 
-def follow(
-    time: FloatArray, clusters: Iterable[Sequence[tuple[frozenset[int], frozenset[int]]]], definition: Definition
-) -> list[Track]:
+def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: Definition) -> list[Track]:
     """Follow clusters from frame to frame.
 
     Parameters
@@ -177,8 +182,8 @@ class Climb:
     gain : float
         m.
     speed, standard_error : float
-        Slope of the leader's height against time within it, m/s, and the error of that fit: heights of neighbouring
-        frames go together, so that it is a lower bound of what is not known of the speed.
+        Slope of the leader's height against time within it, m/s; its error from the speeds in up to ten equal shares of
+        that time, which are independent where the frames are not (NaN with less than four of them).
     leader : int
         The bead that gained most among those that were topmost at the end or at one of ten moments before.
     height : float
@@ -263,10 +268,13 @@ def _ends(track: Track) -> list[tuple[int, frozenset[int]]]:
 
 
 def _slope(time: FloatArray, values: FloatArray) -> tuple[float, float]:
-    """Slope of a line through points and its standard error; NaN for fewer than three points."""
-    if len(time) < 3 or np.ptp(time) == 0.0:
+    """Slope of a line through points and its standard error; NaN where there are too few points."""
+    if len(time) < _FEWEST_FRAMES or np.ptp(time) == 0.0:
         return float("nan"), float("nan")
-    from postprocess.gait import fit_slopes
-
-    slope, error = fit_slopes(time, values[:, None])
-    return float(slope[0]), float(error[0])
+    slope = float(np.polynomial.Polynomial.fit(time, values, 1).convert().coef[1])
+    blocks = min(_MOST_BLOCKS, len(time) - 1)
+    if blocks < _FEWEST_BLOCKS:
+        return slope, float("nan")
+    edges = np.linspace(0, len(time) - 1, blocks + 1).round().astype(int)
+    speeds = np.diff(values[edges]) / np.diff(time[edges])
+    return slope, float(speeds.std(ddof=1) / np.sqrt(blocks))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ IntArray = npt.NDArray[np.int64]
 _HEAD_LINES = 9
 FLOOR = 0
 """Number of the floor among the walls; the others are the side walls."""
+_WALLS = {"box": ("floor", "-x", "+x", "-y", "+y"), "cylinder": ("floor", "side")}
+"""Names of the walls of a container, in the order of their numbers (`templates.pile.faces_of`)."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ class Bridges:
     gap : ndarray, shape (K,)
         m, negative where they touch.
     wall_beads, walls : ndarray of int, shape (M,)
-        Bead and wall, 0 being the floor.
+        Bead and wall, 0 being the floor; a cylinder's side is one wall.
     """
 
     beads: IntArray
@@ -75,6 +77,11 @@ class Bridges:
     gap: FloatArray
     wall_beads: IntArray
     walls: IntArray
+
+
+def names_of_walls(walls: Iterable[int], case: PileCase) -> str:
+    """Names of some walls, such as ``-x +y`` for a corner of a box."""
+    return " ".join(_WALLS[case.container.shape][wall] for wall in sorted(walls))
 
 
 def read_pile(directory: str | Path) -> PileMotion:
@@ -177,6 +184,8 @@ def read_bridges(motion: PileMotion) -> Iterator[Bridges]:
             real, held = np.any(force != 0.0, axis=1), np.any(against[:, wall("fx") : wall("fx") + 3] != 0.0, axis=1)
             ids = between[real][:, [pair("id1"), pair("id2")]].astype(np.int64) - motion.first_id
             on_wall = against[held][:, [wall("id"), wall("triangle")]].astype(np.int64)
+            if motion.case.container.shape == "cylinder":
+                on_wall[:, 1] = np.minimum(on_wall[:, 1], 1)  # the faces of the prism are one wall
             # Every wall stands twice in the deck.
             on_wall = np.unique(on_wall, axis=0).reshape(-1, 2)
             gap = -between[real, pair("overlap")]

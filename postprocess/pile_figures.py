@@ -1,4 +1,4 @@
-"""Figures of a pile: clusters that rise over its surface, segregation and agitation; the box seen from the side."""
+"""Figures of a pile: clusters that rise over its surface, what happens to them, segregation and agitation."""
 
 from __future__ import annotations
 
@@ -9,16 +9,14 @@ import numpy as np
 
 from postprocess.drawing import new_figure, save_figure
 from postprocess.pile_result import PileAnalysis, analyse
-from postprocess.rendering import side_view
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 CLIMB_NAME = "climb.png"
-SERIES_NAME = "series.png"
-_SHOWN = 6
-"""Pictures in a time series."""
+_MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "let go": "x"}
+"""How events are marked (`postprocess.events`)."""
 
 
 def plot_pile(directory: Path, destination: Path | None = None) -> list[Path]:
@@ -34,8 +32,8 @@ def plot_pile(directory: Path, destination: Path | None = None) -> list[Path]:
     Returns
     -------
     list of Path
-        ``climb.png``: heights of the clusters' leaders over the pile's surface against time, the Brazil-nut index, the
-        mean square velocity.
+        ``climb.png``: heights of the clusters' leaders over the pile's surface against time with the events in their
+        lives, the Brazil-nut index, the mean square velocity.
     """
     place = (destination or directory) / CLIMB_NAME
     return save_figure(_climb_figure(analyse(directory)), place, [directory.name])
@@ -77,42 +75,22 @@ def _heights(axes: Axes, found: PileAnalysis) -> None:
         if climb.climbed:
             told = f"climb led by a {leads} bead, {climb.size} beads: {climb.speed * 1e3:.1f} mm/s"
             line.set_label(told)
+    _mark_events(axes, found)
     axes.set(ylabel="height (mm)")
-    axes.legend(fontsize=7, loc="upper left")
+    axes.legend(fontsize=7, loc="upper left", ncols=2)
 
 
-def render_series(directory: Path, destination: Path | None = None, *, images: int = _SHOWN) -> list[Path]:
-    """Side views of the box beside each other, evenly through the drive, climbers coloured, as in Fig. 1a.
-
-    Parameters
-    ----------
-    directory
-        A run directory.
-    destination
-        The PNG to write; ``series.png`` in the run directory if None.
-    images
-        How many.
-    """
-    place = destination or directory / SERIES_NAME
-    found = analyse(directory)
-    motion = found.motion
-    start = int(np.searchsorted(motion.time, 0.0))
-    frames = np.unique(np.linspace(start, len(motion.time) - 1, images).round().astype(int))
-    top = 1.05 * float((motion.position[start:, :, 2] + motion.radius).max())
-    width = motion.case.container.width
-    across = max(0.8, 4.0 * width / top + 0.3)  # inches a picture, which is four inches high
-    figure, axes = new_figure(1.0 + across * len(frames), 5.0, ncols=len(frames), sharey=True)
-    for panel, frame in zip(np.atleast_1d(axes), frames, strict=True):
-        picture = side_view(motion, frame, _climbers(found, int(frame)), top)
-        panel.imshow(picture, extent=(-width * 500.0, width * 500.0, 0.0, top * 1e3), interpolation="bilinear")
-        panel.set(title=f"{motion.time[frame]:.2f} s", xlabel="x (mm)")
-        panel.title.set_fontsize(8)
-        panel.grid(visible=False)
-    np.atleast_1d(axes)[0].set_ylabel("height (mm)")
-    return save_figure(figure, place, [directory.name])
+def _mark_events(axes: Axes, found: PileAnalysis) -> None:
+    """A mark where something happened to a cluster, at the height of its leader in the frame nearest to it."""
+    for kind, marker in _MARKS.items():
+        told = [event for event in found.events if event.kind == kind]
+        frames = np.searchsorted(found.motion.time, [event.time for event in told])
+        leaders = [found.climbs[event.track].leader for event in told]
+        heights = found.motion.position[frames.astype(int), np.array(leaders, dtype=int), 2] * 1e3
+        axes.plot([event.time for event in told], heights, marker, ms=4, color="0.3", mfc="none", lw=0, label=kind)
 
 
-def _climbers(found: PileAnalysis, frame: int) -> set[int]:
+def climbers_in(found: PileAnalysis, frame: int) -> set[int]:
     """Beads of the clusters that climb and are free in a frame."""
     return {
         bead

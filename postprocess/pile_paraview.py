@@ -66,7 +66,7 @@ def beads_of(found: PileAnalysis, frame: int, bridges: Bridges) -> pv.PolyData:
     """Beads of a frame as points, relative to the container, SI units.
 
     Point data: ``bead`` (number, from 0), ``radius``, ``large``, ``velocity``, ``speed``, ``component`` (connected by
-    bridges), ``track`` (of `postprocess.clusters`; -1 for none) and ``is_climber``.
+    bridges), ``liquid`` (in its bridges, m³), ``track`` (of `postprocess.clusters`; -1 for none) and ``is_climber``.
     """
     import pyvista as pv
 
@@ -84,6 +84,7 @@ def beads_of(found: PileAnalysis, frame: int, bridges: Bridges) -> pv.PolyData:
     mesh.point_data["velocity"] = motion.velocity[frame].copy()
     mesh.point_data["speed"] = np.linalg.norm(motion.velocity[frame], axis=1)
     mesh.point_data["component"] = components(count, bridges)
+    mesh.point_data["liquid"] = found.liquid[frame].copy()
     mesh.point_data["track"] = track
     mesh.point_data["is_climber"] = climber
     return mesh

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from postprocess.bed import Bed, bed_of, packing_profile
+from postprocess.bed import Bed, bed_of, liquid_of_beads, packing_profile
 from postprocess.bridges import Columns
-from postprocess.clusters import Climb, Definition, Track, bulk_of, components, follow, held_clusters, judge
-from postprocess.pile import PileMotion, read_bridges, read_pile
+from postprocess.clusters import Climb, Cluster, Definition, Track, bulk_of, components, follow, held_clusters, judge
+from postprocess.events import Event, events_of
+from postprocess.pile import PileMotion, names_of_walls, read_bridges, read_pile
 from postprocess.result import RESULT_NAME, read_result
 from postprocess.tables import PILE_TABLES, intact, write_table
 from runner.files import write_json
+
+FloatArray = npt.NDArray[np.float64]
 
 _LAYERS = 0.5
 """Thickness of the layers of the packing profile, in diameters of the largest bead."""
@@ -31,16 +35,26 @@ class PileAnalysis:
         Of the beads.
     beds
         One a frame.
+    liquid : ndarray, shape (F, N)
+        In the bridges of each bead, m³.
+    bulks, held
+        Of each frame, which beads were of the bulk, and the clusters that were free and held (none before the drive).
     tracks, climbs
-        The clusters that were free and held, and what each of them did.
+        These clusters followed through time, and what each of them did.
+    events
+        When they came free, met, parted and ended.
     definition
         What counted as a climb.
     """
 
     motion: PileMotion
     beds: list[Bed]
+    liquid: FloatArray
+    bulks: list[npt.NDArray[np.bool_]]
+    held: list[list[Cluster]]
     tracks: list[Track]
     climbs: list[Climb]
+    events: list[Event]
     definition: Definition
 
 
@@ -61,18 +75,27 @@ def analyse(directory: str | Path, definition: Definition | None = None) -> Pile
     """
     rule = definition or Definition()
     motion = read_pile(directory)
+    case = motion.case
     beds: list[Bed] = []
-    clusters = []
+    liquid, bulks, held = [], [], []
     for frame, bridges in enumerate(read_bridges(motion)):
         labels = components(len(motion.radius), bridges)
-        position, velocity = motion.position[frame], motion.velocity[frame]
-        bulk = bulk_of(labels, bridges)
-        beds.append(bed_of(position, velocity, motion.radius, motion.large, bulk, bridges, motion.case.container))
+        bulks.append(bulk_of(labels, bridges, heap=not case.beads.placed))
+        liquid.append(liquid_of_beads(motion.radius, case.liquid.volume_fraction, bridges))
+        beds.append(bed_of(motion, frame, bulks[-1], bridges, liquid[-1]))
         # While the pile falls and settles, most of it is free of the rest.
-        clusters.append(list(held_clusters(labels, bridges)) if motion.time[frame] >= 0.0 else [])
-    tracks = follow(motion.time, clusters, rule)
-    climbs = [judge(track, motion.time, motion.position[:, :, 2], motion.large, rule) for track in tracks]
-    return PileAnalysis(motion, beds, tracks, climbs, rule)
+        driven = motion.time[frame] >= 0.0
+        held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
+    return judged(PileAnalysis(motion, beds, np.stack(liquid), bulks, held, [], [], [], rule), rule)
+
+
+def judged(found: PileAnalysis, definition: Definition) -> PileAnalysis:
+    """The same pile with another definition of a climb."""
+    motion = found.motion
+    tracks = follow(motion.time, found.held, definition)
+    climbs = [judge(track, motion.time, motion.position[:, :, 2], motion.large, definition) for track in tracks]
+    events = events_of(tracks, motion.time, found.bulks, definition)
+    return replace(found, tracks=tracks, climbs=climbs, events=events, definition=definition)
 
 
 def tabulate_pile(directory: str | Path, definition: Definition | None = None) -> dict[str, Any]:
@@ -92,7 +115,8 @@ def tabulate_pile(directory: str | Path, definition: Definition | None = None) -
     found = analyse(directory, definition)
     write_table(directory, "bed", _bed_columns(found))
     write_table(directory, "clusters", _cluster_columns(found))
-    write_table(directory, "profile", _profile_columns(found.motion))
+    write_table(directory, "events", _event_columns(found.events))
+    write_table(directory, "profile", _profile_columns(found))
     outcome = _result(found)
     write_json(directory / RESULT_NAME, outcome)
     return outcome
@@ -139,6 +163,9 @@ def _cluster_columns(found: PileAnalysis) -> Columns:
         "walls": column([len(climb.walls) for climb in climbs], np.int64),
         "merged_into": column([-1 if track.merged_into is None else track.merged_into for track in tracks], np.int64),
     }
+    columns["wall_names"] = np.array(
+        [names_of_walls(climb.walls, found.motion.case) for climb in climbs], dtype=np.str_
+    )
     for name in ("begin", "end", "gain", "speed", "standard_error", "height"):
         columns[name] = column([getattr(climb, name) for climb in climbs], np.float64)
     for name in ("leader", "size", "large"):
@@ -147,11 +174,24 @@ def _cluster_columns(found: PileAnalysis) -> Columns:
     return columns
 
 
-def _profile_columns(motion: PileMotion) -> Columns:
+def _event_columns(events: list[Event]) -> Columns:
+    return {
+        "time": np.array([event.time for event in events], dtype=np.float64),
+        "event": np.array([event.kind for event in events], dtype=np.str_),
+        "track": np.array([event.track for event in events], dtype=np.int64),
+        "other": np.array([-1 if event.other is None else event.other for event in events], dtype=np.int64),
+    }
+
+
+def _profile_columns(found: PileAnalysis) -> Columns:
+    motion = found.motion
     driven = motion.time >= motion.time[-1] / 2.0
     layer = _LAYERS * 2.0 * float(motion.radius.max())
-    height, fraction = packing_profile(motion.position[driven], motion.radius, motion.case.container, layer)
-    return {"height": height, "packing_fraction": fraction}
+    names = ("height", "packing_fraction", "liquid_fraction")
+    profile = packing_profile(
+        motion.position[driven], motion.radius, found.liquid[driven], motion.case.container, layer
+    )
+    return dict(zip(names, profile, strict=True))
 
 
 def _result(found: PileAnalysis) -> dict[str, Any]:
@@ -171,6 +211,7 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
         "surface": {"start": beds[start].surface, "end": beds[-1].surface},
         "brazil_nut": {"start": beds[start].brazil_nut, "end": beds[-1].brazil_nut},
         "clusters": len(found.tracks),
+        "events": dict(Counter(event.kind for event in found.events)),
         "climbs": [
             {
                 "begin": climb.begin,
@@ -182,7 +223,7 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
                 "height": climb.height,
                 "size": climb.size,
                 "large": climb.large,
-                "walls": list(climb.walls),
+                "walls": names_of_walls(climb.walls, case).split(),
             }
             for climb in found.climbs
             if climb.climbed
@@ -200,12 +241,14 @@ def describe_pile(directory: Path, result: dict[str, Any], *, found: bool = Fals
         f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling",
         f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
         f"  segregation (z of large - z of small)/sum: {nuts['start']:.3f} at the start, {nuts['end']:.3f} at the end",
-        f"  clusters   {result['clusters']} were free of the pile and held to a wall for a while",
+        f"  clusters   {result['clusters']} were free of the pile and held to a wall for a while"
+        + "".join(f", {count} {kind}" for kind, count in result["events"].items()),
         f"  climbs     {len(result['climbs']) or 'none'}",
     ]
     for climb in result["climbs"]:
         speed = "-" if climb["speed"] is None else f"{climb['speed'] * 1e3:.2f}"
-        where = "in a corner" if len(climb["walls"]) > 1 else "on a wall"
+        names = " ".join(climb["walls"])
+        where = f"in the corner {names}" if len(climb["walls"]) > 1 else f"on the wall {names}"
         leader = "large" if climb["leader_large"] else "small"
         lines.append(
             f"    {climb['begin']:.2f} to {climb['end']:.2f} s: {climb['gain'] * 1e3:.2f} mm up to "

@@ -19,7 +19,11 @@ if TYPE_CHECKING:
 
 PICTURE_NAME = "walker.png"
 _RUBY = ("#b0203c", "#e0566c")
+_GLASS = ("#8c9aa5", "#c9d2d8")
+"""Large and small beads of a pile."""
 _FLOOR = "#c9d2d8"
+_MANY = 500
+"""Beads from which on spheres are drawn coarser."""
 
 
 def render_run(
@@ -136,48 +140,62 @@ def top_view(
     return picture
 
 
-def side_view(motion: PileMotion, frame: int, coloured: Collection[int], top: float) -> npt.NDArray[np.uint8]:
-    """A pile seen along y, without perspective.
+class SideView:
+    """A pile seen along y, without perspective; one window for any number of frames.
 
     Parameters
     ----------
     motion
         Of the pile.
-    frame
-        When.
-    coloured
-        Beads shown in another colour.
     top
         Height up to which the box is shown, m.
-
-    Returns
-    -------
-    ndarray, shape (height, width, 3)
-        Red, green, blue; 40 pixels to a millimetre, from wall to wall and from the floor up.
+    pixels
+        To a millimetre.
     """
-    _prefer_egl()
-    import pyvista as pv
 
-    width = motion.case.container.width
-    size = [round(extent * 40e3) for extent in (width, top)]
-    plotter = pv.Plotter(off_screen=True, window_size=size, lighting="light kit")
-    plotter.background_color = pv.Color("white")
-    chosen = np.zeros(len(motion.radius), dtype=bool)
-    chosen[list(coloured)] = True
-    kinds = ((motion.large & ~chosen, "#8c9aa5"), (~motion.large & ~chosen, "#c9d2d8"))
-    for beads, colour in (*kinds, (chosen & motion.large, _RUBY[0]), (chosen & ~motion.large, _RUBY[1])):
-        if beads.any():
-            cloud = pv.PolyData(motion.position[frame, beads] * 1e3)
-            cloud["diameter"] = 2e3 * motion.radius[beads]
-            ball = pv.Sphere(radius=0.5, theta_resolution=24, phi_resolution=24)
-            plotter.add_mesh(cloud.glyph(scale="diameter", geom=ball, orient=False), color=colour, specular=0.4)
-    middle = (0.0, 0.0, top / 2.0 * 1e3)
-    plotter.camera_position = [(0.0, -1e2, middle[2]), middle, (0.0, 0.0, 1.0)]
-    plotter.camera.parallel_projection = True
-    plotter.camera.parallel_scale = top / 2.0 * 1e3
-    picture: npt.NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
-    plotter.close()
-    return picture
+    def __init__(self, motion: PileMotion, top: float, pixels: float = 40.0) -> None:
+        _prefer_egl()
+        import pyvista as pv
+
+        self._motion = motion
+        size = [2 * round(extent * pixels * 1e3 / 2.0) for extent in (motion.case.container.width, top)]
+        self._plotter = pv.Plotter(off_screen=True, window_size=size, lighting="light kit")
+        self._plotter.background_color = pv.Color("white")
+        rounds = 18 if len(motion.radius) < _MANY else 10
+        ball = pv.Sphere(radius=1.0, theta_resolution=rounds, phi_resolution=rounds)
+        self._around = (motion.radius[:, None, None] * ball.points * 1e3).astype(np.float32)
+        first = np.arange(len(motion.radius), dtype=np.int64) * ball.n_points
+        faces = np.tile(ball.faces.reshape(-1, 4).astype(np.int64), (len(first), 1, 1))
+        faces[:, :, 1:] += first[:, None, None]
+        self._mesh = pv.PolyData(self._around.reshape(-1, 3), faces.ravel())
+        # A sphere's own points are its normals: smooth without computing any.
+        self._mesh.point_data["Normals"] = np.tile(ball.points, (len(motion.radius), 1)).astype(np.float32)
+        self._mesh.point_data.active_normals_name = "Normals"
+        self._mesh.point_data["colour"] = np.zeros((self._mesh.n_points, 3), dtype=np.uint8)
+        self._plotter.add_mesh(self._mesh, scalars="colour", rgb=True, specular=0.4, smooth_shading=False)
+        middle = (0.0, 0.0, top / 2.0 * 1e3)
+        self._plotter.camera_position = [(0.0, -1e2, middle[2]), middle, (0.0, 0.0, 1.0)]
+        self._plotter.camera.parallel_projection = True
+        self._plotter.camera.parallel_scale = top / 2.0 * 1e3
+
+    def picture(self, frame: int, coloured: Collection[int]) -> npt.NDArray[np.uint8]:
+        """The pile in a frame, with some beads in another colour: shape (height, width, 3), red, green, blue."""
+        import pyvista as pv
+
+        motion = self._motion
+        chosen = np.zeros(len(motion.radius), dtype=bool)
+        chosen[list(coloured)] = True
+        names = np.where(chosen, np.where(motion.large, *_RUBY), np.where(motion.large, *_GLASS))
+        rgb = {str(name): pv.Color(str(name)).int_rgb for name in np.unique(names)}
+        colours = np.array([rgb[str(name)] for name in names], dtype=np.uint8)
+        self._mesh.points = (self._around + motion.position[frame][:, None] * 1e3).reshape(-1, 3).astype(np.float32)
+        self._mesh.point_data["colour"] = np.repeat(colours, self._around.shape[1], axis=0)
+        self._plotter.render()  # a screenshot does so the first time only
+        return np.array(self._plotter.screenshot(return_img=True), dtype=np.uint8)
+
+    def close(self) -> None:
+        """Give back the window."""
+        self._plotter.close()
 
 
 def _prefer_egl() -> None:

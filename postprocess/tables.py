@@ -5,6 +5,7 @@ Written with pyarrow alone (pandas takes a third of a second to import); read in
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -85,6 +86,7 @@ BED = {
     "touching": ("", "bridges between beads that touch"),
     "opened": ("", "bridges between beads that do not"),
     "mean_force": ("N", "normal force of the bridges between beads, positive: pulling together"),
+    "liquid_in_bridges": ("m^3", "sum of the volumes of all bridges, those to walls too"),
     "bulk": ("", "beads in the bulk"),
     "clusters": ("", "clusters that are free of the bulk and held to a side wall"),
     "highest": ("m", "height of the topmost bead of these; the surface where there is none"),
@@ -99,7 +101,7 @@ CLUSTERS = {
     "end": ("s", "of that gain"),
     "gain": ("m", "greatest gain of height of its leader"),
     "speed": ("m/s", "slope of the leader's height against time within it"),
-    "standard_error": ("m/s", "of the fit of the speed"),
+    "standard_error": ("m/s", "of the speed, from those in ten equal shares of the time"),
     "climbed": ("", "whether that counts as a climb"),
     "leader": ("", "number of the topmost bead at the end of the gain, from 0"),
     "leader_large": ("", "whether it is of the large class"),
@@ -108,6 +110,7 @@ CLUSTERS = {
     "size": ("", "beads then"),
     "large": ("", "large beads then"),
     "walls": ("", "number of side walls that held it then: two in a corner"),
+    "wall_names": ("", "which ones: -x, +x, -y, +y, of a cylinder side"),
     "merged_into": ("", "number of the track that took it over, -1 if none did"),
 }
 """``clusters.parquet``: a row a cluster of a pile."""
@@ -115,14 +118,23 @@ CLUSTERS = {
 PROFILE = {
     "height": ("m", "middle of a layer"),
     "packing_fraction": ("", "volume of beads over that of the container, mean over the second half of the drive"),
+    "liquid_fraction": ("", "volume of bridges over that of the container, as above"),
 }
 """``profile.parquet``: a row a layer of a pile."""
 
+EVENTS = {
+    "time": ("s", "from the begin of the drive"),
+    "event": ("", "freed, split, merged, rejoined or let go (postprocess.events)"),
+    "track": ("", "number of the cluster to which it happened"),
+    "other": ("", "that from which it split or into which it merged, -1 for none"),
+}
+"""``events.parquet``: a row an event in the lives of a pile's clusters."""
+
 WALKER_TABLES = ("trajectory", "walkers", "bridges")
-PILE_TABLES = ("bed", "clusters", "profile")
+PILE_TABLES = ("bed", "clusters", "events", "profile")
 TABLES = {
     **{"trajectory": TRAJECTORY, "walkers": WALKERS, "bridges": BRIDGES},
-    **{"bed": BED, "clusters": CLUSTERS, "profile": PROFILE},
+    **{"bed": BED, "clusters": CLUSTERS, "events": EVENTS, "profile": PROFILE},
 }
 
 
@@ -152,7 +164,7 @@ def write_table(directory: Path, name: str, columns: Mapping[str, npt.NDArray[An
         pa.field(key, array.type, metadata={"unit": unit, "meaning": meaning})
         for (key, (unit, meaning)), array in zip(description.items(), arrays, strict=True)
     ]
-    beside = directory / f"{name}.parquet.new"
+    beside = directory / f"{name}.parquet.{os.getpid()}.new"  # several may tabulate a run at once
     reals = [field.name for field in fields if pa.types.is_floating(field.type)]
     pq.write_table(
         pa.Table.from_arrays(arrays, schema=pa.schema(fields)),
@@ -182,6 +194,8 @@ def _arrow(values: npt.NDArray[Any]) -> Any:
     """An arrow array on numpy's memory; ``pyarrow.array`` would import pandas to see whether it was given a series."""
     import pyarrow as pa
 
+    if values.dtype.kind == "U":
+        return pa.array(values.tolist(), pa.string())
     if values.dtype == np.bool_:
         return pa.Array.from_buffers(
             pa.bool_(), len(values), [None, pa.py_buffer(np.packbits(values, bitorder="little").tobytes())]
@@ -198,8 +212,8 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     directory
         The run directory.
     name
-        ``trajectory``, ``walkers`` or ``bridges``, of a pile ``bed``, ``clusters`` or ``profile``; their columns are
-        described in `TABLES`.
+        ``trajectory``, ``walkers`` or ``bridges``, of a pile ``bed``, ``clusters``, ``events`` or ``profile``;
+        their columns are described in `TABLES`.
 
     Returns
     -------

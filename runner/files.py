@@ -51,7 +51,7 @@ def write_text(path: Path, text: str) -> None:
 
 def write_bytes(path: Path, contents: bytes) -> None:
     """Write a file."""
-    beside = path.with_name(path.name + ".new")
+    beside = path.with_name(f"{path.name}.{os.getpid()}.new")  # several may write it at once
     with beside.open("wb") as file:
         file.write(contents)
         file.flush()

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from inputs.axes import flatten
 from inputs.errors import InputError, Problem
+from postprocess.clusters import Climb, Definition
+from postprocess.pile_result import analyse, judged
 from runner.directory import CASE_NAME, finished_run
 from runner.files import read_json
 from runner.parts import PARTS, is_pile
@@ -102,6 +106,70 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
         "sizes": [climb["size"] for climb in every],
         "led_by_large": sum(climb["leader_large"] for climb in every),
     }
+
+
+VARIATIONS = {
+    "least_gain": (1e-3, 2e-3, 3e-3, 5e-3),
+    "brush": (0.03, 0.1, 0.2),
+    "same": (0.3, 0.5, 0.7),
+}
+"""Other thresholds of `postprocess.clusters.Definition`, tried one at a time."""
+
+
+def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
+    """How the outcome depends on the thresholds of what counts as a climb.
+
+    Parameters
+    ----------
+    runs
+        Run directories of piles.
+
+    Returns
+    -------
+    list of dict
+        A row a definition, the usual one first: ``threshold`` and ``value`` (empty and None for the usual one),
+        ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s).
+    """
+    usual = Definition()
+    tried: list[tuple[str, float | None, Definition]] = [("", None, usual)]
+    for name, values in VARIATIONS.items():
+        tried += [(name, value, replace(usual, **{name: value})) for value in values if value != getattr(usual, name)]
+    counted: list[list[list[Climb]]] = [[] for _ in tried]
+    larges: list[npt.NDArray[np.bool_]] = []
+    for run in runs:
+        found = analyse(run)
+        larges.append(found.motion.large)
+        for climbs, (_, _, definition) in zip(counted, tried, strict=True):
+            climbs.append([climb for climb in judged(found, definition).climbs if climb.climbed])
+    rows = []
+    for climbs, (name, value, _) in zip(counted, tried, strict=True):
+        speeds = [climb.speed for one in climbs for climb in one]
+        led = sum(bool(large[climb.leader]) for one, large in zip(climbs, larges, strict=True) for climb in one)
+        rows.append(
+            {
+                "threshold": name,
+                "value": value,
+                "runs": len(runs),
+                "climbed": sum(bool(one) for one in climbs),
+                "climbs": len(speeds),
+                "led_by_large": led,
+                "median_speed": float(np.median(speeds)) if speeds else None,
+            }
+        )
+    return rows
+
+
+def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:
+    """`sensitivity` as text; mm, s, mm/s."""
+    lines = []
+    for row in rows:
+        told = "as defined" if row["value"] is None else f"{row['threshold']} = {row['value']:g}"
+        speed = "-" if row["median_speed"] is None else f"{row['median_speed'] * 1e3:.2f} mm/s"
+        lines.append(
+            f"  {told:20} {row['climbed']} of {row['runs']} runs, {row['climbs']} climbs, {row['led_by_large']} led by "
+            f"a large bead, median {speed}"
+        )
+    return "\n".join(lines)
 
 
 def describe_climbs(found: dict[str, Any]) -> str:

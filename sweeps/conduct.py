@@ -65,8 +65,9 @@ class Options:
         return self.site.workers if self.site else self.workers
 
     def for_ranks(self, ranks: int) -> Options:
-        """The same for decks of so many MPI processes each: fewer of them at once here, so that each has its cores."""
-        return replace(self, workers=max(1, self.workers // ranks))
+        """The same for decks of so many MPI processes each: fewer of them at once, so that each has its cores."""
+        site = replace(self.site, ranks=ranks) if self.site else None
+        return replace(self, workers=max(1, self.workers // ranks), site=site)
 
     @property
     def longest_seconds(self) -> float:

@@ -47,8 +47,8 @@ class SweepPlan:
 
     @property
     def core_seconds(self) -> float:
-        """Predicted time of the engines, s."""
-        return sum(deck.seconds for deck in self.decks)
+        """Predicted time of the engines, over all of their MPI processes, s."""
+        return sum(deck.seconds * max(ranks_of(self.cases[point]) for point in deck.points) for deck in self.decks)
 
     @property
     def wall_seconds(self) -> float:
@@ -59,7 +59,7 @@ class SweepPlan:
     def core_seconds_apart(self) -> float:
         """What the same points would cost with one deck a point, s."""
         missing = {point for deck in self.decks for point in deck.points}
-        return sum(seconds_of(self.cases[point]) for point in missing)
+        return sum(seconds_of(self.cases[point]) * ranks_of(self.cases[point]) for point in missing)
 
     def as_text(self) -> str:
         """The plan in a few lines."""

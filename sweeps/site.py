@@ -81,10 +81,28 @@ class SiteFile(BaseModel):
 
 @dataclass(frozen=True)
 class Site:
-    """A cluster: how many decks run at once on it, and what Parsl is told."""
+    """A cluster, and what Parsl is told.
 
-    workers: int
+    Attributes
+    ----------
+    file
+        As it was read.
+    ranks
+        MPI processes of each deck: a node takes so many decks fewer.
+    """
+
     file: SiteFile
+    ranks: int = 1
+
+    @property
+    def workers_per_node(self) -> int:
+        """How many decks run at once on a node."""
+        return max(1, self.file.cores // self.ranks)
+
+    @property
+    def workers(self) -> int:
+        """How many decks run at once."""
+        return self.workers_per_node * self.file.nodes * self.file.jobs
 
 
 def cores_here() -> int:
@@ -109,7 +127,7 @@ def load_site(path: str | Path) -> Site:
     problems = _problems(file, document)
     if problems:
         raise InputError(str(path), problems)
-    site = Site(file.cores * file.nodes * file.jobs, file)
+    site = Site(file)
     try:
         pilots(site, Path("parsl"))
     except Exception as error:  # whatever Parsl's classes raise about what they are given
@@ -209,7 +227,7 @@ def pilots(site: Site, run_dir: Path) -> Config:
         settings["launcher"] = getattr(parsl.launchers, _launchers()[launcher])()
     provider = getattr(parsl.providers, name)(**(settings | _as_tuples(file.provider)))
     options: dict[str, Any] = {
-        "max_workers_per_node": file.cores,
+        "max_workers_per_node": site.workers_per_node,
         "heartbeat_period": 10,
         "heartbeat_threshold": 60,
         "block_error_handler": windowed_error_handler,

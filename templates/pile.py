@@ -134,6 +134,8 @@ def place_pile(case: PileCase) -> Scene:
 
 def _places(case: PileCase, largest: float) -> list[tuple[Point, float]]:
     """Centre and radius of each bead."""
+    if case.beads.placed:
+        return [((x, y, z), radius) for x, y, z, radius in case.beads.placed]
     from numpy.random import default_rng
 
     draw = default_rng(case.seed)

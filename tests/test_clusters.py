@@ -3,11 +3,14 @@
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
+from inputs.forces import bridge_volume_between_beads
 from inputs.pile import Container
-from postprocess.bed import packing_profile, segregation
+from postprocess.bed import liquid_of_beads, packing_profile, segregation
 from postprocess.clusters import Climb, Definition, Track, bulk_of, components, follow, held_clusters, judge
+from postprocess.events import events_of
 from postprocess.pile import Bridges
 
 BULK = list(range(20))
@@ -40,14 +43,18 @@ class Scene:
         # Bead 20 leads 21, held to the wall; 22 and 23 stay on the bulk.
         self.pairs = [[(20, 21), (22, 19), (23, 19)] for _ in TIME]
         self.walls: list[dict[int, int]] = [{20: SIDE, 0: SIDE, 1: 0} for _ in TIME]
+        self.bulks: list[npt.NDArray[np.bool_]] = []
 
     def climbs(self, definition: Definition | None = None) -> tuple[list[Track], list[Climb]]:
         rule = definition or Definition()
         clusters = []
         for pairs, walls in zip(self.pairs, self.walls, strict=True):
             bridges = frame(pairs, walls)
-            clusters.append(list(held_clusters(components(24, bridges), bridges)))
+            labels = components(24, bridges)
+            self.bulks.append(bulk_of(labels, bridges))
+            clusters.append(list(held_clusters(labels, bridges, self.bulks[-1])))
         tracks = follow(TIME, clusters, rule)
+        self.events = [(event.kind, event.track, event.other) for event in events_of(tracks, TIME, self.bulks, rule)]
         return tracks, [judge(track, TIME, self.height, self.large, rule) for track in tracks]
 
 
@@ -61,6 +68,18 @@ def test_a_rising_cluster_climbs() -> None:
     assert climb.speed == pytest.approx(3e-3, rel=1e-9)
     assert (climb.leader, climb.size, climb.large, climb.walls) == (20, 2, 1, (SIDE,))
     assert len(track.frames) == FRAMES
+    assert climb.standard_error == pytest.approx(0.0, abs=1e-12)
+    assert scene.events == [("freed", 0, None)]
+
+
+def test_the_error_of_a_speed_is_that_of_shares_of_its_time() -> None:
+    """A climb of 1 s at 4 mm/s and 3 s at 2 mm/s: ten shares, of which a quarter are fast."""
+    scene = Scene()
+    rise = np.where(TIME < 1.0, 4e-3 * TIME, 2e-3 + 2e-3 * TIME)
+    scene.height[:, 20:22] += rise[:, None]
+    _, (climb,) = scene.climbs()
+    speeds = [4e-3, 4e-3, 3e-3, *[2e-3] * 7]
+    assert climb.standard_error == pytest.approx(np.std(speeds, ddof=1) / np.sqrt(10), rel=0.1)
 
 
 def test_a_column_that_sinks_does_not() -> None:
@@ -124,6 +143,7 @@ def test_two_that_meet_go_on_as_one() -> None:
     tracks, climbs = scene.climbs()
     assert len(tracks) == 2
     assert sorted(len(track.frames) for track in tracks) == [meet, FRAMES]
+    assert sorted(kind for kind, _, _ in scene.events) == ["freed", "freed", "merged"]
     (ended,) = [track for track in tracks if track.merged_into is not None]
     assert len(ended.frames) == meet
     assert max(climb.size for climb in climbs) == 4
@@ -138,7 +158,20 @@ def test_one_that_parts_is_followed_by_its_beads() -> None:
     scene.height[:, 20:] += 3e-3 * TIME[:, None]
     tracks, _ = scene.climbs()
     assert [len(track.frames) for track in tracks] == [FRAMES, FRAMES - part]
+    assert scene.events == [("freed", 0, None), ("split", 1, 0)]
     assert {tracks[0].members[-1], tracks[1].members[-1]} == {frozenset({20, 21}), frozenset({22, 23})}
+
+
+@pytest.mark.parametrize("event", ["rejoined", "let go"])
+def test_how_a_cluster_ends(event: str) -> None:
+    scene = Scene()
+    for number in range(FRAMES // 2, FRAMES):
+        if event == "rejoined":
+            scene.pairs[number].append((21, 19))
+        else:
+            del scene.walls[number][20]
+    scene.climbs()
+    assert scene.events == [("freed", 0, None), (event, 0, None)]
 
 
 def test_a_fall_ends_a_climb_at_its_top() -> None:
@@ -181,10 +214,23 @@ def test_the_packing_profile_holds_all_of_the_beads() -> None:
     radius = draw.uniform(3e-4, 6e-4, 50)
     position = draw.uniform(1e-3, 9e-3, (3, 50, 3))
     container = Container("box", 5e-3, 20e-3, "glass")
-    height, fraction = packing_profile(position, radius, container, 2e-4)
+    liquid = draw.uniform(1e-12, 2e-12, (3, 50))
+    height, fraction, wet = packing_profile(position, radius, liquid, container, 2e-4)
     volume = float((fraction * container.cross_section * 2e-4).sum())
     assert volume == pytest.approx(float((4.0 / 3.0 * np.pi * radius**3).sum()), rel=1e-9)
+    assert float((wet * container.cross_section * 2e-4).sum()) == pytest.approx(liquid.sum() / 3.0)
     assert height[0] == pytest.approx(1e-4)
+
+
+def test_liquid_is_that_of_the_bridges() -> None:
+    """Three beads in a chain, the first on the floor: halves of the bridges between them, all of that at the floor."""
+    radius, fraction = np.array([3e-4, 3e-4, 5e-4]), 0.01
+    pairs = np.array([[0, 1], [1, 2]])
+    bridges = Bridges(pairs, np.ones(2), -np.ones(2), np.array([0]), np.array([0]))
+    equal, unequal = (bridge_volume_between_beads(3e-4, other, fraction) for other in (3e-4, 5e-4))
+    floor = 0.5 * fraction * 4.0 / 3.0 * np.pi * 3e-4**3
+    expected = [floor + equal / 2.0, (equal + unequal) / 2.0, unequal / 2.0]
+    np.testing.assert_allclose(liquid_of_beads(radius, fraction, bridges), expected)
 
 
 def test_the_brazil_nut_index_is_one_with_all_small_beads_on_the_floor() -> None:

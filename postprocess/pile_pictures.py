@@ -1,0 +1,185 @@
+"""The box seen from the side, as in Fig. 1a of Khan et al.: pictures beside each other, and films."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from inputs.errors import InputError, Problem
+from inputs.pile import PileCase
+from inputs.units import DURATION, parse_quantity
+from postprocess.drawing import new_figure, save_figure
+from postprocess.pile_figures import climbers_in
+from postprocess.pile_result import PileAnalysis, analyse
+from postprocess.rendering import SideView
+from runner.directory import CASE_NAME
+from runner.files import read_json
+
+SERIES_NAME = "series.png"
+FILM_NAME = "pile.mp4"
+_SHOWN = 6
+"""Pictures in a time series."""
+_MOST_SHOWN = 60
+_MARGIN = 64
+"""Pixels for the heights beside a film."""
+_LEAST_WIDTH = 200
+"""Pixels; on less the time has no room."""
+
+
+def render_series(
+    directory: Path, destination: Path | None = None, *, images: int = _SHOWN, apart: float | None = None
+) -> list[Path]:
+    """Side views of the box beside each other, climbers coloured, with times and a scale of heights.
+
+    Parameters
+    ----------
+    directory
+        A run directory.
+    destination
+        The PNG to write; ``series.png`` in the run directory if None.
+    images
+        How many, evenly through the drive.
+    apart
+        Seconds between them: the last ones of the run then, as many as ``images``.
+
+    Raises
+    ------
+    InputError
+        If frames were recorded less often, or the drive was shorter than that.
+    """
+    found = analyse(directory)
+    motion = found.motion
+    frames = _frames_evenly(found, images) if apart is None else _frames_apart(found, images, apart, directory)
+    top = _top(found)
+    width = motion.case.container.width
+    across = max(0.8, 4.0 * width / top + 0.3)  # inches a picture, which is four inches high
+    figure, axes = new_figure(1.0 + across * len(frames), 5.0, ncols=len(frames), sharey=True)
+    view = SideView(motion, top)
+    decimals = 2 if apart is None or apart >= 0.01 else 4
+    for panel, frame in zip(np.atleast_1d(axes), frames, strict=True):
+        picture = view.picture(frame, climbers_in(found, frame))
+        panel.imshow(picture, extent=(-width * 500.0, width * 500.0, 0.0, top * 1e3), interpolation="bilinear")
+        panel.set(title=f"{motion.time[frame]:.{decimals}f} s", xlabel="x (mm)")
+        panel.title.set_fontsize(8)
+        panel.grid(visible=False)
+    view.close()
+    np.atleast_1d(axes)[0].set_ylabel("height (mm)")
+    return save_figure(figure, destination or directory / SERIES_NAME, [directory.name])
+
+
+def render_film(directory: Path, destination: Path | None = None, *, slower: float = 1.0) -> Path:
+    """Film the box from the side, climbers coloured, with the time and a scale of heights in the picture.
+
+    Parameters
+    ----------
+    directory
+        A run directory.
+    destination
+        The MP4 to write (H.264); ``pile.mp4`` in the run directory if None.
+    slower
+        How many times slower than in reality: every frame of the drive is shown, one after the other.
+    """
+    from imageio_ffmpeg import write_frames
+
+    found = analyse(directory)
+    time = found.motion.time
+    start = int(np.searchsorted(time, 0.0))
+    path = destination or directory / FILM_NAME
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.stem}.{os.getpid()}.mp4")
+    pictures = _film(found, range(start, len(time)))
+    first = next(pictures)
+    rate = max(1.0, 1.0 / (float(np.median(np.diff(time[start:]))) * slower)) if len(time) > start + 1 else 1.0
+    size = (first.shape[1], first.shape[0])
+    writer = write_frames(beside, size, fps=rate, codec="libx264", quality=7, macro_block_size=2)
+    try:
+        writer.send(None)
+        writer.send(np.ascontiguousarray(first))
+        for picture in pictures:
+            writer.send(np.ascontiguousarray(picture))
+        writer.close()
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+    return path
+
+
+def _film(found: PileAnalysis, frames: Sequence[int]) -> Iterator[npt.NDArray[np.uint8]]:
+    """The pictures of a film, each with heights on its left and the time above."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    top = _top(found)
+    pixels = min(40.0, 1.6 / top)  # as high as a screen at most
+    view = SideView(found.motion, top, pixels)
+    font = ImageFont.load_default(16)
+    for frame in frames:
+        box = Image.fromarray(view.picture(frame, climbers_in(found, frame)))
+        wide = 2 * (max(_MARGIN + box.width + 8, _LEAST_WIDTH) // 2)
+        page = Image.new("RGB", (wide, box.height + 48), "white")
+        page.paste(box, (_MARGIN, 32))
+        draw = ImageDraw.Draw(page)
+        floor, left = 32 + box.height, _MARGIN - 2
+        draw.line([(left, 32), (left, floor), (_MARGIN + box.width + 1, floor), (_MARGIN + box.width + 1, 32)], "black")
+        draw.text((_MARGIN, 6), f"{found.motion.time[frame]:.3f} s", "black", font)
+        for height in range(0, int(top * 1e3) + 1, 5):
+            level = floor - height * box.height / (top * 1e3)
+            draw.line([(left - 6, level), (left, level)], "black")
+            draw.text((left - 10, level), f"{height} mm" if height else "0", "black", font, anchor="rm")
+        yield np.asarray(page)
+    view.close()
+
+
+def _top(found: PileAnalysis) -> float:
+    """Height up to which the box is shown, m: a little more than any bead reaches while it is shaken."""
+    motion = found.motion
+    start = int(np.searchsorted(motion.time, 0.0))
+    return 1.05 * float((motion.position[start:, :, 2] + motion.radius).max())
+
+
+def _frames_evenly(found: PileAnalysis, images: int) -> list[int]:
+    time = found.motion.time
+    start = int(np.searchsorted(time, 0.0))
+    return [int(frame) for frame in np.unique(np.linspace(start, len(time) - 1, images).round().astype(int))]
+
+
+def _frames_apart(found: PileAnalysis, images: int, apart: float, directory: Path) -> list[int]:
+    """The last frames of a run that are so many seconds apart, to a fifth of that."""
+    time = found.motion.time
+    driven = time[time >= 0.0]
+    count = min(images, int(driven[-1] / apart * (1.0 + 1e-9)) + 1, _MOST_SHOWN) if len(driven) else 0
+    wanted = driven[-1] - apart * np.arange(count)[::-1] if count else np.zeros(0)
+    frames = np.abs(time[:, None] - wanted).argmin(axis=0)
+    if count < 2 or np.abs(time[frames] - wanted).max() > 0.2 * apart:
+        between = float(np.median(np.diff(driven))) if len(driven) > 1 else 0.0
+        told = (
+            f"expected at most {driven[-1] if len(driven) else 0.0:.3g} s and a multiple of the frames' {between:.4g} s"
+        )
+        raise InputError(str(directory), [Problem("", None, f"pictures {apart:.4g} s apart: {told}")])
+    return [int(frame) for frame in frames]
+
+
+def seconds_apart(text: str, directory: Path) -> float:
+    """Read a time between pictures: a duration, or a part or multiple of the drive's cycle such as ``T/4`` or ``2 T``.
+
+    Raises
+    ------
+    InputError
+        If the text is neither.
+    """
+    cycles = re.fullmatch(r"(?P<many>[\d.]*)\s*T\s*(/\s*(?P<parts>\d+))?", text.strip())
+    try:
+        if cycles:
+            frequency = PileCase.from_dict(read_json(directory / CASE_NAME)).drive.frequency
+            seconds = float(cycles["many"] or 1) / int(cycles["parts"] or 1) / frequency
+        else:
+            seconds = parse_quantity(text, DURATION)
+        if seconds > 0.0:
+            return seconds
+    except (ValueError, ZeroDivisionError):
+        pass
+    raise InputError("--apart", [Problem("", None, f'{text!r}: expected a time such as "2 s", or "T/4" of a cycle')])
