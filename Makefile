@@ -67,6 +67,10 @@ bench: setup ## Measure what docs/performance.md states
 bench-sweeps: setup ## Measure what docs/performance.md states of sweeps
 	.venv/bin/python tests/benchmark_sweeps.py
 
+.PHONY: bench-piles
+bench-piles: setup ## Measure what docs/performance.md states of piles
+	.venv/bin/python tests/benchmark_piles.py
+
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info
