@@ -60,12 +60,14 @@ def render_series(
     across = max(0.8, 4.0 * width / top + 0.3)  # inches a picture, which is four inches high
     figure, axes = new_figure(1.0 + across * len(frames), 5.0, ncols=len(frames), sharey=True)
     view = SideView(motion, top)
+    aside = max(1, int(width * 400.0))  # mm, whole ones within the picture
     decimals = 2 if apart is None or apart >= 0.01 else 4
     for panel, frame in zip(np.atleast_1d(axes), frames, strict=True):
         picture = view.picture(frame, climbers_in(found, frame))
         panel.imshow(picture, extent=(-width * 500.0, width * 500.0, 0.0, top * 1e3), interpolation="bilinear")
         panel.set(title=f"{motion.time[frame]:.{decimals}f} s", xlabel="x (mm)")
         panel.title.set_fontsize(8)
+        panel.set_xticks([-aside, 0, aside])
         panel.grid(visible=False)
     view.close()
     np.atleast_1d(axes)[0].set_ylabel("height (mm)")
