@@ -6,6 +6,7 @@ WALKERS := .venv/bin/walkers
 OUT ?= runs
 CASE ?= fig1b
 SWEEP ?= fig2
+CALIBRATION ?= ruby
 
 .PHONY: help
 help: ## List the targets
@@ -37,6 +38,10 @@ pile: setup ## Shake the small pile (or CASE=pile-fig1a): what climbed, pictures
 .PHONY: figures
 figures: setup ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)
 	@$(WALKERS) figures --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
+
+.PHONY: calibrate
+calibrate: setup ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
+	@$(WALKERS) calibrate $(CALIBRATION) --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
 .PHONY: test
 test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test first)

@@ -23,7 +23,8 @@ class Beads:
 class Liquid:
     """Surface tension (N/m), dynamic viscosity (Pa s), density (kg/m³), effective contact angle (rad).
 
-    ``volume_fraction`` is the liquid on a bead over the bead's volume.
+    The viscosity is that of the bridges: the liquid's, times the case's ``viscosity_ratio``. ``volume_fraction`` is the
+    liquid on a bead over the bead's volume.
     """
 
     surface_tension: float

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
@@ -36,8 +36,7 @@ _BOUND_UNITS = {
     "liquid.contact_angle": " rad",
 }
 _PLAIN = {
-    "too_long": "expected two radii",
-    "tuple_type": f"expected a list, {_EXAMPLES['beads.radii']}",
+    "tuple_type": "expected a list",
     "bool_type": "expected true or false",
     "bool_parsing": "expected true or false",
     "string_type": "expected text in quotes",
@@ -70,9 +69,14 @@ def problem_of(
     key = _dotted(location)
     if details["type"] == "missing":
         if isinstance(location[-1], int):
-            return Problem(_dotted(location[:-1]), quoted(document, location[:-1]), "expected two radii")
+            return Problem(_dotted(location[:-1]), quoted(document, location[:-1]), _entries(_dotted(location[:-1])))
         return Problem(key, None, f"missing; expected {_EXAMPLES.get(key, 'a value')}")
     return Problem(key, quoted(document, location), _expectation(details, key, file, whole))
+
+
+def _entries(key: str) -> str:
+    """What is wrong with a list of places or radii that is too short or too long."""
+    return "expected three places: x, y, z" if key.endswith(".at") else "expected two radii"
 
 
 def _dotted(location: Sequence[str | int]) -> str:
@@ -84,8 +88,10 @@ def _dotted(location: Sequence[str | int]) -> str:
 
 def _expectation(details: ErrorDetails, key: str, file: type[BaseModel], whole: str) -> str:
     kind, context = details["type"], details.get("ctx", {})
+    if kind == "too_long":
+        return _entries(key) if "beads" in key else f"expected at most {context['max_length']} entries"
     if kind in _PLAIN:
-        return _PLAIN[kind]
+        return _PLAIN[kind] + (f", {_EXAMPLES[key]}" if kind == "tuple_type" and key in _EXAMPLES else "")
     if kind == "extra_forbidden":
         return _unknown_key([str(part) for part in details["loc"] if isinstance(part, str)], file, whole)
     if kind == "literal_error":
@@ -98,17 +104,26 @@ def _expectation(details: ErrorDetails, key: str, file: type[BaseModel], whole: 
 
 
 def _table_at(location: Sequence[str], file: type[BaseModel]) -> type[BaseModel] | None:
-    table = file
-    for part in location:
+    table, parts = file, iter(location)
+    for part in parts:
         field = table.model_fields.get(part)
-        if field is None:
+        nested = _model_in(field.annotation) if field is not None else None
+        if nested is None:
             return None
-        annotations = [field.annotation, *get_args(field.annotation)]
-        nested = [kind for kind in annotations if isinstance(kind, type) and issubclass(kind, BaseModel)]
-        if not nested:
+        table, named = nested
+        if named and next(parts, None) is None:  # a table of tables that have names of the user's
             return None
-        table = nested[0]
     return table
+
+
+def _model_in(annotation: Any) -> tuple[type[BaseModel], bool] | None:
+    """The model that a field holds, whether alone, in a list or by names (which is told), or None."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation, False
+    for inner in get_args(annotation):
+        if (found := _model_in(inner)) is not None:
+            return found[0], found[1] or get_origin(annotation) is dict
+    return None
 
 
 def _all_keys(file: type[BaseModel], prefix: str = "") -> list[str]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from math import ceil, dist, hypot, pi
+from math import ceil, dist, pi
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from inputs.case import Contact, Drive, Liquid
 from inputs.dimer import Dimer
-from inputs.pile import Container, PileBeads, PileCase, PileRun, lattice
+from inputs.pile import Container, PileBeads, PileCase, PileRun, distance_from_axis, lattice
 from inputs.resolving import (
     MOST_STEPS,
     UnusableKeyError,
@@ -134,9 +134,10 @@ def _sizes(key: str, bounds: tuple[float, float], number: int) -> tuple[float, .
 def _placed(file: PileFile) -> PileBeads:
     """Beads that are placed one by one; those above the middle of the radii are the large ones."""
     table = file.beads
-    for key in ("small", "large", "count", "fill_height"):
-        if getattr(table, key) is not None:
-            raise UnusableKeyError(f"beads.{key}", "expected none where the beads are placed one by one (beads.placed)")
+    for key in sorted(table.model_fields_set - {"placed", "material", "density"}):
+        raise UnusableKeyError(f"beads.{key}", "expected none where the beads are placed one by one (beads.placed)")
+    if file.start.model_fields_set:
+        raise UnusableKeyError("start.seed", "expected none where the beads are placed: every start would be the same")
     if not table.placed:
         raise UnusableKeyError("beads.placed", "expected at least one bead")
     placed = tuple((*bead.at, bead.radius) for bead in table.placed)
@@ -154,8 +155,11 @@ def _check_places(beads: PileBeads, container: Container) -> None:
     half = container.width / 2.0
     for number, (x, y, z, radius) in enumerate(beads.placed):
         slack = _OVERLAP * radius
-        across = max(abs(x), abs(y)) if container.shape == "box" else hypot(x, y)
-        if across + radius > half + slack or z < radius - slack or z + radius > container.height:
+        if (
+            distance_from_axis(container, x, y) + radius > half + slack
+            or z < radius - slack
+            or z + radius > container.height
+        ):
             raise UnusableKeyError(f"beads.placed[{number}].at", "expected a bead within the container")
         for other in range(number):
             *there, size = beads.placed[other]

@@ -148,6 +148,7 @@ def resolve_liquid(table: LiquidTable) -> Liquid:
     if tension is None or viscosity is None:
         lacking = "surface_tension" if tension is None else "dynamic_viscosity"
         raise UnusableKeyError(f"liquid.{lacking}", "missing; expected a liquid of the library by name, or this number")
+    viscosity = float(f"{viscosity * table.viscosity_ratio:.15g}")
     return Liquid(tension, viscosity, density, table.volume_fraction, table.contact_angle, table.name)
 
 

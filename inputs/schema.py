@@ -85,7 +85,10 @@ class BeadsTable(Table):
 
 
 class LiquidTable(Table):
-    """``[liquid]``: a name from the library, or its numbers, or both (the numbers win)."""
+    """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
+
+    ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag.
+    """
 
     name: str | None = None
     surface_tension: SurfaceTension | None = None
@@ -93,6 +96,7 @@ class LiquidTable(Table):
     kinematic_viscosity: KinematicViscosity | None = None
     dynamic_viscosity: DynamicViscosity | None = None
     volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] = 0.01
+    viscosity_ratio: Annotated[Number, Field(ge=1e-3, le=1e4)] = 1.0
     contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] = 0.0
 
 

@@ -93,8 +93,9 @@ def bed_of(motion: PileMotion, frame: int, bulk: npt.NDArray[np.bool_], bridges:
 def liquid_of_beads(radius: FloatArray, volume_fraction: float, bridges: Bridges) -> FloatArray:
     """Liquid in the bridges of each bead, m³, shape (N,): half of that of each of its bridges, all of that at walls.
 
-    The engine gives a bridge its volume from the films of the two beads, whatever other bridges these have (Shi and
-    McCarthy 2008): the liquid of a frame is what its bridges hold, and more than there is where bridges are many.
+    The engine gives a bridge a share of the films of its two beads, that of the caps which they cover of each other
+    (Shi and McCarthy 2008), and half of a bead's film to a bridge with a wall, whatever other bridges it has. Caps of
+    beads that touch do not overlap, so that a frame's liquid is less than was given; the rest is on the beads.
     """
     sizes, which = np.unique(radius, return_inverse=True)
     between = np.array([[bridge_volume_between_beads(one, other, volume_fraction) for other in sizes] for one in sizes])

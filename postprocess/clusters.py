@@ -6,15 +6,19 @@ one of its beads to a side wall. A *track* is a cluster followed by its beads: f
 shares most of them. What is no cluster for a moment only, because its tail brushes the pile or it lets go of the wall,
 for no longer than `Definition.brush`, stays the same track.
 
-A *climb* is height gained while free and held: a track whose leader, one of its topmost beads, rose by at least
-`Definition.least_gain` between frames that follow each other and in both of which the cluster was free and held. A
-column that detaches high and sinks gains none; a bead thrown into the air is not held, nor is what flies for a moment.
+A *climb* is height gained while free and held: a track whose beads rose by at least `Definition.least_gain` between
+frames that follow each other and in both of which the cluster was free and held. From frame to frame the rise is that
+of the mean height of the beads that it has in both, so that beads that it takes up or leaves behind count for nothing.
+A column that detaches high and sinks gains none; a bead thrown into the air is not held, nor is what flies for a
+moment.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +33,7 @@ Cluster = tuple[frozenset[int], frozenset[int]]
 _FEWEST_BEADS = 2
 _FEWEST_FRAMES = 3
 _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
-"""Shares of a climb from whose speeds the error of its speed is taken."""
+"""Parts of a climb from whose speeds the error of its speed is taken."""
 
 
 @dataclass(frozen=True)
@@ -63,14 +67,15 @@ class Track:
         Its beads in each of these.
     walls
         The side walls that held it in each.
-    merged_into
-        Number of the track that took over its beads, or None.
+    merged_into, merged_at
+        Number of the track that took over its beads, and the frame in which it did; None if none did.
     """
 
     frames: list[int] = field(default_factory=list)
     members: list[frozenset[int]] = field(default_factory=list)
     walls: list[frozenset[int]] = field(default_factory=list)
     merged_into: int | None = None
+    merged_at: int | None = None
 
     def members_at(self, frame: int) -> frozenset[int]:
         """Its beads in a frame; none where it was not free and held."""
@@ -150,7 +155,7 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: 
             if number in taken.values() or number in ended:
                 continue
             if place in taken:
-                tracks[number].merged_into = taken[place]
+                tracks[number].merged_into, tracks[number].merged_at = taken[place], frame
                 ended.add(number)
             else:
                 taken[place] = number
@@ -182,10 +187,12 @@ class Climb:
     gain : float
         m.
     speed, standard_error : float
-        Slope of the leader's height against time within it, m/s; its error from the speeds in up to ten equal shares of
-        that time, which are independent where the frames are not (NaN with less than four of them).
+        The gain over the time in which it was made, m/s, and the error of that mean, from the speeds in up to ten equal
+        numbers of frames (NaN with less than four of them). It is too small where the speed changes more slowly than
+        a tenth of the climb takes; that begin and end are those of the greatest gain makes the speed of a short and
+        unsteady climb too large.
     leader : int
-        The bead that gained most among those that were topmost at the end or at one of ten moments before.
+        The bead that was most often topmost meanwhile.
     height : float
         Of the leader at the end, m.
     size, large : int
@@ -229,52 +236,60 @@ def judge(
     definition
         What counts.
     """
-    best: tuple[float, int, int, int] | None = None
-    for leader in {max(members, key=lambda bead: height[frame, bead]) for frame, members in _ends(track)}:
-        places = [place for place, members in enumerate(track.members) if leader in members]
-        z = height[[track.frames[place] for place in places], leader]
-        # Height gained: what is gained while it is no cluster does not count.
-        adjacent = np.diff([track.frames[place] for place in places]) == 1
-        gained = np.concatenate([[0.0], np.cumsum(np.where(adjacent, np.diff(z), np.minimum(np.diff(z), 0.0)))])
-        lowest = np.minimum.accumulate(gained)
-        end = int(np.argmax(gained - lowest))
-        found = (float(gained[end] - lowest[end]), leader, places[int(np.argmin(gained[: end + 1]))], places[end])
-        best = found if best is None else max(best, found)
-    if best is None:
+    if not track.frames:
         raise ValueError("a track without a frame")
-    gain, leader, begin, end = best
-    span = [track.frames[place] for place in range(begin, end + 1) if leader in track.members[place]]
-    speed, error = _slope(time[span], height[span, leader])
-    members = track.members[end]
+    gained, seconds = _gained(track, time, height)
+    risen = gained - np.minimum.accumulate(gained)
+    end = int(np.argmax(risen))
+    begin = int(np.argmin(gained[: end + 1]))
+    span = range(begin, end + 1)
+    topmost = Counter(max(track.members[place], key=lambda bead: height[track.frames[place], bead]) for place in span)
+    leader = topmost.most_common(1)[0][0]
+    speed, error = _speed(seconds[begin : end + 1], gained[begin : end + 1])
+    last, members = track.frames[end], track.members[end]
     return Climb(
-        begin=float(time[span[0]]),
-        end=float(time[span[-1]]),
-        gain=gain,
+        begin=float(time[track.frames[begin]]),
+        end=float(time[last]),
+        gain=float(risen[end]),
         speed=speed,
         standard_error=error,
         leader=leader,
-        height=float(height[span[-1], leader]),
+        height=float(height[last, leader]),
         size=len(members),
         large=int(large[list(members)].sum()),
         walls=tuple(sorted(track.walls[end])),
-        climbed=gain >= definition.least_gain and len(span) >= _FEWEST_FRAMES,
+        climbed=bool(risen[end] >= definition.least_gain and len(span) >= _FEWEST_FRAMES),
     )
 
 
-def _ends(track: Track) -> list[tuple[int, frozenset[int]]]:
-    """A few frames of a track from which leaders are taken: every tenth and the last."""
-    places = {*range(0, len(track.frames), max(1, len(track.frames) // 10)), len(track.frames) - 1}
-    return [(track.frames[place], track.members[place]) for place in sorted(places)]
+def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Height gained since a track's first frame (m) and the seconds in which it was, shape (frames of the track,).
+
+    What is gained while it is no cluster does not count, nor does the time; what is lost then does.
+    """
+    rises, seconds = [0.0], [0.0]
+    for place, (before, now) in enumerate(pairwise(track.frames)):
+        common = list(track.members[place] & track.members[place + 1])
+        rise = float((height[now, common] - height[before, common]).mean()) if common else 0.0
+        follows = now == before + 1
+        rises.append(rise if follows else min(rise, 0.0))
+        seconds.append(float(time[now] - time[before]) if follows else 0.0)
+    return np.cumsum(rises), np.cumsum(seconds)
 
 
-def _slope(time: FloatArray, values: FloatArray) -> tuple[float, float]:
-    """Slope of a line through points and its standard error; NaN where there are too few points."""
-    if len(time) < _FEWEST_FRAMES or np.ptp(time) == 0.0:
+def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
+    """Gain over time, and its standard error from those of equal numbers of frames; NaN where there are too few."""
+    whole = seconds[-1] - seconds[0]
+    if len(gained) < _FEWEST_FRAMES or whole == 0.0:
         return float("nan"), float("nan")
-    slope = float(np.polynomial.Polynomial.fit(time, values, 1).convert().coef[1])
-    blocks = min(_MOST_BLOCKS, len(time) - 1)
+    speed = float((gained[-1] - gained[0]) / whole)
+    blocks = min(_MOST_BLOCKS, len(gained) - 1)
     if blocks < _FEWEST_BLOCKS:
-        return slope, float("nan")
-    edges = np.linspace(0, len(time) - 1, blocks + 1).round().astype(int)
-    speeds = np.diff(values[edges]) / np.diff(time[edges])
-    return slope, float(speeds.std(ddof=1) / np.sqrt(blocks))
+        return speed, float("nan")
+    edges = np.linspace(0, len(gained) - 1, blocks + 1).round().astype(int)
+    lasted, risen = np.diff(seconds[edges]), np.diff(gained[edges])
+    there = lasted > 0.0
+    if there.sum() < _FEWEST_BLOCKS:
+        return speed, float("nan")
+    speeds, shares = risen[there] / lasted[there], lasted[there] / lasted[there].sum()
+    return speed, float(np.sqrt((shares**2 * (speeds - speed) ** 2).sum() * there.sum() / (there.sum() - 1)))

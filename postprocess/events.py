@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -39,11 +40,12 @@ class Event:
 
 
 def events_of(
-    tracks: Sequence[Track], time: FloatArray, bulk: Sequence[BoolArray], definition: Definition
+    tracks: Sequence[Track], time: FloatArray, bulk: Sequence[BoolArray], definition: Definition, first: int = 0
 ) -> list[Event]:
     """The events of all tracks in the order of time.
 
-    A cluster that is free and held in the last frame goes on: its end is no event.
+    A cluster that is free and held in the first frame that counts was so before, and one that may still be within a
+    brush in the last frame goes on: these begins and ends are no events.
 
     Parameters
     ----------
@@ -55,31 +57,41 @@ def events_of(
         Of each frame, which beads belong to the bulk.
     definition
         That of the tracks: how long a moment is.
+    first
+        The first frame that counts.
     """
     events = []
     for number, track in enumerate(tracks):
-        parent = _parent(tracks, number, time, definition)
-        born = float(time[track.frames[0]])
-        events.append(Event(born, "freed", number) if parent is None else Event(born, "split", number, parent))
-        after = track.frames[-1] + 1
-        if after == len(time):
-            continue
-        ended = float(time[after])
-        if track.merged_into is not None:
-            events.append(Event(ended, "merged", number, track.merged_into))
-            continue
-        back = bulk[after][list(track.members[-1])]
-        events.append(Event(ended, "rejoined" if back.mean() >= definition.same else "let go", number))
+        born, parent = track.frames[0], _parent(tracks, number, time, definition)
+        if parent is not None:
+            events.append(Event(float(time[born]), "split", number, parent))
+        elif born > first:
+            events.append(Event(float(time[born]), "freed", number))
+        if track.merged_at is not None:
+            events.append(Event(float(time[track.merged_at]), "merged", number, track.merged_into))
+        elif time[-1] - time[track.frames[-1]] > definition.brush:
+            events.append(_end(number, track, time, bulk, definition))
     return sorted(events, key=lambda event: (event.time, event.track))
+
+
+def _end(number: int, track: Track, time: FloatArray, bulk: Sequence[BoolArray], definition: Definition) -> Event:
+    """How a track ended: on the pile, if most of its beads were there when it could no longer be the same."""
+    after = track.frames[-1] + 1
+    until = int(np.searchsorted(time, time[track.frames[-1]] + definition.brush, side="right"))
+    members = list(track.members[-1])
+    back = any(bulk[frame][members].mean() >= definition.same for frame in range(after, min(until, len(time) - 1) + 1))
+    return Event(float(time[after]), "rejoined" if back else "let go", number)
 
 
 def _parent(tracks: Sequence[Track], number: int, time: FloatArray, definition: Definition) -> int | None:
     """The track that held most of another one's beads shortly before it began."""
     first, members = tracks[number].frames[0], tracks[number].members[0]
+    best, most = None, definition.same * len(members)
     for other, track in enumerate(tracks):
-        before = [place for place, frame in enumerate(track.frames) if frame < first]
-        if other == number or not before or time[first] - time[track.frames[before[-1]]] > definition.brush:
+        before = bisect_left(track.frames, first) - 1
+        if other == number or before < 0 or time[first] - time[track.frames[before]] > definition.brush:
             continue
-        if len(track.members[before[-1]] & members) >= definition.same * len(members):
-            return other
-    return None
+        shared = len(track.members[before] & members)
+        if shared >= most:
+            best, most = other, shared
+    return best

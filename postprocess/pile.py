@@ -35,7 +35,7 @@ class PileMotion:
     case
         Of the run.
     time : ndarray, shape (F,)
-        From the begin of the drive; negative while the pile settles.
+        s, from the begin of the drive; negative while the pile settles.
     position, velocity : ndarray, shape (F, N, 3)
     radius : ndarray, shape (N,)
     large : ndarray of bool, shape (N,)
@@ -54,6 +54,11 @@ class PileMotion:
     large: npt.NDArray[np.bool_]
     first_id: int
     frames: list[tuple[Path, int]]
+
+    @property
+    def first_driven(self) -> int:
+        """Number of the first frame of the drive; of the last one where it has not begun."""
+        return min(int(np.searchsorted(self.time, 0.0)), len(self.time) - 1)
 
 
 @dataclass(frozen=True)
@@ -129,7 +134,9 @@ def read_pile(directory: str | Path) -> PileMotion:
     data, walls = np.stack(rows), np.stack(riders)
     x, vx = dump.column("x"), dump.column("vx")
     radius = data[0, :, dump.column("radius")]
-    time = (np.array(steps, dtype=np.float64) - (start if start is not None else steps[-1])) * case.run.time_step
+    # Before the drive has begun it is as if it would with the next frame.
+    begin = start if start is not None else steps[-1] + case.run.steps_per_frame
+    time = (np.array(steps, dtype=np.float64) - begin) * case.run.time_step
     # In the laboratory frame the riders move with the walls, in the container's they rest.
     shift, speed = walls[:, None, x : x + 3] - walls[0, x : x + 3], walls[:, None, vx : vx + 3]
     return PileMotion(

@@ -84,17 +84,9 @@ def _mark_events(axes: Axes, found: PileAnalysis) -> None:
     """A mark where something happened to a cluster, at the height of its leader in the frame nearest to it."""
     for kind, marker in _MARKS.items():
         told = [event for event in found.events if event.kind == kind]
+        if not told:
+            continue
         frames = np.searchsorted(found.motion.time, [event.time for event in told])
         leaders = [found.climbs[event.track].leader for event in told]
         heights = found.motion.position[frames.astype(int), np.array(leaders, dtype=int), 2] * 1e3
         axes.plot([event.time for event in told], heights, marker, ms=4, color="0.3", mfc="none", lw=0, label=kind)
-
-
-def climbers_in(found: PileAnalysis, frame: int) -> set[int]:
-    """Beads of the clusters that climb and are free in a frame."""
-    return {
-        bead
-        for track, climb in zip(found.tracks, found.climbs, strict=True)
-        if climb.climbed
-        for bead in track.members_at(frame)
-    }

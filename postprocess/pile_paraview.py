@@ -50,7 +50,7 @@ def write_pile_vtk(directory: Path, *, every: int = 1, vtu: bool = False, destin
 
 def _frames(found: PileAnalysis, every: int) -> Iterator[Frame]:
     motion = found.motion
-    start = int(np.searchsorted(motion.time, 0.0))
+    start = motion.first_driven
     for frame, bridges in enumerate(read_bridges(motion)):
         if frame < start or (frame - start) % every:
             continue

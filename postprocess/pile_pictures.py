@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from inputs.errors import InputError, Problem
+from inputs.errors import InputError, Problem, WalkersError
 from inputs.pile import PileCase
 from inputs.units import DURATION, parse_quantity
 from postprocess.drawing import new_figure, save_figure
-from postprocess.pile_figures import climbers_in
 from postprocess.pile_result import PileAnalysis, analyse
 from postprocess.rendering import SideView
 from runner.directory import CASE_NAME
@@ -24,7 +23,8 @@ SERIES_NAME = "series.png"
 FILM_NAME = "pile.mp4"
 _SHOWN = 6
 """Pictures in a time series."""
-_MOST_SHOWN = 60
+_TOLERANCE = 0.1
+"""Of a time between pictures: frames are where they are."""
 _MARGIN = 64
 """Pixels for the heights beside a film."""
 _LEAST_WIDTH = 200
@@ -52,6 +52,8 @@ def render_series(
     InputError
         If frames were recorded less often, or the drive was shorter than that.
     """
+    path = destination or directory / SERIES_NAME
+    check_picture(path, ".png")
     found = analyse(directory)
     motion = found.motion
     frames = _frames_evenly(found, images) if apart is None else _frames_apart(found, images, apart, directory)
@@ -61,9 +63,9 @@ def render_series(
     figure, axes = new_figure(1.0 + across * len(frames), 5.0, ncols=len(frames), sharey=True)
     view = SideView(motion, top)
     aside = max(1, int(width * 400.0))  # mm, whole ones within the picture
-    decimals = 2 if apart is None or apart >= 0.01 else 4
+    decimals = 2 if apart is None or apart >= 0.1 else 4
     for panel, frame in zip(np.atleast_1d(axes), frames, strict=True):
-        picture = view.picture(frame, climbers_in(found, frame))
+        picture = view.picture(frame, _climbers(found, frame))
         panel.imshow(picture, extent=(-width * 500.0, width * 500.0, 0.0, top * 1e3), interpolation="bilinear")
         panel.set(title=f"{motion.time[frame]:.{decimals}f} s", xlabel="x (mm)")
         panel.title.set_fontsize(8)
@@ -71,7 +73,7 @@ def render_series(
         panel.grid(visible=False)
     view.close()
     np.atleast_1d(axes)[0].set_ylabel("height (mm)")
-    return save_figure(figure, destination or directory / SERIES_NAME, [directory.name])
+    return save_figure(figure, path, [directory.name])
 
 
 def render_film(directory: Path, destination: Path | None = None, *, slower: float = 1.0) -> Path:
@@ -85,18 +87,26 @@ def render_film(directory: Path, destination: Path | None = None, *, slower: flo
         The MP4 to write (H.264); ``pile.mp4`` in the run directory if None.
     slower
         How many times slower than in reality: every frame of the drive is shown, one after the other.
+
+    Raises
+    ------
+    InputError
+        If the name is none of an MP4.
+    FilmFailed
+        If ffmpeg could not write all of it.
     """
     from imageio_ffmpeg import write_frames
 
+    path = destination or directory / FILM_NAME
+    check_picture(path, ".mp4")
     found = analyse(directory)
     time = found.motion.time
-    start = int(np.searchsorted(time, 0.0))
-    path = destination or directory / FILM_NAME
+    shown = range(found.motion.first_driven, len(time))
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.stem}.{os.getpid()}.mp4")
-    pictures = _film(found, range(start, len(time)))
+    pictures = _film(found, shown)
     first = next(pictures)
-    rate = max(1.0, 1.0 / (float(np.median(np.diff(time[start:]))) * slower)) if len(time) > start + 1 else 1.0
+    rate = 1.0 / (float(np.median(np.diff(time[shown.start :]))) * slower) if len(shown) > 1 else 1.0
     size = (first.shape[1], first.shape[0])
     writer = write_frames(beside, size, fps=rate, codec="libx264", quality=7, macro_block_size=2)
     try:
@@ -105,13 +115,43 @@ def render_film(directory: Path, destination: Path | None = None, *, slower: flo
         for picture in pictures:
             writer.send(np.ascontiguousarray(picture))
         writer.close()
+        _check_film(beside, len(shown))
         beside.replace(path)
     finally:
+        pictures.close()
         beside.unlink(missing_ok=True)
     return path
 
 
-def _film(found: PileAnalysis, frames: Sequence[int]) -> Iterator[npt.NDArray[np.uint8]]:
+class FilmFailed(WalkersError):
+    """A film that could not be written as a whole."""
+
+
+def _check_film(path: Path, frames: int) -> None:
+    """Ffmpeg ends in silence when the disk is full."""
+    from imageio_ffmpeg import count_frames_and_secs
+
+    try:
+        written, _ = count_frames_and_secs(str(path))
+    except (RuntimeError, OSError):
+        written = 0
+    if written != frames:
+        raise FilmFailed(f"ffmpeg wrote {written} of the {frames} pictures of {path.parent}: is the disk full?")
+
+
+def check_picture(path: Path, suffix: str) -> None:
+    """Refuse a place for a picture or a film that would be written as something else.
+
+    Raises
+    ------
+    InputError
+        If it has another suffix or is a folder.
+    """
+    if path.suffix.lower() != suffix or path.is_dir():
+        raise InputError("--to", [Problem("", None, f"{path}: expected the name of a {suffix} file")])
+
+
+def _film(found: PileAnalysis, frames: Sequence[int]) -> Generator[npt.NDArray[np.uint8]]:
     """The pictures of a film, each with heights on its left and the time above."""
     from PIL import Image, ImageDraw, ImageFont
 
@@ -119,50 +159,53 @@ def _film(found: PileAnalysis, frames: Sequence[int]) -> Iterator[npt.NDArray[np
     pixels = min(40.0, 1.6 / top)  # as high as a screen at most
     view = SideView(found.motion, top, pixels)
     font = ImageFont.load_default(16)
-    for frame in frames:
-        box = Image.fromarray(view.picture(frame, climbers_in(found, frame)))
-        wide = 2 * (max(_MARGIN + box.width + 8, _LEAST_WIDTH) // 2)
-        page = Image.new("RGB", (wide, box.height + 48), "white")
-        page.paste(box, (_MARGIN, 32))
-        draw = ImageDraw.Draw(page)
-        floor, left = 32 + box.height, _MARGIN - 2
-        draw.line([(left, 32), (left, floor), (_MARGIN + box.width + 1, floor), (_MARGIN + box.width + 1, 32)], "black")
-        draw.text((_MARGIN, 6), f"{found.motion.time[frame]:.3f} s", "black", font)
-        for height in range(0, int(top * 1e3) + 1, 5):
-            level = floor - height * box.height / (top * 1e3)
-            draw.line([(left - 6, level), (left, level)], "black")
-            draw.text((left - 10, level), f"{height} mm" if height else "0", "black", font, anchor="rm")
-        yield np.asarray(page)
-    view.close()
+    try:
+        for frame in frames:
+            box = Image.fromarray(view.picture(frame, _climbers(found, frame)))
+            wide = 2 * (max(_MARGIN + box.width + 8, _LEAST_WIDTH) // 2)
+            page = Image.new("RGB", (wide, box.height + 48), "white")
+            page.paste(box, (_MARGIN, 32))
+            draw = ImageDraw.Draw(page)
+            floor, left = 32 + box.height, _MARGIN - 2
+            draw.line(
+                [(left, 32), (left, floor), (_MARGIN + box.width + 1, floor), (_MARGIN + box.width + 1, 32)], "black"
+            )
+            draw.text((_MARGIN, 6), f"{found.motion.time[frame]:.3f} s", "black", font)
+            for height in range(0, int(top * 1e3) + 1, 5):
+                level = floor - height * box.height / (top * 1e3)
+                draw.line([(left - 6, level), (left, level)], "black")
+                draw.text((left - 10, level), f"{height} mm" if height else "0", "black", font, anchor="rm")
+            yield np.asarray(page)
+    finally:
+        view.close()
 
 
 def _top(found: PileAnalysis) -> float:
     """Height up to which the box is shown, m: a little more than any bead reaches while it is shaken."""
     motion = found.motion
-    start = int(np.searchsorted(motion.time, 0.0))
+    start = motion.first_driven
     return 1.05 * float((motion.position[start:, :, 2] + motion.radius).max())
 
 
 def _frames_evenly(found: PileAnalysis, images: int) -> list[int]:
     time = found.motion.time
-    start = int(np.searchsorted(time, 0.0))
+    start = found.motion.first_driven
     return [int(frame) for frame in np.unique(np.linspace(start, len(time) - 1, images).round().astype(int))]
 
 
 def _frames_apart(found: PileAnalysis, images: int, apart: float, directory: Path) -> list[int]:
-    """The last frames of a run that are so many seconds apart, to a fifth of that."""
-    time = found.motion.time
-    driven = time[time >= 0.0]
-    count = min(images, int(driven[-1] / apart * (1.0 + 1e-9)) + 1, _MOST_SHOWN) if len(driven) else 0
-    wanted = driven[-1] - apart * np.arange(count)[::-1] if count else np.zeros(0)
-    frames = np.abs(time[:, None] - wanted).argmin(axis=0)
-    if count < 2 or np.abs(time[frames] - wanted).max() > 0.2 * apart:
-        between = float(np.median(np.diff(driven))) if len(driven) > 1 else 0.0
-        told = (
-            f"expected at most {driven[-1] if len(driven) else 0.0:.3g} s and a multiple of the frames' {between:.4g} s"
-        )
-        raise InputError(str(directory), [Problem("", None, f"pictures {apart:.4g} s apart: {told}")])
-    return [int(frame) for frame in frames]
+    """The last frames of a run that are so many seconds apart, to a tenth of that."""
+    motion = found.motion
+    last = len(motion.time) - 1
+    between = motion.case.run.steps_per_frame * motion.case.run.time_step
+    every = round(apart / between)
+    if not every or abs(every * between / apart - 1.0) > _TOLERANCE:
+        told = f"{apart:.4g} s between pictures: expected a multiple of the {between:.4g} s between frames"
+        raise InputError(str(directory), [Problem("", None, told)])
+    if every > last - motion.first_driven:
+        told = f"{apart:.4g} s between pictures: expected less than the {max(motion.time[-1], 0.0):.3g} s of the drive"
+        raise InputError(str(directory), [Problem("", None, told)])
+    return list(range(last, motion.first_driven - 1, -every))[:images][::-1]
 
 
 def seconds_apart(text: str, directory: Path) -> float:
@@ -185,3 +228,13 @@ def seconds_apart(text: str, directory: Path) -> float:
     except (ValueError, ZeroDivisionError):
         pass
     raise InputError("--apart", [Problem("", None, f'{text!r}: expected a time such as "2 s", or "T/4" of a cycle')])
+
+
+def _climbers(found: PileAnalysis, frame: int) -> set[int]:
+    """Beads of the clusters that climb and are free in a frame."""
+    return {
+        bead
+        for track, climb in zip(found.tracks, found.climbs, strict=True)
+        if climb.climbed
+        for bead in track.members_at(frame)
+    }

@@ -94,7 +94,7 @@ def judged(found: PileAnalysis, definition: Definition) -> PileAnalysis:
     motion = found.motion
     tracks = follow(motion.time, found.held, definition)
     climbs = [judge(track, motion.time, motion.position[:, :, 2], motion.large, definition) for track in tracks]
-    events = events_of(tracks, motion.time, found.bulks, definition)
+    events = events_of(tracks, motion.time, found.bulks, definition, motion.first_driven)
     return replace(found, tracks=tracks, climbs=climbs, events=events, definition=definition)
 
 
@@ -185,7 +185,7 @@ def _event_columns(events: list[Event]) -> Columns:
 
 def _profile_columns(found: PileAnalysis) -> Columns:
     motion = found.motion
-    driven = motion.time >= motion.time[-1] / 2.0
+    driven = motion.time >= min(motion.time[motion.first_driven :].mean(), motion.time[-1])
     layer = _LAYERS * 2.0 * float(motion.radius.max())
     names = ("height", "packing_fraction", "liquid_fraction")
     profile = packing_profile(
@@ -197,7 +197,7 @@ def _profile_columns(found: PileAnalysis) -> Columns:
 def _result(found: PileAnalysis) -> dict[str, Any]:
     motion, beds = found.motion, found.beds
     case = motion.case
-    start = int(np.searchsorted(motion.time, 0.0))
+    start = motion.first_driven
     return {
         "case": case.name,
         "kind": case.kind,
@@ -207,7 +207,7 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
         "frequency": case.drive.frequency,
         "peak_acceleration": case.drive.peak_acceleration,
         "driven": float(max(motion.time[-1], 0.0)),
-        "settling": float(-motion.time[0]),
+        "settling": float(min(motion.time[-1], 0.0) - motion.time[0]),
         "surface": {"start": beds[start].surface, "end": beds[-1].surface},
         "brazil_nut": {"start": beds[start].brazil_nut, "end": beds[-1].brazil_nut},
         "clusters": len(found.tracks),

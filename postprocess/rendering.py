@@ -22,6 +22,7 @@ _RUBY = ("#b0203c", "#e0566c")
 _GLASS = ("#8c9aa5", "#c9d2d8")
 """Large and small beads of a pile."""
 _FLOOR = "#c9d2d8"
+_MOST_PIXELS = 4000
 _MANY = 500
 """Beads from which on spheres are drawn coarser."""
 
@@ -158,7 +159,9 @@ class SideView:
         import pyvista as pv
 
         self._motion = motion
-        size = [2 * round(extent * pixels * 1e3 / 2.0) for extent in (motion.case.container.width, top)]
+        extents = (motion.case.container.width, top)
+        pixels = min(pixels, _MOST_PIXELS / (1e3 * max(extents)))
+        size = [2 * max(1, round(extent * pixels * 1e3 / 2.0)) for extent in extents]
         self._plotter = pv.Plotter(off_screen=True, window_size=size, lighting="light kit")
         self._plotter.background_color = pv.Color("white")
         rounds = 18 if len(motion.radius) < _MANY else 10

@@ -14,7 +14,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from inputs.errors import WalkersError
+from inputs.errors import InputError, Problem, WalkersError
 from inputs.reading import AnyCase
 from runner.binary import Engine
 from runner.ensemble import remove_remains
@@ -67,6 +67,9 @@ class Options:
     def for_ranks(self, ranks: int) -> Options:
         """The same for decks of so many MPI processes each: fewer of them at once, so that each has its cores."""
         site = replace(self.site, ranks=ranks) if self.site else None
+        if site is not None and ranks > site.file.cores:
+            told = f"a deck has {ranks} MPI processes (run.ranks), more than the {site.file.cores} cores of a node"
+            raise InputError("cores", [Problem("", None, told)])
         return replace(self, workers=max(1, self.workers // ranks), site=site)
 
     @property

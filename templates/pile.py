@@ -7,7 +7,7 @@ from functools import lru_cache
 from math import cos, pi, sin, sqrt
 
 from inputs.forces import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
-from inputs.pile import LOOSE, PileCase, lattice
+from inputs.pile import LOOSE, PileCase, lattice, turns_of_sides
 from templates.deck import Checkpoint, Deck, Plan, Recording, compose
 from templates.scene import Bead, Face, Point, Scene
 
@@ -19,8 +19,6 @@ WALL_COLUMNS = ("x", "y", "z", "triangle", "id", "fx", "fy", "fz")
 _SKIN = 2e-4
 """m; between 0.1 and 0.3 mm it makes no difference of more than some per cent to the time of a step."""
 _STATUS_LINES_PER_CYCLE = 2
-SIDES = 24
-"""Of the prism that stands for a cylinder: its edges are 0.9 % of the radius farther out than its faces."""
 SETTLING_SECONDS = 0.05
 """Length of the parts in which a pile settles; at the end of each it is looked whether it has."""
 
@@ -46,8 +44,8 @@ def faces_of(case: PileCase) -> tuple[Face, ...]:
     level = case.container.height / 4.0
     floor = Face("z", 1, (aside, 0.0, 0.0))
     if case.container.shape == "cylinder":
-        turns = [2.0 * pi * (number + 0.5) / SIDES for number in range(SIDES)]
-        return (floor, *(Face("x", -1, (half * cos(turn), half * sin(turn), level), turn) for turn in turns))
+        sides = [((half * cos(turn), half * sin(turn), level), turn) for turn in turns_of_sides()]
+        return (floor, *(Face("x", -1, place, turn) for place, turn in sides))
     return (
         floor,
         Face("x", 1, (-half, 0.0, level)),

@@ -12,6 +12,7 @@ import typer
 
 from walkers.commands import (
     audit,
+    calibrate,
     climb,
     deck,
     figures,
@@ -34,7 +35,23 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (show, deck, run, result, plot, vtk, render, theory, sweep, status, table, climb, figures, audit):
+for command in (
+    show,
+    deck,
+    run,
+    result,
+    plot,
+    vtk,
+    render,
+    theory,
+    sweep,
+    status,
+    table,
+    climb,
+    figures,
+    calibrate,
+    audit,
+):
     app.command(name=command.__name__.rsplit(".", 1)[-1])(command.command)
 
 

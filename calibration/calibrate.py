@@ -1,0 +1,241 @@
+"""A calibration from its file to its outcome: waves, emulators, posterior, and the engine's word on what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.emulator import Emulator, fit_emulators
+from calibration.posterior import Posterior, sample_posterior
+from calibration.space import Space, spread_out
+from calibration.waves import Wave, run_wave, wave_sweep
+from inputs.calibration import Calibration
+from inputs.errors import InputError, Problem
+from paper.sources import ProgressOf
+from runner.files import read_json, write_json
+from sweeps.conduct import Failure, Options
+
+FloatArray = npt.NDArray[np.float64]
+_STEPS_BETWEEN_WAVES = 800
+"""Of the chain that places the next wave; the last chain has the file's number."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came out of a calibration.
+
+    Attributes
+    ----------
+    calibration, space
+        What was calibrated.
+    unit : ndarray, shape (P, D)
+        All sets of all waves, in the unit cube.
+    outcome : ndarray, shape (P, K)
+        What the engine made of them.
+    emulators
+        One an observation, fitted to all waves.
+    posterior
+        From all observations.
+    held_out
+        From those that each trial of the file leaves.
+    predictive
+        The engine at the best set (first) and at samples of the posterior.
+    checks
+        The engine at the best set with half the time step, and for twice as long.
+    sobol : ndarray, shape (2, K, D)
+        First and total order indices of each observation's transformed residual over the whole range.
+    failures
+        Points that failed, by sweep.
+    """
+
+    calibration: Calibration
+    space: Space
+    unit: FloatArray
+    outcome: FloatArray
+    emulators: list[Emulator]
+    posterior: Posterior
+    held_out: dict[str, Posterior]
+    predictive: Wave
+    checks: dict[str, Wave]
+    sobol: FloatArray
+    failures: dict[str, list[Failure]]
+
+    @property
+    def best(self) -> dict[str, float]:
+        """The set of the highest posterior density: parameter to value, SI units."""
+        values = self.space.values(self.predictive.unit[0])
+        return dict(zip([one.name for one in self.space.parameters], map(float, values), strict=True))
+
+
+@dataclass
+class _Engine:
+    """How waves are run, and what failed."""
+
+    calibration: Calibration
+    out: Path
+    options: Options
+    arguments: Mapping[str, Any]
+    progress_of: ProgressOf | None
+    failures: dict[str, list[Failure]]
+
+    def run(self, name: str, unit: FloatArray, extra: Mapping[str, Mapping[str, Any]] | None = None) -> Wave:
+        sweep = f"{self.calibration.name}-{name}"
+        with self.progress_of(sweep) if self.progress_of else nullcontext() as advance:
+            wave, failed = run_wave(
+                self.calibration,
+                unit,
+                sweep,
+                self.out,
+                self.options,
+                extra=extra,
+                on_progress=advance,
+                **self.arguments,
+            )
+        if failed:
+            self.failures[sweep] = failed
+        return wave
+
+
+def calibrate(
+    calibration: Calibration,
+    out: Path,
+    options: Options,
+    *,
+    engine: str | None = None,
+    despite_audit: bool = False,
+    progress_of: ProgressOf | None = None,
+) -> Outcome:
+    """Calibrate, or go on with it: what is finished is not run again.
+
+    Parameters
+    ----------
+    calibration
+        From `inputs.calibration.load_calibration`.
+    out
+        Folder of the run directories; each wave is a sweep there, and the designs are kept in a folder of the
+        calibration's name.
+    options, engine, despite_audit
+        As for `sweeps.run.run_sweep`.
+    progress_of
+        As for `paper.sources.make_sources`.
+
+    Returns
+    -------
+    Outcome
+
+    Raises
+    ------
+    InputError
+        If a key of the file cannot be used, or designs that are there belong to other parameters.
+    runner.EngineFailure
+        If there is no engine, or its audit failed.
+    """
+    space, seed = Space(calibration.parameters), calibration.seed
+    folder = out / calibration.name
+    folder.mkdir(parents=True, exist_ok=True)
+    arguments = {"engine": engine, "despite_audit": despite_audit}
+    runner = _Engine(calibration, out, options, arguments, progress_of, {})
+    unit, outcome = np.zeros((0, space.dimensions)), np.zeros((0, len(calibration.observations)))
+    for number, points in enumerate(calibration.waves, 1):
+        make = partial(_design, calibration, unit, outcome, points)
+        design = _kept(folder / f"wave-{number}.json", calibration, make)
+        wave = runner.run(f"wave-{number}", design)
+        unit, outcome = np.concatenate([unit, design]), np.concatenate([outcome, wave.outcome])
+    emulators = fit_emulators(unit, outcome, calibration.observations, seed)
+    posterior = sample_posterior(emulators, space, calibration.steps, seed)
+    held_out = {
+        name: sample_posterior(emulators, space, calibration.steps, seed, groups)
+        for name, groups in calibration.held_out.items()
+    }
+    drawn = _kept(folder / "predictive.json", calibration, partial(_drawn, posterior, calibration.predictive))
+    predictive = runner.run("predictive", drawn)
+    checks = {
+        name: runner.run(name, drawn[:1], extra)
+        for name, extra in _finer_and_longer(calibration, space.values(drawn[:1])).items()
+    }
+    return Outcome(
+        calibration,
+        space,
+        unit,
+        outcome,
+        emulators,
+        posterior,
+        held_out,
+        predictive,
+        checks,
+        sobol_indices(emulators, space, seed),
+        runner.failures,
+    )
+
+
+def _kept(path: Path, calibration: Calibration, make: Callable[[], FloatArray]) -> FloatArray:
+    """The parameter sets of a wave, as written down before, or made and written down.
+
+    A calibration that goes on must not depend on whether the libraries would draw the same points again.
+    """
+    ours = {one.name: [one.low, one.high, one.log] for one in calibration.parameters}
+    if path.exists():
+        try:
+            kept = read_json(path)
+            unit = np.array(kept["unit"], dtype=np.float64)
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise InputError(str(path), [Problem("", None, f"cannot be read ({error}); delete it")]) from error
+        if kept.get("parameters") != ours:
+            told = "belongs to other parameters or ranges; delete it and what follows it, or give another --out"
+            raise InputError(str(path), [Problem("parameters", None, told)])
+        return unit
+    unit = make()
+    write_json(path, {"parameters": ours, "unit": unit.tolist()})
+    return unit
+
+
+def _design(calibration: Calibration, unit: FloatArray, outcome: FloatArray, points: int) -> FloatArray:
+    """The first wave fills the range; later ones what the posterior leaves of it, far from what was run before."""
+    space, seed = Space(calibration.parameters), calibration.seed
+    if not len(unit):
+        return space.design(points, seed)
+    emulators = fit_emulators(unit, outcome, calibration.observations, seed)
+    posterior = sample_posterior(emulators, space, min(_STEPS_BETWEEN_WAVES, calibration.steps), seed)
+    return spread_out(np.unique(posterior.unit, axis=0), points, unit)
+
+
+def _drawn(posterior: Posterior, points: int) -> FloatArray:
+    """The best sample, and so many others, evenly through the chain."""
+    every = np.linspace(0, len(posterior.unit) - 1, points - 1).round().astype(int)
+    return np.concatenate([posterior.best[None], posterior.unit[every]])
+
+
+def _finer_and_longer(calibration: Calibration, values: FloatArray) -> dict[str, dict[str, dict[str, Any]]]:
+    """What the runs of a set have beside it: half of their time steps; twice their cycles."""
+    cases = list(wave_sweep(calibration, values, "check").cases())
+    finer, longer = {}, {}
+    for label, case in zip(calibration.experiments, cases, strict=True):
+        finer[label] = {"run.time_step": f"{case.run.time_step / 2.0 * 1e6:.6g} us"}
+        longer[label] = {"run.cycles": 2 * case.run.cycles}
+    return {"half-step": finer, "twice-as-long": longer}
+
+
+def sobol_indices(emulators: list[Emulator], space: Space, seed: int, points: int = 512) -> FloatArray:
+    """How much of each observation's variance over the whole range hangs on each parameter (Saltelli et al. 2010).
+
+    Returns
+    -------
+    ndarray, shape (2, K, D)
+        First order: alone; total order: with all others too. Of the transformed residual.
+    """
+    from scipy.stats import sobol_indices as indices_of
+    from scipy.stats import uniform
+
+    def respond(points: FloatArray) -> FloatArray:
+        return np.stack([one.process.predict(points.T) for one in emulators])
+
+    found = indices_of(func=respond, n=points, dists=[uniform()] * space.dimensions, rng=np.random.default_rng(seed))
+    indices: FloatArray = np.clip(np.stack([found.first_order, found.total_order]), 0.0, 1.0)
+    return indices

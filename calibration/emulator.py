@@ -1,0 +1,133 @@
+"""Emulators: what the engine would give, interpolated between the sets that were run, with an error."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from inputs.calibration import Observation
+
+FloatArray = npt.NDArray[np.float64]
+_FOLDS = 10
+_FEWEST = 8
+"""Runs without which there is no emulator."""
+_LARGEST = 12.0
+"""Of the transformed residuals: beyond, sinh overflows and nobody asks."""
+
+
+def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:
+    """Arsinh of the residual in standard deviations: linear near the observation, logarithmic far from it.
+
+    A walker that came apart may run at any speed; on this scale it does not outweigh those that walk.
+    """
+    return np.asarray(np.arcsinh((outcome - observation.value) / observation.deviation))
+
+
+@dataclass(frozen=True)
+class Emulator:
+    """One observation as a function of the parameters: a Gaussian process of the transformed residual.
+
+    Attributes
+    ----------
+    observation
+        What it gives.
+    process
+        scikit-learn's regressor.
+    stretch
+        By how much its standard deviations are too small, from cross-validation; at least 1.
+    error
+        Root mean square of the cross-validated error, in the transformed residual.
+    explained
+        Share of the variance that is explained in cross-validation.
+    runs
+        It was fitted to.
+    """
+
+    observation: Observation
+    process: Any
+    stretch: float
+    error: float
+    explained: float
+    runs: int
+
+    def residual(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Residual in standard deviations of the observation, and its standard error, at points (N, D): shape (N,)."""
+        mean, deviation = self.process.predict(unit, return_std=True)
+        mean = np.clip(mean, -_LARGEST, _LARGEST)
+        return np.sinh(mean), np.cosh(mean) * deviation * self.stretch
+
+    def value(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The observation and its standard error at points (N, D), SI units and degrees: shape (N,)."""
+        residual, error = self.residual(unit)
+        observation = self.observation
+        return observation.value + observation.deviation * residual, observation.deviation * error
+
+
+def fit_emulators(
+    unit: FloatArray, outcome: FloatArray, observations: Sequence[Observation], seed: int
+) -> list[Emulator]:
+    """One emulator an observation.
+
+    Parameters
+    ----------
+    unit : ndarray, shape (P, D)
+        The sets that were run, in the unit cube.
+    outcome : ndarray, shape (P, K)
+        What they gave; NaN where they failed.
+    observations
+        K of them.
+    seed
+        Of the restarts of the fit.
+
+    Raises
+    ------
+    ValueError
+        If there are too few runs of an observation.
+    """
+    return [_fitted(unit, outcome[:, k], observation, seed) for k, observation in enumerate(observations)]
+
+
+def _fitted(unit: FloatArray, outcome: FloatArray, observation: Observation, seed: int) -> Emulator:
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
+    there = np.isfinite(outcome)
+    if there.sum() < _FEWEST:
+        raise ValueError(f"{observation.name}: {there.sum()} runs succeeded, expected at least {_FEWEST}")
+    at, wanted = unit[there], transformed(outcome[there], observation)
+    scales = np.full(unit.shape[1], 0.7)
+    kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(scales, (5e-2, 2e1), nu=2.5) + WhiteKernel(1e-2, (1e-6, 1.0))
+    process = GaussianProcessRegressor(kernel, normalize_y=True, n_restarts_optimizer=1, random_state=seed)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # a scale at its bound: no influence
+        process.fit(at, wanted)
+    predicted, deviation = _cross_validated(process, at, wanted, seed)
+    miss = wanted - predicted
+    spread = float(np.var(wanted))
+    return Emulator(
+        observation,
+        process,
+        stretch=max(1.0, float(np.sqrt(np.mean((miss / deviation) ** 2)))),
+        error=float(np.sqrt(np.mean(miss**2))),
+        explained=1.0 - float(np.mean(miss**2)) / spread if spread > 0.0 else 1.0,
+        runs=len(wanted),
+    )
+
+
+def _cross_validated(process: Any, at: FloatArray, wanted: FloatArray, seed: int) -> tuple[FloatArray, FloatArray]:
+    """Mean and standard deviation at each run from those of other folds, with the kernel that all of them gave."""
+    from sklearn.base import clone
+    from sklearn.model_selection import KFold
+
+    mean, deviation = np.zeros(len(wanted)), np.zeros(len(wanted))
+    for others, fold in KFold(min(_FOLDS, len(wanted)), shuffle=True, random_state=seed).split(at):
+        partial = clone(process).set_params(kernel=process.kernel_, optimizer=None)
+        partial.fit(at[others], wanted[others])
+        mean[fold], deviation[fold] = partial.predict(at[fold], return_std=True)
+    return mean, deviation

@@ -1,0 +1,99 @@
+"""Figures of a calibration: the posterior's corners, predictions beside observations, what hangs on what."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calibration.calibrate import Outcome
+from calibration.report import Row, rows_of
+from postprocess.drawing import new_figure, save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def draw(found: Outcome, to: Path) -> list[Path]:
+    """Write ``corner.png``, ``predictions.png`` and ``sobol.png``."""
+    rows = rows_of(found)
+    sources = [Path(run).name for run in found.predictive.table["run"]]
+    files = []
+    for name, figure in (("corner", _corner(found)), ("predictions", _predictions(rows)), ("sobol", _sobol(found))):
+        files += save_figure(figure, to / f"{name}.png", sources, title=f"{found.calibration.title}: {name}")
+    return files
+
+
+def _corner(found: Outcome) -> Figure:
+    import corner
+
+    parameters, posterior = found.space.parameters, found.posterior
+    logs = np.array([one.log for one in parameters])
+    samples = found.space.values(posterior.unit)
+    samples = np.where(logs, np.log10(np.where(logs, samples, 1.0)), samples)
+    best = found.space.values(found.predictive.unit[0])
+    best = np.where(logs, np.log10(np.where(logs, best, 1.0)), best)
+    ends = np.log10([[one.low, one.high] for one in parameters])
+    figure, _ = new_figure(1.7 * len(parameters), 1.7 * len(parameters), nrows=len(parameters), ncols=len(parameters))
+    figure.set_layout_engine("none")
+    corner.corner(
+        samples,
+        fig=figure,
+        labels=[("log " if one.log else "") + one.symbol for one in parameters],
+        range=[(a, b) if log else (one.low, one.high) for one, log, (a, b) in zip(parameters, logs, ends, strict=True)],
+        truths=best,
+        truth_color="C1",
+        quantiles=[0.05, 0.5, 0.95],
+        label_kwargs={"fontsize": 8},
+        plot_datapoints=False,
+        smooth=1.0,
+        bins=24,
+    )
+    return figure
+
+
+def _predictions(rows: list[Row]) -> Figure:
+    """Residuals in standard deviations: the engine at the best set and over the posterior, and what was held out."""
+    figure, axes = new_figure(7.6, 0.34 * len(rows) + 1.4)
+    places = np.arange(len(rows))[::-1]
+    axes.axvspan(-1.0, 1.0, color="0.9", lw=0)
+    axes.axvline(0.0, color="0.4", lw=0.8)
+    _bars(axes, rows, places)
+    trials = list(dict.fromkeys(trial for row in rows for trial in row.held_out))
+    for number, trial in enumerate(trials):
+        seen = [(place, row) for place, row in zip(places, rows, strict=True) if trial in row.held_out]
+        middle = [(row.held_out[trial][0] - row.value) / row.deviation for _, row in seen]
+        width = [row.held_out[trial][1] / row.deviation for _, row in seen]
+        heights = [place - 0.22 for place, _ in seen]
+        axes.errorbar(middle, heights, xerr=width, fmt="s", ms=4, color=f"C{number + 2}", lw=1.0, label=trial)
+    axes.set_yticks(places, [row.title for row in rows], fontsize=7)
+    axes.set(xlabel="(predicted - published)/standard deviation", xscale="symlog", ylim=(-0.8, len(rows) - 0.2))
+    axes.set_xscale("symlog", linthresh=3.0)
+    axes.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=2)
+    return figure
+
+
+def _bars(axes: Axes, rows: list[Row], places: np.ndarray[tuple[int], np.dtype[np.int64]]) -> None:
+    low, high, best = (
+        np.array([(getattr(row, name) - row.value) / row.deviation for row in rows])
+        for name in ("low", "high", "engine")
+    )
+    axes.hlines(places, low, high, color="C0", lw=4.0, alpha=0.5, label="engine over the posterior")
+    axes.plot(best, places, "o", ms=5, color="C1", label="engine at the best set")
+
+
+def _sobol(found: Outcome) -> Figure:
+    names = [one.symbol for one in found.space.parameters]
+    figure, axes = new_figure(1.0 * len(names) + 3.4, 0.28 * len(found.emulators) + 1.6)
+    total = found.sobol[1]
+    image = axes.imshow(total, aspect="auto", cmap="Blues", vmin=0.0, vmax=1.0)
+    for row, column in np.ndindex(*total.shape):
+        colour = "w" if total[row, column] > 0.55 else "0.2"
+        axes.text(column, row, f"{total[row, column]:.2f}", ha="center", va="center", fontsize=6, color=colour)
+    axes.set_xticks(range(len(names)), names, rotation=35, ha="right", fontsize=7)
+    axes.set_yticks(range(len(found.emulators)), [one.observation.title for one in found.emulators], fontsize=7)
+    axes.grid(visible=False)
+    figure.colorbar(image, ax=axes, label="total Sobol index over the whole range")
+    return figure

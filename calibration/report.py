@@ -1,0 +1,236 @@
+"""What a calibration found, as tables: observations beside predictions, parameters with their uncertainty."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.calibrate import Outcome
+from calibration.emulator import Emulator, transformed
+from calibration.posterior import Posterior
+from inputs.calibration import QUANTITIES, Observation
+from inputs.units import SPEED
+from runner.files import write_json, write_text
+
+FloatArray = npt.NDArray[np.float64]
+_SIGMAS = 2.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """An observation and what is predicted of it; speeds in mm/s, angles in degrees.
+
+    Attributes
+    ----------
+    name, group, title, unit, value, deviation
+        As published.
+    engine
+        At the best set.
+    low, high
+        Of the engine over samples of the posterior (and the best set).
+    emulator, error
+        At the best set.
+    agrees
+        Whether the engine lies within the deviation of the published value.
+    half_step, twice_as_long
+        The engine at the best set with half the time step, and for twice as long.
+    held_out
+        For each trial that did not see the observation's group: predicted mean and standard deviation.
+    """
+
+    name: str
+    group: str
+    title: str
+    unit: str
+    value: float
+    deviation: float
+    engine: float
+    low: float
+    high: float
+    emulator: float
+    error: float
+    agrees: bool
+    half_step: float
+    twice_as_long: float
+    held_out: dict[str, tuple[float, float]]
+
+
+def unit_of(observation: Observation) -> tuple[str, float]:
+    """Unit in which an observation is shown, and how many of it the SI unit is."""
+    if observation.over:
+        return "", 1.0
+    return ("mm/s", 1e3) if QUANTITIES[observation.quantity] is SPEED else ("°", 1.0)
+
+
+def rows_of(found: Outcome) -> list[Row]:
+    """A row an observation."""
+    rows = []
+    engine = found.predictive.outcome
+    for place, observation in enumerate(found.calibration.observations):
+        unit, scale = unit_of(observation)
+        emulated, error = found.emulators[place].value(found.predictive.unit[:1])
+        seen = engine[:, place]
+        best = float(seen[0])
+        rows.append(
+            Row(
+                name=observation.name,
+                group=observation.group,
+                title=observation.title,
+                unit=unit,
+                value=observation.value * scale,
+                deviation=observation.deviation * scale,
+                engine=best * scale,
+                low=float(np.nanmin(seen)) * scale,
+                high=float(np.nanmax(seen)) * scale,
+                emulator=float(emulated[0]) * scale,
+                error=float(error[0]) * scale,
+                agrees=bool(abs(best - observation.value) <= observation.deviation),
+                half_step=float(found.checks["half-step"].outcome[0, place]) * scale,
+                twice_as_long=float(found.checks["twice-as-long"].outcome[0, place]) * scale,
+                held_out={
+                    name: _predicted(found.emulators[place], posterior, scale)
+                    for name, posterior in found.held_out.items()
+                    if observation.group in found.calibration.held_out[name]
+                },
+            )
+        )
+    return rows
+
+
+def _predicted(emulator: Emulator, posterior: Posterior, scale: float) -> tuple[float, float]:
+    """Median over a posterior and half of the width that holds 68 %, the emulator's error in it."""
+    value, error = emulator.value(posterior.unit)
+    draw = np.random.default_rng(0)
+    low, middle, high = np.percentile(value + error * draw.standard_normal(len(value)), (16.0, 50.0, 84.0))
+    return float(middle) * scale, float(high - low) / 2.0 * scale
+
+
+def emulator_checks(found: Outcome) -> FloatArray:
+    """Errors of the emulators at the runs of the predictive wave, in their stated standard errors, shape (S, K)."""
+    columns = []
+    for place, emulator in enumerate(found.emulators):
+        mean, deviation = emulator.process.predict(found.predictive.unit, return_std=True)
+        seen = transformed(found.predictive.outcome[:, place], emulator.observation)
+        columns.append((seen - mean) / (deviation * emulator.stretch))
+    return np.stack(columns, axis=1)
+
+
+def intervals(found: Outcome, posterior: Posterior | None = None) -> dict[str, tuple[float, float, float]]:
+    """Of each parameter the 5th, 50th and 95th percentile of a posterior (that of all observations if None)."""
+    values = found.space.values((posterior or found.posterior).unit)
+    percentiles = np.percentile(values, (5.0, 50.0, 95.0), axis=0)
+    return {
+        one.name: (float(low), float(middle), float(high))
+        for one, low, middle, high in zip(found.space.parameters, *percentiles, strict=True)
+    }
+
+
+def write_tables(found: Outcome, to: Path) -> list[Path]:
+    """Write ``posterior.parquet``, ``calibration.json`` and ``calibration.md``.
+
+    The samples' columns are the parameters (SI units), ``discrepancy_GROUP`` (in standard deviations) and
+    ``log_density``.
+    """
+    import pandas as pd
+
+    to.mkdir(parents=True, exist_ok=True)
+    posterior = found.posterior
+    samples = pd.DataFrame(found.space.values(posterior.unit), columns=[one.name for one in found.space.parameters])
+    for place, group in enumerate(posterior.groups):
+        samples[f"discrepancy_{group}"] = posterior.discrepancy[:, place]
+    samples["log_density"] = posterior.log_density
+    beside = to / "posterior.parquet.new"
+    samples.to_parquet(beside, index=False)
+    beside.replace(to / "posterior.parquet")
+    rows = rows_of(found)
+    write_json(to / "calibration.json", _as_dict(found, rows))
+    write_text(to / "calibration.md", as_markdown(found, rows))
+    return [to / name for name in ("posterior.parquet", "calibration.json", "calibration.md")]
+
+
+def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
+    posterior, checks = found.posterior, emulator_checks(found)
+    contents = {
+        "calibration": found.calibration.name,
+        "sets": len(found.unit),
+        "best": found.best,
+        "intervals": intervals(found),
+        "discrepancies": {
+            group: float(np.median(posterior.discrepancy[:, place])) for place, group in enumerate(posterior.groups)
+        },
+        "chain": {
+            "steps": posterior.steps,
+            "autocorrelation": posterior.autocorrelation,
+            "acceptance": posterior.acceptance,
+        },
+        "emulators": {
+            one.observation.name: {"explained": one.explained, "error": one.error, "stretch": one.stretch}
+            for one in found.emulators
+        },
+        "emulators_within_two_errors": float(np.mean(np.abs(checks[np.isfinite(checks)]) <= _SIGMAS)),
+        "agree": sum(row.agrees for row in rows),
+        "observations": [asdict(row) for row in rows],
+        "sobol_total": {
+            one.observation.name: dict(
+                zip([p.name for p in found.space.parameters], map(float, found.sobol[1, place]), strict=True)
+            )
+            for place, one in enumerate(found.emulators)
+        },
+    }
+    return json.loads(json.dumps(contents).replace("NaN", "null"))  # type: ignore[no-any-return]
+
+
+def as_markdown(found: Outcome, rows: list[Row]) -> str:
+    """The tables as a page."""
+    trials = list(found.calibration.held_out)
+    lines = [
+        f"# {found.calibration.title or found.calibration.name}",
+        "",
+        f"{sum(row.agrees for row in rows)} of {len(rows)} observations agree at the best set: the engine lies within "
+        f"the published deviation. {len(found.unit)} parameter sets were run.",
+        "",
+        "| parameter | best | 5 % | median | 95 % | range |",
+        "|---|---|---|---|---|---|",
+    ]
+    known = intervals(found)
+    for one in found.space.parameters:
+        low, middle, high = known[one.name]
+        lines.append(
+            f"| {one.symbol} | {found.best[one.name]:.3g} | {low:.3g} | {middle:.3g} | {high:.3g} | "
+            f"{one.low:g} … {one.high:g} |"
+        )
+    head = ["observation", "published", "engine, best set", "over the posterior", "emulator", "agrees", *trials]
+    lines += ["", "| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
+    for row in rows:
+        held = [_pair(*row.held_out[trial]) if trial in row.held_out else "" for trial in trials]
+        cells = [
+            row.title,
+            f"{_pair(row.value, row.deviation)} {row.unit}".strip(),
+            f"{row.engine:.3g}",
+            f"{row.low:.3g} … {row.high:.3g}",
+            _pair(row.emulator, row.error),
+            "yes" if row.agrees else "**no**",
+            *held,
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    lines += ["", "| group | discrepancy, standard deviations |", "|---|---|"]
+    for place, group in enumerate(found.posterior.groups):
+        low, middle, high = np.percentile(found.posterior.discrepancy[:, place], (5.0, 50.0, 95.0))
+        lines.append(f"| {group} | {middle:.2f} ({low:.2f} … {high:.2f}) |")
+    checks = emulator_checks(found)
+    inside = float(np.mean(np.abs(checks[np.isfinite(checks)]) <= _SIGMAS))
+    lines += [
+        "",
+        f"At {len(checks)} sets that no emulator has seen, {inside:.0%} of the engine's values lie within two standard "
+        f"errors of the emulators'. Chain: {found.posterior.steps} steps, autocorrelation time "
+        f"{found.posterior.autocorrelation:.0f}, {found.posterior.acceptance:.0%} of the moves accepted.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _pair(value: float, error: float) -> str:
+    return f"{value:.3g} ± {error:.2g}"

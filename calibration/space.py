@@ -1,0 +1,94 @@
+"""The space of the free parameters, as a unit cube: designs in it, beliefs about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import norm, qmc
+
+from inputs.calibration import Parameter
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Space:
+    """D free parameters.
+
+    Attributes
+    ----------
+    parameters
+        In the order of the coordinates.
+    """
+
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def dimensions(self) -> int:
+        """D."""
+        return len(self.parameters)
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Ends of the coordinates before they are scaled (logarithms where a parameter says so), shape (2, D)."""
+        return np.array([[_scaled(one, value) for one in self.parameters] for value in (0, 1)])
+
+    def values(self, unit: FloatArray) -> FloatArray:
+        """Values of the parameters at points of the unit cube, shape (..., D)."""
+        low, high = self.bounds
+        scaled = low + np.asarray(unit) * (high - low)
+        log = np.array([one.log for one in self.parameters])
+        return np.where(log, np.exp(np.where(log, scaled, 0.0)), scaled)
+
+    def unit(self, values: FloatArray) -> FloatArray:
+        """Points of the unit cube at values of the parameters, shape (..., D)."""
+        low, high = self.bounds
+        log = np.array([one.log for one in self.parameters])
+        values = np.asarray(values, dtype=np.float64)
+        scaled = np.where(log, np.log(np.where(log, values, 1.0)), values)
+        return np.asarray((scaled - low) / (high - low), dtype=np.float64)
+
+    def log_belief(self, unit: FloatArray) -> FloatArray:
+        """Logarithm of the density that is believed beforehand, but for a constant, shape (...); -inf outside."""
+        unit = np.asarray(unit)
+        low, high = self.bounds
+        scaled = low + unit * (high - low)
+        total = np.where(np.all((unit >= 0.0) & (unit <= 1.0), axis=-1), 0.0, -np.inf)
+        for place, one in enumerate(self.parameters):
+            if one.normal is not None:
+                mean, deviation = one.normal
+                centre = np.log(mean) if one.log else mean
+                total = total + norm.logpdf(scaled[..., place], centre, deviation)
+        return total
+
+    def design(self, points: int, seed: int) -> FloatArray:
+        """A space-filling first wave, shape (points, D): a scrambled Sobol sequence (`scipy.stats.qmc`)."""
+        sampler = qmc.Sobol(self.dimensions, rng=np.random.default_rng(seed))
+        return np.asarray(sampler.random_base2(int(np.ceil(np.log2(points))))[:points], dtype=np.float64)
+
+
+def _scaled(parameter: Parameter, end: int) -> float:
+    value = (parameter.low, parameter.high)[end]
+    return float(np.log(value)) if parameter.log else value
+
+
+def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatArray:
+    """So many of some candidates, each the farthest from those before it and from points that are taken already.
+
+    Parameters
+    ----------
+    candidates : ndarray, shape (C, D)
+    points
+        How many, at most C.
+    taken : ndarray, shape (T, D)
+    """
+    distance = np.full(len(candidates), np.inf)
+    for one in taken:
+        distance = np.minimum(distance, np.linalg.norm(candidates - one, axis=1))
+    chosen = []
+    for _ in range(min(points, len(candidates))):
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(candidates - candidates[chosen[-1]], axis=1))
+    return candidates[chosen]

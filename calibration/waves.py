@@ -1,0 +1,152 @@
+"""Waves: parameter sets run through all experiments, each wave a sweep like any other; what they give."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.space import Space
+from inputs.calibration import Calibration, Observation
+from inputs.sweep import Sweep, expand
+from paper.sensitivity import misalignment
+from sweeps.conduct import Failure, Options, Progress
+from sweeps.run import run_sweep
+from sweeps.table import load
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = npt.NDArray[np.float64]
+_DIGITS = 9
+
+
+@dataclass(frozen=True)
+class Wave:
+    """P parameter sets and what the engine made of them.
+
+    Attributes
+    ----------
+    unit : ndarray, shape (P, D)
+        The sets, in the unit cube.
+    outcome : ndarray, shape (P, K)
+        Each observation, SI units and degrees; NaN where a run failed.
+    table
+        The sweep's, P times the number of experiments long.
+    """
+
+    unit: FloatArray
+    outcome: FloatArray
+    table: pd.DataFrame
+
+
+def wave_sweep(
+    calibration: Calibration, values: FloatArray, name: str, extra: Mapping[str, Mapping[str, Any]] | None = None
+) -> Sweep:
+    """The sweep of a wave: every parameter set with every experiment, set by set.
+
+    Parameters
+    ----------
+    calibration
+        What is calibrated.
+    values : ndarray, shape (P, D)
+        Values of the parameters.
+    name
+        Of the sweep.
+    extra
+        Keys by experiment that these runs alone have.
+
+    Raises
+    ------
+    InputError
+        If a key of the calibration is none of a case.
+    """
+    columns: dict[str, list[Any]] = {}
+    for row in np.atleast_2d(values):
+        for label, keys in calibration.experiments.items():
+            point = {**keys, **(extra or {}).get(label, {})}
+            for parameter, value in zip(calibration.parameters, row, strict=True):
+                if label in parameter.experiments:
+                    point |= dict.fromkeys(parameter.keys, float(f"{value:.{_DIGITS}g}"))
+            for key, value in point.items():
+                columns.setdefault(key, []).append(value)
+    document = {"title": calibration.title, "case": calibration.case, "set": calibration.settings, "zip": [columns]}
+    return expand(document, source=calibration.source, name=name, folder=calibration.folder)
+
+
+def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
+    """What a wave's table says of each observation, shape (P, K).
+
+    Parameters
+    ----------
+    calibration
+        What is calibrated.
+    table
+        Of a wave's sweep (`sweeps.table.load`).
+    """
+    labels = list(calibration.experiments)
+    sets = len(table) // len(labels)
+    quantities = {observation.quantity for observation in calibration.observations}
+    seen = {quantity: _column(table, quantity).reshape(sets, len(labels)) for quantity in quantities}
+
+    def mean(observation: Observation, experiments: tuple[str, ...]) -> FloatArray:
+        return np.asarray(seen[observation.quantity][:, [labels.index(one) for one in experiments]].mean(axis=1))
+
+    columns = []
+    for observation in calibration.observations:
+        value = mean(observation, observation.of)
+        if observation.over:
+            below = mean(observation, observation.over)
+            # A ratio of two speeds says nothing where the lower one is none.
+            value = np.where(np.abs(below) > _LEAST_SPEED, value / np.where(below == 0.0, 1.0, below), np.nan)
+        columns.append(value)
+    return np.stack(columns, axis=1)
+
+
+_LEAST_SPEED = 5e-5
+
+
+def _column(table: pd.DataFrame, quantity: str) -> FloatArray:
+    finished = (table["status"] == "finished").to_numpy()
+    if quantity != "misalignment":
+        return np.where(finished, table[quantity].to_numpy(dtype=np.float64), np.nan)
+    runs = table["run"].tolist()
+    return np.array([misalignment(run).max() if done else np.nan for run, done in zip(runs, finished, strict=True)])
+
+
+def run_wave(  # noqa: PLR0913
+    calibration: Calibration,
+    unit: FloatArray,
+    name: str,
+    out: Path,
+    options: Options,
+    *,
+    extra: Mapping[str, Mapping[str, Any]] | None = None,
+    engine: str | None = None,
+    despite_audit: bool = False,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> tuple[Wave, list[Failure]]:
+    """Run what is missing of a wave.
+
+    Parameters
+    ----------
+    calibration, extra
+        As for `wave_sweep`.
+    unit : ndarray, shape (P, D)
+        The parameter sets, in the unit cube.
+    name
+        Of the sweep.
+    out, options, engine, despite_audit, on_progress
+        As for `sweeps.run.run_sweep`.
+    """
+    space = Space(calibration.parameters)
+    sweep = wave_sweep(calibration, space.values(unit), name, extra)
+    record, failures = run_sweep(
+        sweep, out, options, engine=engine, despite_audit=despite_audit, on_progress=on_progress
+    )
+    table = load(record.directory)
+    return Wave(unit, observed(calibration, table), table), failures

@@ -1,0 +1,337 @@
+"""Calibration files: which parameters of a case are free, and which published numbers they are to give.
+
+case = "fig1b"
+
+[parameters.friction]
+keys  = ["contact.friction.bead_wall"]
+range = [0.05, 0.5]
+log   = true
+
+[experiments.slow]
+drive.peak_acceleration = "4 g"
+
+[[observations]]
+name      = "v_4g"
+group     = "fig2"
+of        = ["slow"]
+value     = "1.23 mm/s"
+deviation = "0.18 mm/s"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from inputs.axes import Value, flatten
+from inputs.errors import InputError, Problem
+from inputs.library import suggestion
+from inputs.messages import problem_of
+from inputs.reading import find_input, read_toml
+from inputs.schema import Number, Whole
+from inputs.units import ANGLE, SPEED, Kind, parse_quantity
+
+_SHIPPED = Path(__file__).parent / "calibrations"
+_MOST = 10_000
+QUANTITIES: dict[str, Kind] = {
+    **dict.fromkeys(("velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3"), SPEED),
+    "misalignment": ANGLE,
+}
+"""What an observation may be of: a column of a sweep's table, or the largest angle of a walker to the drive axis."""
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ParameterTable(_Table):
+    """``[parameters.NAME]``: keys of the case that take its value, its range, and what is believed beforehand."""
+
+    keys: Annotated[list[str], Field(min_length=1)]
+    range: tuple[Number, Number]
+    log: bool = False
+    experiments: list[str] | None = None
+    symbol: str = ""
+    normal: tuple[Number, Annotated[Number, Field(gt=0)]] | None = None
+
+
+class ObservationTable(_Table):
+    """``[[observations]]``: a mean over experiments, or its ratio to the mean over others."""
+
+    name: str
+    group: str
+    title: str = ""
+    quantity: Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3", "misalignment"] = (
+        "velocity"
+    )
+    of: Annotated[list[str], Field(min_length=1)]
+    over: list[str] = []
+    value: str | Number
+    deviation: str | Number
+
+
+class DesignTable(_Table):
+    """``[design]``: sizes of the waves and of the predictive check, and of the walk through the posterior."""
+
+    seed: Annotated[Whole, Field(ge=0)] = 1
+    waves: Annotated[list[Annotated[Whole, Field(ge=4, le=_MOST)]], Field(min_length=1)] = [64]
+    predictive: Annotated[Whole, Field(ge=2, le=1000)] = 8
+    steps: Annotated[Whole, Field(ge=100, le=1_000_000)] = 2000
+
+
+class CalibrationFile(_Table):
+    """A calibration file."""
+
+    title: str = ""
+    case: str
+    set: dict[str, Any] = {}
+    parameters: Annotated[dict[str, ParameterTable], Field(min_length=1)]
+    experiments: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
+    observations: Annotated[list[ObservationTable], Field(min_length=1)]
+    held_out: dict[str, list[str]] = {}
+    design: DesignTable = DesignTable()
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A free parameter.
+
+    Attributes
+    ----------
+    name, symbol
+        In tables and in figures.
+    keys
+        Of the case, that take its value.
+    low, high
+        Its range.
+    log
+        Whether designs and beliefs are even in its logarithm.
+    experiments
+        Those that it belongs to.
+    normal
+        Mean and standard deviation of a normal belief; of the natural logarithm where ``log``. None: even in the range.
+    """
+
+    name: str
+    symbol: str
+    keys: tuple[str, ...]
+    low: float
+    high: float
+    log: bool
+    experiments: frozenset[str]
+    normal: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Observation:
+    """A published number: SI units, angles in degrees.
+
+    Attributes
+    ----------
+    name, group, title
+        What it is; groups are held out together and share a discrepancy.
+    quantity
+        Of `QUANTITIES`.
+    of, over
+        Experiments: the mean over the first, divided by that over the others if there are any.
+    value, deviation
+        As published, with its standard deviation.
+    """
+
+    name: str
+    group: str
+    title: str
+    quantity: str
+    of: tuple[str, ...]
+    over: tuple[str, ...]
+    value: float
+    deviation: float
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibration, read.
+
+    Attributes
+    ----------
+    name, title, source, folder
+        Of the file.
+    case, settings
+        Base case and what all experiments have in common.
+    parameters, observations
+        What is free and what it is to give.
+    experiments
+        Values of the same keys for each.
+    held_out
+        Names of trials, each with the groups that it leaves out.
+    seed, waves, predictive, steps
+        Of the design.
+    """
+
+    name: str
+    title: str
+    source: str
+    folder: Path
+    case: str
+    settings: Mapping[str, Any]
+    parameters: tuple[Parameter, ...]
+    experiments: Mapping[str, Mapping[str, Value]]
+    observations: tuple[Observation, ...]
+    held_out: Mapping[str, tuple[str, ...]]
+    seed: int
+    waves: tuple[int, ...]
+    predictive: int
+    steps: int
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Groups of observations, in their order."""
+        return tuple(dict.fromkeys(observation.group for observation in self.observations))
+
+
+def shipped_calibrations() -> dict[str, Path]:
+    """The calibrations that come with the project: name to file."""
+    return {path.stem: path for path in sorted(_SHIPPED.glob("*.toml"))}
+
+
+def load_calibration(calibration: str | Path) -> Calibration:
+    """Read a calibration file, or a shipped calibration such as ``ruby``.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or anything in it cannot be used.
+    """
+    path = find_input(calibration, shipped_calibrations(), "calibration")
+    return read_calibration(read_toml(path), source=str(calibration), name=path.stem, folder=path.parent)
+
+
+def read_calibration(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Calibration:
+    """A calibration given as nested tables; parameters and errors as for `inputs.sweep.expand`."""
+    try:
+        file = CalibrationFile.model_validate(document)
+    except ValidationError as error:
+        problems = [problem_of(details, document, CalibrationFile, "a calibration") for details in error.errors()]
+        raise InputError(source, problems) from error
+    problems = _problems(file)
+    if problems:
+        raise InputError(source, problems)
+    experiments = {label: flatten(table, lambda _: False) for label, table in file.experiments.items()}
+    return Calibration(
+        name=name,
+        title=file.title,
+        source=source,
+        folder=folder,
+        case=file.case,
+        settings=file.set,
+        parameters=tuple(_parameter(label, table, file) for label, table in file.parameters.items()),
+        experiments=experiments,
+        observations=tuple(_observation(table) for table in file.observations),
+        held_out={label: tuple(groups) for label, groups in file.held_out.items()},
+        seed=file.design.seed,
+        waves=tuple(file.design.waves),
+        predictive=file.design.predictive,
+        steps=file.design.steps,
+    )
+
+
+def _parameter(name: str, table: ParameterTable, file: CalibrationFile) -> Parameter:
+    everywhere = frozenset(file.experiments)
+    experiments = everywhere if table.experiments is None else frozenset(table.experiments)
+    low, high = table.range
+    return Parameter(name, table.symbol or name, tuple(table.keys), low, high, table.log, experiments, table.normal)
+
+
+def _number(value: str | float, quantity: str) -> float:
+    if not isinstance(value, str):
+        return float(value)
+    number = parse_quantity(value, QUANTITIES[quantity])
+    return number * _DEGREES if QUANTITIES[quantity] is ANGLE else number
+
+
+_DEGREES = 57.29577951308232
+
+
+def _observation(table: ObservationTable) -> Observation:
+    value, deviation = (_number(one, table.quantity) for one in (table.value, table.deviation))
+    return Observation(
+        table.name, table.group, table.title or table.name, table.quantity, tuple(table.of), tuple(table.over), value,
+        deviation,
+    )  # fmt: skip
+
+
+def _problems(file: CalibrationFile) -> list[Problem]:
+    """What pydantic cannot see."""
+    found = [*_problems_of_experiments(file), *_problems_of_parameters(file)]
+    names = [observation.name for observation in file.observations]
+    groups = {observation.group for observation in file.observations}
+    for number, observation in enumerate(file.observations):
+        place = f"observations[{number}]"
+        if names.index(observation.name) != number:
+            found.append(Problem(f"{place}.name", f'"{observation.name}"', "expected a name of its own"))
+        for key in ("of", "over"):
+            found += _unknown(f"{place}.{key}", getattr(observation, key), file.experiments, "an experiment")
+        for key in ("value", "deviation"):
+            found += _unreadable(f"{place}.{key}", getattr(observation, key), observation)
+    for name, held in file.held_out.items():
+        found += _unknown(f"held_out.{name}", held, groups, "a group of observations")
+        if set(held) >= groups:
+            found.append(Problem(f"held_out.{name}", None, "expected to leave a group to calibrate on"))
+    return found
+
+
+def _problems_of_experiments(file: CalibrationFile) -> list[Problem]:
+    first, *others = [(label, set(flatten(table, lambda _: False))) for label, table in file.experiments.items()]
+    found = []
+    for label, keys in others:
+        for key in sorted(keys ^ first[1]):
+            told = f"expected the same keys in every experiment; {first[0]} and {label} differ in {key}"
+            found.append(Problem(f"experiments.{label}", None, told))
+    return found
+
+
+def _problems_of_parameters(file: CalibrationFile) -> list[Problem]:
+    found = []
+    taken: dict[tuple[str, str], str] = {}
+    for name, table in file.parameters.items():
+        place = f"parameters.{name}"
+        low, high = table.range
+        if low >= high or (table.log and low <= 0.0):
+            expected = "expected a smaller and a larger number" + (", both above zero" if table.log else "")
+            found.append(Problem(f"{place}.range", f"[{low:g}, {high:g}]", expected))
+        found += _unknown(f"{place}.experiments", table.experiments or [], file.experiments, "an experiment")
+        for key in table.keys:
+            for experiment in table.experiments or file.experiments:
+                other = taken.setdefault((key, experiment), name)
+                if other != name:
+                    told = f"{key} of the experiment {experiment} is set by {other} already"
+                    found.append(Problem(f"{place}.keys", None, told))
+    return found
+
+
+def _unknown(place: str, given: list[str], known: Any, what: str) -> list[Problem]:
+    return [
+        Problem(place, f'"{name}"', f"expected {what}: one of {', '.join(sorted(known))}{suggestion(name, known)}")
+        for name in given
+        if name not in known
+    ]
+
+
+def _unreadable(place: str, given: str | float, observation: ObservationTable) -> list[Problem]:
+    if observation.over:
+        wrong = "expected a plain number: a ratio has no unit" if isinstance(given, str) else ""
+    elif not isinstance(given, str):
+        wrong = QUANTITIES[observation.quantity].expectation
+    else:
+        wrong = ""
+        try:
+            parse_quantity(given, QUANTITIES[observation.quantity])
+        except ValueError as error:
+            wrong = str(error)
+    if not wrong and place.endswith("deviation") and _number(given, observation.quantity) <= 0.0:
+        wrong = "expected more than zero"
+    return [Problem(place, f'"{given}"' if isinstance(given, str) else f"{given:g}", wrong)] if wrong else []

@@ -1,0 +1,52 @@
+"""``walkers calibrate``: free parameters from published numbers."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from walkers.commands.arguments import DespiteAudit, EngineName, Out
+from walkers.pipeline import DEFAULT_OUT
+
+File = Annotated[
+    str, typer.Argument(metavar="CALIBRATION", help="A calibration file, or a shipped calibration such as ruby.")
+]
+To = Annotated[Path | None, typer.Option("--to", help="Folder of tables and figures; OUT/NAME if left out.")]
+Jobs = Annotated[int | None, typer.Option("-j", "--jobs", min=1, help="Decks at once; all cores if left out.")]
+
+
+def command(
+    calibration: File,
+    out: Out = DEFAULT_OUT,
+    to: To = None,
+    jobs: Jobs = None,
+    engine: EngineName = None,
+    despite_audit: DespiteAudit = False,
+) -> int:
+    """Calibrate, or go on with it: waves of runs, emulators, posterior, predictions by the engine."""
+    from calibration.calibrate import calibrate
+    from calibration.figures import draw
+    from calibration.report import write_tables
+    from inputs.calibration import load_calibration
+    from sweeps.conduct import Options
+    from sweeps.site import cores_here
+    from walkers.progress import progress_of_sweep
+
+    read = load_calibration(calibration)
+    found = calibrate(
+        read,
+        out,
+        Options(jobs or cores_here()),
+        engine=engine,
+        despite_audit=despite_audit,
+        progress_of=progress_of_sweep,
+    )
+    for sweep, failures in found.failures.items():
+        print(f"walkers: {sweep}: {len(failures)} points failed", file=sys.stderr)
+    folder = to or out / read.name
+    for file in [*write_tables(found, folder), *draw(found, folder)]:
+        print(file)
+    return 0
