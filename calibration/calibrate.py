@@ -234,8 +234,8 @@ def sobol_indices(emulators: list[Emulator], space: Space, seed: int, points: in
     from scipy.stats import uniform
 
     def respond(points: FloatArray) -> FloatArray:
-        return np.stack([one.process.predict(points.T) for one in emulators])
+        return np.stack([one.predict(points.T)[0] for one in emulators])
 
     found = indices_of(func=respond, n=points, dists=[uniform()] * space.dimensions, rng=np.random.default_rng(seed))
-    indices: FloatArray = np.clip(np.stack([found.first_order, found.total_order]), 0.0, 1.0)
-    return indices
+    indices: FloatArray = np.stack([found.first_order, found.total_order])  # without K where that is 1
+    return np.clip(indices.reshape(2, len(emulators), space.dimensions), 0.0, 1.0)

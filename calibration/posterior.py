@@ -107,6 +107,7 @@ def sample_posterior(
     Posterior
     """
     import emcee
+    from threadpoolctl import threadpool_limits
 
     used = [one for one in emulators if one.observation.group not in held_out]
     groups = tuple(dict.fromkeys(one.observation.group for one in used))
@@ -122,7 +123,8 @@ def sample_posterior(
         moves=[(emcee.moves.DEMove(), 0.7), (emcee.moves.DESnookerMove(), 0.1), (emcee.moves.StretchMove(), 0.2)],
     )
     sampler.random_state = np.random.RandomState(seed).get_state()
-    sampler.run_mcmc(_beginnings(density, walkers, dimensions, draw), steps)
+    with threadpool_limits(1):  # matrices are small: threads would wait for each other
+        sampler.run_mcmc(_beginnings(density, walkers, dimensions, draw), steps)
     gone = int(_BURN * steps)
     chain, log_density = sampler.get_chain(discard=gone), sampler.get_log_prob(discard=gone)
     thin = max(1, chain.shape[0] * walkers // _KEPT)

@@ -113,7 +113,7 @@ def emulator_checks(found: Outcome) -> FloatArray:
     """Errors of the emulators at the runs of the predictive wave, in their stated standard errors, shape (S, K)."""
     columns = []
     for place, emulator in enumerate(found.emulators):
-        mean, deviation = emulator.process.predict(found.predictive.unit, return_std=True)
+        mean, deviation = emulator.predict(found.predictive.unit)
         seen = transformed(found.predictive.outcome[:, place], emulator.observation)
         columns.append((seen - mean) / (deviation * emulator.stretch))
     return np.stack(columns, axis=1)

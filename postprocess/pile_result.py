@@ -21,6 +21,8 @@ from runner.files import write_json
 
 FloatArray = npt.NDArray[np.float64]
 
+METHOD = 2
+"""Of judging climbs: a result that was made by another one is made anew."""
 _LAYERS = 0.5
 """Thickness of the layers of the packing profile, in diameters of the largest bead."""
 
@@ -127,7 +129,7 @@ def current_pile_result(directory: str | Path) -> dict[str, Any]:
     directory = Path(directory)
     try:
         result = read_result(directory)
-        usual = result.get("definition") == vars(Definition())
+        usual = result.get("definition") == vars(Definition()) and result.get("method") == METHOD
         if usual and result.keys() >= {"climbs", "surface"} and intact(directory, PILE_TABLES):
             return result
     except (OSError, ValueError):
@@ -229,6 +231,7 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
             if climb.climbed
         ],
         "definition": vars(found.definition),
+        "method": METHOD,
     }
 
 

@@ -61,19 +61,21 @@ def make_case(**changes: Any) -> WalkerCase:
 
 
 def to_toml(values: dict[str, Any]) -> str:
-    """A nested document as TOML text; JSON's strings, numbers and lists are TOML's."""
+    """A nested document as TOML text; JSON's strings and numbers are TOML's."""
     plain = {key: value for key, value in values.items() if not isinstance(value, dict)}
-    lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in plain.items()]
+    lines = [f"{key} = {_inline(value)}" for key, value in plain.items()]
     for key, value in values.items():
         if isinstance(value, dict):
-            lines.append(f"[{key}]")
-            for name, entry in value.items():
-                if isinstance(entry, dict):
-                    inner = ", ".join(f"{k} = {json.dumps(v)}" for k, v in entry.items())
-                    lines.append(f"{name} = {{ {inner} }}")
-                else:
-                    lines.append(f"{name} = {json.dumps(entry, ensure_ascii=False)}")
+            lines += [f"[{key}]", *(f"{name} = {_inline(entry)}" for name, entry in value.items())]
     return "\n".join(lines) + "\n"
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_inline(entry)}" for key, entry in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,261 @@
+"""Calibrations: files, emulators and posteriors of known functions, parameters found again from the engine's data."""
+
+import json
+import subprocess
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+import pytest
+
+from calibration.calibrate import calibrate, sobol_indices
+from calibration.emulator import fit_emulators
+from calibration.posterior import sample_posterior
+from calibration.report import emulator_checks, intervals, rows_of
+from calibration.space import Space, spread_out
+from calibration.waves import run_wave, wave_sweep
+from inputs import InputError
+from inputs.calibration import Observation, Parameter, load_calibration, read_calibration, shipped_calibrations
+from sweeps.conduct import Options
+from tests.conftest import PROGRAM, to_toml
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def parameter(name: str, low: float, high: float, *, log: bool = False, **more: Any) -> Parameter:
+    return Parameter(name, name, (name,), low, high, log, frozenset({"one"}), more.get("normal"))
+
+
+def observation(name: str, value: float, deviation: float, group: str = "all") -> Observation:
+    return Observation(name, group, name, "velocity", ("one",), (), value, deviation)
+
+
+SPACE = Space((parameter("a", 0.1, 10.0, log=True), parameter("b", -1.0, 3.0)))
+
+
+def test_the_cube_and_the_parameters_are_one() -> None:
+    unit = np.random.default_rng(1).random((50, 2))
+    values = SPACE.values(unit)
+    assert 0.1 <= values[:, 0].min() < values[:, 0].max() <= 10.0
+    np.testing.assert_allclose(SPACE.unit(values), unit)
+    np.testing.assert_allclose(SPACE.values(np.array([0.5, 0.5])), [1.0, 1.0])
+    believed = Space((parameter("a", 0.1, 10.0, log=True, normal=(1.0, 0.5)),))
+    densities = believed.log_belief(np.array([[0.5], [0.9], [1.1]]))
+    expected = -0.5 * (np.log(SPACE.values(np.array([0.9, 0.0]))[0]) / 0.5) ** 2
+    assert densities[1] - densities[0] == pytest.approx(expected)
+    assert densities[2] == -np.inf
+
+
+def test_designs_fill_the_cube() -> None:
+    design = SPACE.design(40, 3)
+    assert design.shape == (40, 2)
+    assert np.histogram2d(*design.T, bins=3, range=[[0, 1], [0, 1]])[0].min() >= 2
+    candidates = np.random.default_rng(1).random((500, 2))
+    chosen = spread_out(candidates, 9, np.array([[0.5, 0.5]]))
+    apart = np.linalg.norm(chosen[:, None] - chosen, axis=2)[~np.eye(9, dtype=bool)]
+    assert apart.min() > 0.25
+
+
+def _known(unit: FloatArray) -> FloatArray:
+    """Two observations of two parameters, one of them with a cliff's tail."""
+    x, y = unit.T
+    return np.stack([3.0 + 2.0 * x + np.sin(3.0 * y), 1.0 + x * y + 1e3 * np.maximum(x - 0.9, 0.0)], axis=1)
+
+
+TRUTH = np.array([[0.4, 0.6]])
+
+
+@pytest.fixture(scope="module")
+def known() -> tuple[Any, list[Observation]]:
+    values = _known(TRUTH)[0]
+    observations = [observation("p", values[0], 0.05), observation("q", values[1], 0.05, "other")]
+    design = SPACE.design(64, 1)
+    return fit_emulators(design, _known(design), observations, 1), observations
+
+
+def test_emulators_know_their_error(known: tuple[Any, list[Observation]]) -> None:
+    emulators, _ = known
+    fresh = np.random.default_rng(5).random((200, 2)) * [0.85, 1.0]
+    for place, emulator in enumerate(emulators):
+        value, error = emulator.value(fresh)
+        miss = np.abs(value - _known(fresh)[:, place])
+        assert np.median(miss) < 0.05
+        assert np.mean(miss <= 3.0 * error + 1e-6) > 0.9
+        assert emulator.explained > 0.9
+
+
+def test_a_posterior_is_the_known_one(known: tuple[Any, list[Observation]]) -> None:
+    """With little discrepancy the truth is found; without a group its observation is predicted wider."""
+    emulators, _ = known
+    posterior = sample_posterior(emulators, SPACE, 1500, 1)
+    assert np.abs(posterior.best - TRUTH[0]).max() < 0.06
+    low, high = np.percentile(posterior.unit, (5.0, 95.0), axis=0)
+    assert (low < TRUTH[0]).all()
+    assert (high > TRUTH[0]).all()
+    without = sample_posterior(emulators, SPACE, 1500, 1, {"other"})
+    assert without.groups == ("all",)
+    seen, unseen = (emulators[1].value(one.unit)[0].std() for one in (posterior, without))
+    assert unseen > 1.5 * seen
+
+
+def test_an_impossible_observation_is_a_discrepancy() -> None:
+    """Those that agree and one that no parameter gives: it does not bend the others."""
+    design = SPACE.design(64, 1)
+    outcome = np.concatenate([_known(design), design, 5.0 + 0.1 * design[:, :1]], axis=1)
+    values = [*_known(TRUTH)[0], *TRUTH[0]]
+    observations = [
+        *(observation(name, value, 0.05) for name, value in zip("pqxy", values, strict=True)),
+        observation("never", 0.0, 0.05, "other"),
+    ]
+    posterior = sample_posterior(fit_emulators(design, outcome, observations, 1), SPACE, 1500, 1)
+    middle = np.median(posterior.discrepancy, axis=0)
+    assert middle[posterior.groups.index("other")] > 20.0
+    assert middle[posterior.groups.index("all")] < 2.0
+    assert np.abs(np.median(posterior.unit, axis=0) - TRUTH[0]).max() < 0.1
+
+
+def test_sobol_indices_are_those_of_a_known_function() -> None:
+    """y = x1 + 2 x2 on the unit square, near its observation: the shares are 1/5 and 4/5."""
+    design = SPACE.design(64, 1)
+    outcome = (design[:, 0] + 2.0 * design[:, 1])[:, None]
+    emulators = fit_emulators(design, outcome, [observation("p", 1.5, 50.0)], 1)
+    first, total = sobol_indices(emulators, SPACE, 1)
+    np.testing.assert_allclose(first[0], [0.2, 0.8], atol=0.05)
+    np.testing.assert_allclose(total[0], [0.2, 0.8], atol=0.05)
+
+
+# --- the real engine --------------------------------------------------------------------------------------------------
+
+TRUE = {"friction": 0.1, "drag": 2.0}
+REDUCED: dict[str, Any] = {
+    "title": "Friction and drag from three speeds",
+    "case": "fig1b",
+    "set": {"start": {"replicates": 1}, "run": {"cycles": 20, "settling_cycles": 10}},
+    "parameters": {
+        "friction": {
+            "keys": ["contact.friction.bead_wall", "contact.friction.bead_bead"],
+            "range": [0.04, 0.25],
+            "log": True,
+        },
+        "drag": {"keys": ["liquid.viscosity_ratio"], "range": [0.4, 10.0], "log": True},
+    },
+    "experiments": {
+        "slow": {"drive.frequency": "60 Hz", "drive.peak_acceleration": "3 g"},
+        "fast": {"drive.frequency": "90 Hz", "drive.peak_acceleration": "3 g"},
+        "strong": {"drive.frequency": "90 Hz", "drive.peak_acceleration": "6 g"},
+    },
+    "design": {"waves": [16, 8], "predictive": 3, "steps": 1000, "seed": 2},
+}
+
+
+def reduced(values: dict[str, float]) -> dict[str, Any]:
+    observations = [
+        {"name": name, "group": "v", "of": [name], "value": f"{value} m/s", "deviation": f"{0.03 * value} m/s"}
+        for name, value in values.items()
+    ]
+    ratio = {"name": "ratio", "group": "r", "of": ["fast"], "over": ["slow"], "deviation": 0.03}
+    return {**REDUCED, "observations": [*observations, {**ratio, "value": values["fast"] / values["slow"]}]}
+
+
+def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: Path) -> None:
+    guess = read_calibration(
+        reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3}), source="truth", name="truth", folder=tmp_path
+    )
+    truth = Space(guess.parameters).unit(np.array([list(TRUE.values())]))
+    out = tmp_path / "runs"
+    wave, failures = run_wave(guess, truth, "truth", out, Options(2))
+    assert not failures
+    document = reduced(dict(zip(REDUCED["experiments"], wave.outcome[0, :3].tolist(), strict=True)))
+    file = tmp_path / "reduced.toml"
+    file.write_text(to_toml(document))
+    command = [PROGRAM, "calibrate", str(file), "--out", str(out), "--to", str(tmp_path / "here")]
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    names = ["posterior.parquet", "calibration.json", "calibration.md", "corner.png", "predictions.png", "sobol.png"]
+    assert [Path(line).name for line in told.splitlines()] == names
+    said = json.loads((tmp_path / "here" / "calibration.json").read_text())
+    assert said["sets"] == 24
+    for name, true in TRUE.items():
+        low, middle, high = said["intervals"][name]
+        assert low * 0.97 < true < high * 1.03, name
+        assert middle == pytest.approx(true, rel=0.2), name
+    assert said["agree"] == 4
+    assert said["emulators_within_two_errors"] >= 0.8
+    samples = pd.read_parquet(tmp_path / "here" / "posterior.parquet")
+    assert {"friction", "drag", "discrepancy_v", "discrepancy_r", "log_density"} == set(samples.columns)
+    # Everything is there: again is no run, and the same outcome.
+    runs = {path.name: path.stat().st_mtime_ns for path in out.glob("*/manifest.json")}
+    again = calibrate(load_calibration(file), out, Options(2))
+    assert {path.name: path.stat().st_mtime_ns for path in out.glob("*/manifest.json")} == runs
+    assert again.best == pytest.approx(said["best"])
+    assert {name: list(one) for name, one in intervals(again).items()} == said["intervals"]
+    assert emulator_checks(again).shape == (3, 4)
+    for row in rows_of(again):
+        assert row.half_step == pytest.approx(row.engine, rel=0.02)
+    # Designs of other ranges are not taken for these.
+    document["parameters"]["drag"]["range"] = [0.5, 10.0]
+    file.write_text(to_toml(document))
+    refused = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
+    assert refused.stderr.count("\n") == 1
+    assert "wave-1.json" in refused.stderr
+
+
+# --- files ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", shipped_calibrations())
+def test_shipped_calibrations_can_be_run(name: str) -> None:
+    found = load_calibration(name)
+    sweep = wave_sweep(found, Space(found.parameters).values(np.full((1, len(found.parameters)), 0.5)), name)
+    cases = list(sweep.cases())
+    assert len(cases) == len(found.experiments)
+    assert {observation.group for observation in found.observations} == set(found.groups)
+
+
+def _bad(path: str, value: Any) -> dict[str, Any]:
+    document = json.loads(json.dumps(reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})))
+    *tables, key = path.split("/")
+    table = document
+    for name in tables:
+        table = table[int(name)] if isinstance(table, list) else table[name]
+    if value is None:
+        del table[key]
+    else:
+        table[key] = value
+    return document
+
+
+BAD = {
+    "range": ("parameters/drag/range", [3.0, 1.0], r"parameters\.drag\.range"),
+    "log": ("parameters/drag/range", [0.0, 1.0], r"parameters\.drag\.range"),
+    "unknown table key": ("parameters/drag/rang", [0.0, 1.0], r"parameters\.drag\.rang.*range"),
+    "twice": ("parameters/drag/keys", ["contact.friction.bead_wall"], r"set by friction already"),
+    "experiment": ("observations/0/of", ["slo"], r'observations\[0\]\.of.*"slow"'),
+    "no unit": ("observations/0/value", 1.0, r"observations\[0\]\.value.*speed"),
+    "unit of a ratio": ("observations/3/value", "1 mm/s", r"observations\[3\]\.value.*ratio"),
+    "deviation": ("observations/0/deviation", "0 mm/s", r"observations\[0\]\.deviation"),
+    "name": ("observations/1/name", "slow", r"observations\[1\]\.name"),
+    "keys": ("experiments/fast/start.angle", "3 deg", r"experiments\.fast"),
+    "held": ("held_out", {"x": ["w"]}, r"held_out\.x"),
+    "all held": ("held_out", {"x": ["v", "r"]}, r"held_out\.x"),
+    "missing": ("observations", None, "observations"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_calibration_is_told_by_its_key(name: str, tmp_path: Path) -> None:
+    path, value, told = BAD[name]
+    with pytest.raises(InputError, match=told):
+        read_calibration(_bad(path, value), source="bad.toml", name="bad", folder=tmp_path)
+
+
+def test_a_key_that_is_none_of_a_case_is_told(tmp_path: Path) -> None:
+    found = read_calibration(
+        _bad("parameters/drag/keys", ["liquid.viscosity_ration"]), source="bad.toml", name="bad", folder=tmp_path
+    )
+    with pytest.raises(InputError, match="viscosity_ratio"):
+        calibrate(found, tmp_path, Options(1))
+    assert tomllib.loads(to_toml(REDUCED))["case"] == "fig1b"
