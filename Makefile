@@ -28,12 +28,12 @@ sweep: setup ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.tom
 
 .PHONY: pile
 pile: setup ## Shake the small pile (or CASE=pile-fig1a): what climbed, pictures; goes on where it was interrupted
-	@$(WALKERS) run $(if $(filter pile%,$(CASE)),$(CASE),pile-small) --out $(OUT)
+	@$(WALKERS) run $(if $(filter pile% cluster,$(CASE)),$(CASE),pile-small) --out $(OUT)
 	@echo "pictures:"
-	@$(WALKERS) plot $(if $(filter pile%,$(CASE)),$(CASE),pile-small) --out $(OUT) | sed 's/^/  /'
-	@$(WALKERS) render $(if $(filter pile%,$(CASE)),$(CASE),pile-small) --out $(OUT) | sed 's/^/  /'
+	@$(WALKERS) plot $(if $(filter pile% cluster,$(CASE)),$(CASE),pile-small) --out $(OUT) | sed 's/^/  /'
+	@$(WALKERS) render $(if $(filter pile% cluster,$(CASE)),$(CASE),pile-small) --out $(OUT) | sed 's/^/  /'
 	@echo "for ParaView:"
-	@$(WALKERS) vtk $(if $(filter pile%,$(CASE)),$(CASE),pile-small) --every 2 --out $(OUT) | sed 's/^/  /'
+	@$(WALKERS) vtk $(if $(filter pile% cluster,$(CASE)),$(CASE),pile-small) --every 2 --out $(OUT) | sed 's/^/  /'
 
 .PHONY: figures
 figures: setup ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)

@@ -62,10 +62,13 @@ def liquid(name: str) -> dict[str, float]:
 
 
 def surface_pair(first: str | None, second: str | None) -> dict[str, float] | None:
-    """Friction and rolling friction of two wet surfaces, or None where the library has no value for them."""
+    """How two wet surfaces touch, or None where the library has no value for them.
+
+    ``friction`` and ``rolling_friction``, where they are known also ``minimum_separation_ratio`` and ``viscosity_ratio``.
+    """
     for entry in _contents()["surface_pairs"]:
         if sorted(entry["materials"]) == sorted([first or "", second or ""]):
-            return {key: float(entry[key]["value"]) for key in ("friction", "rolling_friction")}
+            return {key: float(known["value"]) for key, known in entry.items() if key != "materials"}
     return None
 
 

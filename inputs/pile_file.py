@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from inputs import library
 from inputs.case import Contact, Drive, Liquid
 from inputs.dimer import Dimer
 from inputs.pile import Container, PileBeads, PileCase, PileRun, distance_from_axis, lattice
@@ -112,7 +113,7 @@ def resolve_pile(file: PileFile, name: str) -> PileCase:
     """
     beads = _beads(file)
     wall = file.container.material
-    liquid = resolve_liquid(file.liquid)
+    liquid = resolve_liquid(file.liquid, library.surface_pair(beads.material, wall))
     contact = resolve_contact(file.contact, beads.material, "container.material", wall)
     drive = Drive("z", file.drive.frequency, file.drive.peak_acceleration, file.drive.frame)
     container = Container(file.container.shape, file.container.width, file.container.height, wall)

@@ -13,6 +13,8 @@ from inputs.schema import BeadsTable, ContactTable, LiquidTable, WalkerFile
 from inputs.timestep import TimeStepLimits, fit_into_cycle, time_step_limits
 
 MOST_STEPS = 2**31 - 1
+_MINIMUM_SEPARATION_RATIO, _VISCOSITY_RATIO = 0.01, 1.0
+"""Where neither the case nor the library says more."""
 _WAYS: dict[str, Literal["both", "right", "left"]] = {
     **{"both": "both", "right": "right", "left": "left"},
     **{"up": "right", "down": "left"},
@@ -38,7 +40,8 @@ def resolve(file: WalkerFile, name: str) -> WalkerCase:
         If something is missing that the library does not know, or keys contradict each other.
     """
     beads = _beads(file)
-    liquid = resolve_liquid(file.liquid)
+    pair = library.surface_pair(beads.material, file.substrate.material)
+    liquid = resolve_liquid(file.liquid, pair)
     contact = resolve_contact(file.contact, beads.material, "substrate.material", file.substrate.material)
     dimer = Dimer(beads.radii, beads.density, liquid.surface_tension)
     drive = _drive(file, dimer)
@@ -122,8 +125,8 @@ def _radii(table: BeadsTable) -> tuple[float, float]:
     return first, second
 
 
-def resolve_liquid(table: LiquidTable) -> Liquid:
-    """A liquid, the library's numbers filled in.
+def resolve_liquid(table: LiquidTable, pair: dict[str, float] | None = None) -> Liquid:
+    """A liquid, the library's numbers filled in, those of the two surfaces among them.
 
     Raises
     ------
@@ -148,7 +151,8 @@ def resolve_liquid(table: LiquidTable) -> Liquid:
     if tension is None or viscosity is None:
         lacking = "surface_tension" if tension is None else "dynamic_viscosity"
         raise UnusableKeyError(f"liquid.{lacking}", "missing; expected a liquid of the library by name, or this number")
-    viscosity = float(f"{viscosity * table.viscosity_ratio:.15g}")
+    ratio = _first(table.viscosity_ratio, pair, "viscosity_ratio")
+    viscosity = float(f"{viscosity * (_VISCOSITY_RATIO if ratio is None else ratio):.15g}")
     return Liquid(tension, viscosity, density, table.volume_fraction, table.contact_angle, table.name)
 
 
@@ -184,6 +188,7 @@ def resolve_contact(table: ContactTable, bead: str | None, wall_key: str, wall: 
             f"contact.{lacking[0]}",
             f"missing{others}; the library has them for {pairs} only, not for {bead or 'these beads'} on {wall}",
         )
+    separation = _first(table.minimum_separation_ratio, on_wall, "minimum_separation_ratio")
     return Contact(
         youngs_modulus=table.youngs_modulus,
         poissons_ratio=table.poissons_ratio,
@@ -191,14 +196,14 @@ def resolve_contact(table: ContactTable, bead: str | None, wall_key: str, wall: 
         friction_bead_bead=known["friction.bead_bead"] or 0.0,
         friction_bead_wall=known["friction.bead_wall"] or 0.0,
         rolling_friction=known["rolling_friction"] or 0.0,
-        minimum_separation_ratio=table.minimum_separation_ratio,
+        minimum_separation_ratio=_MINIMUM_SEPARATION_RATIO if separation is None else separation,
     )
 
 
 def _first(given: float | None, pair: dict[str, float] | None, key: str) -> float | None:
     if given is not None:
         return given
-    return pair[key] if pair is not None else None
+    return pair.get(key) if pair is not None else None
 
 
 def _drive(file: WalkerFile, dimer: Dimer) -> Drive:

@@ -87,7 +87,8 @@ class BeadsTable(Table):
 class LiquidTable(Table):
     """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
 
-    ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag.
+    ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag. Left out, the
+    library's value for the surfaces holds, else 1.
     """
 
     name: str | None = None
@@ -96,7 +97,7 @@ class LiquidTable(Table):
     kinematic_viscosity: KinematicViscosity | None = None
     dynamic_viscosity: DynamicViscosity | None = None
     volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] = 0.01
-    viscosity_ratio: Annotated[Number, Field(ge=1e-3, le=1e4)] = 1.0
+    viscosity_ratio: Annotated[Number, Field(ge=1e-3, le=1e4)] | None = None
     contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] = 0.0
 
 
@@ -114,14 +115,17 @@ class FrictionTable(Table):
 
 
 class ContactTable(Table):
-    """``[contact]``: the model of the contacts."""
+    """``[contact]``: the model of the contacts.
+
+    ``minimum_separation_ratio``, left out, is the library's for the surfaces, else 0.01.
+    """
 
     friction: FrictionTable = FrictionTable()
     rolling_friction: Coefficient | None = None
     restitution: Annotated[Number, Field(ge=1e-3, le=1)] = 0.3
     youngs_modulus: Annotated[Modulus, Field(ge=5e6)] = 5e7
     poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = 0.3
-    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] = 0.01
+    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] | None = None
 
 
 class DriveTable(Table):
