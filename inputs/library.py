@@ -64,7 +64,7 @@ def liquid(name: str) -> dict[str, float]:
 def surface_pair(first: str | None, second: str | None) -> dict[str, float] | None:
     """How two wet surfaces touch, or None where the library has no value for them.
 
-    ``friction`` and ``rolling_friction``, where they are known also ``minimum_separation_ratio`` and ``viscosity_ratio``.
+    ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio`` and ``viscosity_ratio``.
     """
     for entry in _contents()["surface_pairs"]:
         if sorted(entry["materials"]) == sorted([first or "", second or ""]):
