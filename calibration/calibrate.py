@@ -23,6 +23,8 @@ from runner.files import read_json, write_json
 from sweeps.conduct import Failure, Options
 
 FloatArray = npt.NDArray[np.float64]
+_HOPELESS = 30.0
+"""Standard deviations by which a run that failed is off."""
 _STEPS_BETWEEN_WAVES = 800
 """Of the chain that places the next wave; the last chain has the file's number."""
 
@@ -46,9 +48,10 @@ class Outcome:
     held_out
         From those that each trial of the file leaves.
     predictive
-        The engine at the best set (first) and at samples of the posterior.
+        The engine at samples of the posterior, that of the highest density first.
     checks
-        The engine at the best set with half the time step, and for twice as long.
+        The engine at the best set of all that were run: as in the waves (``best``), with half the time step
+        (``half-step``), and for twice as long (``twice-as-long``).
     sobol : ndarray, shape (2, K, D)
         First and total order indices of each observation's transformed residual over the whole range.
     failures
@@ -69,8 +72,8 @@ class Outcome:
 
     @property
     def best(self) -> dict[str, float]:
-        """The set of the highest posterior density: parameter to value, SI units."""
-        values = self.space.values(self.predictive.unit[0])
+        """The set with which the engine came nearest to all observations: parameter to value, SI units."""
+        values = self.space.values(self.checks["best"].unit[0])
         return dict(zip([one.name for one in self.space.parameters], map(float, values), strict=True))
 
 
@@ -156,9 +159,10 @@ def calibrate(
     }
     drawn = _kept(folder / "predictive.json", calibration, partial(_drawn, posterior, calibration.predictive))
     predictive = runner.run("predictive", drawn)
+    best = _best(calibration, np.concatenate([unit, drawn]), np.concatenate([outcome, predictive.outcome]))
     checks = {
-        name: runner.run(name, drawn[:1], extra)
-        for name, extra in _finer_and_longer(calibration, space.values(drawn[:1])).items()
+        name: runner.run(name, best, extra)
+        for name, extra in _finer_and_longer(calibration, space.values(best)).items()
     }
     return Outcome(
         calibration,
@@ -203,23 +207,41 @@ def _design(calibration: Calibration, unit: FloatArray, outcome: FloatArray, poi
         return space.design(points, seed)
     emulators = fit_emulators(unit, outcome, calibration.observations, seed)
     posterior = sample_posterior(emulators, space, min(_STEPS_BETWEEN_WAVES, calibration.steps), seed)
-    return spread_out(np.unique(posterior.unit, axis=0), points, unit)
+    samples, first = np.unique(posterior.unit, axis=0, return_index=True)
+    likely = samples[np.argsort(posterior.log_density[first])[::-1]][: len(samples) // 2]
+    # Half of them where the posterior is high, far from each other; the others wherever it is, to find what is missing.
+    among = spread_out(likely[: 20 * points], points - points // 2, unit)
+    beyond = np.random.default_rng([seed, len(unit)]).choice(samples, points // 2, replace=len(samples) < points)
+    return np.concatenate([among, beyond])
 
 
 def _drawn(posterior: Posterior, points: int) -> FloatArray:
-    """The best sample, and so many others, evenly through the chain."""
+    """The sample of the highest density, and so many others, evenly through the chain."""
     every = np.linspace(0, len(posterior.unit) - 1, points - 1).round().astype(int)
     return np.concatenate([posterior.best[None], posterior.unit[every]])
 
 
+def _best(calibration: Calibration, unit: FloatArray, outcome: FloatArray) -> FloatArray:
+    """Of all sets that were run that with the least misfit Σ ln(1 + r²), shape (1, D), r in standard deviations.
+
+    The engine's own word: emulators err most where they hope most. The logarithm keeps an observation that no set gives
+    from deciding among them.
+    """
+    value = np.array([one.value for one in calibration.observations])
+    deviation = np.array([one.deviation for one in calibration.observations])
+    residual = (outcome - value) / deviation
+    misfit = np.log1p(np.where(np.isfinite(residual), residual, _HOPELESS) ** 2).sum(axis=1)
+    return unit[[int(np.argmin(misfit))]]
+
+
 def _finer_and_longer(calibration: Calibration, values: FloatArray) -> dict[str, dict[str, dict[str, Any]]]:
-    """What the runs of a set have beside it: half of their time steps; twice their cycles."""
+    """What the runs of a set have beside it: nothing; half of their time steps; twice their cycles."""
     cases = list(wave_sweep(calibration, values, "check").cases())
     finer, longer = {}, {}
     for label, case in zip(calibration.experiments, cases, strict=True):
         finer[label] = {"run.time_step": f"{case.run.time_step / 2.0 * 1e6:.6g} us"}
         longer[label] = {"run.cycles": 2 * case.run.cycles}
-    return {"half-step": finer, "twice-as-long": longer}
+    return {"best": {}, "half-step": finer, "twice-as-long": longer}
 
 
 def sobol_indices(emulators: list[Emulator], space: Space, seed: int, points: int = 512) -> FloatArray:

@@ -111,6 +111,7 @@ def _fitted(unit: FloatArray, outcome: FloatArray, observation: Observation, see
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+    from threadpoolctl import threadpool_limits
 
     there = np.isfinite(outcome)
     if there.sum() < _FEWEST:
@@ -119,7 +120,7 @@ def _fitted(unit: FloatArray, outcome: FloatArray, observation: Observation, see
     scales = np.full(unit.shape[1], 0.7)
     kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(scales, (5e-2, 2e1), nu=2.5) + WhiteKernel(1e-2, (1e-6, 1.0))
     process = GaussianProcessRegressor(kernel, normalize_y=True, n_restarts_optimizer=1, random_state=seed)
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), threadpool_limits(1):  # matrices are small: threads would wait for each other
         warnings.simplefilter("ignore", ConvergenceWarning)  # a scale at its bound: no influence
         process.fit(at, wanted)
     predicted, deviation = _cross_validated(process, at, wanted, seed)

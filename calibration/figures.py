@@ -33,7 +33,7 @@ def _corner(found: Outcome) -> Figure:
     logs = np.array([one.log for one in parameters])
     samples = found.space.values(posterior.unit)
     samples = np.where(logs, np.log10(np.where(logs, samples, 1.0)), samples)
-    best = found.space.values(found.predictive.unit[0])
+    best = found.space.values(found.checks["best"].unit[0])
     best = np.where(logs, np.log10(np.where(logs, best, 1.0)), best)
     ends = np.log10([[one.low, one.high] for one in parameters])
     figure, _ = new_figure(1.7 * len(parameters), 1.7 * len(parameters), nrows=len(parameters), ncols=len(parameters))

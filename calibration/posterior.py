@@ -12,7 +12,7 @@ from calibration.emulator import Emulator
 from calibration.space import Space
 
 FloatArray = npt.NDArray[np.float64]
-_WALKERS_PER_DIMENSION = 4
+_WALKERS_PER_DIMENSION = 8
 _BURN = 0.4
 _KEPT = 4000
 _DISCREPANCY = 0.5
@@ -129,7 +129,7 @@ def sample_posterior(
     chain, log_density = sampler.get_chain(discard=gone), sampler.get_log_prob(discard=gone)
     thin = max(1, chain.shape[0] * walkers // _KEPT)
     samples = chain[::thin].reshape(-1, dimensions)
-    times = emcee.autocorr.integrated_time(chain, quiet=True, has_walkers=True)
+    times = emcee.autocorr.integrated_time(chain, tol=0, has_walkers=True)
     return Posterior(
         unit=samples[:, : space.dimensions],
         discrepancy=np.exp(samples[:, space.dimensions :]),

@@ -31,7 +31,7 @@ class Row:
     engine
         At the best set.
     low, high
-        Of the engine over samples of the posterior (and the best set).
+        Of the engine over samples of the posterior.
     emulator, error
         At the best set.
     agrees
@@ -72,9 +72,9 @@ def rows_of(found: Outcome) -> list[Row]:
     engine = found.predictive.outcome
     for place, observation in enumerate(found.calibration.observations):
         unit, scale = unit_of(observation)
-        emulated, error = found.emulators[place].value(found.predictive.unit[:1])
+        emulated, error = found.emulators[place].value(found.checks["best"].unit)
         seen = engine[:, place]
-        best = float(seen[0])
+        best = float(found.checks["best"].outcome[0, place])
         rows.append(
             Row(
                 name=observation.name,
