@@ -23,8 +23,6 @@ from runner.files import read_json, write_json
 from sweeps.conduct import Failure, Options
 
 FloatArray = npt.NDArray[np.float64]
-_HOPELESS = 30.0
-"""Standard deviations by which a run that failed is off."""
 _STEPS_BETWEEN_WAVES = 800
 """Of the chain that places the next wave; the last chain has the file's number."""
 
@@ -230,7 +228,7 @@ def _best(calibration: Calibration, unit: FloatArray, outcome: FloatArray) -> Fl
     value = np.array([one.value for one in calibration.observations])
     deviation = np.array([one.deviation for one in calibration.observations])
     residual = (outcome - value) / deviation
-    misfit = np.log1p(np.where(np.isfinite(residual), residual, _HOPELESS) ** 2).sum(axis=1)
+    misfit = np.log1p(residual**2).sum(axis=1)
     return unit[[int(np.argmin(misfit))]]
 
 

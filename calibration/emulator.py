@@ -14,8 +14,6 @@ from inputs.calibration import Observation
 
 FloatArray = npt.NDArray[np.float64]
 _FOLDS = 10
-_FEWEST = 8
-"""Runs without which there is no emulator."""
 _LARGEST = 12.0
 """Of the transformed residuals: beyond, sinh overflows and nobody asks."""
 
@@ -92,16 +90,11 @@ def fit_emulators(
     unit : ndarray, shape (P, D)
         The sets that were run, in the unit cube.
     outcome : ndarray, shape (P, K)
-        What they gave; NaN where they failed.
+        What they gave.
     observations
         K of them.
     seed
         Of the restarts of the fit.
-
-    Raises
-    ------
-    ValueError
-        If there are too few runs of an observation.
     """
     return [_fitted(unit, outcome[:, k], observation, seed) for k, observation in enumerate(observations)]
 
@@ -113,10 +106,7 @@ def _fitted(unit: FloatArray, outcome: FloatArray, observation: Observation, see
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
     from threadpoolctl import threadpool_limits
 
-    there = np.isfinite(outcome)
-    if there.sum() < _FEWEST:
-        raise ValueError(f"{observation.name}: {there.sum()} runs succeeded, expected at least {_FEWEST}")
-    at, wanted = unit[there], transformed(outcome[there], observation)
+    at, wanted = unit, transformed(outcome, observation)
     scales = np.full(unit.shape[1], 0.7)
     kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(scales, (5e-2, 2e1), nu=2.5) + WhiteKernel(1e-2, (1e-6, 1.0))
     process = GaussianProcessRegressor(kernel, normalize_y=True, n_restarts_optimizer=1, random_state=seed)

@@ -84,8 +84,8 @@ def rows_of(found: Outcome) -> list[Row]:
                 value=observation.value * scale,
                 deviation=observation.deviation * scale,
                 engine=best * scale,
-                low=float(np.nanmin(seen)) * scale,
-                high=float(np.nanmax(seen)) * scale,
+                low=float(seen.min()) * scale,
+                high=float(seen.max()) * scale,
                 emulator=float(emulated[0]) * scale,
                 error=float(error[0]) * scale,
                 agrees=bool(abs(best - observation.value) <= observation.deviation),
@@ -171,7 +171,7 @@ def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
             one.observation.name: {"explained": one.explained, "error": one.error, "stretch": one.stretch}
             for one in found.emulators
         },
-        "emulators_within_two_errors": float(np.mean(np.abs(checks[np.isfinite(checks)]) <= _SIGMAS)),
+        "emulators_within_two_errors": float(np.mean(np.abs(checks) <= _SIGMAS)),
         "agree": sum(row.agrees for row in rows),
         "observations": [asdict(row) for row in rows],
         "sobol_total": {
@@ -222,7 +222,7 @@ def as_markdown(found: Outcome, rows: list[Row]) -> str:
         low, middle, high = np.percentile(found.posterior.discrepancy[:, place], (5.0, 50.0, 95.0))
         lines.append(f"| {group} | {middle:.2f} ({low:.2f} … {high:.2f}) |")
     checks = emulator_checks(found)
-    inside = float(np.mean(np.abs(checks[np.isfinite(checks)]) <= _SIGMAS))
+    inside = float(np.mean(np.abs(checks) <= _SIGMAS))
     lines += [
         "",
         f"At {len(checks)} sets that no emulator has seen, {inside:.0%} of the engine's values lie within two standard "

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 _DIGITS = 9
+HOPELESS = 30.0
+"""Deviations by which an observation is off that could not be made."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Wave:
     unit : ndarray, shape (P, D)
         The sets, in the unit cube.
     outcome : ndarray, shape (P, K)
-        Each observation, SI units and degrees; NaN where a run failed.
+        Each observation, SI units and degrees; `HOPELESS` deviations off where there is none.
     table
         The sweep's, P times the number of experiments long.
     """
@@ -81,6 +83,9 @@ def wave_sweep(
 def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
     """What a wave's table says of each observation, shape (P, K).
 
+    Where a run failed, or its two beads came apart, there is no walker to observe, however fast they roll: that counts
+    as `HOPELESS` deviations off, for an emulator has to know that it is bad there.
+
     Parameters
     ----------
     calibration
@@ -103,15 +108,17 @@ def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
             below = mean(observation, observation.over)
             # A ratio of two speeds says nothing where the lower one is none.
             value = np.where(np.abs(below) > _LEAST_SPEED, value / np.where(below == 0.0, 1.0, below), np.nan)
-        columns.append(value)
+        columns.append(np.where(np.isnan(value), observation.value + HOPELESS * observation.deviation, value))
     return np.stack(columns, axis=1)
 
 
 _LEAST_SPEED = 5e-5
+_APART = 0.5
+"""Share of the time beyond which beads without contact are no walker."""
 
 
 def _column(table: pd.DataFrame, quantity: str) -> FloatArray:
-    finished = (table["status"] == "finished").to_numpy()
+    finished = ((table["status"] == "finished") & (table["open_3"] < _APART)).to_numpy()
     if quantity != "misalignment":
         return np.where(finished, table[quantity].to_numpy(dtype=np.float64), np.nan)
     runs = table["run"].tolist()

@@ -25,10 +25,10 @@ PARAMETERS = {
     "minimum separation ratio": "contact.minimum_separation_ratio",
     "liquid volume fraction": "liquid.volume_fraction",
     "Young's modulus (MPa)": "contact.youngs_modulus",
-    "viscosity (mm²/s)": "liquid.kinematic_viscosity",
+    "viscosity ratio": "liquid.viscosity_ratio",
 }
 """What is varied, and the column that says so (the friction of bead on bead goes with that of bead on wall)."""
-_TOGETHER = "all together"
+_TOGETHER = "uncalibrated"
 _ASTRAY = np.pi / 4.0
 """A walker that ends at a larger angle, rad, from where it was to face has left the axis."""
 
@@ -92,7 +92,9 @@ def _astray(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
 _STRONG = (0.3, 60.0, 10.0, 0.0)
 OBSERVATIONS = (
     Observation("Fig. 2: v at 80 Hz, 4 g (mm/s)", _speed((0.3, 80.0, 4.0, 0.0)), published.FIT[4.0] * 1e3),
-    Observation("Fig. 4a: v (mm/s)", _speed((0.6, 80.0, 2.0, 0.0)), published.FIG4_VELOCITY[0] * 1e3),
+    Observation(
+        "Fig. 3: v for 0.4/0.2 mm (mm/s)", _speed((0.4, 80.0, 3.0612, 0.0)), published.FIG3_FIT[0.4, 0.2] * 1e3
+    ),
     Observation("Fig. 2: v(90 Hz)/v(60 Hz) at 6 g", _ratio((0.3, 90.0, 6.0, 0.0), (0.3, 60.0, 6.0, 0.0)), 1.0),
     Observation("plateau: v(10 g)/v(6 g) at 60 Hz", _ratio(_STRONG, (0.3, 60.0, 6.0, 0.0)), 1.0),
     Observation("walkers astray at 60 Hz, 10 g (%)", _astray(_STRONG), 0.0),
@@ -107,7 +109,7 @@ def sensitivities(sources: Sources) -> pd.DataFrame:
     -------
     DataFrame
         A row a set of parameters, in the order of the sweep: ``parameter`` (``shipped``, one of `PARAMETERS`, or
-        ``all together``), ``value``, and a column an observation: NaN where a run of it is not finished, and for speeds
+        ``uncalibrated``), ``value``, and a column an observation: NaN where a run of it is not finished, and for speeds
         of which no walker is left on the axis.
     """
     import pandas as pd
@@ -175,7 +177,7 @@ def _tornado(axes: Axes, found: pd.DataFrame, observation: Observation) -> None:
                 continue
             axes.barh(place + offset, end - shipped, 0.32, shipped, fc=colour, ec="0.1", lw=0.5, label=told)
     together = found[found["parameter"] == _TOGETHER][observation.name]
-    axes.plot(together, [len(PARAMETERS)] * len(together), "D", color="C2", ms=6, label="all together")
+    axes.plot(together, [len(PARAMETERS)] * len(together), "D", color="C2", ms=6, label=_TOGETHER)
     if known:
         axes.axvline(shipped, color="0.1", lw=1.0, label="shipped")
     else:

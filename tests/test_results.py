@@ -60,7 +60,7 @@ def test_velocity_is_the_strobed_displacement_over_time(moved: Trajectory) -> No
 def test_mean_velocity_through_the_cycle_is_the_strobed_one(moved: Trajectory) -> None:
     """Twenty samples a cycle represent the gait: their mean velocity is the displacement a cycle."""
     through = gait(moved).velocity[settled_samples(moved)].mean(axis=0)
-    np.testing.assert_allclose(through, walk(moved).velocity, rtol=0.01)
+    np.testing.assert_allclose(through, walk(moved).velocity, rtol=0.03)
 
 
 def test_sliding_is_velocity_less_rotation(moved: Trajectory) -> None:

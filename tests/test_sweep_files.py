@@ -128,8 +128,7 @@ def test_shipped_sweeps_are_the_papers() -> None:
         "fig3",
         "fig4",
         "modes",
-        "pile-climb",
-        "pile-seeds",
+        *("pile-around", "pile-climb", "pile-paper", "pile-seeds", "pile-softness", "pile-step"),
         "sensitivity",
     }
     assert set(shipped_sweeps()) == expected
