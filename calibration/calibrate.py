@@ -70,7 +70,7 @@ class Outcome:
 
     @property
     def best(self) -> dict[str, float]:
-        """The set with which the engine came nearest to all observations: parameter to value, SI units."""
+        """The set with which the engine gives most observations: parameter to value, SI units."""
         values = self.space.values(self.checks["best"].unit[0])
         return dict(zip([one.name for one in self.space.parameters], map(float, values), strict=True))
 
@@ -220,16 +220,16 @@ def _drawn(posterior: Posterior, points: int) -> FloatArray:
 
 
 def _best(calibration: Calibration, unit: FloatArray, outcome: FloatArray) -> FloatArray:
-    """Of all sets that were run that with the least misfit Σ ln(1 + r²), shape (1, D), r in standard deviations.
+    """Of all sets that were run the one that gives most observations within their deviations, shape (1, D).
 
-    The engine's own word: emulators err most where they hope most. The logarithm keeps an observation that no set gives
-    from deciding among them.
+    Of several that with the least misfit Σ ln(1 + r²), r in standard deviations; the logarithm keeps an observation
+    that none of them gives from deciding. It is the engine's own word: emulators err most where they hope most.
     """
     value = np.array([one.value for one in calibration.observations])
     deviation = np.array([one.deviation for one in calibration.observations])
     residual = (outcome - value) / deviation
-    misfit = np.log1p(residual**2).sum(axis=1)
-    return unit[[int(np.argmin(misfit))]]
+    given, misfit = (np.abs(residual) <= 1.0).sum(axis=1), np.log1p(residual**2).sum(axis=1)
+    return unit[[int(np.lexsort((misfit, -given))[0])]]
 
 
 def _finer_and_longer(calibration: Calibration, values: FloatArray) -> dict[str, dict[str, dict[str, Any]]]:
