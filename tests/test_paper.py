@@ -111,8 +111,8 @@ def test_every_published_number_is_compared(sources: Sources) -> None:
             assert ours is not None and row.published is not None
             assert row.ratio * row.published == pytest.approx(ours)
     agree, of = count(rows, measured=False)
-    assert of == 10
-    assert agree >= 9
+    assert of == 9
+    assert agree == 9
     told = as_markdown(rows)
     assert all(f"| {row.what} |" in told for row in rows)
     assert all(line.count("|") == 7 for line in told.splitlines() if line.startswith("|"))
