@@ -65,13 +65,13 @@ def _in_mm(speed: float) -> float:
 
 
 _SPEED = (
-    "Speeds hang on friction and on the tangential drag of the bridges, which are calibrated to all of these numbers at "
-    "once."
+    "Speeds hang on friction and on the tangential drag of the bridges, which are calibrated to all of these numbers "
+    "at once."
 )
 _ASYMMETRY = (
     "At one Γ0 larger beads are shaken less. The paper's law of friction, whose drag grows with the normal force, has "
-    "speeds that depend on the asymmetry alone; Coulomb's friction and the bridges' drag let large beads walk slower, in "
-    "every set that the calibration ran."
+    "speeds that depend on the asymmetry alone; Coulomb's friction and the bridges' drag let large beads walk slower, "
+    "in every set that the calibration ran."
 )
 _FIG4A = (
     "It hangs on the friction of the slide: with more of it the large bead stops sliding, but walks too fast where "
@@ -113,8 +113,8 @@ NUMBERS = (
         "Fig. 2, v(10 g)/v(6 g): a plateau from Γ0 ≈ 0.6 on",
         1.0,
         "",
-        hangs_on="Speeds level off only with less viscous drag than the missing dependence on the frequency asks for: no "
-        "set of parameters gives both. Beyond 6 g some walkers leave the axis.",
+        hangs_on="Speeds level off only with less viscous drag than the missing dependence on the frequency asks for: "
+        "no set of parameters gives both. Beyond 6 g some walkers leave the axis.",
     ),
     Published(
         "fig2_threshold",
