@@ -152,7 +152,7 @@ def fig_sensitivity(sources: Sources) -> Figure:
     for panel, observation in zip(axes, OBSERVATIONS, strict=True):
         _tornado(panel, found, observation)
     names = [_label(found, name) for name in PARAMETERS]
-    axes[0].set_yticks(range(len(names) + 1), [*names, "friction 0.3 and 17 ×\nthe tangential drag"])
+    axes[0].set_yticks(range(len(names) + 1), [*names, "friction 0.07,\nliquid as it is"])
     axes[0].invert_yaxis()
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=7)
     return figure
