@@ -264,10 +264,10 @@ _HEAD = """# Published numbers beside this project's
 and drive alone. To agree is to lie within what the paper says (the bounds shown) or, where it gives no spread, within
 {tolerance:.0%} of the published value: the paper's points and error bars are in its figures only. Parameters are the
 shipped ones, which were calibrated to these numbers (docs/calibration.md), the same in all rows but for the friction
-of Fig. 4's other substrate. Theory is Coulomb friction with the bridges' drag, with the engine's parameters. As in the
-paper, a velocity is the mean of six walkers, half of them facing each way, seen once a cycle (alignment: two walkers a start); brackets hold the slowest and the
-fastest, or the range over the frequencies where a number is one for all of them. Fig. 1a is a pile's and is not among
-them.
+of Fig. 4's other substrate. Theory is Coulomb friction with the bridges' drag, with the engine's parameters. As in
+the paper, a velocity is the mean of six walkers, half of them facing each way, seen once a cycle (alignment: two
+walkers a start); brackets hold the slowest and the fastest, or the range over the frequencies where a number is one
+for all of them. Fig. 1a is a pile's and is not among them.
 
 | | published | engine | theory | ratio | agrees |
 |---|---|---|---|---|---|

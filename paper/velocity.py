@@ -59,7 +59,7 @@ def fig2(sources: Sources) -> Figure:
         )
         above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
         panel.axhline(0.0, color="0.4", lw=0.6)
-        panel.set(xlabel=r"peak acceleration $a_0$ (g, 9.8 m/s²)", xlim=(0.0, top * 1.02), ylim=(-3.5, _FIG2_TOP))
+        panel.set(xlabel=r"peak acceleration $a_0$ (g, 9.8 m/s²)", xlim=(0.0, top * 1.02), ylim=(-5.0, _FIG2_TOP))
     engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction and bridges")
     engine.plot([], [], color="0.45", lw=2.2, marker="*", ms=9, label="paper's fit, κ = 0.033 s/mm")
     engine.set_ylabel("velocity (mm/s)")
@@ -98,7 +98,7 @@ def _threshold_inset(inset: Axes, sources: Sources) -> None:
     case = dimers.shipped()
     predicted = [threshold(one) for f in MARKERS for one in dimers.driven(case, f, [case.drive.peak_acceleration])]
     inset.plot(list(MARKERS), predicted, "--", color="0.2", lw=0.9)
-    inset.set(ylim=(0.0, None), xlim=(55.0, 95.0))
+    inset.set(ylim=(0.0, 1.3 * float(ends["gamma0_moving"].max())), xlim=(55.0, 95.0))
     inset.tick_params(labelsize=6)
     inset.set_xlabel("f (Hz)", fontsize=7, labelpad=1)
     inset.set_ylabel(r"$\Gamma_\mathrm{c}$", fontsize=7, labelpad=1)
