@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from calibration.space import Space
 from inputs.calibration import Calibration, Observation
+from inputs.errors import InputError, Problem
 from inputs.sweep import Sweep, expand
 from paper.sensitivity import misalignment
 from sweeps.conduct import Failure, Options, Progress
@@ -77,7 +78,10 @@ def wave_sweep(
             for key, value in point.items():
                 columns.setdefault(key, []).append(value)
     document = {"title": calibration.title, "case": calibration.case, "set": calibration.settings, "zip": [columns]}
-    return expand(document, source=calibration.source, name=name, folder=calibration.folder)
+    sweep = expand(document, source=calibration.source, name=name, folder=calibration.folder)
+    if sweep.document.get("kind") == "pile":
+        raise InputError(calibration.source, [Problem("case", f'"{calibration.case}"', "expected a walker's case")])
+    return sweep
 
 
 def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:

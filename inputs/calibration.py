@@ -113,7 +113,8 @@ class Parameter:
     experiments
         Those that it belongs to.
     normal
-        Mean and standard deviation of a normal belief; of the natural logarithm where ``log``. None: even in the range.
+        Mean and standard deviation of a normal belief; where ``log``, the median and the deviation of the natural
+        logarithm. None: even in the range.
     """
 
     name: str
@@ -297,12 +298,27 @@ def _problems_of_experiments(file: CalibrationFile) -> list[Problem]:
 def _problems_of_parameters(file: CalibrationFile) -> list[Problem]:
     found = []
     taken: dict[tuple[str, str], str] = {}
+    for key in {key for table in file.parameters.values() for key in table.keys}:
+        having = {
+            experiment
+            for table in file.parameters.values()
+            if key in table.keys
+            for experiment in table.experiments or file.experiments
+        }
+        if lacking := [experiment for experiment in file.experiments if experiment not in having]:
+            told = f"no parameter gives {key} to {', '.join(lacking)}: all experiments have it or none"
+            found.append(Problem("parameters", None, told))
     for name, table in file.parameters.items():
         place = f"parameters.{name}"
         low, high = table.range
         if low >= high or (table.log and low <= 0.0):
             expected = "expected a smaller and a larger number" + (", both above zero" if table.log else "")
             found.append(Problem(f"{place}.range", f"[{low:g}, {high:g}]", expected))
+        if table.normal is not None and table.log and table.normal[0] <= 0.0:
+            expected = "expected a median above zero: the belief is one of the logarithm"
+            found.append(Problem(f"{place}.normal", f"[{table.normal[0]:g}, {table.normal[1]:g}]", expected))
+        if table.experiments is not None and not table.experiments:
+            found.append(Problem(f"{place}.experiments", "[]", "expected at least one experiment"))
         found += _unknown(f"{place}.experiments", table.experiments or [], file.experiments, "an experiment")
         for key in table.keys:
             for experiment in table.experiments or file.experiments:

@@ -221,13 +221,18 @@ def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
 # --- files ------------------------------------------------------------------------------------------------------------
 
 
+def test_the_example_of_the_docs_can_be_read(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[1] / "docs" / "calibration.md").read_text()
+    document = tomllib.loads(page.split("```toml\n")[1].split("```")[0])
+    assert read_calibration(document, source="docs", name="docs", folder=tmp_path).groups == ("fig2", "fig4a")
+
+
 @pytest.mark.parametrize("name", shipped_calibrations())
 def test_shipped_calibrations_can_be_run(name: str) -> None:
     found = load_calibration(name)
     sweep = wave_sweep(found, Space(found.parameters).values(np.full((1, len(found.parameters)), 0.5)), name)
     cases = list(sweep.cases())
     assert len(cases) == len(found.experiments)
-    assert {observation.group for observation in found.observations} == set(found.groups)
 
 
 def _bad(path: str, value: Any) -> dict[str, Any]:
@@ -254,6 +259,13 @@ BAD = {
     "deviation": ("observations/0/deviation", "0 mm/s", r"observations\[0\]\.deviation"),
     "name": ("observations/1/name", "slow", r"observations\[1\]\.name"),
     "keys": ("experiments/fast/start.angle", "3 deg", r"experiments\.fast"),
+    "median": ("parameters/drag/normal", [-1.0, 0.5], r"parameters\.drag\.normal"),
+    "nowhere": ("parameters/drag/experiments", [], r"parameters\.drag\.experiments"),
+    "somewhere": (
+        "parameters/drag/experiments",
+        ["slow"],
+        r"no parameter gives liquid\.viscosity_ratio to fast, strong",
+    ),
     "held": ("held_out", {"x": ["w"]}, r"held_out\.x"),
     "all held": ("held_out", {"x": ["v", "r"]}, r"held_out\.x"),
     "missing": ("observations", None, "observations"),
@@ -273,4 +285,8 @@ def test_a_key_that_is_none_of_a_case_is_told(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match="viscosity_ratio"):
         calibrate(found, tmp_path, Options(1))
-    assert tomllib.loads(to_toml(REDUCED))["case"] == "fig1b"
+    pile = _bad("case", "pile-ci") | {"parameters": {"drag": REDUCED["parameters"]["drag"]}}
+    pile["experiments"] = {name: {"drive.frequency": "170 Hz"} for name in REDUCED["experiments"]}
+    pile["set"] = {}
+    with pytest.raises(InputError, match="expected a walker's case"):
+        calibrate(read_calibration(pile, source="bad.toml", name="pile", folder=tmp_path), tmp_path, Options(1))

@@ -25,9 +25,13 @@ def reference_walker(**changes: dict[str, Any]) -> WalkerCase:
     """The walker of Fig. 2 at 4 g, friction 0.1, alone and on the axis: its speed is known from other engines."""
     tables: dict[str, dict[str, Any]] = {
         "beads": {"radii": ["0.3 mm", "0.2 mm"], "material": "ruby"},
-        "liquid": {"name": "Si AK5"},
+        "liquid": {"name": "Si AK5", "viscosity_ratio": 1.0},
         "substrate": {"material": "chromium-coated glass"},
-        "contact": {"friction": {"bead_bead": 0.1, "bead_wall": 0.1}, "rolling_friction": 0.0},
+        "contact": {
+            "friction": {"bead_bead": 0.1, "bead_wall": 0.1},
+            "rolling_friction": 0.0,
+            "minimum_separation_ratio": 0.01,
+        },
         "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
         "start": {"replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
         "run": {"cycles": 30, "settling_cycles": 10},
