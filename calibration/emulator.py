@@ -67,17 +67,23 @@ class Emulator:
         variance = process.kernel_.diag(unit) - np.einsum("np,np->n", near @ self.inverse, near)
         return mean, np.sqrt(np.maximum(variance, 0.0)) * process._y_train_std
 
-    def residual(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residual in standard deviations of the observation, and its standard error, at points (N, D): shape (N,)."""
+    def draw(self, unit: FloatArray, normal: FloatArray) -> FloatArray:
+        """The observation as it may be at points (N, D), SI units and degrees: shape (N,).
+
+        Parameters
+        ----------
+        unit : ndarray, shape (N, D)
+        normal : ndarray, shape (N,)
+            Standard normal numbers, one a point.
+        """
         mean, deviation = self.predict(unit)
-        mean = np.clip(mean, -_LARGEST, _LARGEST)
-        return np.sinh(mean), np.cosh(mean) * deviation * self.stretch
+        residual = np.sinh(np.clip(mean + deviation * self.stretch * normal, -_LARGEST, _LARGEST))
+        return np.asarray(self.observation.value + self.observation.deviation * residual)
 
     def value(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The observation and its standard error at points (N, D), SI units and degrees: shape (N,)."""
-        residual, error = self.residual(unit)
-        observation = self.observation
-        return observation.value + observation.deviation * residual, observation.deviation * error
+        """The observation (median) and half of the width that holds 68 % at points (N, D): shape (N,)."""
+        low, middle, high = (self.draw(unit, np.full(len(unit), sigmas)) for sigmas in (-1.0, 0.0, 1.0))
+        return middle, (high - low) / 2.0
 
 
 def fit_emulators(

@@ -19,6 +19,9 @@ _DISCREPANCY = 0.5
 """Scale of the half-Cauchy belief about a group's discrepancy, in standard deviations of its observations: most groups
 have little, but one may have much without bending all parameters toward it."""
 _LOG_DISCREPANCY = (-5.0, 5.0)
+_NODES, _WEIGHTS = np.polynomial.hermite.hermgauss(21)
+_LARGEST = 12.0
+"""Of the transformed residuals: beyond, sinh overflows and nobody asks."""
 
 
 @dataclass(frozen=True)
@@ -58,12 +61,33 @@ class Posterior:
         return best
 
 
+def log_likelihood(mean: FloatArray, deviation: FloatArray, variance: FloatArray) -> FloatArray:
+    """Logarithm of what a residual of 0 is worth if its arsinh is normally distributed, but for a constant.
+
+    ln ∫ N(sinh z; 0, variance) N(z; mean, deviation²) dz, by Gauss and Hermite. Taking the residual's own error for
+    cosh(mean) deviation instead would make the hopeless cheap: no residual would be more than 1/deviation errors off.
+
+    Parameters
+    ----------
+    mean, deviation
+        Of the transformed residual (`calibration.emulator.transformed`).
+    variance
+        Of the residual: 1, and the square of the discrepancy.
+    """
+    places = np.clip(mean[..., None] + np.sqrt(2.0) * deviation[..., None] * _NODES, -_LARGEST, _LARGEST)
+    exponents = -0.5 * np.sinh(places) ** 2 / variance[..., None] + np.log(_WEIGHTS)
+    largest = exponents.max(axis=-1, keepdims=True)
+    total = np.log(np.exp(exponents - largest).sum(axis=-1)) + largest[..., 0]
+    return np.asarray(total - 0.5 * np.log(variance))
+
+
 class _Density:
     """Log density of the parameters and of the logarithms of the discrepancies."""
 
     def __init__(self, emulators: Sequence[Emulator], space: Space, groups: tuple[str, ...]) -> None:
         self.emulators, self.space = emulators, space
         self.group = np.array([groups.index(one.observation.group) for one in emulators])
+        self.stretch = np.array([one.stretch for one in emulators])
         self.dimensions = space.dimensions
 
     def __call__(self, points: FloatArray) -> FloatArray:
@@ -75,9 +99,9 @@ class _Density:
         if not inside.any():
             return total
         logs = logs[inside]
-        residuals, errors = np.stack([one.residual(unit[inside]) for one in self.emulators], axis=2)
-        variance = 1.0 + np.exp(2.0 * logs)[:, self.group] + errors**2
-        likelihood = -0.5 * (residuals**2 / variance + np.log(variance)).sum(axis=1)
+        variance = 1.0 + np.exp(2.0 * logs)[:, self.group]
+        mean, deviation = np.stack([one.predict(unit[inside]) for one in self.emulators], axis=2)
+        likelihood = log_likelihood(mean, deviation * self.stretch, variance).sum(axis=1)
         # Half-Cauchy, with the Jacobian of the logarithm.
         belief = (logs - np.log1p((np.exp(logs) / _DISCREPANCY) ** 2)).sum(axis=1)
         total[inside] += likelihood + belief

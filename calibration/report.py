@@ -12,6 +12,7 @@ import numpy.typing as npt
 from calibration.calibrate import Outcome
 from calibration.emulator import Emulator, transformed
 from calibration.posterior import Posterior
+from calibration.waves import HOPELESS
 from inputs.calibration import QUANTITIES, Observation
 from inputs.units import SPEED
 from runner.files import write_json, write_text
@@ -31,7 +32,7 @@ class Row:
     engine
         At the best set.
     low, high
-        Of the engine over samples of the posterior.
+        Of the engine over samples of the posterior, of those that are walkers.
     emulator, error
         At the best set.
     agrees
@@ -73,7 +74,9 @@ def rows_of(found: Outcome) -> list[Row]:
     for place, observation in enumerate(found.calibration.observations):
         unit, scale = unit_of(observation)
         emulated, error = found.emulators[place].value(found.checks["best"].unit)
+        # A placeholder says that there was no walker: it is none of the engine's values.
         seen = engine[:, place]
+        seen = seen[~np.isclose(seen, observation.value + HOPELESS * observation.deviation)]
         best = float(found.checks["best"].outcome[0, place])
         rows.append(
             Row(
@@ -84,8 +87,8 @@ def rows_of(found: Outcome) -> list[Row]:
                 value=observation.value * scale,
                 deviation=observation.deviation * scale,
                 engine=best * scale,
-                low=float(seen.min()) * scale,
-                high=float(seen.max()) * scale,
+                low=float(seen.min(initial=np.inf)) * scale,
+                high=float(seen.max(initial=-np.inf)) * scale,
                 emulator=float(emulated[0]) * scale,
                 error=float(error[0]) * scale,
                 agrees=bool(abs(best - observation.value) <= observation.deviation),
@@ -103,9 +106,8 @@ def rows_of(found: Outcome) -> list[Row]:
 
 def _predicted(emulator: Emulator, posterior: Posterior, scale: float) -> tuple[float, float]:
     """Median over a posterior and half of the width that holds 68 %, the emulator's error in it."""
-    value, error = emulator.value(posterior.unit)
-    draw = np.random.default_rng(0)
-    low, middle, high = np.percentile(value + error * draw.standard_normal(len(value)), (16.0, 50.0, 84.0))
+    normal = np.random.default_rng(0).standard_normal(len(posterior.unit))
+    low, middle, high = np.percentile(emulator.draw(posterior.unit, normal), (16.0, 50.0, 84.0))
     return float(middle) * scale, float(high - low) / 2.0 * scale
 
 

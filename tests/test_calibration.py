@@ -10,10 +10,12 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
 
 from calibration.calibrate import calibrate, sobol_indices
 from calibration.emulator import fit_emulators
-from calibration.posterior import sample_posterior
+from calibration.posterior import log_likelihood, sample_posterior
 from calibration.report import emulator_checks, intervals, rows_of
 from calibration.space import Space, spread_out
 from calibration.waves import HOPELESS, run_wave, wave_sweep
@@ -99,6 +101,22 @@ def test_a_posterior_is_the_known_one(known: tuple[Any, list[Observation]]) -> N
     assert without.groups == ("all",)
     seen, unseen = (emulators[1].value(one.unit)[0].std() for one in (posterior, without))
     assert unseen > 1.5 * seen
+
+
+@pytest.mark.parametrize("mean", [0.0, 1.0, 3.0, -4.1])
+@pytest.mark.parametrize("deviation", [0.05, 0.3, 0.6, 1.2])
+def test_the_likelihood_is_the_integral_over_what_the_emulator_does_not_know(mean: float, deviation: float) -> None:
+    discrepancy = 1.5
+    variance = 1.0 + discrepancy**2
+
+    def density(z: float) -> float:
+        return float(norm.pdf(np.sinh(z), 0.0, np.sqrt(variance)) * norm.pdf(z, mean, deviation))
+
+    # The integrand peaks between the emulator's mean and zero.
+    exact, _ = quad(density, -12.0, 12.0, points=[mean, 0.0, mean / 2.0, mean / 4.0], limit=400)
+    found = log_likelihood(*(np.array([[value]]) for value in (mean, deviation, variance)))[0, 0]
+    constant = -0.5 * np.log(2.0 * np.pi) - 0.5 * np.log(np.pi)
+    assert found + constant == pytest.approx(np.log(exact), abs=0.1)
 
 
 def test_an_impossible_observation_is_a_discrepancy() -> None:
