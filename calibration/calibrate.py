@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -155,7 +156,10 @@ def calibrate(
         name: sample_posterior(emulators, space, calibration.steps, seed, groups)
         for name, groups in calibration.held_out.items()
     }
-    drawn = _kept(folder / "predictive.json", calibration, partial(_drawn, posterior, calibration.predictive))
+    seen = sha256(np.concatenate([unit, outcome], axis=1).tobytes())
+    seen.update(repr((calibration.observations, calibration.steps, seed)).encode())
+    draw = partial(_drawn, posterior, calibration.predictive)
+    drawn = _kept(folder / "predictive.json", calibration, draw, follows=seen.hexdigest())
     predictive = runner.run("predictive", drawn)
     best = _best(calibration, np.concatenate([unit, drawn]), np.concatenate([outcome, predictive.outcome]))
     checks = {
@@ -177,24 +181,28 @@ def calibrate(
     )
 
 
-def _kept(path: Path, calibration: Calibration, make: Callable[[], FloatArray]) -> FloatArray:
+def _kept(path: Path, calibration: Calibration, make: Callable[[], FloatArray], follows: str = "") -> FloatArray:
     """The parameter sets of a wave, as written down before, or made and written down.
 
-    A calibration that goes on must not depend on whether the libraries would draw the same points again.
+    A calibration that goes on must not depend on whether the libraries would draw the same points again. What
+    ``follows`` from something else is made anew where that has changed.
     """
     ours = {one.name: [one.low, one.high, one.log] for one in calibration.parameters}
     if path.exists():
         try:
             kept = read_json(path)
             unit = np.array(kept["unit"], dtype=np.float64)
+            if unit.ndim != 2 or unit.shape[1] != len(ours) or not ((unit >= 0.0) & (unit <= 1.0)).all():
+                raise ValueError("no points of the unit cube")
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InputError(str(path), [Problem("", None, f"cannot be read ({error}); delete it")]) from error
         if kept.get("parameters") != ours:
             told = "belongs to other parameters or ranges; delete it and what follows it, or give another --out"
             raise InputError(str(path), [Problem("parameters", None, told)])
-        return unit
+        if kept.get("follows", "") == follows:
+            return unit
     unit = make()
-    write_json(path, {"parameters": ours, "unit": unit.tolist()})
+    write_json(path, {"parameters": ours, "follows": follows, "unit": unit.tolist()})
     return unit
 
 

@@ -165,6 +165,7 @@ REDUCED: dict[str, Any] = {
         "fast": {"drive.frequency": "90 Hz", "drive.peak_acceleration": "3 g"},
         "strong": {"drive.frequency": "90 Hz", "drive.peak_acceleration": "6 g"},
     },
+    "held_out": {"ratio": ["r"]},
     "design": {"waves": [14, 6], "predictive": 2, "steps": 1000, "seed": 2},
 }
 
@@ -200,7 +201,7 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
         assert low * 0.97 < true < high * 1.03, name
         assert middle == pytest.approx(true, rel=0.2), name
     assert said["agree"] == 4
-    assert said["emulators_within_two_errors"] >= 0.8
+    assert said["emulators_within_two_errors"] >= 0.6  # of eight
     samples = pd.read_parquet(tmp_path / "here" / "posterior.parquet")
     assert {"friction", "drag", "discrepancy_v", "discrepancy_r", "log_density"} == set(samples.columns)
     # Everything is there: again is no run, and the same outcome.
@@ -212,7 +213,17 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     assert emulator_checks(again).shape == (2, 4)
     for row in rows_of(again):
         assert row.half_step == pytest.approx(row.engine, rel=0.02)
-    # Designs of other ranges are not taken for these.
+        if row.held_out:
+            assert row.name == "ratio"
+            ((middle, width),) = row.held_out.values()
+            assert middle == pytest.approx(row.value, abs=max(0.05, 2.0 * width))
+    # A design that cannot be one is told, and designs of other ranges are not taken for these.
+    design = out / "reduced" / "wave-1.json"
+    whole = design.read_text()
+    design.write_text(json.dumps({**json.loads(whole), "unit": [[0.5, 3.0]]}))
+    refused = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
+    design.write_text(whole)
     document["parameters"]["drag"]["range"] = [0.5, 10.0]
     file.write_text(to_toml(document))
     refused = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -226,6 +237,7 @@ def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
     document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
     document |= {"case": "fig4b", "experiments": {"strong": {"drive.peak_acceleration": "10 g"}}}
     document["observations"] = [one for one in document["observations"] if one["name"] == "strong"]
+    del document["held_out"]
     document["set"] = {**document["set"], "liquid": {"volume_fraction": 0.01}, "contact": {"rolling_friction": 0.003}}
     found = read_calibration(document, source="apart", name="apart", folder=tmp_path)
     unit = Space(found.parameters).unit(np.array([[0.1, 0.5], [0.2, 9.9]]))
