@@ -111,6 +111,17 @@ def largest_tangential_drag(dynamic_viscosity: float, reduced_radius: float, min
     return stokes * (8.0 / 15.0 * log(1.0 / minimum_separation_ratio) + 0.9588)
 
 
+def film_drag(film_viscosity: float, radius: float) -> float:
+    """Coefficient of the drag that a film on the substrate has on a bead's translation, 6πηR (Stokes), N s/m.
+
+    Parameters
+    ----------
+    film_viscosity, radius
+        η in Pa s, R in m.
+    """
+    return 6.0 * pi * film_viscosity * radius
+
+
 def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -> float:
     """Overlap at which the Hertz force 4/3 E* √R* δ^(3/2) carries a load, m.
 

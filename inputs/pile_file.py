@@ -113,6 +113,8 @@ def resolve_pile(file: PileFile, name: str) -> PileCase:
     """
     beads = _beads(file)
     wall = file.container.material
+    if file.liquid.film_drag_ratio:
+        raise UnusableKeyError("liquid.film_drag_ratio", "expected 0: most beads of a pile touch no wall's film")
     liquid = resolve_liquid(file.liquid, library.surface_pair(beads.material, wall))
     contact = resolve_contact(file.contact, beads.material, "container.material", wall)
     drive = Drive("z", file.drive.frequency, file.drive.peak_acceleration, file.drive.frame)

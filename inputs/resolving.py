@@ -152,8 +152,9 @@ def resolve_liquid(table: LiquidTable, pair: dict[str, float] | None = None) -> 
         lacking = "surface_tension" if tension is None else "dynamic_viscosity"
         raise UnusableKeyError(f"liquid.{lacking}", "missing; expected a liquid of the library by name, or this number")
     ratio = _first(table.viscosity_ratio, pair, "viscosity_ratio")
+    film = float(f"{viscosity * table.film_drag_ratio:.15g}")
     viscosity = float(f"{viscosity * (_VISCOSITY_RATIO if ratio is None else ratio):.15g}")
-    return Liquid(tension, viscosity, density, table.volume_fraction, table.contact_angle, table.name)
+    return Liquid(tension, viscosity, density, table.volume_fraction, table.contact_angle, table.name, film)
 
 
 def resolve_contact(table: ContactTable, bead: str | None, wall_key: str, wall: str) -> Contact:

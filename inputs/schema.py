@@ -88,7 +88,8 @@ class LiquidTable(Table):
     """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
 
     ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag. Left out, the
-    library's value for the surfaces holds, else 1.
+    library's value for the surfaces holds, else 1. ``film_drag_ratio`` is a drag on the beads' translation over that
+    of Stokes in the liquid, 6π η R v.
     """
 
     name: str | None = None
@@ -98,6 +99,7 @@ class LiquidTable(Table):
     dynamic_viscosity: DynamicViscosity | None = None
     volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] = 0.01
     viscosity_ratio: Annotated[Number, Field(ge=1e-3, le=1e4)] | None = None
+    film_drag_ratio: Annotated[Number, Field(ge=0, le=1e4)] = 0.0
     contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] = 0.0
 
 

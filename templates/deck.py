@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from inputs.case import Contact, WalkerCase
 from inputs.dimer import contact_loads, dimer_of, hop_height, reach
+from inputs.forces import film_drag
 from inputs.pile import PileCase
 from templates.engine import ALL_REMEDIES, Remedies, contact_angle_setting, separation_cap, wall_mesh
 from templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
@@ -222,6 +223,7 @@ def compose(plan: Plan) -> Deck:
         plan=plan,
         amplitude=[drive.amplitude * component for component in axis],
         peak_velocity=[drive.peak_velocity * component for component in axis],
+        films=_films(case, scene),
         prescribed=plan.prescribed,
         ranks=plan.ranks,
         checkpoint=plan.checkpoint,
@@ -235,6 +237,24 @@ def compose(plan: Plan) -> Deck:
     if fastest is None:
         fastest = fastest_of(case) if isinstance(case, WalkerCase) else inf
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest)
+
+
+@dataclass(frozen=True)
+class _Film:
+    """Atoms of one radius and how strongly the film on the substrate drags each of them, N s/m."""
+
+    number: int
+    atoms: tuple[int, ...]
+    coefficient: float
+
+
+def _films(case: WalkerCase | PileCase, scene: Scene) -> list[_Film]:
+    viscosity = case.liquid.film_viscosity
+    radii = dict.fromkeys(bead.radius for bead in scene.beads) if viscosity else ()
+    return [
+        _Film(number, tuple(bead.id for bead in scene.beads if bead.radius == radius), film_drag(viscosity, radius))
+        for number, radius in enumerate(radii, 1)
+    ]
 
 
 def _terms(compute: str, columns: Sequence[str], all_columns: Sequence[str]) -> list[str]:

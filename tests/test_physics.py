@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from inputs import load_case
+from inputs.dimer import dimer_of
 from postprocess.gait import Walk, gait, settled_samples, walk
 from postprocess.trajectory import Trajectory
 from tests.conftest import make_case
@@ -71,6 +72,23 @@ def test_laboratory_and_container_frame_agree(walked: Walked, acceleration: str)
     drive = {"peak_acceleration": acceleration}
     laboratory = walked(drive=drive).velocity[0]
     assert walked(drive={**drive, "frame": "container"}).velocity[0] == pytest.approx(laboratory, rel=1e-3)
+
+
+@pytest.mark.parametrize("frame", ["lab", "container"])
+def test_a_film_drags_beads_that_nothing_else_holds(trajectory: Moved, frame: str) -> None:
+    """Without friction and with next to no drag of the bridges, M dv/dt = -M a(t) - Σ 6πηR v: |v| = a0/√(ω² + β²)."""
+    moved = trajectory(
+        liquid={"film_drag_ratio": 50.0, "viscosity_ratio": 1e-3},
+        contact={"friction": {"bead_bead": 0.0, "bead_wall": 0.0}},
+        drive={"peak_acceleration": "1 g", "frame": frame},
+        run={"cycles": 20, "settling_cycles": 10},
+    )
+    case, dimer = moved.case, dimer_of(moved.case)
+    assert case.liquid.film_viscosity == pytest.approx(50.0 * 5e-6 * 920.0)
+    rate = 6.0 * np.pi * case.liquid.film_viscosity * sum(case.beads.radii) / dimer.total_mass
+    expected = case.drive.peak_acceleration / np.hypot(case.drive.angular_frequency, rate)
+    found = np.sqrt(2.0 * np.mean(moved.velocity[settled_samples(moved), 0, :, 0] ** 2, axis=0))
+    np.testing.assert_allclose(found, expected, rtol=2e-4)
 
 
 def test_velocity_does_not_depend_on_the_time_step(walked: Walked) -> None:

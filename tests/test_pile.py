@@ -262,6 +262,7 @@ BAD: dict[str, tuple[dict[str, dict[str, Any]], str]] = {
     "step": ({"run": {"time_step": "6 us"}}, "run.time_step"),
     "friction": ({"contact": {"friction": {}}}, "contact.friction.bead_bead"),
     "unknown": ({"container": {"depth": "3 mm"}}, "container.depth"),
+    "film": ({"liquid": {"film_drag_ratio": 1.0}}, "liquid.film_drag_ratio"),
     "material": ({"container": {"material": "glas"}, "contact": {"friction": {}}}, "container.material"),
 }
 

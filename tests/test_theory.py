@@ -45,6 +45,21 @@ def test_velocities_of_the_papers_model(
     assert float(model(gamma0, sin_delta)) * 1e3 == pytest.approx(velocity, abs=6e-6)
 
 
+@pytest.mark.parametrize("ratio", [1.0, 5.0, 20.0])
+def test_a_film_slows_the_theorys_walker_as_it_does_the_engines(
+    run_directory: Callable[..., Path], ratio: float
+) -> None:
+    """From 1.6 mm/s without it to 0.45 at twenty times Stokes's drag; the two agree as they do without it."""
+    case = make_case(
+        liquid={"film_drag_ratio": ratio, "viscosity_ratio": 8.0},
+        contact={"friction": {"bead_bead": 0.1, "bead_wall": 0.2}},
+        run={"cycles": 30, "settling_cycles": 10},
+    )
+    found = read_result(run_directory(case))["velocity"]["mean"]
+    assert found == pytest.approx(float(motion_of(case).velocity[0]), rel=0.02)
+    assert found == pytest.approx({1.0: 1.46e-3, 5.0: 1.05e-3, 20.0: 0.445e-3}[ratio], rel=0.01)
+
+
 def test_matrices_and_closed_form_are_the_same_model() -> None:
     gamma, sine = np.meshgrid(np.linspace(0.01, 2.5, 60), np.linspace(-0.6, 0.6, 61))
     matrices, closed = mean_velocity(gamma, sine), mean_velocity_closed_form(gamma, sine)

@@ -2,9 +2,10 @@
 
     M dv/dt = -M a(t) (1, 1, 0) - G F∥,    F = F0 + D F∥,    F∥ = law(v, F)
 
-(symbols as in `theory.quasistatic`). Coulomb's law is set-valued: a contact that sticks is held by whatever force
-keeps it at rest. Each step is implicit (`theory.stepping`), its friction forces found by a semi-smooth Newton method:
-sticking needs no regularisation, and steps are short only where a contact begins to stick or to slip.
+(symbols as in `theory.quasistatic`); a film on the substrate may drag the beads' centres besides. Coulomb's law is
+set-valued: a contact that sticks is held by whatever force keeps it at rest. Each step is implicit (`theory.stepping`),
+its friction forces found by a semi-smooth Newton method: sticking needs no regularisation, and steps are short only
+where a contact begins to stick or to slip.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy.typing as npt
 
 from inputs.case import WalkerCase
 from inputs.dimer import Dimer, contact_loads, dimer_of
+from inputs.forces import film_drag
 from theory.friction import Friction
 from theory.quasistatic import forces_at_rest, inertia_matrix, normal_force_matrix, translation
 
@@ -41,6 +43,8 @@ class Walker:
         4πγR̄, N.
     at_rest : ndarray, shape (3, N)
         Normal forces at rest, in that unit.
+    film : ndarray, shape (2, N)
+        How strongly a film on the substrate drags the beads' centres, N s/m.
     """
 
     sin_delta: FloatArray
@@ -48,6 +52,7 @@ class Walker:
     scale: FloatArray
     force_unit: FloatArray
     at_rest: FloatArray
+    film: FloatArray
 
     @classmethod
     def of_dimer(cls, dimer: Dimer, gravity: float = 0.0) -> Walker:
@@ -59,14 +64,16 @@ class Walker:
             scale=np.array([dimer.capillary_scale / dimer.total_mass]),
             force_unit=np.array([dimer.capillary_scale]),
             at_rest=(forces_at_rest(dimer.sin_delta) + weights)[:, None],
+            film=np.zeros((2, 1)),
         )
 
     @classmethod
     def of_case(cls, case: WalkerCase) -> Walker:
-        """A case's walker with the capillary forces that its bridges have in the engine, and its weight."""
+        """A case's walker with the capillary forces that its bridges have in the engine, its weight and its film."""
         dimer = dimer_of(case)
         forces = np.array(contact_loads(case).capillary) + np.array([*dimer.masses, 0.0]) * case.pressing_gravity
-        return replace(cls.of_dimer(dimer), at_rest=(forces / dimer.capillary_scale)[:, None])
+        film = [[film_drag(case.liquid.film_viscosity, radius)] for radius in case.beads.radii]
+        return replace(cls.of_dimer(dimer), at_rest=(forces / dimer.capillary_scale)[:, None], film=np.array(film))
 
     @classmethod
     def joined(cls, walkers: Sequence[Walker]) -> Walker:
@@ -165,12 +172,18 @@ def walk(
 
 
 def _rows_of(walker: Walker, count: int) -> FloatArray:
-    """The table of `theory.stepping.integrate`, shape (N, 7, 3)."""
+    """The table of `theory.stepping.integrate`, shape (N, 9, 3).
+
+    A force on a bead's centre acts on the normal forces as one at its contact with the substrate does.
+    """
     asymmetry = np.broadcast_to(walker.asymmetry, (count,))
     gains = inertia_matrix(asymmetry) * np.broadcast_to(walker.scale, (count,))[:, None, None]
     matrix = normal_force_matrix(np.broadcast_to(walker.sin_delta, (count,)), asymmetry)
     rest = np.broadcast_to(walker.at_rest, (3, count)).T[:, None]
-    return np.concatenate([gains, matrix, rest], axis=1)
+    film = np.broadcast_to(walker.film / walker.force_unit, (2, count)).T
+    pressed = np.einsum("nij,nj->ni", matrix[:, :, :2], film)[:, None]
+    rate = film.sum(axis=1) * np.broadcast_to(walker.scale, (count,))
+    return np.concatenate([gains, matrix, rest, pressed, np.broadcast_to(rate[:, None, None], (count, 1, 3))], axis=1)
 
 
 def _law_of(friction: Friction, walker: Walker, count: int) -> FloatArray:

@@ -13,8 +13,9 @@ _TOLERANCE = 1e-8
 """Of the friction forces, in units of 4πγR̄."""
 _SLIDING, _PARALLEL, _NORMAL, _MODE = range(4)
 """Rows of a walker's state: sliding velocities, friction forces, normal forces, and 0, ±1: sticking, sliding."""
-_RIGHT, _START, _FREE = range(3, 6)
-"""Rows of what is worked with, after a matrix: right side, velocities that a stage starts from and coasts to."""
+_RIGHT, _START, _FREE, _NOW = range(3, 7)
+"""Rows of what is worked with, after a matrix: right side, velocities that a stage starts from and coasts to; from the
+last one on the walker's first seven rows as the film leaves them."""
 _FIRST = 1.0 - np.sqrt(0.5)
 """Length of either stage of an L-stable step of second order (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006)."""
 _FINER = 8
@@ -33,8 +34,9 @@ def integrate(
 
     Parameters
     ----------
-    walkers : ndarray, shape (N, 7, 3)
-        Of each: three rows of G times 4πγR̄/M (m/s²), three rows of D, the normal forces at rest.
+    walkers : ndarray, shape (N, 9, 3)
+        Of each: three rows of G times 4πγR̄/M (m/s²), three rows of D, the normal forces at rest; of the film's drag
+        what it adds to the normal forces (s/m), and its rate (1/s).
     law : ndarray, shape (N, 5, 3)
         Of each, contact by contact: μk, μs, vs (m/s), κ (s/m), and the drag in units of 4πγR̄ (s/m).
     drive : ndarray, shape (N, 3)
@@ -59,7 +61,7 @@ def integrate(
     means, leasts = np.zeros((3, count)), np.zeros((3, count))
     repeated, solved = np.zeros(count, np.bool_), np.ones(count, np.bool_)
     series = np.zeros((count, steps, 3))
-    after, work = np.zeros((4, 3)), np.zeros((6, 3))
+    after, work = np.zeros((4, 3)), np.zeros((_NOW + 7, 3))
     for of in range(count):
         state, totals = np.zeros((4, 3)), np.full((2, 3), np.inf)
         later = np.zeros(3)
@@ -146,15 +148,35 @@ def _stage(
     """An implicit Euler step of a part of a cycle from the sliding velocities in work; its end replaces the state."""
     seconds = length / drive[0]
     push = seconds * (drive[1] * np.cos(2.0 * np.pi * (begin + length)) + drive[2])
-    free = work[_FREE]
+    free, now = work[_FREE], work[_NOW:]
     for at in range(3):
         free[at] = work[_START, at] - (push if at < 2 else 0.0)
-    solved = _settle(walker, seconds, law, state, work)
+    _drag(walker, seconds, work)
+    solved = _settle(now, seconds, law, state, work)
     for at in range(3):
         slips = state[_MODE, at] != 0.0
-        state[_SLIDING, at] = free[at] - seconds * _row(walker, at, state[_PARALLEL]) if slips else 0.0
-        state[_NORMAL, at] = walker[6, at] + _row(walker, 3 + at, state[_PARALLEL])
+        state[_SLIDING, at] = free[at] - seconds * _row(now, at, state[_PARALLEL]) if slips else 0.0
+        state[_NORMAL, at] = now[6, at] + _row(now, 3 + at, state[_PARALLEL])
     return solved
+
+
+@njit(cache=True)
+def _drag(walker: FloatArray, seconds: float, work: FloatArray) -> None:
+    """What the film's drag on v_x = (v1 + v2 - v3)/2 leaves of a stage, implicitly, in place.
+
+    With (1 + k) v_x' = v_x for a step in which it would take away k v_x; the same for what the friction forces give.
+    """
+    free, start, now = work[_FREE], work[_START], work[_NOW:]
+    lost = seconds * walker[8, 0] / (1.0 + seconds * walker[8, 0]) / 2.0
+    along = (start[0] + start[1] - start[2]) / 2.0
+    taken = lost * (free[0] + free[1] - free[2])
+    free[0] -= taken
+    free[1] -= taken
+    for by in range(3):
+        taken = lost * (walker[0, by] + walker[1, by] - walker[2, by])
+        for at in range(6):
+            now[at, by] = walker[at, by] - (taken if at < 2 else 0.0)
+        now[6, by] = walker[6, by] + walker[7, by] * along
 
 
 @njit(cache=True)
