@@ -12,6 +12,7 @@ import numpy as np
 from paper import published
 from paper.sources import Sources
 from postprocess.drawing import new_figure
+from postprocess.steady import on_axis, steady_walkers
 from postprocess.tables import read_table
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ PARAMETERS = {
 }
 """What is varied, and the column that says so (the friction of bead on bead goes with that of bead on wall)."""
 _TOGETHER = "uncalibrated"
-_ASTRAY = np.pi / 4.0
 """A walker that ends at a larger angle, rad, from where it was to face has left the axis."""
 
 
@@ -61,12 +61,8 @@ def _speed(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
 
 
 def steady_speed(run: str | Path) -> float:
-    """Mean velocity of those walkers of a run that are steady and have not turned round, m/s; NaN if there is none.
-
-    Mean velocities of walkers that leave the axis say how long the run was, rather than how they walk.
-    """
-    walkers = read_table(run, "walkers")
-    kept = walkers[walkers["steady"] & (walkers["orientation_end"].abs() < _ASTRAY)]
+    """Mean velocity of a run's `postprocess.steady.steady_walkers`, m/s; NaN if there is none."""
+    kept = steady_walkers(run)
     return float(kept["velocity"].mean()) if len(kept) else np.nan
 
 
@@ -84,7 +80,7 @@ def _angle(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
 def _astray(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
     def share(table: pd.DataFrame) -> float:
         ends = read_table(table["run"][of], "walkers")
-        return 100.0 * float((ends["orientation_end"].abs() >= _ASTRAY).mean())
+        return 100.0 * float((~on_axis(ends)).mean())
 
     return share
 

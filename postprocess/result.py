@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from inputs.case import WalkerCase
-from inputs.dimer import dimer_of
+from inputs.dimer import contact_loads, dimer_of
 from postprocess.bridges import Columns, bridge_columns
 from postprocess.dump import FloatArray
 from postprocess.gait import Gait, Walk, gait, settled_samples, walk
@@ -66,7 +66,7 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     directory = Path(directory)
     try:
         result = read_result(directory)
-        if result.keys() >= {"velocity", "walkers", "gamma0"} and intact(directory):
+        if result.keys() >= {"velocity", "walkers", "gamma0", "parted"} and intact(directory):
             return result
     except (OSError, ValueError):
         pass
@@ -117,6 +117,7 @@ def _walker_columns(trajectory: Trajectory, motion: Gait, walked: Walk) -> Colum
         **{f"rotation_{bead + 1}": rotation[:, bead] for bead in range(2)},
         **{f"sliding_{contact + 1}": sliding[:, contact] for contact in range(3)},
         **{f"open_{contact + 1}": opened[:, contact] for contact in range(3)},
+        "parted": (motion.gap[samples, :, 2] > contact_loads(trajectory.case).rupture[2]).mean(axis=0),
     }
 
 
@@ -152,6 +153,7 @@ def _result(trajectory: Trajectory, walkers: Columns) -> dict[str, Any]:
         "rotation": {f"bead_{bead}": _mean(walkers[f"rotation_{bead}"]) for bead in (1, 2)},
         "sliding": {f"contact_{contact}": _mean(walkers[f"sliding_{contact}"]) for contact in (1, 2, 3)},
         "open": {f"contact_{contact}": _mean(walkers[f"open_{contact}"]) for contact in (1, 2, 3)},
+        "parted": _mean(walkers["parted"]),
         "orientation_end": _spread(walkers["orientation_end"]),
         "steady": int(np.sum(walkers["steady"])),
         "turned_round": int(np.sum(np.abs(trajectory.orientation).max(axis=0) > np.pi / 2.0)),

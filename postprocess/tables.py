@@ -59,6 +59,7 @@ WALKERS = {
     "open_1": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
     "open_2": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
     "open_3": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
+    "parted": ("", "share of the samples in which the beads are farther apart than a bridge between them reaches"),
 }
 """``walkers.parquet``: a row a walker; means are over the cycles after the settling ones."""
 

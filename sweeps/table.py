@@ -34,7 +34,7 @@ _INPUTS = {name for columns in DERIVED.values() for name in columns}
 _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
     *("standard_error", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2", "open_3"),
-    *("orientation_end", "turned_round", "walkers_met", "lost", "reason"),
+    *("parted", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
 }
 """Columns that a table to look at leaves out."""
 

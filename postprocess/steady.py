@@ -1,0 +1,36 @@
+"""Which walkers of a run are walkers until its end: speeds of others say how long the run was, not how they walk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postprocess.tables import read_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+ASTRAY = np.pi / 4.0
+"""rad; a walker that ends farther from where it was to face has left the axis."""
+PARTED = 0.1
+"""Share of the time beyond which beads that no bridge can hold together are no walker."""
+
+
+def on_axis(walkers: pd.DataFrame) -> pd.Series[bool]:
+    """Whether walkers of a table `walkers` end near the direction that they started to face."""
+    return walkers["orientation_end"].abs() < ASTRAY
+
+
+def steady_walkers(run: str | Path) -> pd.DataFrame:
+    """Rows of a run's table ``walkers`` that are steady, have not left the axis and whose beads stay together.
+
+    Parameters
+    ----------
+    run
+        A finished run directory.
+    """
+    walkers = read_table(run, "walkers")
+    kept: pd.DataFrame = walkers[walkers["steady"] & on_axis(walkers) & (walkers["parted"] < PARTED)]
+    return kept
