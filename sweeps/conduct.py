@@ -21,7 +21,7 @@ from runner.ensemble import remove_remains
 from runner.locks import is_locked
 from sweeps.kinds import sharing_of
 from sweeps.packing import LONGEST_SECONDS, PlannedDeck, halves, pack, unfinished_parts
-from sweeps.record import SweepRecord, chains, states, velocity_of
+from sweeps.record import PointState, SweepRecord, chains, states, velocity_of
 from sweeps.site import Site, pilots, threads
 from sweeps.worker import STOPS, Report, SweepStopped, Task, work
 
@@ -52,12 +52,16 @@ class Options:
         How often a point that failed is tried again.
     time_limit
         Wall time in s that an engine may take, or None.
+    final
+        Names of failures after which a point is not run again, not by a later call either: the engine would meet them
+        again. They are told as failures each time.
     """
 
     workers: int
     site: Site | None = None
     retries: int = 0
     time_limit: float | None = None
+    final: frozenset[str] = frozenset()
 
     @property
     def decks_at_once(self) -> int:
@@ -250,6 +254,15 @@ def batches(
     return [descend(group) for group in together.values()]
 
 
+def final_failures(record: SweepRecord, found: Sequence[PointState], options: Options) -> list[Failure]:
+    """The points that failed before for one of the reasons that are final."""
+    return [
+        Failure(point, run, state.reason or "", state.message or "", str(state.directory))
+        for point, (run, state) in enumerate(zip(record.runs, found, strict=True))
+        if state.status == "failed" and state.reason in options.final
+    ]
+
+
 class _Conductor:
     """Hands out decks and takes in reports."""
 
@@ -265,12 +278,14 @@ class _Conductor:
         self.record, self.options, self.parsl, self.engine = record, options, workers, engine
         self.cases: Mapping[int, AnyCase] = dict(enumerate(cases))
         self.on_progress = on_progress or (lambda _: None)
-        known = zip(record.runs, states(record), strict=True)
+        found = states(record)
+        known = zip(record.runs, found, strict=True)
         finished = [(run, state.directory) for run, state in known if state.status == "finished"]
         self.places = {run: directory for run, directory in finished if directory is not None}
         self.finished = set(self.places)
         self.velocities: dict[str, float] = {}
-        self.failures: list[Failure] = []
+        self.failures = final_failures(record, found, options)
+        self.given_up = {failure.run for failure in self.failures}
         self.ended: SimpleQueue[tuple[_Job, Future[Report]]] = SimpleQueue()
         self.out_there: dict[_Job, None] = {}
         self.later: list[tuple[float, _Job]] = []
@@ -300,8 +315,9 @@ class _Conductor:
             self.velocities[run] = velocity_of(self.places[run])
         return self.record.descent is not None and self.record.descent.at_rest(self.velocities.get(run, nan))
 
-    def _is_finished(self, point: int) -> bool:
-        return self.record.runs[point] in self.finished
+    def _is_settled(self, point: int) -> bool:
+        run = self.record.runs[point]
+        return run in self.finished or run in self.given_up
 
     def _advance(self, course: _Course) -> None:
         """Hand out the next batch of which anything is missing."""
@@ -309,14 +325,14 @@ class _Conductor:
             batch = next(course.batches, None)
             if batch is None:
                 return
-            course.unsettled = {point for point in batch if not self._is_finished(point)}
+            course.unsettled = {point for point in batch if not self._is_settled(point)}
             if course.unsettled:
                 for deck in pack(
                     {point: self.cases[point] for point in batch},
                     self.options.decks_at_once,
                     self.options.longest_seconds,
                 ):
-                    for part in unfinished_parts(deck.points, self.cases, self._is_finished):
+                    for part in unfinished_parts(deck.points, self.cases, self._is_settled):
                         self._hand_out(_Job(part, course))
 
     def _hand_out(self, job: _Job) -> None:
@@ -340,8 +356,8 @@ class _Conductor:
             return
         self.finished |= set(report.finished)
         self.velocities |= {run: velocity for run, (_, velocity) in report.finished.items()}
-        settled = [point for point in job.deck.points if self._is_finished(point)]
-        left = [point for point in job.deck.points if not self._is_finished(point)]
+        settled = [point for point in job.deck.points if self._is_settled(point)]
+        left = [point for point in job.deck.points if not self._is_settled(point)]
         self.seconds_done += job.deck.seconds * len(settled) / len(job.deck.points)
         if report.failure:
             self._failed(job, report, left)

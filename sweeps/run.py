@@ -9,7 +9,7 @@ from pathlib import Path
 from inputs.reading import AnyCase
 from inputs.sweep import Sweep
 from runner.binary import Engine, find_engine
-from sweeps.conduct import Failure, Options, Progress, conduct
+from sweeps.conduct import Failure, Options, Progress, conduct, final_failures
 from sweeps.kinds import ranks_of, seconds_of
 from sweeps.packing import PlannedDeck, makespan, pack, unfinished_parts
 from sweeps.record import SweepRecord, describe_sweep, states, write_record
@@ -104,14 +104,16 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     cases = list(sweep.cases())
     options = options.for_ranks(max(map(ranks_of, cases)))
     record = describe_sweep(sweep, cases, binary, out)
-    statuses = [state.status for state in states(record)]
+    found = states(record)
+    statuses = [state.status for state in found]
+    final = {failure.point for failure in final_failures(record, found, options)}
     numbered = dict(enumerate(cases))
     # The points of a descent come one after the other, so that few of them can share a deck.
     packed = [deck for point in numbered for deck in pack({point: cases[point]}, 1)] if record.descent else None
     decks = [
         part
         for deck in packed or pack(numbered, options.decks_at_once, options.longest_seconds)
-        for part in unfinished_parts(deck.points, numbered, lambda point: statuses[point] in _SETTLED)
+        for part in unfinished_parts(deck.points, numbered, lambda point: statuses[point] in _SETTLED or point in final)
     ]
     return SweepPlan(record, cases, binary, decks, statuses, options.decks_at_once)
 
@@ -157,6 +159,6 @@ def run_sweep(
         check_audit(plan.engine, despite_audit)
     write_record(plan.record)
     if not plan.decks:
-        return plan.record, []
+        return plan.record, final_failures(plan.record, states(plan.record), options)
     options = options.for_ranks(max(map(ranks_of, plan.cases)))
     return plan.record, conduct(plan.record, plan.cases, plan.engine, options, on_progress)
