@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -26,6 +26,8 @@ from sweeps.conduct import Failure, Options
 FloatArray = npt.NDArray[np.float64]
 _STEPS_BETWEEN_WAVES = 800
 """Of the chain that places the next wave; the last chain has the file's number."""
+FINAL = frozenset({"BeadsLost", "BlowUp", "WalkersMet"})
+"""Failures of a set's own making: calling again would bring the same."""
 
 
 @dataclass(frozen=True)
@@ -143,14 +145,16 @@ def calibrate(
     folder = out / calibration.name
     folder.mkdir(parents=True, exist_ok=True)
     arguments = {"engine": engine, "despite_audit": despite_audit}
-    runner = _Engine(calibration, out, options, arguments, progress_of, {})
+    runner = _Engine(calibration, out, replace(options, final=FINAL), arguments, progress_of, {})
     unit, outcome = np.zeros((0, space.dimensions)), np.zeros((0, len(calibration.observations)))
+    first = 0
     for number, points in enumerate(calibration.waves, 1):
-        make = partial(_design, calibration, unit, outcome, points)
+        make = partial(_design, calibration, unit, outcome, points, first)
         design = _kept(folder / f"wave-{number}.json", calibration, make)
         wave = runner.run(f"wave-{number}", design)
         unit, outcome = np.concatenate([unit, design]), np.concatenate([outcome, wave.outcome])
-    emulators = fit_emulators(unit, outcome, calibration.observations, seed)
+        first = first or len(design)
+    emulators = fit_emulators(unit, outcome, calibration.observations, seed, first)
     posterior = sample_posterior(emulators, space, calibration.steps, seed)
     held_out = {
         name: sample_posterior(emulators, space, calibration.steps, seed, groups)
@@ -161,7 +165,7 @@ def calibrate(
     draw = partial(_drawn, posterior, calibration.predictive)
     drawn = _kept(folder / "predictive.json", calibration, draw, follows=seen.hexdigest())
     predictive = runner.run("predictive", drawn)
-    best = _best(calibration, np.concatenate([unit, drawn]), np.concatenate([outcome, predictive.outcome]))
+    best = best_set(calibration, np.concatenate([unit, drawn]), np.concatenate([outcome, predictive.outcome]))
     checks = {
         name: runner.run(name, best, extra)
         for name, extra in _finer_and_longer(calibration, space.values(best)).items()
@@ -206,15 +210,22 @@ def _kept(path: Path, calibration: Calibration, make: Callable[[], FloatArray], 
     return unit
 
 
-def _design(calibration: Calibration, unit: FloatArray, outcome: FloatArray, points: int) -> FloatArray:
+def first_wave(calibration: Calibration, space: Space) -> FloatArray:
+    """The guesses, and sets that fill the ranges, shape (G + P, D)."""
+    guesses = space.unit(np.reshape(np.array(calibration.guesses, np.float64), (-1, space.dimensions)))
+    filling = space.design(calibration.waves[0], calibration.seed)
+    return np.concatenate([np.clip(guesses, 0.0, 1.0), filling])
+
+
+def _design(calibration: Calibration, unit: FloatArray, outcome: FloatArray, points: int, first: int) -> FloatArray:
     """The first wave fills the range; later ones what the posterior leaves of it, far from what was run before."""
     space, seed = Space(calibration.parameters), calibration.seed
     if not len(unit):
-        return space.design(points, seed)
-    emulators = fit_emulators(unit, outcome, calibration.observations, seed)
+        return first_wave(calibration, space)
+    emulators = fit_emulators(unit, outcome, calibration.observations, seed, first)
     posterior = sample_posterior(emulators, space, min(_STEPS_BETWEEN_WAVES, calibration.steps), seed)
-    samples, first = np.unique(posterior.unit, axis=0, return_index=True)
-    likely = samples[np.argsort(posterior.log_density[first])[::-1]][: len(samples) // 2]
+    samples, places = np.unique(posterior.unit, axis=0, return_index=True)
+    likely = samples[np.argsort(posterior.log_density[places])[::-1]][: len(samples) // 2]
     # Half of them where the posterior is high, far from each other; the others wherever it is, to find what is missing.
     among = spread_out(likely[: 20 * points], points - points // 2, unit)
     beyond = np.random.default_rng([seed, len(unit)]).choice(samples, points // 2, replace=len(samples) < points)
@@ -227,11 +238,20 @@ def _drawn(posterior: Posterior, points: int) -> FloatArray:
     return np.concatenate([posterior.best[None], posterior.unit[every]])
 
 
-def _best(calibration: Calibration, unit: FloatArray, outcome: FloatArray) -> FloatArray:
+def best_set(calibration: Calibration, unit: FloatArray, outcome: FloatArray) -> FloatArray:
     """Of all sets that were run the one that gives most observations within their deviations, shape (1, D).
 
     Of several that with the least misfit Σ ln(1 + r²), r in standard deviations; the logarithm keeps an observation
     that none of them gives from deciding. It is the engine's own word: emulators err most where they hope most.
+
+    Parameters
+    ----------
+    calibration
+        Whose observations.
+    unit : ndarray, shape (P, D)
+        The sets.
+    outcome : ndarray, shape (P, K)
+        What the engine made of them.
     """
     value = np.array([one.value for one in calibration.observations])
     deviation = np.array([one.deviation for one in calibration.observations])

@@ -14,7 +14,8 @@ from inputs.calibration import Observation
 
 FloatArray = npt.NDArray[np.float64]
 _FOLDS = 10
-_LARGEST = 12.0
+_FEW = 20
+LARGEST = 12.0
 """Of the transformed residuals: beyond, sinh overflows and nobody asks."""
 
 
@@ -39,13 +40,11 @@ class Emulator:
     inverse : ndarray, shape (P, P)
         Of its covariance matrix.
     stretch
-        By how much its standard deviations are too small, from cross-validation; at least 1.
+        By how much its standard deviations are too small, from cross-validation in the later waves; at least 1.
     error
         Root mean square of the cross-validated error, in the transformed residual.
     explained
         Share of the variance that is explained in cross-validation.
-    runs
-        It was fitted to.
     """
 
     observation: Observation
@@ -54,7 +53,6 @@ class Emulator:
     stretch: float
     error: float
     explained: float
-    runs: int
 
     def predict(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Transformed residual and its standard deviation, as the process gives them: shape (N,).
@@ -77,7 +75,7 @@ class Emulator:
             Standard normal numbers, one a point.
         """
         mean, deviation = self.predict(unit)
-        residual = np.sinh(np.clip(mean + deviation * self.stretch * normal, -_LARGEST, _LARGEST))
+        residual = np.sinh(np.clip(mean + deviation * self.stretch * normal, -LARGEST, LARGEST))
         return np.asarray(self.observation.value + self.observation.deviation * residual)
 
     def value(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -87,7 +85,7 @@ class Emulator:
 
 
 def fit_emulators(
-    unit: FloatArray, outcome: FloatArray, observations: Sequence[Observation], seed: int
+    unit: FloatArray, outcome: FloatArray, observations: Sequence[Observation], seed: int, first: int = 0
 ) -> list[Emulator]:
     """One emulator an observation.
 
@@ -101,46 +99,49 @@ def fit_emulators(
         K of them.
     seed
         Of the restarts of the fit.
+    first
+        Number of the sets that fill the range. Errors are judged by the sets after them, if there are enough: these are
+        where the posterior is, and there walkers are more than elsewhere on the verge of something.
     """
-    return [_fitted(unit, outcome[:, k], observation, seed) for k, observation in enumerate(observations)]
+    judged = slice(first if len(unit) - first >= _FEW else 0, None)
+    return [_fitted(unit, outcome[:, k], observation, seed, judged) for k, observation in enumerate(observations)]
 
 
-def _fitted(unit: FloatArray, outcome: FloatArray, observation: Observation, seed: int) -> Emulator:
+def _fitted(unit: FloatArray, outcome: FloatArray, observation: Observation, seed: int, judged: slice) -> Emulator:
     from scipy.linalg import cho_solve
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
     from threadpoolctl import threadpool_limits
 
-    at, wanted = unit, transformed(outcome, observation)
+    wanted = transformed(outcome, observation)
     scales = np.full(unit.shape[1], 0.7)
     kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(scales, (5e-2, 2e1), nu=2.5) + WhiteKernel(1e-2, (1e-6, 1.0))
     process = GaussianProcessRegressor(kernel, normalize_y=True, n_restarts_optimizer=1, random_state=seed)
     with warnings.catch_warnings(), threadpool_limits(1):  # matrices are small: threads would wait for each other
         warnings.simplefilter("ignore", ConvergenceWarning)  # a scale at its bound: no influence
-        process.fit(at, wanted)
-    predicted, deviation = _cross_validated(process, at, wanted, seed)
+        process.fit(unit, wanted)
+    predicted, deviation = _cross_validated(process, unit, wanted, seed)
     miss = wanted - predicted
     spread = float(np.var(wanted))
     return Emulator(
         observation,
         process,
-        inverse=cho_solve((process.L_, True), np.eye(len(at))),
-        stretch=max(1.0, float(np.sqrt(np.mean((miss / deviation) ** 2)))),
+        inverse=cho_solve((process.L_, True), np.eye(len(unit))),
+        stretch=max(1.0, float(np.sqrt(np.mean((miss / deviation)[judged] ** 2)))),
         error=float(np.sqrt(np.mean(miss**2))),
         explained=1.0 - float(np.mean(miss**2)) / spread if spread > 0.0 else 1.0,
-        runs=len(wanted),
     )
 
 
-def _cross_validated(process: Any, at: FloatArray, wanted: FloatArray, seed: int) -> tuple[FloatArray, FloatArray]:
+def _cross_validated(process: Any, unit: FloatArray, wanted: FloatArray, seed: int) -> tuple[FloatArray, FloatArray]:
     """Mean and standard deviation at each run from those of other folds, with the kernel that all of them gave."""
     from sklearn.base import clone
     from sklearn.model_selection import KFold
 
     mean, deviation = np.zeros(len(wanted)), np.zeros(len(wanted))
-    for others, fold in KFold(min(_FOLDS, len(wanted)), shuffle=True, random_state=seed).split(at):
+    for others, fold in KFold(min(_FOLDS, len(wanted)), shuffle=True, random_state=seed).split(unit):
         partial = clone(process).set_params(kernel=process.kernel_, optimizer=None)
-        partial.fit(at[others], wanted[others])
-        mean[fold], deviation[fold] = partial.predict(at[fold], return_std=True)
+        partial.fit(unit[others], wanted[others])
+        mean[fold], deviation[fold] = partial.predict(unit[fold], return_std=True)
     return mean, deviation

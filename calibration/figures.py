@@ -6,22 +6,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from calibration.calibrate import Outcome
-from calibration.report import Row, rows_of
+from calibration.report import Row, unit_of
+from calibration.waves import seen_in
+from inputs.calibration import Band
 from postprocess.drawing import new_figure, save_figure
+
+FloatArray = npt.NDArray[np.float64]
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-def draw(found: Outcome, to: Path) -> list[Path]:
-    """Write ``corner.png``, ``predictions.png`` and ``sobol.png``."""
-    rows = rows_of(found)
+def draw(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
+    """Write ``corner.png``, ``predictions.png``, ``sobol.png`` and, if the file has any, ``bands.png``."""
     sources = [Path(run).name for run in found.predictive.table["run"]]
+    figures = {"corner": _corner(found), "predictions": _predictions(rows), "sobol": _sobol(found)}
+    if found.calibration.bands:
+        figures["bands"] = _bands(found)
     files = []
-    for name, figure in (("corner", _corner(found)), ("predictions", _predictions(rows)), ("sobol", _sobol(found))):
+    for name, figure in figures.items():
         files += save_figure(figure, to / f"{name}.png", sources, title=f"{found.calibration.title}: {name}")
     return files
 
@@ -31,19 +38,19 @@ def _corner(found: Outcome) -> Figure:
 
     parameters, posterior = found.space.parameters, found.posterior
     logs = np.array([one.log for one in parameters])
-    samples = found.space.values(posterior.unit)
-    samples = np.where(logs, np.log10(np.where(logs, samples, 1.0)), samples)
-    best = found.space.values(found.checks["best"].unit[0])
-    best = np.where(logs, np.log10(np.where(logs, best, 1.0)), best)
-    ends = np.log10([[one.low, one.high] for one in parameters])
+
+    def drawn(unit: FloatArray) -> FloatArray:
+        values = found.space.values(unit)
+        return np.where(logs, np.log10(np.where(logs, values, 1.0)), values)
+
     figure, _ = new_figure(1.7 * len(parameters), 1.7 * len(parameters), nrows=len(parameters), ncols=len(parameters))
     figure.set_layout_engine("none")
     corner.corner(
-        samples,
+        drawn(posterior.unit),
         fig=figure,
         labels=[("log " if one.log else "") + one.symbol for one in parameters],
-        range=[(a, b) if log else (one.low, one.high) for one, log, (a, b) in zip(parameters, logs, ends, strict=True)],
-        truths=best,
+        range=drawn(np.array([np.zeros(len(parameters)), np.ones(len(parameters))])).T.tolist(),
+        truths=drawn(found.checks["best"].unit[0]),
         truth_color="C1",
         quantiles=[0.05, 0.5, 0.95],
         label_kwargs={"fontsize": 8},
@@ -69,19 +76,71 @@ def _predictions(rows: list[Row]) -> Figure:
         heights = [place - 0.22 for place, _ in seen]
         axes.errorbar(middle, heights, xerr=width, fmt="s", ms=4, color=f"C{number + 2}", lw=1.0, label=trial)
     axes.set_yticks(places, [row.title for row in rows], fontsize=7)
-    axes.set(xlabel="(predicted - published)/standard deviation", xscale="symlog", ylim=(-0.8, len(rows) - 0.2))
+    axes.set(xlabel="(predicted - published)/standard deviation", ylim=(-0.8, len(rows) - 0.2))
     axes.set_xscale("symlog", linthresh=3.0)
     axes.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=2)
     return figure
 
 
 def _bars(axes: Axes, rows: list[Row], places: np.ndarray[tuple[int], np.dtype[np.int64]]) -> None:
+    known = {name: [getattr(row, name) for row in rows] for name in ("low", "high", "engine")}
     low, high, best = (
-        np.array([(getattr(row, name) - row.value) / row.deviation for row in rows])
-        for name in ("low", "high", "engine")
+        np.array(
+            [
+                np.nan if value is None else (value - row.value) / row.deviation
+                for value, row in zip(values, rows, strict=True)
+            ]
+        )
+        for values in known.values()
     )
     axes.hlines(places, low, high, color="C0", lw=4.0, alpha=0.5, label="engine over the posterior")
     axes.plot(best, places, "o", ms=5, color="C1", label="engine at the best set")
+
+
+def _bands(found: Outcome) -> Figure:
+    """The engine over the posterior and at the best set, against what the experiments differ in."""
+    bands = found.calibration.bands
+    columns = min(len(bands), 3)
+    figure, axes = new_figure(3.3 * columns, 2.9 * -(-len(bands) // columns), nrows=-(-len(bands) // columns),
+                              ncols=columns, squeeze=False)  # fmt: skip
+    for place, band in zip(axes.flat, bands, strict=False):
+        _band(place, band, found)
+    for place in axes.flat[len(bands) :]:
+        place.set_visible(False)
+    axes.flat[0].legend(fontsize=7)
+    return figure
+
+
+def _band(axes: Axes, band: Band, found: Outcome) -> None:
+    labels = list(found.calibration.experiments)
+    chosen = [labels.index(one) for one in band.of]
+    table = found.checks["best"].table
+    where = table[band.against].to_numpy()[chosen]
+    order = np.argsort(where)
+    many, best = (
+        seen_in(found.calibration, wave.table, band.quantity)[:, chosen] * 1e3
+        for wave in (found.predictive, found.checks["best"])
+    )
+    order_seen = order[np.isfinite(many[:, order]).any(axis=0)]
+    low, high = (of(many[:, order_seen], axis=0) for of in (np.nanmin, np.nanmax))
+    axes.fill_between(where[order_seen], low, high, color="C0", alpha=0.3, lw=0, label="engine over the posterior")
+    axes.plot(where[order], best[0, order], "o-", ms=4, lw=1.0, color="C1", label="engine at the best set")
+    published = [
+        (where[chosen.index(labels.index(of))], one)
+        for one in found.calibration.observations
+        if one.quantity == band.quantity and not one.over
+        for of in one.of
+        if of in band.of
+    ]
+    scale = unit_of(published[0][1])[1] if published else 1.0
+    values, errors = ([getattr(one, name) * scale for _, one in published] for name in ("value", "deviation"))
+    axes.errorbar([x for x, _ in published], values, errors, fmt="ks", ms=4, lw=1.0, label="published")
+    unit = table.attrs["units"].get(band.against, "")
+    axes.set(
+        title=band.title,
+        xlabel=band.against.replace("_", " ") + (f" ({unit})" if unit else ""),
+        ylabel=f"{band.quantity.replace('_', ' of bead ')} (mm/s)",
+    )
 
 
 def _sobol(found: Outcome) -> Figure:

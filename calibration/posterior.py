@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from calibration.emulator import Emulator
+from calibration.emulator import LARGEST, Emulator
 from calibration.space import Space
 
 FloatArray = npt.NDArray[np.float64]
@@ -20,8 +20,6 @@ _DISCREPANCY = 0.5
 have little, but one may have much without bending all parameters toward it."""
 _LOG_DISCREPANCY = (-5.0, 5.0)
 _NODES, _WEIGHTS = np.polynomial.hermite.hermgauss(21)
-_LARGEST = 12.0
-"""Of the transformed residuals: beyond, sinh overflows and nobody asks."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +72,7 @@ def log_likelihood(mean: FloatArray, deviation: FloatArray, variance: FloatArray
     variance
         Of the residual: 1, and the square of the discrepancy.
     """
-    places = np.clip(mean[..., None] + np.sqrt(2.0) * deviation[..., None] * _NODES, -_LARGEST, _LARGEST)
+    places = np.clip(mean[..., None] + np.sqrt(2.0) * deviation[..., None] * _NODES, -LARGEST, LARGEST)
     exponents = -0.5 * np.sinh(places) ** 2 / variance[..., None] + np.log(_WEIGHTS)
     largest = exponents.max(axis=-1, keepdims=True)
     total = np.log(np.exp(exponents - largest).sum(axis=-1)) + largest[..., 0]
@@ -133,7 +131,7 @@ def sample_posterior(
     import emcee
     from threadpoolctl import threadpool_limits
 
-    used = [one for one in emulators if one.observation.group not in held_out]
+    used = [one for one in emulators if one.observation.group not in held_out and not one.observation.derived]
     groups = tuple(dict.fromkeys(one.observation.group for one in used))
     density = _Density(used, space, groups)
     dimensions = space.dimensions + len(groups)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from calibration.posterior import Posterior
 from calibration.waves import HOPELESS
 from inputs.calibration import QUANTITIES, Observation
 from inputs.units import SPEED
-from runner.files import write_json, write_text
+from runner.files import write_bytes, write_json, write_text
 
 FloatArray = npt.NDArray[np.float64]
 _SIGMAS = 2.0
@@ -32,7 +31,7 @@ class Row:
     engine
         At the best set.
     low, high
-        Of the engine over samples of the posterior, of those that are walkers.
+        Of the engine over samples of the posterior, of those that are walkers; None where none is.
     emulator, error
         At the best set.
     agrees
@@ -50,8 +49,8 @@ class Row:
     value: float
     deviation: float
     engine: float
-    low: float
-    high: float
+    low: float | None
+    high: float | None
     emulator: float
     error: float
     agrees: bool
@@ -87,8 +86,8 @@ def rows_of(found: Outcome) -> list[Row]:
                 value=observation.value * scale,
                 deviation=observation.deviation * scale,
                 engine=best * scale,
-                low=float(seen.min(initial=np.inf)) * scale,
-                high=float(seen.max(initial=-np.inf)) * scale,
+                low=float(seen.min()) * scale if len(seen) else None,
+                high=float(seen.max()) * scale if len(seen) else None,
                 emulator=float(emulated[0]) * scale,
                 error=float(error[0]) * scale,
                 agrees=bool(abs(best - observation.value) <= observation.deviation),
@@ -121,9 +120,9 @@ def emulator_checks(found: Outcome) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-def intervals(found: Outcome, posterior: Posterior | None = None) -> dict[str, tuple[float, float, float]]:
-    """Of each parameter the 5th, 50th and 95th percentile of a posterior (that of all observations if None)."""
-    values = found.space.values((posterior or found.posterior).unit)
+def intervals(found: Outcome) -> dict[str, tuple[float, float, float]]:
+    """Of each parameter the 5th, 50th and 95th percentile of the posterior."""
+    values = found.space.values(found.posterior.unit)
     percentiles = np.percentile(values, (5.0, 50.0, 95.0), axis=0)
     return {
         one.name: (float(low), float(middle), float(high))
@@ -131,8 +130,8 @@ def intervals(found: Outcome, posterior: Posterior | None = None) -> dict[str, t
     }
 
 
-def write_tables(found: Outcome, to: Path) -> list[Path]:
-    """Write ``posterior.parquet``, ``calibration.json`` and ``calibration.md``.
+def write_tables(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
+    """Write ``posterior.parquet``, ``calibration.json`` and ``calibration.md``; rows from `rows_of`.
 
     The samples' columns are the parameters (SI units), ``discrepancy_GROUP`` (in standard deviations) and
     ``log_density``.
@@ -145,10 +144,7 @@ def write_tables(found: Outcome, to: Path) -> list[Path]:
     for place, group in enumerate(posterior.groups):
         samples[f"discrepancy_{group}"] = posterior.discrepancy[:, place]
     samples["log_density"] = posterior.log_density
-    beside = to / "posterior.parquet.new"
-    samples.to_parquet(beside, index=False)
-    beside.replace(to / "posterior.parquet")
-    rows = rows_of(found)
+    write_bytes(to / "posterior.parquet", samples.to_parquet(index=False))
     write_json(to / "calibration.json", _as_dict(found, rows))
     write_text(to / "calibration.md", as_markdown(found, rows))
     return [to / name for name in ("posterior.parquet", "calibration.json", "calibration.md")]
@@ -156,7 +152,7 @@ def write_tables(found: Outcome, to: Path) -> list[Path]:
 
 def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
     posterior, checks = found.posterior, emulator_checks(found)
-    contents = {
+    contents: dict[str, object] = {
         "calibration": found.calibration.name,
         "sets": len(found.unit),
         "best": found.best,
@@ -183,7 +179,7 @@ def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
             for place, one in enumerate(found.emulators)
         },
     }
-    return json.loads(json.dumps(contents).replace("NaN", "null"))  # type: ignore[no-any-return]
+    return contents
 
 
 def as_markdown(found: Outcome, rows: list[Row]) -> str:
@@ -213,7 +209,7 @@ def as_markdown(found: Outcome, rows: list[Row]) -> str:
             row.title,
             f"{_pair(row.value, row.deviation)} {row.unit}".strip(),
             f"{row.engine:.3g}",
-            f"{row.low:.3g} … {row.high:.3g}",
+            "" if row.low is None else f"{row.low:.3g} … {row.high:.3g}",
             _pair(row.emulator, row.error),
             "yes" if row.agrees else "**no**",
             *held,

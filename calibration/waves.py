@@ -15,6 +15,7 @@ from inputs.calibration import Calibration, Observation
 from inputs.errors import InputError, Problem
 from inputs.sweep import Sweep, expand
 from paper.sensitivity import misalignment
+from postprocess.steady import steady_walkers
 from sweeps.conduct import Failure, Options, Progress
 from sweeps.run import run_sweep
 from sweeps.table import load
@@ -74,7 +75,10 @@ def wave_sweep(
             point = {**keys, **(extra or {}).get(label, {})}
             for parameter, value in zip(calibration.parameters, row, strict=True):
                 if label in parameter.experiments:
-                    point |= dict.fromkeys(parameter.keys, float(f"{value:.{_DIGITS}g}"))
+                    digits = f"{value:.{_DIGITS}g}"
+                    point |= dict.fromkeys(
+                        parameter.keys, f"{digits} {parameter.unit}" if parameter.unit else float(digits)
+                    )
             for key, value in point.items():
                 columns.setdefault(key, []).append(value)
     document = {"title": calibration.title, "case": calibration.case, "set": calibration.settings, "zip": [columns]}
@@ -87,8 +91,9 @@ def wave_sweep(
 def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
     """What a wave's table says of each observation, shape (P, K).
 
-    Where a run failed, or its two beads came apart, there is no walker to observe, however fast they roll: that counts
-    as `HOPELESS` deviations off, for an emulator has to know that it is bad there.
+    Speeds are means over the walkers that are some until the end (`postprocess.steady.steady_walkers`). Where there is
+    none, or the run failed, nothing was observed: that counts as `HOPELESS` deviations off, for an emulator has to know
+    that it is bad there.
 
     Parameters
     ----------
@@ -98,9 +103,8 @@ def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
         Of a wave's sweep (`sweeps.table.load`).
     """
     labels = list(calibration.experiments)
-    sets = len(table) // len(labels)
     quantities = {observation.quantity for observation in calibration.observations}
-    seen = {quantity: _column(table, quantity).reshape(sets, len(labels)) for quantity in quantities}
+    seen = {quantity: seen_in(calibration, table, quantity) for quantity in quantities}
 
     def mean(observation: Observation, experiments: tuple[str, ...]) -> FloatArray:
         return np.asarray(seen[observation.quantity][:, [labels.index(one) for one in experiments]].mean(axis=1))
@@ -117,16 +121,18 @@ def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
 
 
 _LEAST_SPEED = 5e-5
-_APART = 0.5
-"""Share of the time beyond which beads without contact are no walker."""
 
 
-def _column(table: pd.DataFrame, quantity: str) -> FloatArray:
-    finished = ((table["status"] == "finished") & (table["open_3"] < _APART)).to_numpy()
-    if quantity != "misalignment":
-        return np.where(finished, table[quantity].to_numpy(dtype=np.float64), np.nan)
-    runs = table["run"].tolist()
-    return np.array([misalignment(run).max() if done else np.nan for run, done in zip(runs, finished, strict=True)])
+def seen_in(calibration: Calibration, table: pd.DataFrame, quantity: str) -> FloatArray:
+    """A quantity of each run of a wave, NaN where there is none, shape (P, number of experiments)."""
+    found = np.full(len(table), np.nan)
+    for place in np.flatnonzero(table["status"] == "finished"):
+        run = table["run"].iloc[place]
+        if quantity == "misalignment":
+            found[place] = misalignment(run).max()
+        elif len(kept := steady_walkers(run)):
+            found[place] = kept[quantity].mean()
+    return found.reshape(-1, len(calibration.experiments))
 
 
 def run_wave(  # noqa: PLR0913

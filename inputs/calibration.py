@@ -49,10 +49,14 @@ class _Table(BaseModel):
 
 
 class ParameterTable(_Table):
-    """``[parameters.NAME]``: keys of the case that take its value, its range, and what is believed beforehand."""
+    """``[parameters.NAME]``: keys of the case that take its value, its range, and what is believed beforehand.
+
+    Numbers are in its ``unit``, if it has one.
+    """
 
     keys: Annotated[list[str], Field(min_length=1)]
     range: tuple[Number, Number]
+    unit: str = ""
     log: bool = False
     experiments: list[str] | None = None
     symbol: str = ""
@@ -60,7 +64,10 @@ class ParameterTable(_Table):
 
 
 class ObservationTable(_Table):
-    """``[[observations]]``: a mean over experiments, or its ratio to the mean over others."""
+    """``[[observations]]``: a mean over experiments, or its ratio to the mean over others.
+
+    One that is ``derived`` follows from others: it is told of, but does not weigh in the posterior a second time.
+    """
 
     name: str
     group: str
@@ -72,6 +79,16 @@ class ObservationTable(_Table):
     over: list[str] = []
     value: str | Number
     deviation: str | Number
+    derived: bool = False
+
+
+class BandTable(_Table):
+    """``[[bands]]``: a picture of a quantity of some experiments against a column of their sweep's table."""
+
+    title: str = ""
+    of: Annotated[list[str], Field(min_length=1)]
+    against: Literal["peak_acceleration", "gamma0", "frequency", "sin_delta"]
+    quantity: Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3"] = "velocity"
 
 
 class DesignTable(_Table):
@@ -92,6 +109,8 @@ class CalibrationFile(_Table):
     parameters: Annotated[dict[str, ParameterTable], Field(min_length=1)]
     experiments: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
     observations: Annotated[list[ObservationTable], Field(min_length=1)]
+    guesses: list[dict[str, Number]] = []
+    bands: list[BandTable] = []
     held_out: dict[str, list[str]] = {}
     design: DesignTable = DesignTable()
 
@@ -106,8 +125,8 @@ class Parameter:
         In tables and in figures.
     keys
         Of the case, that take its value.
-    low, high
-        Its range.
+    low, high, unit
+        Its range, in its unit.
     log
         Whether designs and beliefs are even in its logarithm.
     experiments
@@ -125,6 +144,7 @@ class Parameter:
     log: bool
     experiments: frozenset[str]
     normal: tuple[float, float] | None
+    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -141,6 +161,8 @@ class Observation:
         Experiments: the mean over the first, divided by that over the others if there are any.
     value, deviation
         As published, with its standard deviation.
+    derived
+        Whether it follows from others and is left out of the posterior.
     """
 
     name: str
@@ -151,6 +173,17 @@ class Observation:
     over: tuple[str, ...]
     value: float
     deviation: float
+    derived: bool = False
+
+
+@dataclass(frozen=True)
+class Band:
+    """A picture of the predictions: a quantity of some experiments against a column of their sweep's table."""
+
+    title: str
+    of: tuple[str, ...]
+    against: str
+    quantity: str
 
 
 @dataclass(frozen=True)
@@ -167,6 +200,10 @@ class Calibration:
         What is free and what it is to give.
     experiments
         Values of the same keys for each.
+    guesses
+        Sets that the first wave has beside those that fill the ranges: values in the order of the parameters.
+    bands
+        What is drawn of the predictions.
     held_out
         Names of trials, each with the groups that it leaves out.
     seed, waves, predictive, steps
@@ -182,6 +219,8 @@ class Calibration:
     parameters: tuple[Parameter, ...]
     experiments: Mapping[str, Mapping[str, Value]]
     observations: tuple[Observation, ...]
+    guesses: tuple[tuple[float, ...], ...]
+    bands: tuple[Band, ...]
     held_out: Mapping[str, tuple[str, ...]]
     seed: int
     waves: tuple[int, ...]
@@ -232,6 +271,8 @@ def read_calibration(document: Mapping[str, Any], *, source: str, name: str, fol
         parameters=tuple(_parameter(label, table, file) for label, table in file.parameters.items()),
         experiments=experiments,
         observations=tuple(_observation(table) for table in file.observations),
+        guesses=tuple(tuple(guess[label] for label in file.parameters) for guess in file.guesses),
+        bands=tuple(Band(table.title, tuple(table.of), table.against, table.quantity) for table in file.bands),
         held_out={label: tuple(groups) for label, groups in file.held_out.items()},
         seed=file.design.seed,
         waves=tuple(file.design.waves),
@@ -244,7 +285,9 @@ def _parameter(name: str, table: ParameterTable, file: CalibrationFile) -> Param
     everywhere = frozenset(file.experiments)
     experiments = everywhere if table.experiments is None else frozenset(table.experiments)
     low, high = table.range
-    return Parameter(name, table.symbol or name, tuple(table.keys), low, high, table.log, experiments, table.normal)
+    return Parameter(
+        name, table.symbol or name, tuple(table.keys), low, high, table.log, experiments, table.normal, table.unit
+    )
 
 
 def _number(value: str | float, quantity: str) -> float:
@@ -261,7 +304,7 @@ def _observation(table: ObservationTable) -> Observation:
     value, deviation = (_number(one, table.quantity) for one in (table.value, table.deviation))
     return Observation(
         table.name, table.group, table.title or table.name, table.quantity, tuple(table.of), tuple(table.over), value,
-        deviation,
+        deviation, table.derived,
     )  # fmt: skip
 
 
@@ -278,10 +321,31 @@ def _problems(file: CalibrationFile) -> list[Problem]:
             found += _unknown(f"{place}.{key}", getattr(observation, key), file.experiments, "an experiment")
         for key in ("value", "deviation"):
             found += _unreadable(f"{place}.{key}", getattr(observation, key), observation)
+    if all(observation.derived for observation in file.observations):
+        found.append(Problem("observations", None, "expected one that is not derived"))
+    found += _problems_of_guesses(file)
+    for number, band in enumerate(file.bands):
+        found += _unknown(f"bands[{number}].of", band.of, file.experiments, "an experiment")
     for name, held in file.held_out.items():
         found += _unknown(f"held_out.{name}", held, groups, "a group of observations")
-        if set(held) >= groups:
+        if set(held) >= {observation.group for observation in file.observations if not observation.derived}:
             found.append(Problem(f"held_out.{name}", None, "expected to leave a group to calibrate on"))
+    return found
+
+
+def _problems_of_guesses(file: CalibrationFile) -> list[Problem]:
+    found = []
+    for number, guess in enumerate(file.guesses):
+        place = f"guesses[{number}]"
+        for name in guess:
+            found += _unknown(f"{place}.{name}", [name], file.parameters, "a parameter")
+        for name, table in file.parameters.items():
+            low, high = table.range
+            if name not in guess:
+                found.append(Problem(f"{place}.{name}", None, "missing; a guess has all parameters"))
+            elif not low <= guess[name] <= high:
+                told = f"expected a number within the parameter's range, {low:g} to {high:g}"
+                found.append(Problem(f"{place}.{name}", f"{guess[name]:g}", told))
     return found
 
 

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from calibration.calibrate import calibrate, sobol_indices
+from calibration.calibrate import FINAL, best_set, calibrate, first_wave, sobol_indices
 from calibration.emulator import fit_emulators
 from calibration.posterior import log_likelihood, sample_posterior
 from calibration.report import emulator_checks, intervals, rows_of
@@ -103,6 +104,23 @@ def test_a_posterior_is_the_known_one(known: tuple[Any, list[Observation]]) -> N
     assert unseen > 1.5 * seen
 
 
+def test_what_is_derived_from_others_weighs_nothing(known: tuple[Any, list[Observation]]) -> None:
+    emulators, _ = known
+    derived = replace(emulators[1], observation=replace(emulators[1].observation, derived=True))
+    alone, both = (sample_posterior(chosen, SPACE, 300, 1) for chosen in (emulators[:1], [emulators[0], derived]))
+    assert both.groups == ("all",)
+    np.testing.assert_array_equal(both.unit, alone.unit)
+
+
+def test_the_best_set_gives_most_observations_and_then_the_least_misfit(tmp_path: Path) -> None:
+    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
+    found = read_calibration(document, source="best", name="best", folder=tmp_path)
+    deviation = np.array([one.deviation for one in found.observations])
+    residuals = np.array([[0.0, 0.0, 5.0, 5.0], [0.9, 0.9, 0.9, 3.0], [0.9, 0.2, 0.2, 2.0], [0.2, 0.2, 0.2, HOPELESS]])
+    outcome = np.array([one.value for one in found.observations]) + residuals * deviation
+    assert best_set(found, np.eye(4), outcome).tolist() == [[0.0, 0.0, 1.0, 0.0]]
+
+
 @pytest.mark.parametrize("mean", [0.0, 1.0, 3.0, -4.1])
 @pytest.mark.parametrize("deviation", [0.05, 0.3, 0.6, 1.2])
 def test_the_likelihood_is_the_integral_over_what_the_emulator_does_not_know(mean: float, deviation: float) -> None:
@@ -166,6 +184,7 @@ REDUCED: dict[str, Any] = {
         "strong": {"drive.frequency": "90 Hz", "drive.peak_acceleration": "6 g"},
     },
     "held_out": {"ratio": ["r"]},
+    "bands": [{"title": "60 and 90 Hz", "of": ["slow", "strong"], "against": "gamma0"}],
     "design": {"waves": [16, 8], "predictive": 2, "steps": 1000, "seed": 2},
 }
 
@@ -192,7 +211,15 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     file.write_text(to_toml(document))
     command = [PROGRAM, "calibrate", str(file), "--out", str(out), "--to", str(tmp_path / "here")]
     told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    names = ["posterior.parquet", "calibration.json", "calibration.md", "corner.png", "predictions.png", "sobol.png"]
+    names = [
+        "posterior.parquet",
+        "calibration.json",
+        "calibration.md",
+        "corner.png",
+        "predictions.png",
+        "sobol.png",
+        "bands.png",
+    ]
     assert [Path(line).name for line in told.splitlines()] == names
     said = json.loads((tmp_path / "here" / "calibration.json").read_text())
     assert said["sets"] == 24
@@ -237,15 +264,59 @@ def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
     document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
     document |= {"case": "fig4b", "experiments": {"strong": {"drive.peak_acceleration": "10 g"}}}
     document["observations"] = [one for one in document["observations"] if one["name"] == "strong"]
-    del document["held_out"]
-    document["set"] = {**document["set"], "liquid": {"volume_fraction": 0.01}, "contact": {"rolling_friction": 0.003}}
+    del document["held_out"], document["bands"]
+    document["set"] = {
+        "start": {"replicates": 1},
+        "run": {"cycles": 40, "settling_cycles": 20, "samples_per_cycle": 10},
+        "liquid": {"volume_fraction": 0.01},
+        "contact": {"rolling_friction": 0.003},
+    }
     found = read_calibration(document, source="apart", name="apart", folder=tmp_path)
     unit = Space(found.parameters).unit(np.array([[0.1, 0.5], [0.2, 9.9]]))
     wave, _ = run_wave(found, unit, "apart", tmp_path / "runs", Options(2))
-    assert wave.table["open_3"].tolist() == pytest.approx([0.0, 1.0], abs=0.2)
+    assert wave.table["parted"].tolist() == pytest.approx([0.0, 1.0], abs=0.1)
     observed = found.observations[0]
     assert wave.outcome[0, 0] == pytest.approx(wave.table["velocity"][0])
     assert wave.outcome[1, 0] == pytest.approx(observed.value + HOPELESS * observed.deviation)
+
+
+def test_values_have_their_units_and_guesses_lead_the_first_wave(tmp_path: Path) -> None:
+    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
+    document["parameters"] = {
+        **REDUCED["parameters"],
+        "angle": {"keys": ["liquid.contact_angle"], "range": [0.0, 60.0], "unit": "deg"},
+    }
+    document["guesses"] = [{"angle": 30.0, "drag": 2.0, "friction": 0.1}]
+    found = read_calibration(document, source="units", name="units", folder=tmp_path)
+    space = Space(found.parameters)
+    assert found.guesses == ((0.1, 2.0, 30.0),)
+    case = next(iter(wave_sweep(found, np.array(found.guesses), "units").cases()))
+    assert case.liquid.contact_angle == pytest.approx(np.pi / 6.0)
+    unit = first_wave(found, space)
+    assert len(unit) == 17
+    np.testing.assert_allclose(space.values(unit[0]), [0.1, 2.0, 30.0])
+
+
+def test_a_set_that_loses_its_beads_is_told_and_not_run_again(tmp_path: Path) -> None:
+    """A step ten times beyond the viscous limit; whoever goes on finds what is left of it, and the rest finished."""
+    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
+    document["set"] = {
+        **document["set"],
+        "run": {**document["set"]["run"], "time_step": "40 us", "allow_unstable": True},
+        "contact": {"minimum_separation_ratio": 1e-3},
+    }
+    found = read_calibration(document, source="lost", name="lost", folder=tmp_path)
+    unit = Space(found.parameters).unit(np.array([[0.1, 9.0]]))
+    wave, failures = run_wave(found, unit, "lost", tmp_path / "runs", Options(2))
+    assert {failure.reason for failure in failures} <= FINAL
+    assert len(failures) == 3
+    expected = [one.value + HOPELESS * one.deviation for one in found.observations]
+    np.testing.assert_allclose(wave.outcome[0], expected)
+    remains = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("failure.json")}
+    assert len(remains) == 3
+    _, again = run_wave(found, unit, "lost", tmp_path / "runs", Options(2, final=FINAL))
+    assert again == failures
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("failure.json")} == remains
 
 
 # --- files ------------------------------------------------------------------------------------------------------------
@@ -267,6 +338,7 @@ def test_shipped_calibrations_can_be_run(name: str) -> None:
 
 def _bad(path: str, value: Any) -> dict[str, Any]:
     document = json.loads(json.dumps(reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})))
+    document["observations"][3]["derived"] = True
     *tables, key = path.split("/")
     table = document
     for name in tables:
@@ -289,6 +361,12 @@ BAD = {
     "deviation": ("observations/0/deviation", "0 mm/s", r"observations\[0\]\.deviation"),
     "name": ("observations/1/name", "slow", r"observations\[1\]\.name"),
     "keys": ("experiments/fast/start.angle", "3 deg", r"experiments\.fast"),
+    "unknown guess": ("guesses", [{"friction": 0.1, "dragg": 1.0, "drag": 1.0}], r"guesses\[0\]\.dragg.*drag"),
+    "half a guess": ("guesses", [{"friction": 0.1}], r"guesses\[0\]\.drag.*missing"),
+    "guess": ("guesses", [{"friction": 0.1, "drag": 11.0}], r"guesses\[0\]\.drag.*0\.4 to 10"),
+    "band": ("bands", [{"of": ["slo"], "against": "gamma0"}], r"bands\[0\]\.of.*slow"),
+    "derived": ("observations/3/derived", 3, r"observations\[3\]\.derived"),
+    "all held but derived": ("held_out", {"x": ["v"]}, r"held_out\.x"),
     "median": ("parameters/drag/normal", [-1.0, 0.5], r"parameters\.drag\.normal"),
     "nowhere": ("parameters/drag/experiments", [], r"parameters\.drag\.experiments"),
     "somewhere": (
@@ -297,7 +375,6 @@ BAD = {
         r"no parameter gives liquid\.viscosity_ratio to fast, strong",
     ),
     "held": ("held_out", {"x": ["w"]}, r"held_out\.x"),
-    "all held": ("held_out", {"x": ["v", "r"]}, r"held_out\.x"),
     "missing": ("observations", None, "observations"),
 }
 

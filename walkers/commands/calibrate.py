@@ -29,7 +29,7 @@ def command(
     """Calibrate, or go on with it: waves of runs, emulators, posterior, predictions by the engine."""
     from calibration.calibrate import calibrate
     from calibration.figures import draw
-    from calibration.report import write_tables
+    from calibration.report import rows_of, write_tables
     from inputs.calibration import load_calibration
     from sweeps.conduct import Options
     from sweeps.site import cores_here
@@ -47,6 +47,7 @@ def command(
     for sweep, failures in found.failures.items():
         print(f"walkers: {sweep}: {len(failures)} points failed", file=sys.stderr)
     folder = to or out / read.name
-    for file in [*write_tables(found, folder), *draw(found, folder)]:
+    rows = rows_of(found)
+    for file in [*write_tables(found, rows, folder), *draw(found, rows, folder)]:
         print(file)
     return 0  # a set whose run fails is an outcome: it counts as far off
