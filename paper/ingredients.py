@@ -1,0 +1,337 @@
+"""Which physics is missing: published numbers from the theory, with one ingredient after the other, each fitted anew.
+
+The engine knows Coulomb's friction, the bridges' drag and a film's. The theory integrates under any law of friction,
+thousands of walkers a second, so that for every ingredient all parameters can be searched for what they give at best.
+It is a theory of walkers whose contacts stay closed, aligned with the drive: of hopping and turning it knows nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from math import nan
+from pathlib import Path
+from statistics import fmean
+
+import numpy as np
+import numpy.typing as npt
+
+from inputs.case import WalkerCase
+from inputs.forces import film_drag
+from inputs.reading import load_case
+from paper import dimers, published
+from runner.files import write_json, write_text
+from theory.friction import Friction
+from theory.motion import Walker, walk
+from theory.prediction import bridge_drag
+from theory.quasistatic import translation
+
+FloatArray = npt.NDArray[np.float64]
+_FREQUENCIES = (60.0, 90.0)
+_PEAKS = (0.5, 2.0, 3.0, 4.0, 5.0, 6.0, 10.0)
+_CYCLES = 40
+_DEVIATION = 0.15
+_HOPELESS = 30.0
+
+
+@dataclass(frozen=True)
+class Ingredient:
+    """Something that the theory may have: parameters and their ranges.
+
+    Attributes
+    ----------
+    name
+        In words.
+    ranges
+        Parameter to lowest and highest value; ``log10_`` parameters are logarithms.
+    """
+
+    name: str
+    ranges: Mapping[str, tuple[float, float]]
+
+
+ALWAYS = Ingredient(
+    "Coulomb friction and the bridges' drag",
+    {
+        "friction_wall": (0.02, 0.6),
+        "friction_slide": (0.02, 0.6),
+        "friction_bead": (0.02, 0.6),
+        "log10_viscosity_ratio": (-1.0, 2.3),
+    },
+)
+"""What the engine has: three frictions, and the bridges' viscosity over the liquid's."""
+ADDED = (
+    Ingredient("drag of a film on the beads' translation", {"log10_film_drag_ratio": (-2.0, 2.0)}),
+    Ingredient("weaker or stronger bridges to the substrate", {"wall_bridge_factor": (0.5, 1.3)}),
+    Ingredient("weaker or stronger bridges between the beads", {"bead_bridge_factor": (0.5, 1.3)}),
+    Ingredient("drag in proportion to the load, the paper's κ (s/m)", {"log10_kappa": (-1.0, 2.0)}),
+    Ingredient(
+        "static friction above the kinetic",
+        {"static_ratio": (1.0, 2.5), "log10_stribeck_velocity": (-4.0, -1.5)},
+    ),
+)
+"""Ingredients to be tried, one at a time and all together."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A published number: a mean over walkers of `walkers_of_the_paper`, or its ratio to the mean over others.
+
+    Attributes
+    ----------
+    name
+        In words.
+    quantity
+        ``velocity``, ``rotation`` or ``sliding`` (both of the large bead).
+    of, over
+        Names of walkers.
+    value, deviation
+        m/s, or a ratio; `_DEVIATION` of the value where the paper gives no spread.
+    """
+
+    name: str
+    quantity: str
+    of: tuple[str, ...]
+    over: tuple[str, ...]
+    value: float
+    deviation: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What an ingredient gives at best.
+
+    Attributes
+    ----------
+    name
+        Of the ingredient.
+    parameters
+        The best ones.
+    values
+        Target's name to what comes out (m/s, or a ratio).
+    met
+        How many of them lie within their deviations.
+    missed
+        The names of the others, the worst first.
+    misfit
+        Σ ln(1 + r²), r in deviations.
+    """
+
+    name: str
+    parameters: dict[str, float]
+    values: dict[str, float]
+    met: int
+    missed: list[str]
+    misfit: float
+
+
+@cache
+def walkers_of_the_paper() -> dict[str, WalkerCase]:
+    """The walkers of Figs. 2, 3 and 4 by name; their bridges have the liquid's own viscosity, and there is no film."""
+    base = dimers.shipped()
+    found = {
+        f"{f:g} Hz, {peak:g} g": dimers.driven(base, f, [peak * published.GRAVITY])[0]
+        for f in _FREQUENCIES
+        for peak in _PEAKS
+    }
+    found |= {
+        f"{one:g}/{other:g} mm": dimers.of_radii(base, (one * 1e-3, other * 1e-3), 0.5)
+        for one, other in published.FIG3_FIT
+    }
+    found |= {f"4{letter}": load_case(f"fig4{letter}") for letter in "ab"}
+    return {name: _bare(case) for name, case in found.items()}
+
+
+def _bare(case: WalkerCase) -> WalkerCase:
+    from inputs import library
+
+    known = library.liquid(case.liquid.name or "")
+    viscosity = known["kinematic_viscosity"] * known["density"]
+    return replace(case, liquid=replace(case.liquid, dynamic_viscosity=viscosity, film_viscosity=0.0))
+
+
+def targets() -> list[Target]:
+    """The published numbers that tell of walkers on the axis."""
+
+    def speed(name: str, quantity: str, of: Sequence[str], value: float, deviation: float | None = None) -> Target:
+        return Target(name, quantity, tuple(of), (), value, deviation or _DEVIATION * abs(value))
+
+    def ratio(name: str, of: Sequence[str], over: Sequence[str], deviation: float) -> Target:
+        return Target(name, "velocity", tuple(of), tuple(over), 1.0, deviation)
+
+    def at(peak: float) -> list[str]:
+        return [f"{f:g} Hz, {peak:g} g" for f in _FREQUENCIES]
+
+    slow, fast = _FREQUENCIES
+    return [
+        *(speed(f"Fig. 2, {peak:g} g", "velocity", at(peak), value) for peak, value in published.FIT.items()),
+        ratio("Fig. 2, plateau", at(10.0), at(6.0), 0.2),
+        *(
+            ratio(f"Fig. 2, frequency at {peak:g} g", [f"{fast:g} Hz, {peak:g} g"], [f"{slow:g} Hz, {peak:g} g"], 0.15)
+            for peak in (4.0, 6.0)
+        ),
+        speed("Fig. 2, rest at 0.5 g", "velocity", at(0.5), 0.0, 2e-5),
+        *(
+            speed(f"Fig. 3, {one:g}/{other:g} mm", "velocity", [f"{one:g}/{other:g} mm"], value)
+            for (one, other), value in published.FIG3_FIT.items()
+        ),
+        speed("Fig. 4a, velocity", "velocity", ["4a"], published.FIG4_VELOCITY[0]),
+        speed("Fig. 4a, sliding", "sliding", ["4a"], 0.0, 3e-4),
+        speed("Fig. 4b, velocity", "velocity", ["4b"], published.FIG4_VELOCITY[1]),
+        speed("Fig. 4b, rotation", "rotation", ["4b"], published.FIG4B_ROTATION),
+    ]
+
+
+def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """What walkers of the paper do, m/s, by quantity and name; NaN where the forces have no solution.
+
+    Parameters
+    ----------
+    parameters
+        Of `ALWAYS` and of any of `ADDED`.
+    """
+    cases = walkers_of_the_paper()
+    walkers, drag, films = _fixed()
+    known = {**dict.fromkeys(("wall_bridge_factor", "bead_bridge_factor", "static_ratio"), 1.0), **parameters}
+    scale = np.array([[known["wall_bridge_factor"]]] * 2 + [[known["bead_bridge_factor"]]])
+    film = 10.0 ** known["log10_film_drag_ratio"] if "log10_film_drag_ratio" in known else 0.0
+    on_slide = np.array([name.startswith("4") for name in cases])
+    wall = np.where(on_slide, known["friction_slide"], known["friction_wall"])
+    dry = Friction.coulomb(wall, np.full(len(cases), known["friction_bead"]))
+    kinetic = np.asarray(dry.kinetic)
+    friction = Friction(
+        kinetic=kinetic,
+        static=kinetic * known["static_ratio"],
+        stribeck_velocity=10.0 ** known.get("log10_stribeck_velocity", -3.0),
+        linear=10.0 ** known["log10_kappa"] if "log10_kappa" in known else 0.0,
+        viscous=drag * 10.0 ** known["log10_viscosity_ratio"],
+    )
+    motion = walk(
+        replace(walkers, at_rest=walkers.at_rest * scale, film=films * film),
+        friction,
+        [case.drive.frequency for case in cases.values()],
+        [case.drive.peak_acceleration for case in cases.values()],
+        cycles=_CYCLES,
+    )
+    # Contacts that would open are let be: the engine's walkers hop there and walk on.
+    velocity = np.where(motion.solved, translation(motion.sliding), np.nan)
+    columns = {"velocity": velocity, "rotation": velocity - motion.sliding[0], "sliding": motion.sliding[0]}
+    return {name: dict(zip(cases, map(float, values), strict=True)) for name, values in columns.items()}
+
+
+@cache
+def _fixed() -> tuple[Walker, FloatArray, FloatArray]:
+    """The walkers, the drag of their bridges and of a film, both of the liquid's own viscosity."""
+    cases = list(walkers_of_the_paper().values())
+    walkers = Walker.joined([Walker.of_case(case) for case in cases])
+    drag = np.stack([bridge_drag(case) for case in cases], axis=-1)
+    films = [[film_drag(case.liquid.dynamic_viscosity, case.beads.radii[bead]) for case in cases] for bead in range(2)]
+    return walkers, drag, np.array(films)
+
+
+def values_of(parameters: Mapping[str, float], wanted: Sequence[Target]) -> dict[str, float]:
+    """What some parameters give of targets."""
+    found = speeds(parameters)
+    values = {}
+    for target in wanted:
+        value = fmean(found[target.quantity][name] for name in target.of)
+        if target.over:
+            below = fmean(found[target.quantity][name] for name in target.over)
+            value = value / below if below else nan
+        values[target.name] = value
+    return values
+
+
+def _residuals(values: Mapping[str, float], wanted: Sequence[Target]) -> FloatArray:
+    residuals = np.array([(values[target.name] - target.value) / target.deviation for target in wanted])
+    return np.where(np.isfinite(residuals), residuals, _HOPELESS)
+
+
+def fit(ingredients: Sequence[Ingredient], wanted: Sequence[Target], *, seed: int = 1, generations: int = 80) -> Fit:
+    """The parameters with the least misfit (`scipy.optimize.differential_evolution`).
+
+    Parameters
+    ----------
+    ingredients
+        Beside `ALWAYS`.
+    wanted
+        What is to come out.
+    seed, generations
+        Of the search.
+    """
+    from scipy.optimize import differential_evolution
+
+    ranges = {**ALWAYS.ranges, **{key: ends for one in ingredients for key, ends in one.ranges.items()}}
+
+    def misfit(point: FloatArray) -> float:
+        values = values_of(dict(zip(ranges, map(float, point), strict=True)), wanted)
+        return float(np.log1p(_residuals(values, wanted) ** 2).sum())
+
+    found = differential_evolution(
+        misfit, list(ranges.values()), maxiter=generations, popsize=12, rng=np.random.default_rng(seed), polish=False
+    )
+    parameters = dict(zip(ranges, map(float, found.x), strict=True))
+    values = values_of(parameters, wanted)
+    residuals = np.abs(_residuals(values, wanted))
+    worst = [place for place in np.argsort(residuals)[::-1] if residuals[place] > 1.0]
+    return Fit(
+        name=" + ".join(one.name for one in ingredients) or ALWAYS.name,
+        parameters=parameters,
+        values=values,
+        met=len(wanted) - len(worst),
+        missed=[wanted[place].name for place in worst],
+        misfit=float(found.fun),
+    )
+
+
+def try_ingredients(*, seed: int = 1, generations: int = 80) -> list[Fit]:
+    """The fit without any, with each ingredient, and with all of them."""
+    chosen: list[Sequence[Ingredient]] = [(), *((one,) for one in ADDED), ADDED]
+    fits = [fit(ingredients, targets(), seed=seed, generations=generations) for ingredients in chosen]
+    return [*fits[:-1], replace(fits[-1], name="all of these")]
+
+
+def write_ingredients(fits: Sequence[Fit], to: Path) -> list[Path]:
+    """Write ``ingredients.json`` and ``ingredients.md``."""
+    to.mkdir(parents=True, exist_ok=True)
+    write_json(
+        to / "ingredients.json", {"targets": [asdict(one) for one in targets()], "fits": [asdict(one) for one in fits]}
+    )
+    write_text(to / "ingredients.md", as_markdown(fits))
+    return [to / "ingredients.json", to / "ingredients.md"]
+
+
+def as_markdown(fits: Sequence[Fit]) -> str:
+    """The fits as a table, and below it what they give."""
+    wanted = targets()
+    lines = [
+        "# Which physics is missing",
+        "",
+        f"The theory (contacts stay closed, walkers on the axis) fitted to {len(wanted)} published numbers: without "
+        "any ingredient, with each by itself and with all of them. Misfit is Σ ln(1 + r²), r the residual in "
+        "deviations, which are 15 % of speeds.",
+        "",
+        "| added | misfit | met | missed, the worst first | parameters |",
+        "|---|---|---|---|---|",
+    ]
+    for one in fits:
+        parameters = ", ".join(f"{_name(key)} {_value(key, value):.3g}" for key, value in one.parameters.items())
+        lines.append(
+            f"| {one.name} | {one.misfit:.1f} | {one.met} of {len(wanted)} | {'; '.join(one.missed)} | {parameters} |"
+        )
+    lines += ["", "| | published | " + " | ".join(str(number) for number in range(1, len(fits) + 1)) + " |"]
+    lines.append("|---" * (len(fits) + 2) + "|")
+    for target in wanted:
+        scale, unit = (1.0, "") if target.over else (1e3, " mm/s")
+        cells = [f"{one.values[target.name] * scale:.2f}" for one in fits]
+        lines.append(f"| {target.name} | {target.value * scale:.2f}{unit} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _name(key: str) -> str:
+    return key.removeprefix("log10_").replace("_", " ")
+
+
+def _value(key: str, value: float) -> float:
+    return 10.0**value if key.startswith("log10_") else value

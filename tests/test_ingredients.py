@@ -1,0 +1,69 @@
+"""Fits of the theory with further ingredients: what is put in comes out, and what is lacking is missed."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inputs import load_case
+from paper.ingredients import (
+    ADDED,
+    ALWAYS,
+    as_markdown,
+    fit,
+    speeds,
+    targets,
+    values_of,
+    walkers_of_the_paper,
+    write_ingredients,
+)
+from runner.files import read_json
+from theory.prediction import motion_of
+
+KNOWN = {"friction_wall": 0.25, "friction_slide": 0.2, "friction_bead": 0.12, "log10_viscosity_ratio": 1.0}
+
+
+def test_targets_are_of_walkers_that_there_are() -> None:
+    names = {name for target in targets() for name in (*target.of, *target.over)}
+    assert names == set(walkers_of_the_paper())
+    assert len({target.name for target in targets()}) == len(targets()) == 18
+
+
+def test_walkers_are_those_of_the_shipped_cases() -> None:
+    """With the numbers of a shipped case the same velocity comes out."""
+    case = load_case("fig4a")
+    bare = walkers_of_the_paper()["4a"]
+    drag = case.liquid.dynamic_viscosity / bare.liquid.dynamic_viscosity
+    contact = {
+        "friction_wall": 0.1,
+        "friction_slide": case.contact.friction_bead_wall,
+        "friction_bead": case.contact.friction_bead_bead,
+        "log10_viscosity_ratio": float(np.log10(drag)),
+    }
+    if case.liquid.film_viscosity:
+        film = case.liquid.film_viscosity / bare.liquid.dynamic_viscosity
+        contact["log10_film_drag_ratio"] = float(np.log10(film))
+    expected = float(motion_of(case).velocity[0])
+    assert speeds(contact)["velocity"]["4a"] == pytest.approx(expected, rel=1e-6)
+
+
+def test_what_the_theory_made_is_found_again_and_what_it_lacks_is_missed(tmp_path: Path) -> None:
+    made = {**KNOWN, "static_ratio": 1.8, "log10_stribeck_velocity": -3.0}
+    wanted = targets()[:7]
+    dry, wet = (
+        [replace(one, value=value) for one, value in zip(wanted, values_of(known, wanted).values(), strict=True)]
+        for known in (KNOWN, made)
+    )
+    alone = fit((), dry, generations=14)
+    assert (alone.met, alone.missed) == (len(wanted), [])
+    assert alone.misfit < 0.2
+    assert alone.parameters["friction_wall"] == pytest.approx(KNOWN["friction_wall"], rel=0.15)
+    without, static = fit((), wet, generations=14), fit((ADDED[-1],), wet, generations=14)
+    assert static.misfit < 0.5 * without.misfit
+    assert set(static.parameters) == set(ALWAYS.ranges) | set(ADDED[-1].ranges)
+    full = [replace(one, values=values_of(one.parameters, targets())) for one in (without, static)]
+    paths = write_ingredients(full, tmp_path)
+    assert [path.name for path in paths] == ["ingredients.json", "ingredients.md"]
+    assert len(read_json(paths[0])["fits"]) == 2
+    assert as_markdown(full).count("\n| Fig.") == len(targets())
