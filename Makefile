@@ -43,6 +43,10 @@ figures: setup ## The paper's figures and published numbers beside ours, in figu
 calibrate: setup ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
 	@$(WALKERS) calibrate $(CALIBRATION) --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
+.PHONY: ingredients
+ingredients: setup ## Which physics is missing: the theory fitted to the published numbers with each ingredient
+	@$(WALKERS) ingredients
+
 .PHONY: test
 test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test first)
 	.venv/bin/ruff check .

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +14,7 @@ from paper.alignment import paper_drives
 from paper.published import NUMBERS, Published
 from paper.sensitivity import misalignment
 from paper.sources import NothingFinishedError, Sources
+from postprocess.steady import steady_walkers
 from sweeps.table import thresholds
 from theory.mathieu import largest_stable_v
 from theory.prediction import motion_of, threshold
@@ -33,13 +34,15 @@ _SMALL = 0.05
 class Value:
     """One of our numbers, in the unit of the published one: engine with its range, and theory; NaN where there is none.
 
-    The range is over walkers, or over the frequencies where a number is a mean over these.
+    The range is over walkers, or over the frequencies where a number is a mean over these. ``left_out`` of all walkers
+    are none until the end (`postprocess.steady`).
     """
 
     engine: float
     low: float
     high: float
     theory: float = float("nan")
+    left_out: int = 0
 
 
 _NOTHING = Value(float("nan"), float("nan"), float("nan"))
@@ -55,7 +58,7 @@ class Row:
     ----------
     key, what, unit, published, measured
         See `paper.published.Published`.
-    engine, low, high, theory
+    engine, low, high, theory, left_out
         See `Value`; theory is Coulomb friction with the bridges' drag, nothing fitted.
     ratio
         Engine (or theory, where the number is one of theory alone) to published; None where that is zero or in words,
@@ -79,6 +82,7 @@ class Row:
     low: float | None
     high: float | None
     theory: float | None
+    left_out: int
     ratio: float | None
     bounds: tuple[float, float] | None
     within_bounds: bool | None
@@ -111,12 +115,21 @@ def _row(number: Published, value: Value) -> Row:
         low=_finite(value.low),
         high=_finite(value.high),
         theory=_finite(value.theory),
+        left_out=value.left_out,
         ratio=_finite(ours / number.value) if number.value else None,
         bounds=number.bounds,
         within_bounds=None if within is None else bool(within),
         agrees=bool(agrees),
-        why="" if agrees else number.hangs_on if np.isfinite(ours) else "A run that it needs is missing or failed.",
+        why="" if agrees else _why(number, value, ours),
     )
+
+
+def _why(number: Published, value: Value, ours: float) -> str:
+    if np.isfinite(ours):
+        return number.hangs_on
+    if value.left_out:
+        return "None of the walkers is steady, stays on the axis and keeps its beads together."
+    return "A run that it needs is missing or failed."
 
 
 def _near(ours: float, value: float | None) -> bool:
@@ -131,10 +144,19 @@ def _finite(value: float) -> float | None:
 
 def _speed(rows: pd.DataFrame, column: str = "velocity", theory: float = float("nan")) -> Value:
     """The mean over some points; its range over walkers of one point, or over several points."""
-    mean = rows[column].mean() * 1e3
-    ends = ("smallest", "largest") if len(rows) == 1 and column == "velocity" else (column, column)
-    low, high = rows[ends[0]].min() * 1e3, rows[ends[1]].max() * 1e3
-    return Value(float(mean), float(low), float(high), theory)
+    walkers = [steady_walkers(run)[column].to_numpy() * 1e3 for run in rows["run"]]
+    left_out = int(rows["walkers"].sum()) - sum(map(len, walkers))
+    means = np.array([one.mean() for one in walkers if len(one)])
+    if not len(means):
+        return replace(_NOTHING, theory=theory, left_out=left_out)
+    ends = walkers[0] if len(rows) == 1 else means
+    return Value(float(means.mean()), float(ends.min()), float(ends.max()), theory, left_out)
+
+
+def _speed_of_all(rows: pd.DataFrame, theory: float) -> Value:
+    """As `_speed`, but of all walkers, whichever way they turn."""
+    mean, low, high = (float(rows[name].mean()) * 1e3 for name in ("velocity", "smallest", "largest"))
+    return Value(mean, low, high, theory)
 
 
 def _theory(case: WalkerCase) -> float:
@@ -183,19 +205,21 @@ def _exact(value: float, theory: float = float("nan")) -> Value:
 
 def _mean(values: list[Value]) -> Value:
     engine = [value.engine for value in values]
-    return Value(float(np.mean(engine)), min(engine), max(engine), float(np.mean([value.theory for value in values])))
+    theory, left_out = float(np.mean([value.theory for value in values])), sum(value.left_out for value in values)
+    return Value(float(np.nanmean(engine)), float(np.nanmin(engine)), float(np.nanmax(engine)), theory, left_out)
 
 
 def _quotient(table: pd.DataFrame, case: WalkerCase, upper: tuple[float, float], lower: tuple[float, float]) -> Value:
     """A ratio of two speeds, each at a frequency in Hz and an acceleration in g."""
 
-    def at(drive: tuple[float, float]) -> tuple[float, float]:
+    def at(drive: tuple[float, float]) -> Value:
         frequency, peak = drive[0], drive[1] * published.GRAVITY
         rows = table[(table["frequency"] == frequency) & np.isclose(table["peak_acceleration"], peak)]
-        return float(rows["velocity"].mean()), _theory(dimers.driven(case, frequency, [peak])[0])
+        return _speed(rows, theory=_theory(dimers.driven(case, frequency, [peak])[0]))
 
-    (over, over_theory), (under, under_theory) = at(upper), at(lower)
-    return _exact(over / under, over_theory / under_theory)
+    over, under = at(upper), at(lower)
+    found = _exact(over.engine / under.engine, over.theory / under.theory)
+    return replace(found, left_out=over.left_out + under.left_out)
 
 
 def _fig3(sources: Sources) -> dict[str, Value]:
@@ -205,9 +229,8 @@ def _fig3(sources: Sources) -> dict[str, Value]:
         radii = (r1 * 1e-3, r2 * 1e-3)
         rows = table[np.isclose(table["radius_1"], radii[0]) & np.isclose(table["radius_2"], radii[1])]
         values[f"fig3_{r1:g}_{r2:g}"] = _speed(rows, theory=_theory(dimers.of_radii(case, radii, 0.5)))
-    values["fig3_symmetric"] = _speed(
-        table[dimers.symmetric(table)], theory=_theory(dimers.of_asymmetry(case, 0.0, 0.5))
-    )
+    still = table[dimers.symmetric(table)]
+    values["fig3_symmetric"] = _speed_of_all(still, _theory(dimers.of_asymmetry(case, 0.0, 0.5)))
     return values
 
 
@@ -266,8 +289,9 @@ and drive alone. To agree is to lie within what the paper says (the bounds shown
 shipped ones, which were calibrated to these numbers (docs/calibration.md), the same in all rows but for the friction
 of Fig. 4's other substrate. Theory is Coulomb friction with the bridges' drag, with the engine's parameters. As in
 the paper, a velocity is the mean of six walkers, half of them facing each way, seen once a cycle (alignment: two
-walkers a start); brackets hold the slowest and the fastest, or the range over the frequencies where a number is one
-for all of them. Fig. 1a is a pile's and is not among them.
+walkers a start); those that are not steady, leave the axis or come apart are left out, and so many are told. Brackets
+hold the slowest and the fastest, or the range over the frequencies where a number is one for all of them. Fig. 1a is a
+pile's and is not among them.
 
 | | published | engine | theory | ratio | agrees |
 |---|---|---|---|---|---|
@@ -285,6 +309,7 @@ def as_markdown(rows: list[Row]) -> str:
         spread = ""
         if row.low is not None and row.high is not None and row.high - row.low > 1e-3 * abs(row.high):
             spread = f" ({_number(row.low)} … {_number(row.high)})"
+        spread += f", {row.left_out} left out" if row.left_out else ""
         ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
         agrees = "yes" if row.agrees else "**no**"
         text += (

@@ -16,6 +16,7 @@ from walkers.commands import (
     climb,
     deck,
     figures,
+    ingredients,
     plot,
     render,
     result,
@@ -49,6 +50,7 @@ for command in (
     table,
     climb,
     figures,
+    ingredients,
     calibrate,
     audit,
 ):

@@ -1,0 +1,23 @@
+"""``walkers ingredients``: which physics the published numbers ask for beyond what the engine has."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+To = Annotated[Path, typer.Option("--to", help="Folder of the tables.")]
+Generations = Annotated[int, typer.Option("--generations", min=1, help="Of each search.")]
+
+
+def command(to: To = Path("figures"), generations: Generations = 120) -> int:
+    """Fit the theory to the published numbers with one ingredient after the other; no engine is needed."""
+    from paper.ingredients import try_ingredients, write_ingredients
+
+    fits = try_ingredients(generations=generations)
+    for one in fits:
+        print(f"misfit {one.misfit:5.1f}, {one.met:2d} met: {one.name}")
+    for file in write_ingredients(fits, to):
+        print(file)
+    return 0
