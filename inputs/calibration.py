@@ -25,12 +25,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from inputs.axes import Value, flatten
 from inputs.errors import InputError, Problem
 from inputs.library import suggestion
-from inputs.messages import problem_of
+from inputs.messages import validated
 from inputs.reading import find_input, read_toml
 from inputs.schema import Number, Whole
 from inputs.units import ANGLE, SPEED, Kind, parse_quantity
@@ -252,11 +252,7 @@ def load_calibration(calibration: str | Path) -> Calibration:
 
 def read_calibration(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Calibration:
     """A calibration given as nested tables; parameters and errors as for `inputs.sweep.expand`."""
-    try:
-        file = CalibrationFile.model_validate(document)
-    except ValidationError as error:
-        problems = [problem_of(details, document, CalibrationFile, "a calibration") for details in error.errors()]
-        raise InputError(source, problems) from error
+    file = validated(CalibrationFile, document, source, "a calibration")
     problems = _problems(file)
     if problems:
         raise InputError(source, problems)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import Any, get_args, get_origin
+from typing import Any, TypeVar, get_args, get_origin
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from inputs.errors import Problem
+from inputs.errors import InputError, Problem
 from inputs.library import suggestion
 from inputs.schema import WalkerFile
+
+File = TypeVar("File", bound=BaseModel)
 
 _EXAMPLES = {
     "beads": 'a [beads] table with the radii, such as radii = ["0.3 mm", "0.2 mm"]',
@@ -61,10 +63,30 @@ def quoted(document: Mapping[str, Any], location: Sequence[str | int]) -> str | 
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def problem_of(
-    details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel] = WalkerFile, whole: str = "a case"
-) -> Problem:
-    """One of pydantic's errors about a kind of file as a `Problem`; ``whole`` is what messages call such a file."""
+def validated(model: type[File], document: Mapping[str, Any], source: str, whole: str = "a case") -> File:
+    """A document as a kind of file.
+
+    Parameters
+    ----------
+    model
+        The kind of file.
+    document
+        Nested tables.
+    source, whole
+        What messages call this file, and a file of its kind.
+
+    Raises
+    ------
+    InputError
+        With all that pydantic finds wrong.
+    """
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        raise InputError(source, [_problem_of(one, document, model, whole) for one in error.errors()]) from error
+
+
+def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel], whole: str) -> Problem:
     location = details["loc"]
     key = _dotted(location)
     if details["type"] == "missing":
@@ -76,7 +98,9 @@ def problem_of(
 
 def _entries(key: str) -> str:
     """What is wrong with a list of places or radii that is too short or too long."""
-    return "expected three places: x, y, z" if key.endswith(".at") else "expected two radii"
+    if key.endswith(".at"):
+        return "expected three places: x, y, z"
+    return "expected two radii" if "beads" in key else "expected two numbers"
 
 
 def _dotted(location: Sequence[str | int]) -> str:
@@ -89,7 +113,8 @@ def _dotted(location: Sequence[str | int]) -> str:
 def _expectation(details: ErrorDetails, key: str, file: type[BaseModel], whole: str) -> str:
     kind, context = details["type"], details.get("ctx", {})
     if kind == "too_long":
-        return _entries(key) if "beads" in key else f"expected at most {context['max_length']} entries"
+        most = context["max_length"]
+        return _entries(key) if "beads" in key or most == 2 else f"expected at most {most} entries"
     if kind in _PLAIN:
         return _PLAIN[kind] + (f", {_EXAMPLES[key]}" if kind == "tuple_type" and key in _EXAMPLES else "")
     if kind == "extra_forbidden":

@@ -102,11 +102,15 @@ LOOSE = 1.03
 """Pitch of the places at the start, in diameters of the largest bead."""
 
 
+def lattice_pitch(container: Container, largest: float) -> float:
+    """Distance of the places of a layer at the start, m, for a largest bead of this radius (m)."""
+    return container.width / max(int(container.width / (2.0 * LOOSE * largest)), 1)
+
+
 def lattice(beads: PileBeads, container: Container) -> tuple[list[tuple[float, float]], float]:
     """Where beads begin: the places of a layer (m, from the axis), and the height of all layers (m)."""
     largest, reach = max(beads.large + beads.small), container.width / 2.0
-    across = int(container.width / (2.0 * LOOSE * largest))
-    pitch = container.width / max(across, 1)
+    across, pitch = int(container.width / (2.0 * LOOSE * largest)), lattice_pitch(container, largest)
     line = [(index + 0.5) * pitch - reach for index in range(across)]
     grid = [(x, y) for x in line for y in line]
     if container.shape == "cylinder":

@@ -10,12 +10,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
-
 from inputs.case import WalkerCase
 from inputs.errors import InputError, Problem
 from inputs.library import suggestion
-from inputs.messages import problem_of, quoted
+from inputs.messages import quoted, validated
 from inputs.pile import PileCase
 from inputs.pile_file import PileFile, resolve_pile
 from inputs.resolving import UnusableKeyError, resolve
@@ -142,11 +140,7 @@ def resolve_pile_case(document: Mapping[str, Any], *, source: str = "<case>", na
 def _resolved(
     model: type[_File], resolver: Callable[[_File, str], _Case], document: Mapping[str, Any], source: str, name: str
 ) -> _Case:
-    try:
-        file = model.model_validate(document)
-    except ValidationError as error:
-        problems = [problem_of(details, document, model) for details in error.errors()]
-        raise InputError(source, problems) from error
+    file = validated(model, document, source)
     try:
         return resolver(file, name)
     except ArithmeticError as error:

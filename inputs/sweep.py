@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from inputs.axes import (
     MOST_POINTS,
@@ -36,7 +36,7 @@ from inputs.axes import (
     zipped,
 )
 from inputs.errors import InputError, Problem
-from inputs.messages import problem_of, quoted, suggested_key
+from inputs.messages import quoted, suggested_key, validated
 from inputs.pile_file import PileFile
 from inputs.reading import AnyCase, find_input, read_toml, resolve_any, shipped_cases
 from inputs.schema import ALTERNATIVES, Table, WalkerFile, Whole
@@ -192,11 +192,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
     InputError
         If anything in it cannot be used.
     """
-    try:
-        file = SweepFile.model_validate(document)
-    except ValidationError as error:
-        problems = [problem_of(details, document, SweepFile, "a sweep") for details in error.errors()]
-        raise InputError(source, problems) from error
+    file = validated(SweepFile, document, source, "a sweep")
     base = _base(file.case, source, folder)
     try:
         keys, rows, units, descent = _points(file)

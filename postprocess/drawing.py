@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from inputs.errors import InputError, Problem
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -34,6 +36,18 @@ def new_figure(width: float, height: float, *, mosaic: Any = None, **options: An
     matplotlib.style.use(_STYLE)
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, figure.subplots(**options) if mosaic is None else figure.subplot_mosaic(mosaic, **options)
+
+
+def check_picture(path: Path, suffix: str) -> None:
+    """Refuse a place for a picture or a film that would be written as something else.
+
+    Raises
+    ------
+    InputError
+        If it has another suffix or is a folder.
+    """
+    if path.suffix.lower() != suffix or path.is_dir():
+        raise InputError("--to", [Problem("", None, f"{path}: expected the name of a {suffix} file")])
 
 
 def save_figure(

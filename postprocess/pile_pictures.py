@@ -13,7 +13,7 @@ import numpy.typing as npt
 from inputs.errors import InputError, Problem, WalkersError
 from inputs.pile import PileCase
 from inputs.units import DURATION, parse_quantity
-from postprocess.drawing import new_figure, save_figure
+from postprocess.drawing import check_picture, new_figure, save_figure
 from postprocess.pile_result import PileAnalysis, analyse
 from postprocess.rendering import SideView
 from runner.directory import CASE_NAME
@@ -137,18 +137,6 @@ def _check_film(path: Path, frames: int) -> None:
         written = 0
     if written != frames:
         raise FilmFailed(f"ffmpeg wrote {written} of the {frames} pictures of {path.parent}: is the disk full?")
-
-
-def check_picture(path: Path, suffix: str) -> None:
-    """Refuse a place for a picture or a film that would be written as something else.
-
-    Raises
-    ------
-    InputError
-        If it has another suffix or is a folder.
-    """
-    if path.suffix.lower() != suffix or path.is_dir():
-        raise InputError("--to", [Problem("", None, f"{path}: expected the name of a {suffix} file")])
 
 
 def _film(found: PileAnalysis, frames: Sequence[int]) -> Generator[npt.NDArray[np.uint8]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from postprocess.drawing import check_picture
 from postprocess.dump import FloatArray
 from postprocess.pile import PileMotion
 from postprocess.trajectory import Trajectory, read_trajectory
@@ -59,9 +60,12 @@ def render_run(
     ------
     IndexError
         If there is no such walker.
+    InputError
+        If the destination is no PNG.
     """
-    trajectory = read_trajectory(directory)
     path = destination or directory / PICTURE_NAME
+    check_picture(path, ".png")
+    trajectory = read_trajectory(directory)
     path.parent.mkdir(parents=True, exist_ok=True)
     plotter = _scene(trajectory, walker, images, size)
     beside = path.with_name(f".{path.stem}.new.png")

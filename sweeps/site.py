@@ -21,11 +21,11 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from inputs.errors import InputError, Problem
 from inputs.library import suggestion
-from inputs.messages import problem_of, quoted
+from inputs.messages import quoted, validated
 from inputs.reading import read_toml
 from inputs.schema import Whole
 
@@ -119,11 +119,7 @@ def load_site(path: str | Path) -> Site:
         If it cannot be used: unknown keys are told with those that Parsl's class takes.
     """
     document = read_toml(Path(path))
-    try:
-        file = SiteFile.model_validate(document)
-    except ValidationError as error:
-        problems = [problem_of(details, document, SiteFile, "a site") for details in error.errors()]
-        raise InputError(str(path), problems) from error
+    file = validated(SiteFile, document, str(path), "a site")
     problems = _problems(file, document)
     if problems:
         raise InputError(str(path), problems)

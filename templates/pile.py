@@ -7,7 +7,7 @@ from functools import lru_cache
 from math import cos, pi, sin, sqrt
 
 from inputs.forces import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
-from inputs.pile import LOOSE, PileCase, lattice, turns_of_sides
+from inputs.pile import LOOSE, PileCase, lattice, lattice_pitch, turns_of_sides
 from templates.deck import Checkpoint, Deck, Plan, Recording, compose
 from templates.scene import Bead, Face, Point, Scene
 
@@ -139,7 +139,7 @@ def _places(case: PileCase, largest: float) -> list[tuple[Point, float]]:
     draw = default_rng(case.seed)
     radii = [float(radius) for radius in draw.permutation(case.beads.radii)]
     grid, _ = lattice(case.beads, case.container)
-    pitch = case.container.width / int(case.container.width / (2.0 * LOOSE * largest))
+    pitch = lattice_pitch(case.container, largest)
     places: list[tuple[Point, float]] = []
     for number, radius in enumerate(radii):
         layer, place = divmod(number, len(grid))

@@ -353,6 +353,8 @@ def _bad(path: str, value: Any) -> dict[str, Any]:
 BAD = {
     "range": ("parameters/drag/range", [3.0, 1.0], r"parameters\.drag\.range"),
     "log": ("parameters/drag/range", [0.0, 1.0], r"parameters\.drag\.range"),
+    "half a range": ("parameters/drag/range", [3.0], r"parameters\.drag\.range.*two numbers"),
+    "no range": ("parameters/drag/range", [1.0, 2.0, 3.0], r"parameters\.drag\.range.*two numbers"),
     "unknown table key": ("parameters/drag/rang", [0.0, 1.0], r"parameters\.drag\.rang.*range"),
     "twice": ("parameters/drag/keys", ["contact.friction.bead_wall"], r"set by friction already"),
     "experiment": ("observations/0/of", ["slo"], r'observations\[0\]\.of.*"slow"'),

@@ -15,9 +15,14 @@ DespiteAudit = Annotated[bool, typer.Option("--despite-audit", help="Run on an e
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, SI units.")]
 
 
-def check_out(out: Path) -> None:
-    """Refuse a file as the folder of the run directories."""
+def refuse(option: str, wrong: bool, told: str) -> None:
+    """Refuse an option if something is wrong with it, and tell what."""
     from inputs.errors import InputError, Problem
 
-    if out.exists() and not out.is_dir():
-        raise InputError("--out", [Problem("", None, f"expected a folder, {out} is a file")])
+    if wrong:
+        raise InputError(option, [Problem("", None, told)])
+
+
+def check_out(out: Path) -> None:
+    """Refuse a file as the folder of the run directories."""
+    refuse("--out", out.exists() and not out.is_dir(), f"expected a folder, {out} is a file")

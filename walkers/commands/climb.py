@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import Json
+from walkers.commands.arguments import Json, refuse
 
 Directory = Annotated[Path, typer.Argument(metavar="DIR", help="A sweep of piles, a folder of runs, or one run.")]
 Within = Annotated[float | None, typer.Option("--within", min=0.0, help="Seconds of drive; all of the shortest run.")]
@@ -21,13 +21,11 @@ def command(
     directory: Directory, within: Within = None, thresholds: Sensitivity = False, as_json: Json = False
 ) -> None:
     """Print how often piles climbed, how soon, how fast, and led by whom."""
-    from inputs.errors import InputError, Problem
     from sweeps.climbing import describe_climbs, describe_sensitivity, piles_in, sensitivity, summarise_climbs
 
     groups = piles_in(directory)
     if thresholds:
-        if within is not None:
-            raise InputError("--within", [Problem("", None, "has no meaning with --sensitivity")])
+        refuse("--within", within is not None, "has no meaning with --sensitivity")
         tried = {label: sensitivity(runs) for label, runs in groups.items()}
         text = [line for label, rows in tried.items() for line in (label, describe_sensitivity(rows)) if line]
         print(json.dumps(tried, indent=2, ensure_ascii=False) if as_json else "\n".join(text))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import Out, Run
+from walkers.commands.arguments import Out, Run, refuse
 from walkers.pipeline import DEFAULT_OUT
 
 Picture = Annotated[
@@ -36,19 +36,19 @@ def command(
     slower: Slower = None,
 ) -> None:
     """Render a walker or a pile at several times, or film a pile (off-screen, no X server)."""
-    from postprocess.pile_pictures import check_picture, render_film, render_series, seconds_apart
+    from postprocess.pile_pictures import render_film, render_series, seconds_apart
     from postprocess.rendering import render_run
     from runner.parts import is_pile
     from walkers.pipeline import find_run
 
     found = find_run(run, out)
     pile = is_pile(found.directory)
-    _refuse("--walker", bool(walker) and pile, "a pile has none")
+    refuse("--walker", bool(walker) and pile, "a pile has none")
     for option, given in (("--film", film), ("--apart", apart is not None), ("--slower", slower is not None)):
-        _refuse(option, given and not pile, "is for piles")
+        refuse(option, given and not pile, "is for piles")
     for option, given in (("--apart", apart is not None), ("--images", images is not None)):
-        _refuse(option, given and film, "has no meaning for a film")
-    _refuse("--slower", slower is not None and not film, "is for films (--film)")
+        refuse(option, given and film, "has no meaning for a film")
+    refuse("--slower", slower is not None and not film, "is for films (--film)")
     if film:
         print(render_film(found.directory, to, slower=slower or 1.0))
     elif pile:
@@ -57,14 +57,5 @@ def command(
             print(path)
     else:
         count = len(found.layout.walkers)
-        _refuse("--walker", walker >= count, f"expected less than {count}, the run's number of walkers")
-        if to is not None:
-            check_picture(to, ".png")
+        refuse("--walker", walker >= count, f"expected less than {count}, the run's number of walkers")
         print(render_run(found.directory, to, walker=walker, images=images or 6))
-
-
-def _refuse(option: str, wrong: bool, told: str) -> None:
-    from inputs.errors import InputError, Problem
-
-    if wrong:
-        raise InputError(option, [Problem("", None, told)])

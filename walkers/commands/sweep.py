@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import DespiteAudit, EngineName, Out, check_out
+from walkers.commands.arguments import DespiteAudit, EngineName, Out, check_out, refuse
 from walkers.pipeline import DEFAULT_OUT
 
 SweepFile = Annotated[str, typer.Argument(metavar="SWEEP", help="A sweep file, or a shipped sweep such as fig2.")]
@@ -31,7 +31,6 @@ def command(
     despite_audit: DespiteAudit = False,
 ) -> int:
     """Run the points of a sweep that are missing, on all cores or on a cluster; exit status 1 if any failed."""
-    from inputs.errors import InputError, Problem
     from inputs.sweep import load_sweep
     from sweeps.conduct import Options
     from sweeps.run import plan_sweep, run_sweep
@@ -41,8 +40,7 @@ def command(
 
     loaded = load_sweep(sweep)
     check_out(out)
-    if jobs is not None and site is not None:
-        raise InputError("--jobs", [Problem("", None, "a site says by itself how many decks run at once")])
+    refuse("--jobs", jobs is not None and site is not None, "a site says by itself how many decks run at once")
     options = Options(jobs or cores_here(), load_site(site) if site else None, retries, limit)
     if dry_run:
         print(plan_sweep(loaded, out, options, engine).as_text())

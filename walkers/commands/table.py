@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from walkers.commands.arguments import refuse
+
 Directory = Annotated[Path, typer.Argument(metavar="DIR", help="A sweep's directory, such as runs/fig2.")]
 Csv = Annotated[bool, typer.Option("--csv", help="Comma-separated, units in the head.")]
 Parquet = Annotated[bool, typer.Option("--parquet", help="Parquet, units in the field metadata.")]
@@ -25,21 +27,17 @@ def command(
     thresholds: Thresholds = False,
 ) -> None:
     """Print the table of a sweep, a row a point: what varied, what follows, what came out, where the run is."""
-    from inputs.errors import InputError, Problem
     from sweeps.table import encoded, load, short_text, write_table_file
     from sweeps.table import thresholds as thresholds_of
 
     frame = thresholds_of(directory) if thresholds else load(directory)
     forms = [name for name, wanted in (("csv", csv), ("parquet", parquet), ("json", json)) if wanted]
-    if len(forms) + (to is not None) > 1:
-        raise InputError("--csv, --parquet, --json, --to", [Problem("", None, "expected one of them")])
+    refuse("--csv, --parquet, --json, --to", len(forms) + (to is not None) > 1, "expected one of them")
+    hidden = to is None and forms == ["parquet"] and sys.stdout.isatty()
+    refuse("--parquet", hidden, "is not for a terminal: use --to FILE.parquet, or redirect it")
     if to is not None:
         write_table_file(frame, to)
         print(to)
-    elif forms == ["parquet"] and sys.stdout.isatty():
-        raise InputError(
-            "--parquet", [Problem("", None, "is not for a terminal: use --to FILE.parquet, or redirect it")]
-        )
     elif forms:
         sys.stdout.buffer.write(encoded(frame, forms[0]))
     else:

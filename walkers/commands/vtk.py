@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import Out, Run
+from walkers.commands.arguments import Out, Run, refuse
 from walkers.pipeline import DEFAULT_OUT
 
 Folder = Annotated[
@@ -29,19 +29,17 @@ def command(
     every: Every = 1,
 ) -> None:
     """Write beads, bridges and substrate as .vtp with a .pvd in seconds."""
-    from inputs.errors import InputError, Problem
     from postprocess.paraview import write_vtk
     from postprocess.pile_paraview import write_pile_vtk
     from runner.parts import is_pile
     from walkers.pipeline import find_run
 
     directory = find_run(run, out).directory
-    if is_pile(directory) and (every_sample or as_placed):
-        option = "--every-sample" if every_sample else "--as-placed"
-        raise InputError(option, [Problem("", None, "is for walkers; of a pile --every says which frames")])
-    if is_pile(directory):
+    pile = is_pile(directory)
+    for option, given in (("--every-sample", every_sample), ("--as-placed", as_placed)):
+        refuse(option, given and pile, "is for walkers; of a pile --every says which frames")
+    refuse("--every", every != 1 and not pile, "is for piles; of walkers --every-sample takes all samples")
+    if pile:
         print(write_pile_vtk(directory, every=every, vtu=vtu, destination=to))
         return
-    if every != 1:
-        raise InputError("--every", [Problem("", None, "is for piles; of walkers --every-sample takes all samples")])
     print(write_vtk(directory, every_sample=every_sample, vtu=vtu, as_placed=as_placed, destination=to))
