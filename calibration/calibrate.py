@@ -26,6 +26,8 @@ from sweeps.conduct import Failure, Options
 FloatArray = npt.NDArray[np.float64]
 _STEPS_BETWEEN_WAVES = 800
 """Of the chain that places the next wave; the last chain has the file's number."""
+_PARENTS, _NEAR = 4, 0.06
+"""How many of the best sets a wave looks around, and how far, of the ranges."""
 FINAL = frozenset({"BeadsLost", "BlowUp", "WalkersMet"})
 """Failures of a set's own making: calling again would bring the same."""
 
@@ -147,14 +149,14 @@ def calibrate(
     arguments = {"engine": engine, "despite_audit": despite_audit}
     runner = _Engine(calibration, out, replace(options, final=FINAL), arguments, progress_of, {})
     unit, outcome = np.zeros((0, space.dimensions)), np.zeros((0, len(calibration.observations)))
-    first = 0
+    filling = 0
     for number, points in enumerate(calibration.waves, 1):
-        make = partial(_design, calibration, unit, outcome, points, first)
+        make = partial(_design, calibration, unit, outcome, points, filling)
         design = _kept(folder / f"wave-{number}.json", calibration, make)
         wave = runner.run(f"wave-{number}", design)
         unit, outcome = np.concatenate([unit, design]), np.concatenate([outcome, wave.outcome])
-        first = first or len(design)
-    emulators = fit_emulators(unit, outcome, calibration.observations, seed, first)
+        filling = filling or len(design)
+    emulators = fit_emulators(unit, outcome, calibration.observations, seed, filling)
     posterior = sample_posterior(emulators, space, calibration.steps, seed)
     held_out = {
         name: sample_posterior(emulators, space, calibration.steps, seed, groups)
@@ -165,7 +167,8 @@ def calibrate(
     draw = partial(_drawn, posterior, calibration.predictive)
     drawn = _kept(folder / "predictive.json", calibration, draw, follows=seen.hexdigest())
     predictive = runner.run("predictive", drawn)
-    best = best_set(calibration, np.concatenate([unit, drawn]), np.concatenate([outcome, predictive.outcome]))
+    first_of_all = ranking(calibration, np.concatenate([outcome, predictive.outcome]))[:1]
+    best = np.concatenate([unit, drawn])[first_of_all]
     checks = {
         name: runner.run(name, best, extra)
         for name, extra in _finer_and_longer(calibration, space.values(best)).items()
@@ -217,19 +220,24 @@ def first_wave(calibration: Calibration, space: Space) -> FloatArray:
     return np.concatenate([np.clip(guesses, 0.0, 1.0), filling])
 
 
-def _design(calibration: Calibration, unit: FloatArray, outcome: FloatArray, points: int, first: int) -> FloatArray:
+def _design(calibration: Calibration, unit: FloatArray, outcome: FloatArray, points: int, filling: int) -> FloatArray:
     """The first wave fills the range; later ones what the posterior leaves of it, far from what was run before."""
     space, seed = Space(calibration.parameters), calibration.seed
     if not len(unit):
         return first_wave(calibration, space)
-    emulators = fit_emulators(unit, outcome, calibration.observations, seed, first)
+    emulators = fit_emulators(unit, outcome, calibration.observations, seed, filling)
     posterior = sample_posterior(emulators, space, min(_STEPS_BETWEEN_WAVES, calibration.steps), seed)
     samples, places = np.unique(posterior.unit, axis=0, return_index=True)
     likely = samples[np.argsort(posterior.log_density[places])[::-1]][: len(samples) // 2]
-    # Half of them where the posterior is high, far from each other; the others wherever it is, to find what is missing.
-    among = spread_out(likely[: 20 * points], points - points // 2, unit)
-    beyond = np.random.default_rng([seed, len(unit)]).choice(samples, points // 2, replace=len(samples) < points)
-    return np.concatenate([among, beyond])
+    draw = np.random.default_rng([seed, len(unit)])
+    # A third where the posterior is high, far from each other; a third near the best sets that were run, for there the
+    # engine is known to be good; the others wherever the posterior is, to find what is missing.
+    each = points // 3
+    among = spread_out(likely[: 20 * points], points - 2 * each, unit)
+    parents = unit[ranking(calibration, outcome)[np.arange(each) % _PARENTS]]
+    near = np.clip(parents + draw.normal(0.0, _NEAR, (each, space.dimensions)), 0.0, 1.0)
+    beyond = draw.choice(samples, each, replace=len(samples) < each)
+    return np.concatenate([among, near, beyond])
 
 
 def _drawn(posterior: Posterior, points: int) -> FloatArray:
@@ -238,8 +246,8 @@ def _drawn(posterior: Posterior, points: int) -> FloatArray:
     return np.concatenate([posterior.best[None], posterior.unit[every]])
 
 
-def best_set(calibration: Calibration, unit: FloatArray, outcome: FloatArray) -> FloatArray:
-    """Of all sets that were run the one that gives most observations within their deviations, shape (1, D).
+def ranking(calibration: Calibration, outcome: FloatArray) -> npt.NDArray[np.int64]:
+    """Places of sets that were run: those first that give most observations within their deviations, shape (P,).
 
     Of several that with the least misfit Σ ln(1 + r²), r in standard deviations; the logarithm keeps an observation
     that none of them gives from deciding. It is the engine's own word: emulators err most where they hope most.
@@ -248,16 +256,14 @@ def best_set(calibration: Calibration, unit: FloatArray, outcome: FloatArray) ->
     ----------
     calibration
         Whose observations.
-    unit : ndarray, shape (P, D)
-        The sets.
     outcome : ndarray, shape (P, K)
-        What the engine made of them.
+        What the engine made of each set.
     """
     value = np.array([one.value for one in calibration.observations])
     deviation = np.array([one.deviation for one in calibration.observations])
     residual = (outcome - value) / deviation
     given, misfit = (np.abs(residual) <= 1.0).sum(axis=1), np.log1p(residual**2).sum(axis=1)
-    return unit[[int(np.lexsort((misfit, -given))[0])]]
+    return np.lexsort((misfit, -given))
 
 
 def _finer_and_longer(calibration: Calibration, values: FloatArray) -> dict[str, dict[str, dict[str, Any]]]:

@@ -85,7 +85,7 @@ class Emulator:
 
 
 def fit_emulators(
-    unit: FloatArray, outcome: FloatArray, observations: Sequence[Observation], seed: int, first: int = 0
+    unit: FloatArray, outcome: FloatArray, observations: Sequence[Observation], seed: int, filling: int = 0
 ) -> list[Emulator]:
     """One emulator an observation.
 
@@ -99,11 +99,11 @@ def fit_emulators(
         K of them.
     seed
         Of the restarts of the fit.
-    first
+    filling
         Number of the sets that fill the range. Errors are judged by the sets after them, if there are enough: these are
         where the posterior is, and there walkers are more than elsewhere on the verge of something.
     """
-    judged = slice(first if len(unit) - first >= _FEW else 0, None)
+    judged = slice(filling if len(unit) - filling >= _FEW else 0, None)
     return [_fitted(unit, outcome[:, k], observation, seed, judged) for k, observation in enumerate(observations)]
 
 

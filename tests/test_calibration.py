@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from calibration.calibrate import FINAL, best_set, calibrate, first_wave, sobol_indices
+from calibration.calibrate import FINAL, calibrate, first_wave, ranking, sobol_indices
 from calibration.emulator import fit_emulators
 from calibration.posterior import log_likelihood, sample_posterior
 from calibration.report import emulator_checks, intervals, rows_of
@@ -118,7 +118,7 @@ def test_the_best_set_gives_most_observations_and_then_the_least_misfit(tmp_path
     deviation = np.array([one.deviation for one in found.observations])
     residuals = np.array([[0.0, 0.0, 5.0, 5.0], [0.9, 0.9, 0.9, 3.0], [0.9, 0.2, 0.2, 2.0], [0.2, 0.2, 0.2, HOPELESS]])
     outcome = np.array([one.value for one in found.observations]) + residuals * deviation
-    assert best_set(found, np.eye(4), outcome).tolist() == [[0.0, 0.0, 1.0, 0.0]]
+    assert ranking(found, outcome).tolist() == [2, 1, 3, 0]
 
 
 @pytest.mark.parametrize("mean", [0.0, 1.0, 3.0, -4.1])
