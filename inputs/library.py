@@ -16,6 +16,7 @@ _KINDS = {
     "youngs_modulus": units.MODULUS,
     "surface_tension": units.SURFACE_TENSION,
     "kinematic_viscosity": units.KINEMATIC_VISCOSITY,
+    "contact_angle": units.ANGLE,
 }
 
 
@@ -64,11 +65,12 @@ def liquid(name: str) -> dict[str, float]:
 def surface_pair(first: str | None, second: str | None) -> dict[str, float] | None:
     """How two wet surfaces touch, or None where the library has no value for them.
 
-    ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio`` and ``viscosity_ratio``.
+    ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio``, ``viscosity_ratio``,
+    ``film_drag_ratio``, ``contact_angle`` (rad) and ``volume_fraction``.
     """
     for entry in _contents()["surface_pairs"]:
         if sorted(entry["materials"]) == sorted([first or "", second or ""]):
-            return {key: float(known["value"]) for key, known in entry.items() if key != "materials"}
+            return {key: _number(key, known) for key, known in entry.items() if key != "materials"}
     return None
 
 

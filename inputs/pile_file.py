@@ -115,7 +115,8 @@ def resolve_pile(file: PileFile, name: str) -> PileCase:
     wall = file.container.material
     if file.liquid.film_drag_ratio:
         raise UnusableKeyError("liquid.film_drag_ratio", "expected 0: most beads of a pile touch no wall's film")
-    liquid = resolve_liquid(file.liquid, library.surface_pair(beads.material, wall))
+    pair = library.surface_pair(beads.material, wall) or {}
+    liquid = resolve_liquid(file.liquid, {**pair, "film_drag_ratio": 0.0})
     contact = resolve_contact(file.contact, beads.material, "container.material", wall)
     drive = Drive("z", file.drive.frequency, file.drive.peak_acceleration, file.drive.frame)
     container = Container(file.container.shape, file.container.width, file.container.height, wall)

@@ -13,7 +13,8 @@ from inputs.schema import BeadsTable, ContactTable, LiquidTable, WalkerFile
 from inputs.timestep import TimeStepLimits, fit_into_cycle, time_step_limits
 
 MOST_STEPS = 2**31 - 1
-_MINIMUM_SEPARATION_RATIO, _VISCOSITY_RATIO = 0.01, 1.0
+_MINIMUM_SEPARATION_RATIO = 0.01
+_LIQUID = {"volume_fraction": 0.01, "viscosity_ratio": 1.0, "film_drag_ratio": 0.0, "contact_angle": 0.0}
 """Where neither the case nor the library says more."""
 _WAYS: dict[str, Literal["both", "right", "left"]] = {
     **{"both": "both", "right": "right", "left": "left"},
@@ -151,10 +152,12 @@ def resolve_liquid(table: LiquidTable, pair: dict[str, float] | None = None) -> 
     if tension is None or viscosity is None:
         lacking = "surface_tension" if tension is None else "dynamic_viscosity"
         raise UnusableKeyError(f"liquid.{lacking}", "missing; expected a liquid of the library by name, or this number")
-    ratio = _first(table.viscosity_ratio, pair, "viscosity_ratio")
-    film = float(f"{viscosity * table.film_drag_ratio:.15g}")
-    viscosity = float(f"{viscosity * (_VISCOSITY_RATIO if ratio is None else ratio):.15g}")
-    return Liquid(tension, viscosity, density, table.volume_fraction, table.contact_angle, table.name, film)
+    chosen = {
+        key: value if (value := _first(getattr(table, key), pair, key)) is not None else usual
+        for key, usual in _LIQUID.items()
+    }
+    film, bridges = (float(f"{viscosity * chosen[f'{of}_ratio']:.15g}") for of in ("film_drag", "viscosity"))
+    return Liquid(tension, bridges, density, chosen["volume_fraction"], chosen["contact_angle"], table.name, film)
 
 
 def resolve_contact(table: ContactTable, bead: str | None, wall_key: str, wall: str) -> Contact:

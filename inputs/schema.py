@@ -87,9 +87,9 @@ class BeadsTable(Table):
 class LiquidTable(Table):
     """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
 
-    ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag. Left out, the
-    library's value for the surfaces holds, else 1. ``film_drag_ratio`` is a drag on the beads' translation over that
-    of Stokes in the liquid, 6π η R v.
+    ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag;
+    ``film_drag_ratio`` a drag on the beads' translation over that of Stokes in the liquid, 6π η R v. The last four,
+    left out, are the library's for the surfaces, else as in `inputs.resolving`.
     """
 
     name: str | None = None
@@ -97,10 +97,10 @@ class LiquidTable(Table):
     density: Density | None = None
     kinematic_viscosity: KinematicViscosity | None = None
     dynamic_viscosity: DynamicViscosity | None = None
-    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] = 0.01
+    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] | None = None
     viscosity_ratio: Annotated[Number, Field(ge=1e-3, le=1e4)] | None = None
-    film_drag_ratio: Annotated[Number, Field(ge=0, le=1e4)] = 0.0
-    contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] = 0.0
+    film_drag_ratio: Annotated[Number, Field(ge=0, le=1e4)] | None = None
+    contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] | None = None
 
 
 class SubstrateTable(Table):

@@ -25,7 +25,13 @@ from walkers import run_case
 # axis in equilibrium.
 REFERENCE: dict[str, Any] = {
     "beads": {"radii": ["0.3 mm", "0.2 mm"], "material": "ruby"},
-    "liquid": {"name": "Si AK5", "volume_fraction": 0.01, "viscosity_ratio": 1.0},
+    "liquid": {
+        "name": "Si AK5",
+        "volume_fraction": 0.01,
+        "viscosity_ratio": 1.0,
+        "film_drag_ratio": 0.0,
+        "contact_angle": "0 deg",
+    },
     "substrate": {"material": "chromium-coated glass"},
     "contact": {
         "friction": {"bead_bead": 0.1, "bead_wall": 0.1},

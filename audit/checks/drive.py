@@ -25,7 +25,13 @@ def reference_walker(**changes: dict[str, Any]) -> WalkerCase:
     """The walker of Fig. 2 at 4 g, friction 0.1, alone and on the axis: its speed is known from other engines."""
     tables: dict[str, dict[str, Any]] = {
         "beads": {"radii": ["0.3 mm", "0.2 mm"], "material": "ruby"},
-        "liquid": {"name": "Si AK5", "viscosity_ratio": 1.0},
+        "liquid": {
+            "name": "Si AK5",
+            "volume_fraction": 0.01,
+            "viscosity_ratio": 1.0,
+            "film_drag_ratio": 0.0,
+            "contact_angle": "0 deg",
+        },
         "substrate": {"material": "chromium-coated glass"},
         "contact": {
             "friction": {"bead_bead": 0.1, "bead_wall": 0.1},
