@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
-from math import nan
+from math import isfinite, nan
 from pathlib import Path
 from statistics import fmean
 
@@ -74,6 +74,14 @@ ADDED = (
 """Ingredients to be tried, one at a time and all together."""
 
 
+KAPPA = ADDED[3]
+NOTHING_ELSE = {
+    **dict.fromkeys(("friction_wall", "friction_slide", "friction_bead"), 1e-6),
+    "log10_viscosity_ratio": -9.0,
+}
+"""What leaves the paper's law alone, F∥ = κ v F, but integrated in time, with inertia."""
+
+
 @dataclass(frozen=True)
 class Target:
     """A published number: a mean over walkers of `walkers_of_the_paper`, or its ratio to the mean over others.
@@ -109,7 +117,7 @@ class Fit:
     parameters
         The best ones.
     values
-        Target's name to what comes out (m/s, or a ratio).
+        Target's name to what comes out (m/s, or a ratio); None where the forces have no solution.
     met
         How many of them lie within their deviations.
     missed
@@ -120,7 +128,7 @@ class Fit:
 
     name: str
     parameters: dict[str, float]
-    values: dict[str, float]
+    values: dict[str, float | None]
     met: int
     missed: list[str]
     misfit: float
@@ -248,7 +256,14 @@ def _residuals(values: Mapping[str, float], wanted: Sequence[Target]) -> FloatAr
     return np.where(np.isfinite(residuals), residuals, _HOPELESS)
 
 
-def fit(ingredients: Sequence[Ingredient], wanted: Sequence[Target], *, seed: int = 1, generations: int = 80) -> Fit:
+def fit(
+    ingredients: Sequence[Ingredient],
+    wanted: Sequence[Target],
+    *,
+    fixed: Mapping[str, float] | None = None,
+    seed: int = 1,
+    generations: int = 80,
+) -> Fit:
     """The parameters with the least misfit (`scipy.optimize.differential_evolution`).
 
     Parameters
@@ -257,28 +272,32 @@ def fit(ingredients: Sequence[Ingredient], wanted: Sequence[Target], *, seed: in
         Beside `ALWAYS`.
     wanted
         What is to come out.
+    fixed
+        Parameters that are not searched for.
     seed, generations
         Of the search.
     """
     from scipy.optimize import differential_evolution
 
-    ranges = {**ALWAYS.ranges, **{key: ends for one in ingredients for key, ends in one.ranges.items()}}
+    fixed = fixed or {}
+    every = {**ALWAYS.ranges, **{key: ends for one in ingredients for key, ends in one.ranges.items()}}
+    ranges = {key: ends for key, ends in every.items() if key not in fixed}
 
     def misfit(point: FloatArray) -> float:
-        values = values_of(dict(zip(ranges, map(float, point), strict=True)), wanted)
+        values = values_of({**fixed, **dict(zip(ranges, map(float, point), strict=True))}, wanted)
         return float(np.log1p(_residuals(values, wanted) ** 2).sum())
 
     found = differential_evolution(
         misfit, list(ranges.values()), maxiter=generations, popsize=12, rng=np.random.default_rng(seed), polish=False
     )
     parameters = dict(zip(ranges, map(float, found.x), strict=True))
-    values = values_of(parameters, wanted)
+    values = values_of({**fixed, **parameters}, wanted)
     residuals = np.abs(_residuals(values, wanted))
     worst = [place for place in np.argsort(residuals)[::-1] if residuals[place] > 1.0]
     return Fit(
         name=" + ".join(one.name for one in ingredients) or ALWAYS.name,
         parameters=parameters,
-        values=values,
+        values={name: value if isfinite(value) else None for name, value in values.items()},
         met=len(wanted) - len(worst),
         missed=[wanted[place].name for place in worst],
         misfit=float(found.fun),
@@ -286,10 +305,15 @@ def fit(ingredients: Sequence[Ingredient], wanted: Sequence[Target], *, seed: in
 
 
 def try_ingredients(*, seed: int = 1, generations: int = 80) -> list[Fit]:
-    """The fit without any, with each ingredient, and with all of them."""
+    """The fit without any, with each ingredient, with all of them, and of the paper's law alone."""
     chosen: list[Sequence[Ingredient]] = [(), *((one,) for one in ADDED), ADDED]
     fits = [fit(ingredients, targets(), seed=seed, generations=generations) for ingredients in chosen]
-    return [*fits[:-1], replace(fits[-1], name="all of these")]
+    alone = fit((KAPPA,), targets(), fixed=NOTHING_ELSE, seed=seed, generations=generations)
+    return [
+        *fits[:-1],
+        replace(fits[-1], name="all of these"),
+        replace(alone, name="the paper's law alone, integrated"),
+    ]
 
 
 def write_ingredients(fits: Sequence[Fit], to: Path) -> list[Path]:
@@ -324,7 +348,7 @@ def as_markdown(fits: Sequence[Fit]) -> str:
     lines.append("|---" * (len(fits) + 2) + "|")
     for target in wanted:
         scale, unit = (1.0, "") if target.over else (1e3, " mm/s")
-        cells = [f"{one.values[target.name] * scale:.2f}" for one in fits]
+        cells = ["" if (value := one.values[target.name]) is None else f"{value * scale:.2f}" for one in fits]
         lines.append(f"| {target.name} | {target.value * scale:.2f}{unit} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 

@@ -27,10 +27,11 @@ PARAMETERS = {
     "liquid volume fraction": "liquid.volume_fraction",
     "Young's modulus (MPa)": "contact.youngs_modulus",
     "viscosity ratio": "liquid.viscosity_ratio",
+    "film drag ratio": "liquid.film_drag_ratio",
+    "contact angle (°)": "liquid.contact_angle",
 }
 """What is varied, and the column that says so (the friction of bead on bead goes with that of bead on wall)."""
 _TOGETHER = "uncalibrated"
-"""A walker that ends at a larger angle, rad, from where it was to face has left the axis."""
 
 
 @dataclass(frozen=True)
