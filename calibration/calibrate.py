@@ -18,7 +18,7 @@ from calibration.posterior import Posterior, sample_posterior
 from calibration.space import Space, spread_out
 from calibration.waves import Wave, run_wave, wave_sweep
 from inputs.calibration import Calibration
-from inputs.errors import InputError, Problem
+from inputs.errors import InputError, Problem, WalkersError
 from paper.sources import ProgressOf
 from runner.files import read_json, write_json
 from sweeps.conduct import Failure, Options
@@ -28,8 +28,12 @@ _STEPS_BETWEEN_WAVES = 800
 """Of the chain that places the next wave; the last chain has the file's number."""
 _PARENTS, _NEAR = 4, 0.06
 """How many of the best sets a wave looks around, and how far, of the ranges."""
-FINAL = frozenset({"BeadsLost", "BlowUp", "WalkersMet"})
+FINAL = frozenset({"BeadsLost", "BlowUp"})
 """Failures of a set's own making: calling again would bring the same."""
+
+
+class CalibrationStopped(WalkersError):
+    """Points of a wave are missing, for no fault of their parameters: what follows would be built on sand."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,7 @@ class Outcome:
 
     @property
     def best(self) -> dict[str, float]:
-        """The set with which the engine gives most observations: parameter to value, SI units."""
+        """The set with which the engine gives most observations: parameter to value, in the parameter's unit."""
         values = self.space.values(self.checks["best"].unit[0])
         return dict(zip([one.name for one in self.space.parameters], map(float, values), strict=True))
 
@@ -106,6 +110,10 @@ class _Engine:
             )
         if failed:
             self.failures[sweep] = failed
+        undone = [failure for failure in failed if failure.reason not in FINAL]
+        if undone or not wave.table["status"].isin(("finished", "failed")).all():
+            told = undone[0].message if undone else "others are at it"
+            raise CalibrationStopped(f"{sweep}: points are missing ({told}); call again to go on")
         return wave
 
 
@@ -140,6 +148,8 @@ def calibrate(
     ------
     InputError
         If a key of the file cannot be used, or designs that are there belong to other parameters.
+    CalibrationStopped
+        If points of a wave are missing, for no fault of their parameters.
     runner.EngineFailure
         If there is no engine, or its audit failed.
     """
@@ -162,8 +172,7 @@ def calibrate(
         name: sample_posterior(emulators, space, calibration.steps, seed, groups)
         for name, groups in calibration.held_out.items()
     }
-    seen = sha256(np.concatenate([unit, outcome], axis=1).tobytes())
-    seen.update(repr((calibration.observations, calibration.steps, seed)).encode())
+    seen = sha256(posterior.unit.tobytes() + posterior.log_density.tobytes())
     draw = partial(_drawn, posterior, calibration.predictive)
     drawn = _kept(folder / "predictive.json", calibration, draw, follows=seen.hexdigest())
     predictive = runner.run("predictive", drawn)
@@ -194,7 +203,7 @@ def _kept(path: Path, calibration: Calibration, make: Callable[[], FloatArray], 
     A calibration that goes on must not depend on whether the libraries would draw the same points again. What
     ``follows`` from something else is made anew where that has changed.
     """
-    ours = {one.name: [one.low, one.high, one.log] for one in calibration.parameters}
+    ours = {one.name: [one.low, one.high, one.log, one.unit] for one in calibration.parameters}
     if path.exists():
         try:
             kept = read_json(path)
@@ -221,7 +230,7 @@ def first_wave(calibration: Calibration, space: Space) -> FloatArray:
 
 
 def _design(calibration: Calibration, unit: FloatArray, outcome: FloatArray, points: int, filling: int) -> FloatArray:
-    """The first wave fills the range; later ones what the posterior leaves of it, far from what was run before."""
+    """The first wave fills the range; later ones go where the posterior is, and around the best sets that were run."""
     space, seed = Space(calibration.parameters), calibration.seed
     if not len(unit):
         return first_wave(calibration, space)
@@ -249,8 +258,9 @@ def _drawn(posterior: Posterior, points: int) -> FloatArray:
 def ranking(calibration: Calibration, outcome: FloatArray) -> npt.NDArray[np.int64]:
     """Places of sets that were run: those first that give most observations within their deviations, shape (P,).
 
-    Of several that with the least misfit Σ ln(1 + r²), r in standard deviations; the logarithm keeps an observation
-    that none of them gives from deciding. It is the engine's own word: emulators err most where they hope most.
+    Those that are derived from others do not count. Of several sets that with the least misfit Σ ln(1 + r²), r in
+    standard deviations; the logarithm keeps an observation that none of them gives from deciding. It is the engine's
+    own word: emulators err most where they hope most.
 
     Parameters
     ----------
@@ -261,7 +271,8 @@ def ranking(calibration: Calibration, outcome: FloatArray) -> npt.NDArray[np.int
     """
     value = np.array([one.value for one in calibration.observations])
     deviation = np.array([one.deviation for one in calibration.observations])
-    residual = (outcome - value) / deviation
+    own = np.array([not one.derived for one in calibration.observations])
+    residual = ((outcome - value) / deviation)[:, own]
     given, misfit = (np.abs(residual) <= 1.0).sum(axis=1), np.log1p(residual**2).sum(axis=1)
     return np.lexsort((misfit, -given))
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from calibration.calibrate import Outcome
-from calibration.report import Row, unit_of
+from calibration.report import Row, labelled, unit_of
 from calibration.waves import seen_in
 from inputs.calibration import Band
 from postprocess.drawing import new_figure, save_figure
@@ -48,7 +48,7 @@ def _corner(found: Outcome) -> Figure:
     corner.corner(
         drawn(posterior.unit),
         fig=figure,
-        labels=[("log " if one.log else "") + one.symbol for one in parameters],
+        labels=[("log " if one.log else "") + labelled(one) for one in parameters],
         range=drawn(np.array([np.zeros(len(parameters)), np.ones(len(parameters))])).T.tolist(),
         truths=drawn(found.checks["best"].unit[0]),
         truth_color="C1",

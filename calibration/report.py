@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,8 @@ import numpy.typing as npt
 from calibration.calibrate import Outcome
 from calibration.emulator import Emulator, transformed
 from calibration.posterior import Posterior
-from calibration.waves import HOPELESS
-from inputs.calibration import QUANTITIES, Observation
+from calibration.waves import HOPELESS, Wave
+from inputs.calibration import QUANTITIES, Observation, Parameter
 from inputs.units import SPEED
 from runner.files import write_bytes, write_json, write_text
 
@@ -29,15 +30,15 @@ class Row:
     name, group, title, unit, value, deviation
         As published.
     engine
-        At the best set.
-    low, high
-        Of the engine over samples of the posterior, of those that are walkers; None where none is.
+        At the best set; None where there is no walker.
+    low, high, samples
+        Of the engine over samples of the posterior, of those that are walkers, and how many these are.
     emulator, error
         At the best set.
     agrees
         Whether the engine lies within the deviation of the published value.
     half_step, twice_as_long
-        The engine at the best set with half the time step, and for twice as long.
+        The engine at the best set with half the time step, and for twice as long; None where there is no walker.
     held_out
         For each trial that did not see the observation's group: predicted mean and standard deviation.
     """
@@ -48,14 +49,15 @@ class Row:
     unit: str
     value: float
     deviation: float
-    engine: float
+    engine: float | None
     low: float | None
     high: float | None
+    samples: int
     emulator: float
     error: float
     agrees: bool
-    half_step: float
-    twice_as_long: float
+    half_step: float | None
+    twice_as_long: float | None
     held_out: dict[str, tuple[float, float]]
 
 
@@ -66,17 +68,22 @@ def unit_of(observation: Observation) -> tuple[str, float]:
     return ("mm/s", 1e3) if QUANTITIES[observation.quantity] is SPEED else ("°", 1.0)
 
 
+def labelled(parameter: Parameter) -> str:
+    """A parameter's symbol, with its unit if it has one."""
+    return f"{parameter.symbol} ({parameter.unit})" if parameter.unit else parameter.symbol
+
+
 def rows_of(found: Outcome) -> list[Row]:
     """A row an observation."""
     rows = []
-    engine = found.predictive.outcome
     for place, observation in enumerate(found.calibration.observations):
         unit, scale = unit_of(observation)
         emulated, error = found.emulators[place].value(found.checks["best"].unit)
-        # A placeholder says that there was no walker: it is none of the engine's values.
-        seen = engine[:, place]
-        seen = seen[~np.isclose(seen, observation.value + HOPELESS * observation.deviation)]
-        best = float(found.checks["best"].outcome[0, place])
+        seen = _seen(found.predictive, place, observation, scale)
+        best, finer, longer = (
+            next(iter(_seen(found.checks[name], place, observation, scale)), None)
+            for name in ("best", "half-step", "twice-as-long")
+        )
         rows.append(
             Row(
                 name=observation.name,
@@ -85,14 +92,15 @@ def rows_of(found: Outcome) -> list[Row]:
                 unit=unit,
                 value=observation.value * scale,
                 deviation=observation.deviation * scale,
-                engine=best * scale,
-                low=float(seen.min()) * scale if len(seen) else None,
-                high=float(seen.max()) * scale if len(seen) else None,
+                engine=best,
+                low=min(seen, default=None),
+                high=max(seen, default=None),
+                samples=len(seen),
                 emulator=float(emulated[0]) * scale,
                 error=float(error[0]) * scale,
-                agrees=bool(abs(best - observation.value) <= observation.deviation),
-                half_step=float(found.checks["half-step"].outcome[0, place]) * scale,
-                twice_as_long=float(found.checks["twice-as-long"].outcome[0, place]) * scale,
+                agrees=best is not None and abs(best - observation.value * scale) <= observation.deviation * scale,
+                half_step=finer,
+                twice_as_long=longer,
                 held_out={
                     name: _predicted(found.emulators[place], posterior, scale)
                     for name, posterior in found.held_out.items()
@@ -101,6 +109,13 @@ def rows_of(found: Outcome) -> list[Row]:
             )
         )
     return rows
+
+
+def _seen(wave: Wave, place: int, observation: Observation, scale: float) -> list[float]:
+    """An observation of a wave's sets, but for those where a placeholder says that there was no walker."""
+    values = wave.outcome[:, place]
+    none = np.isclose(values, observation.value + HOPELESS * observation.deviation)
+    return [float(value) * scale for value in values[~none]]
 
 
 def _predicted(emulator: Emulator, posterior: Posterior, scale: float) -> tuple[float, float]:
@@ -133,7 +148,7 @@ def intervals(found: Outcome) -> dict[str, tuple[float, float, float]]:
 def write_tables(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
     """Write ``posterior.parquet``, ``calibration.json`` and ``calibration.md``; rows from `rows_of`.
 
-    The samples' columns are the parameters (SI units), ``discrepancy_GROUP`` (in standard deviations) and
+    The samples' columns are the parameters (in their units), ``discrepancy_GROUP`` (in standard deviations) and
     ``log_density``.
     """
     import pandas as pd
@@ -162,7 +177,7 @@ def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
         },
         "chain": {
             "steps": posterior.steps,
-            "autocorrelation": posterior.autocorrelation,
+            "autocorrelation": posterior.autocorrelation if isfinite(posterior.autocorrelation) else None,
             "acceptance": posterior.acceptance,
         },
         "emulators": {
@@ -198,9 +213,10 @@ def as_markdown(found: Outcome, rows: list[Row]) -> str:
     for one in found.space.parameters:
         low, middle, high = known[one.name]
         lines.append(
-            f"| {one.symbol} | {found.best[one.name]:.3g} | {low:.3g} | {middle:.3g} | {high:.3g} | "
+            f"| {labelled(one)} | {found.best[one.name]:.3g} | {low:.3g} | {middle:.3g} | {high:.3g} | "
             f"{one.low:g} … {one.high:g} |"
         )
+    samples = len(found.predictive.unit)
     head = ["observation", "published", "engine, best set", "over the posterior", "emulator", "agrees", *trials]
     lines += ["", "| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
     for row in rows:
@@ -208,8 +224,8 @@ def as_markdown(found: Outcome, rows: list[Row]) -> str:
         cells = [
             row.title,
             f"{_pair(row.value, row.deviation)} {row.unit}".strip(),
-            f"{row.engine:.3g}",
-            "" if row.low is None else f"{row.low:.3g} … {row.high:.3g}",
+            "no walker" if row.engine is None else f"{row.engine:.3g}",
+            "no walker" if row.low is None else f"{row.low:.3g} … {row.high:.3g} ({row.samples} of {samples})",
             _pair(row.emulator, row.error),
             "yes" if row.agrees else "**no**",
             *held,

@@ -15,7 +15,8 @@ from inputs.calibration import Calibration, Observation
 from inputs.errors import InputError, Problem
 from inputs.sweep import Sweep, expand
 from paper.sensitivity import misalignment
-from postprocess.steady import steady_walkers
+from postprocess.steady import steady_walkers, together
+from postprocess.tables import read_table
 from sweeps.conduct import Failure, Options, Progress
 from sweeps.run import run_sweep
 from sweeps.table import load
@@ -129,7 +130,7 @@ def seen_in(calibration: Calibration, table: pd.DataFrame, quantity: str) -> Flo
     for place in np.flatnonzero(table["status"] == "finished"):
         run = table["run"].iloc[place]
         if quantity == "misalignment":
-            found[place] = misalignment(run).max()
+            found[place] = misalignment(run).max() if together(read_table(run, "walkers")).all() else np.nan
         elif len(kept := steady_walkers(run)):
             found[place] = kept[quantity].mean()
     return found.reshape(-1, len(calibration.experiments))

@@ -37,6 +37,12 @@ class Liquid:
     film_viscosity: float = 0.0
 
 
+def without_no_film(liquid: dict[str, Any]) -> None:
+    """Leave out a film that is none, in place: what ran before there were films keeps its name."""
+    if not liquid["film_viscosity"]:
+        del liquid["film_viscosity"]
+
+
 @dataclass(frozen=True)
 class Contact:
     """Contact model: Young's modulus (Pa) of the softened beads and walls; the rest is dimensionless."""
@@ -145,6 +151,7 @@ class WalkerCase:
             if key not in ("name", "title")
         }
         values["beads"]["radii"] = list(self.beads.radii)
+        without_no_film(values["liquid"])
         return values
 
     def as_dict(self) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, is_dataclass
 from math import cos, hypot, inf, pi, sin
 from typing import Any, Literal
 
-from inputs.case import Contact, Drive, Liquid
+from inputs.case import Contact, Drive, Liquid, without_no_film
 
 
 @dataclass(frozen=True)
@@ -187,6 +187,7 @@ class PileCase:
         }
         if not self.beads.placed:
             del told["beads"]["placed"]
+        without_no_film(told["liquid"])
         return told
 
     def as_dict(self) -> dict[str, Any]:

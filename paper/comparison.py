@@ -59,7 +59,7 @@ class Row:
     key, what, unit, published, measured
         See `paper.published.Published`.
     engine, low, high, theory, left_out
-        See `Value`; theory is Coulomb friction with the bridges' drag, nothing fitted.
+        See `Value`; theory is Coulomb friction with the drag of bridges and film, nothing fitted.
     ratio
         Engine (or theory, where the number is one of theory alone) to published; None where that is zero or in words,
         or there is nothing to compare.
@@ -128,7 +128,7 @@ def _why(number: Published, value: Value, ours: float) -> str:
     if np.isfinite(ours):
         return number.hangs_on
     if value.left_out:
-        return "None of the walkers is steady, stays on the axis and keeps its beads together."
+        return "Of a run that it needs no walker is steady, stays on the axis and keeps its beads together."
     return "A run that it needs is missing or failed."
 
 
@@ -143,12 +143,12 @@ def _finite(value: float) -> float | None:
 
 
 def _speed(rows: pd.DataFrame, column: str = "velocity", theory: float = float("nan")) -> Value:
-    """The mean over some points; its range over walkers of one point, or over several points."""
+    """The mean over some points; its range over walkers of one point, or over several points. NaN if one has none."""
     walkers = [steady_walkers(run)[column].to_numpy() * 1e3 for run in rows["run"]]
     left_out = int(rows["walkers"].sum()) - sum(map(len, walkers))
-    means = np.array([one.mean() for one in walkers if len(one)])
-    if not len(means):
+    if not all(map(len, walkers)):
         return replace(_NOTHING, theory=theory, left_out=left_out)
+    means = np.array([one.mean() for one in walkers])
     ends = walkers[0] if len(rows) == 1 else means
     return Value(float(means.mean()), float(ends.min()), float(ends.max()), theory, left_out)
 
@@ -206,7 +206,7 @@ def _exact(value: float, theory: float = float("nan")) -> Value:
 def _mean(values: list[Value]) -> Value:
     engine = [value.engine for value in values]
     theory, left_out = float(np.mean([value.theory for value in values])), sum(value.left_out for value in values)
-    return Value(float(np.nanmean(engine)), float(np.nanmin(engine)), float(np.nanmax(engine)), theory, left_out)
+    return Value(float(np.mean(engine)), min(engine), max(engine), theory, left_out)
 
 
 def _quotient(table: pd.DataFrame, case: WalkerCase, upper: tuple[float, float], lower: tuple[float, float]) -> Value:
@@ -287,11 +287,12 @@ _HEAD = """# Published numbers beside this project's
 and drive alone. To agree is to lie within what the paper says (the bounds shown) or, where it gives no spread, within
 {tolerance:.0%} of the published value: the paper's points and error bars are in its figures only. Parameters are the
 shipped ones, which were calibrated to these numbers (docs/calibration.md), the same in all rows but for the friction
-of Fig. 4's other substrate. Theory is Coulomb friction with the bridges' drag, with the engine's parameters. As in
-the paper, a velocity is the mean of six walkers, half of them facing each way, seen once a cycle (alignment: two
-walkers a start); those that are not steady, leave the axis or come apart are left out, and so many are told. Brackets
-hold the slowest and the fastest, or the range over the frequencies where a number is one for all of them. Fig. 1a is a
-pile's and is not among them.
+of Fig. 4's other substrate. Theory is Coulomb friction with the drag of bridges and film, with the engine's
+parameters. As in the paper, a velocity is the mean of six walkers, half of them facing each way, seen once a cycle
+(alignment: two walkers a start); those that are not steady, leave the axis or come apart are left out, and so many are
+told (the symmetric dimers need not be on the axis; thresholds and the figures are of all walkers). Brackets hold the
+slowest and the fastest, or the range over the frequencies where a number is one for all of them. Fig. 1a is a pile's
+and is not among them.
 
 | | published | engine | theory | ratio | agrees |
 |---|---|---|---|---|---|

@@ -74,6 +74,14 @@ ADDED = (
 """Ingredients to be tried, one at a time and all together."""
 
 
+_NEUTRAL = {
+    "log10_film_drag_ratio": -2.0,
+    "wall_bridge_factor": 1.0,
+    "bead_bridge_factor": 1.0,
+    "log10_kappa": -1.0,
+    "static_ratio": 1.0,
+    "log10_stribeck_velocity": -3.0,
+}
 KAPPA = ADDED[3]
 NOTHING_ELSE = {
     **dict.fromkeys(("friction_wall", "friction_slide", "friction_bead"), 1e-6),
@@ -223,8 +231,9 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
         cycles=_CYCLES,
     )
     # Contacts that would open are let be: the engine's walkers hop there and walk on.
-    velocity = np.where(motion.solved, translation(motion.sliding), np.nan)
-    columns = {"velocity": velocity, "rotation": velocity - motion.sliding[0], "sliding": motion.sliding[0]}
+    sliding = np.where(motion.solved, motion.sliding, np.nan)
+    velocity = translation(sliding)
+    columns = {"velocity": velocity, "rotation": velocity - sliding[0], "sliding": sliding[0]}
     return {name: dict(zip(cases, map(float, values), strict=True)) for name, values in columns.items()}
 
 
@@ -261,6 +270,7 @@ def fit(
     wanted: Sequence[Target],
     *,
     fixed: Mapping[str, float] | None = None,
+    begin: Mapping[str, float] | None = None,
     seed: int = 1,
     generations: int = 80,
 ) -> Fit:
@@ -274,6 +284,8 @@ def fit(
         What is to come out.
     fixed
         Parameters that are not searched for.
+    begin
+        Parameters to begin with; those of an ingredient that are not among them begin where it does nothing.
     seed, generations
         Of the search.
     """
@@ -287,8 +299,15 @@ def fit(
         values = values_of({**fixed, **dict(zip(ranges, map(float, point), strict=True))}, wanted)
         return float(np.log1p(_residuals(values, wanted) ** 2).sum())
 
+    begin = {**_NEUTRAL, **(begin or {})}
     found = differential_evolution(
-        misfit, list(ranges.values()), maxiter=generations, popsize=12, rng=np.random.default_rng(seed), polish=False
+        misfit,
+        list(ranges.values()),
+        maxiter=generations,
+        popsize=12,
+        rng=np.random.default_rng(seed),
+        polish=False,
+        x0=[begin[key] for key in ranges] if begin.keys() >= ranges.keys() else None,
     )
     parameters = dict(zip(ranges, map(float, found.x), strict=True))
     values = values_of({**fixed, **parameters}, wanted)
@@ -306,14 +325,14 @@ def fit(
 
 def try_ingredients(*, seed: int = 1, generations: int = 80) -> list[Fit]:
     """The fit without any, with each ingredient, with all of them, and of the paper's law alone."""
-    chosen: list[Sequence[Ingredient]] = [(), *((one,) for one in ADDED), ADDED]
-    fits = [fit(ingredients, targets(), seed=seed, generations=generations) for ingredients in chosen]
+    bare = fit((), targets(), seed=seed, generations=generations)
+    # From where the others end: what has more parameters must not come out worse for want of generations.
+    added = [fit((one,), targets(), begin=bare.parameters, seed=seed, generations=generations) for one in ADDED]
+    best = min(added, key=lambda one: one.misfit)
+    every = fit(ADDED, targets(), begin=best.parameters, seed=seed, generations=generations)
     alone = fit((KAPPA,), targets(), fixed=NOTHING_ELSE, seed=seed, generations=generations)
-    return [
-        *fits[:-1],
-        replace(fits[-1], name="all of these"),
-        replace(alone, name="the paper's law alone, integrated"),
-    ]
+    named = (replace(every, name="all of these"), replace(alone, name="the paper's law alone, integrated"))
+    return [bare, *added, *named]
 
 
 def write_ingredients(fits: Sequence[Fit], to: Path) -> list[Path]:
@@ -334,7 +353,7 @@ def as_markdown(fits: Sequence[Fit]) -> str:
         "",
         f"The theory (contacts stay closed, walkers on the axis) fitted to {len(wanted)} published numbers: without "
         "any ingredient, with each by itself and with all of them. Misfit is Σ ln(1 + r²), r the residual in "
-        "deviations, which are 15 % of speeds.",
+        "deviations, which are 15 % of speeds. Factors of bridges are over the shipped cases'.",
         "",
         "| added | misfit | met | missed, the worst first | parameters |",
         "|---|---|---|---|---|",

@@ -60,7 +60,7 @@ def fig2(sources: Sources) -> Figure:
         above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
         panel.axhline(0.0, color="0.4", lw=0.6)
         panel.set(xlabel=r"peak acceleration $a_0$ (g, 9.8 m/s²)", xlim=(0.0, top * 1.02), ylim=(-5.0, _FIG2_TOP))
-    engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction and bridges")
+    engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction, bridges and film")
     engine.plot([], [], color="0.45", lw=2.2, marker="*", ms=9, label="paper's fit, κ = 0.033 s/mm")
     engine.set_ylabel("velocity (mm/s)")
     engine.legend(loc="lower left", title="symbols: engine, mean and range of 6", fontsize=7, title_fontsize=7)
@@ -114,7 +114,7 @@ def fig3(sources: Sources) -> Figure:
     fitted = [((r1 - r2) / (r1 + r2), v * 1e3) for (r1, r2), v in published.FIG3_FIT.items()]
     axes.plot(*zip(*fitted, strict=True), "*", color="0.45", ms=9)
     for viscous, style, label in (
-        (True, "--", "Coulomb friction and bridges, mean R 0.25 mm"),
+        (True, "--", "Coulomb friction, bridges and film, mean R 0.25 mm"),
         (False, ":", "Coulomb friction, dry, mean R 0.25 mm"),
     ):
         cases = [dimers.of_asymmetry(case, sine, gamma0) for sine in sines]
@@ -126,7 +126,7 @@ def fig3(sources: Sources) -> Figure:
         "x",
         color="0.1",
         ms=6,
-        label="Coulomb friction and bridges, these beads",
+        label="Coulomb friction, bridges and film, these beads",
     )
     mean, low, high = (table[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
     axes.errorbar(table["sin_delta"], mean, yerr=[mean - low, high - mean], fmt="s", color="C2", ms=5, label="engine")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from postprocess.result import read_result
 from postprocess.tables import read_table
 
 if TYPE_CHECKING:
@@ -23,8 +24,15 @@ def on_axis(walkers: pd.DataFrame) -> pd.Series[bool]:
     return walkers["orientation_end"].abs() < ASTRAY
 
 
+def together(walkers: pd.DataFrame) -> pd.Series[bool]:
+    """Whether the beads of walkers of a table ``walkers`` stay where a bridge can hold them."""
+    return walkers["parted"] < PARTED
+
+
 def steady_walkers(run: str | Path) -> pd.DataFrame:
     """Rows of a run's table ``walkers`` that are steady, have not left the axis and whose beads stay together.
+
+    Symmetric dimers turn across the axis and need only stay together: they have no way to walk.
 
     Parameters
     ----------
@@ -32,5 +40,8 @@ def steady_walkers(run: str | Path) -> pd.DataFrame:
         A finished run directory.
     """
     walkers = read_table(run, "walkers")
-    kept: pd.DataFrame = walkers[walkers["steady"] & on_axis(walkers) & (walkers["parted"] < PARTED)]
-    return kept
+    kept = together(walkers)
+    if read_result(run)["sin_delta"] != 0.0:
+        kept &= walkers["steady"] & on_axis(walkers)
+    chosen: pd.DataFrame = walkers[kept]
+    return chosen

@@ -239,6 +239,7 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     assert {name: list(one) for name, one in intervals(again).items()} == said["intervals"]
     assert emulator_checks(again).shape == (2, 4)
     for row in rows_of(again):
+        assert row.engine is not None
         assert row.half_step == pytest.approx(row.engine, rel=0.02)
         if row.held_out:
             assert row.name == "ratio"

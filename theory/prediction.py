@@ -49,7 +49,7 @@ def motion_of(*cases: WalkerCase, viscous: bool = True) -> Motion:
     cases
         N of them, driven along the substrate.
     viscous
-        Whether the bridges' drag acts beside friction.
+        Whether the drag of the bridges and of the film acts beside friction.
 
     Raises
     ------
@@ -58,12 +58,17 @@ def motion_of(*cases: WalkerCase, viscous: bool = True) -> Motion:
     """
     _check(*cases)
     return walk(
-        Walker.joined([Walker.of_case(case) for case in cases]),
+        Walker.joined([_walker_of(case, viscous=viscous) for case in cases]),
         friction_of(*cases, viscous=viscous),
         [case.drive.frequency for case in cases],
         [case.drive.peak_acceleration for case in cases],
         steady_acceleration=[case.axial_gravity for case in cases],
     )
+
+
+def _walker_of(case: WalkerCase, *, viscous: bool) -> Walker:
+    walker = Walker.of_case(case)
+    return walker if viscous else replace(walker, film=np.zeros_like(walker.film))
 
 
 def _check(*cases: WalkerCase) -> None:
@@ -88,7 +93,7 @@ def threshold(case: WalkerCase, *, viscous: bool = True) -> float:
     _check(case)
     if dimer_of(case).sin_delta == 0.0:
         return float("nan")
-    dimer, walker, friction = dimer_of(case), Walker.of_case(case), friction_of(case, viscous=viscous)
+    dimer, walker, friction = dimer_of(case), _walker_of(case, viscous=viscous), friction_of(case, viscous=viscous)
     low, high = 0.0, float(detachment(dimer.sin_delta).gamma)
     for _ in range(_ROUNDS):
         trials = np.linspace(low, high, _TRIALS)
