@@ -161,7 +161,7 @@ def calibrate(
     unit, outcome = np.zeros((0, space.dimensions)), np.zeros((0, len(calibration.observations)))
     filling = 0
     for number, points in enumerate(calibration.waves, 1):
-        make = partial(_design, calibration, unit, outcome, points, filling)
+        make = partial(next_wave, calibration, unit, outcome, points, filling)
         design = _kept(folder / f"wave-{number}.json", calibration, make)
         wave = runner.run(f"wave-{number}", design)
         unit, outcome = np.concatenate([unit, design]), np.concatenate([outcome, wave.outcome])
@@ -229,8 +229,22 @@ def first_wave(calibration: Calibration, space: Space) -> FloatArray:
     return np.concatenate([np.clip(guesses, 0.0, 1.0), filling])
 
 
-def _design(calibration: Calibration, unit: FloatArray, outcome: FloatArray, points: int, filling: int) -> FloatArray:
-    """The first wave fills the range; later ones go where the posterior is, and around the best sets that were run."""
+def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, points: int, filling: int) -> FloatArray:
+    """The first wave, or one where the posterior is and around the best sets that were run, shape (P, D).
+
+    Parameters
+    ----------
+    calibration
+        What is calibrated.
+    unit : ndarray, shape (N, D)
+        The sets that were run, in the unit cube; none for the first wave.
+    outcome : ndarray, shape (N, K)
+        What the engine made of them.
+    points
+        P.
+    filling
+        How many of the sets were the first wave.
+    """
     space, seed = Space(calibration.parameters), calibration.seed
     if not len(unit):
         return first_wave(calibration, space)

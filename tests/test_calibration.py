@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from calibration.calibrate import FINAL, calibrate, first_wave, ranking, sobol_indices
+from calibration.calibrate import FINAL, calibrate, first_wave, next_wave, ranking, sobol_indices
 from calibration.emulator import fit_emulators
 from calibration.posterior import log_likelihood, sample_posterior
 from calibration.report import emulator_checks, intervals, rows_of
@@ -88,6 +88,37 @@ def test_emulators_know_their_error(known: tuple[Any, list[Observation]]) -> Non
         assert np.median(miss) < 0.05
         assert np.mean(miss <= 3.0 * error + 1e-6) > 0.9
         assert emulator.explained > 0.9
+
+
+def test_errors_are_judged_by_the_later_sets() -> None:
+    """A function with a kink where the later sets are: there the error is larger than over the whole range."""
+    rng = np.random.default_rng(3)
+    filling, later = SPACE.design(64, 1), np.array([0.5, 0.5]) + rng.uniform(-0.1, 0.1, (24, 2))
+    unit = np.concatenate([filling, later])
+    outcome = unit[:, :1] + 0.3 * np.sign(unit[:, :1] + unit[:, 1:] - 1.0) * (np.abs(unit - 0.5).max(1) < 0.12)[:, None]
+    everywhere, there, few = (
+        fit_emulators(unit[:count], outcome[:count], [observation("p", 0.5, 0.05)], 1, judged)[0].stretch
+        for judged, count in ((0, None), (64, None), (64, 70))
+    )
+    assert there > 1.2 * everywhere
+    assert few == fit_emulators(unit[:70], outcome[:70], [observation("p", 0.5, 0.05)], 1)[0].stretch
+
+
+def test_later_waves_look_around_the_best_sets(tmp_path: Path) -> None:
+    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
+    found = read_calibration(document, source="waves", name="waves", folder=tmp_path)
+    unit = first_wave(found, Space(found.parameters))
+    value = np.array([one.value for one in found.observations])
+    miss = np.linalg.norm(unit - [0.2, 0.8], axis=1)[:, None]
+    outcome = value * (1.0 + miss)
+    chosen = next_wave(found, unit, outcome, 12, len(unit))
+    assert chosen.shape == (12, 2)
+    assert ((chosen >= 0.0) & (chosen <= 1.0)).all()
+    parents = unit[ranking(found, outcome)[:4]]
+    near = chosen[4:8]
+    assert np.linalg.norm(near - parents, axis=1).max() < 0.3
+    assert len(np.unique(chosen, axis=0)) == 12
+    np.testing.assert_array_equal(chosen, next_wave(found, unit, outcome, 12, len(unit)))
 
 
 def test_a_posterior_is_the_known_one(known: tuple[Any, list[Observation]]) -> None:

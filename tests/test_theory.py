@@ -3,6 +3,7 @@
 import json
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,24 @@ def test_a_film_slows_the_theorys_walker_as_it_does_the_engines(
     found = read_result(run_directory(case))["velocity"]["mean"]
     assert found == pytest.approx(float(motion_of(case).velocity[0]), rel=0.02)
     assert found == pytest.approx({1.0: 1.46e-3, 5.0: 1.05e-3, 20.0: 0.445e-3}[ratio], rel=0.01)
+
+
+def test_a_film_presses_the_beads_as_far_as_it_does_not_drag_them_in_proportion_to_their_masses() -> None:
+    """Without friction v_x has the amplitude a0/√(ω² + β²); a drag of c1 and c2 leaves (c1 m2 - c2 m1)/M v_x between
+    the beads, along the line of their centres, whose slope is tan δ.
+    """
+    frequency, peak = 80.0, 9.8
+    masses = np.array(RUBY.masses)
+    for coefficients in (np.array([2e-3, 1e-3]), 1e3 * masses):
+        walker = replace(Walker.of_dimer(RUBY), film=coefficients[:, None])
+        found = walk(walker, Friction(), frequency, peak, cycles=60, steps_per_cycle=512)
+        rate = coefficients.sum() / RUBY.total_mass
+        fastest = peak / np.hypot(2.0 * np.pi * frequency, rate)
+        between = abs(coefficients[0] * masses[1] - coefficients[1] * masses[0]) / RUBY.total_mass * fastest
+        slope = np.tan(np.arcsin(RUBY.sin_delta))
+        lifted = (walker.at_rest - found.smallest_normal_force)[:, 0] * RUBY.capillary_scale
+        np.testing.assert_allclose(lifted[:2], between * slope, rtol=0.01, atol=1e-12)
+        np.testing.assert_allclose(lifted[2], between * np.sqrt(1.0 + slope**2), rtol=0.01, atol=1e-12)
 
 
 def test_matrices_and_closed_form_are_the_same_model() -> None:
