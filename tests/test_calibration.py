@@ -95,7 +95,8 @@ def test_errors_are_judged_by_the_later_sets() -> None:
     rng = np.random.default_rng(3)
     filling, later = SPACE.design(64, 1), np.array([0.5, 0.5]) + rng.uniform(-0.1, 0.1, (24, 2))
     unit = np.concatenate([filling, later])
-    outcome = unit[:, :1] + 0.3 * np.sign(unit[:, :1] + unit[:, 1:] - 1.0) * (np.abs(unit - 0.5).max(1) < 0.12)[:, None]
+    kink = np.sign(unit.sum(axis=1) - 1.0) * (np.abs(unit - 0.5).max(axis=1) < 0.12)
+    outcome = (unit[:, 0] + 0.3 * kink)[:, None]
     everywhere, there, few = (
         fit_emulators(unit[:count], outcome[:count], [observation("p", 0.5, 0.05)], 1, judged)[0].stretch
         for judged, count in ((0, None), (64, None), (64, 70))

@@ -1,5 +1,6 @@
 """Velocities, rotation, orientation and the aggregates over replicates."""
 
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,9 +12,11 @@ from inputs import load_case
 from postprocess import read_result, read_table, read_trajectory
 from postprocess.gait import distance_walked, fit_slopes, gait, settled_samples, walk
 from postprocess.report import describe_result
-from postprocess.result import walkers_met
+from postprocess.result import RESULT_NAME, current_result, walkers_met
+from postprocess.steady import steady_walkers
 from postprocess.tables import TABLES, WALKER_TABLES
 from postprocess.trajectory import Trajectory
+from runner.files import write_json
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +39,26 @@ def test_slopes_and_their_errors_are_those_of_least_squares() -> None:
         (expected, _), covariance = np.polyfit(time - 3.5, values[:, column] - 1e3, 1, cov=True)
         assert slope[column] == pytest.approx(expected, rel=1e-9)
         assert error[column] == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-6)
+
+
+def test_a_result_of_before_is_made_anew(directory: Path, tmp_path: Path) -> None:
+    """One that lacks what is told of walkers today."""
+    copy = tmp_path / directory.name
+    shutil.copytree(directory, copy)
+    known = read_result(copy)
+    write_json(copy / RESULT_NAME, {key: value for key, value in known.items() if key != "parted"})
+    assert current_result(copy) == known
+    assert read_result(copy) == known
+
+
+def test_symmetric_dimers_need_not_be_on_the_axis_to_be_kept(run_directory: Callable[..., Path]) -> None:
+    short = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
+    start = {"angle": "80 deg", "facing": "right"}
+    kept = {
+        radius: len(steady_walkers(run_directory(beads={"radii": [radius, "0.25 mm"]}, start=start, run=short)))
+        for radius in ("0.25 mm", "0.26 mm")
+    }
+    assert kept == {"0.25 mm": 1, "0.26 mm": 0}
 
 
 def test_two_points_give_a_slope_without_an_error() -> None:
