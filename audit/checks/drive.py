@@ -12,6 +12,7 @@ from audit.bench import FIRST_BEAD, Bench, bench_case, changed_case
 from audit.check import Check, Line
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
+from inputs.forces import film_drag
 from postprocess.gait import walk
 from postprocess.trajectory import prescribed_motion, read_trajectory
 from runner.directory import CASE_NAME
@@ -111,6 +112,29 @@ def frames(bench: Bench) -> Iterator[Line]:
     )
 
 
+def film(bench: Bench) -> Iterator[Line]:
+    """A dimer that nothing but a film drags along, in both frames."""
+    for frame in ("lab", "container"):
+        case = reference_walker(
+            liquid={"film_drag_ratio": 50.0, "viscosity_ratio": 1e-3},
+            contact={"friction": {"bead_bead": 0.0, "bead_wall": 0.0}},
+            drive={"peak_acceleration": "1 g", "frame": frame},
+            run={"cycles": 20, "settling_cycles": 10},
+        )
+        series = bench.run(walker_plan(case, remedies=bench.remedies))
+        drive, dimer = case.drive, dimer_of(case)
+        last = slice(case.run.settling_cycles * case.run.samples_per_cycle, -1)
+        own = series.velocity[last, series.row(FIRST_BEAD), 0]
+        if frame == "lab":
+            own = own - prescribed_motion(drive, series.steps[last] * case.run.time_step)[1][:, 0]
+        rate = sum(film_drag(case.liquid.film_viscosity, radius) for radius in case.beads.radii) / dimer.total_mass
+        expected = drive.peak_acceleration / float(np.hypot(drive.angular_frequency, rate))
+        found = float(np.sqrt(2.0 * np.mean(own**2)))
+        yield Line(
+            f"speed against the film, {frame} frame", "a0/√(ω² + β²), β = Σ 6πηR/M", expected, found, "m/s", 1e-3
+        )
+
+
 def known_speed(bench: Bench) -> Iterator[Line]:
     """The walker that YADE, MercuryDPM and a hand-written loop agree on within 0.4 %."""
     found = walking_speed(bench, reference_walker())
@@ -130,5 +154,6 @@ def known_speed(bench: Bench) -> Iterator[Line]:
 CHECKS = (
     Check("wall-motion", 6, "motion of rider and wall, acceleration of a bead on it", True, wall_motion),
     Check("known-speed", 6, "speed of the reference walker", True, known_speed),
+    Check("film", 6, "a frictionless dimer dragged along by a film", False, film),
     Check("frames", 6, "laboratory against container frame", False, frames),
 )
