@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import norm
 
 from calibration.emulator import Emulator, fit_emulators
 from calibration.posterior import Posterior, sample_posterior
@@ -26,8 +27,9 @@ from sweeps.conduct import Failure, Options
 FloatArray = npt.NDArray[np.float64]
 _STEPS_BETWEEN_WAVES = 800
 """Of the chain that places the next wave; the last chain has the file's number."""
-_PARENTS, _NEAR = 4, 0.06
-"""How many of the best sets a wave looks around, and how far, of the ranges."""
+_PARENTS, _NEAR, _TRIED = 4, 0.1, 500
+"""How many of the best sets a wave looks around, how far (of the ranges), and how many sets it thinks of around each."""
+_QUANTILES = norm.ppf((np.arange(5) + 0.5) / 5.0)
 FINAL = frozenset({"BeadsLost", "BlowUp"})
 """Failures of a set's own making: calling again would bring the same."""
 
@@ -253,14 +255,29 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
     samples, places = np.unique(posterior.unit, axis=0, return_index=True)
     likely = samples[np.argsort(posterior.log_density[places])[::-1]][: len(samples) // 2]
     draw = np.random.default_rng([seed, len(unit)])
-    # A third where the posterior is high, far from each other; a third near the best sets that were run, for there the
+    # A quarter where the posterior is high, far from each other; half around the best sets that were run, for there the
     # engine is known to be good; the others wherever the posterior is, to find what is missing.
-    each = points // 3
-    among = spread_out(likely[: 20 * points], points - 2 * each, unit)
-    parents = unit[ranking(calibration, outcome)[np.arange(each) % _PARENTS]]
-    near = np.clip(parents + draw.normal(0.0, _NEAR, (each, space.dimensions)), 0.0, 1.0)
-    beyond = draw.choice(samples, each, replace=len(samples) < each)
+    few = points // 4
+    among = spread_out(likely[: 20 * points], few, unit)
+    parents = unit[ranking(calibration, outcome)[:_PARENTS]]
+    near = _promising(emulators, parents, points - 2 * few, unit, draw)
+    beyond = draw.choice(samples, few, replace=len(samples) < few)
     return np.concatenate([among, near, beyond])
+
+
+def _promising(
+    emulators: list[Emulator], parents: FloatArray, points: int, taken: FloatArray, draw: np.random.Generator
+) -> FloatArray:
+    """Of many sets around some those that the emulators expect least misfit of, not too near each other."""
+    tried = np.repeat(parents, _TRIED, axis=0)
+    tried = np.clip(tried + draw.normal(0.0, _NEAR, tried.shape), 0.0, 1.0)
+    expected = np.zeros(len(tried))
+    for emulator in emulators:
+        if not emulator.observation.derived:
+            mean, deviation = emulator.predict(tried)
+            residuals = np.sinh(mean[:, None] + emulator.stretch * deviation[:, None] * _QUANTILES)
+            expected += np.log1p(residuals**2).mean(axis=1)
+    return spread_out(tried[np.argsort(expected)[: 4 * points]], points, taken)
 
 
 def _drawn(posterior: Posterior, points: int) -> FloatArray:

@@ -115,9 +115,10 @@ def test_later_waves_look_around_the_best_sets(tmp_path: Path) -> None:
     chosen = next_wave(found, unit, outcome, 12, len(unit))
     assert chosen.shape == (12, 2)
     assert ((chosen >= 0.0) & (chosen <= 1.0)).all()
-    parents = unit[ranking(found, outcome)[:4]]
-    near = chosen[4:8]
-    assert np.linalg.norm(near - parents, axis=1).max() < 0.3
+    # The best set that there may be is known; half of the wave is nearer to it than all that was run but a few.
+    near = np.sort(np.linalg.norm(chosen[3:9] - [0.2, 0.8], axis=1))
+    assert near[0] < np.sort(miss[:, 0])[2]
+    assert near[-1] < 0.5
     assert len(np.unique(chosen, axis=0)) == 12
     np.testing.assert_array_equal(chosen, next_wave(found, unit, outcome, 12, len(unit)))
 
