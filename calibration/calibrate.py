@@ -28,7 +28,7 @@ FloatArray = npt.NDArray[np.float64]
 _STEPS_BETWEEN_WAVES = 800
 """Of the chain that places the next wave; the last chain has the file's number."""
 _PARENTS, _NEAR, _TRIED = 4, 0.1, 500
-"""How many of the best sets a wave looks around, how far (of the ranges), and how many sets it thinks of around each."""
+"""How many of the best sets a wave looks around, how far (of the ranges), how many sets it thinks of around each."""
 _QUANTILES = norm.ppf((np.arange(5) + 0.5) / 5.0)
 FINAL = frozenset({"BeadsLost", "BlowUp"})
 """Failures of a set's own making: calling again would bring the same."""
