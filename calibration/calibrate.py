@@ -27,8 +27,8 @@ from sweeps.conduct import Failure, Options
 FloatArray = npt.NDArray[np.float64]
 _STEPS_BETWEEN_WAVES = 800
 """Of the chain that places the next wave; the last chain has the file's number."""
-_PARENTS, _NEAR, _TRIED = 4, 0.1, 500
-"""How many of the best sets a wave looks around, how far (of the ranges), how many sets it thinks of around each."""
+_PARENTS, _NEAR, _TRIED = 5, 0.06, 4000
+"""How many of the best sets a wave looks around, how far (of the ranges), and how many sets it thinks of."""
 _QUANTILES = norm.ppf((np.arange(5) + 0.5) / 5.0)
 FINAL = frozenset({"BeadsLost", "BlowUp"})
 """Failures of a set's own making: calling again would bring the same."""
@@ -268,9 +268,9 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
 def _promising(
     emulators: list[Emulator], parents: FloatArray, points: int, taken: FloatArray, draw: np.random.Generator
 ) -> FloatArray:
-    """Of many sets around some those that the emulators expect least misfit of, not too near each other."""
-    tried = np.repeat(parents, _TRIED, axis=0)
-    tried = np.clip(tried + draw.normal(0.0, _NEAR, tried.shape), 0.0, 1.0)
+    """Of many sets around and between some those that the emulators expect least misfit of, not too near each other."""
+    shares = draw.dirichlet(np.full(len(parents), 0.5), _TRIED)
+    tried = np.clip(shares @ parents + draw.normal(0.0, _NEAR, (_TRIED, parents.shape[1])), 0.0, 1.0)
     expected = np.zeros(len(tried))
     for emulator in emulators:
         if not emulator.observation.derived:
