@@ -14,6 +14,12 @@ from calibration.waves import seen_in
 from inputs.calibration import Band
 from postprocess.drawing import new_figure, save_figure
 
+_AGAINST = {
+    "peak_acceleration": "peak acceleration (m/s²)",
+    "gamma0": r"dimensionless peak force $\Gamma_0$",
+    "frequency": "frequency (Hz)",
+    "sin_delta": r"asymmetry $\sin\,\delta$",
+}
 FloatArray = npt.NDArray[np.float64]
 
 if TYPE_CHECKING:
@@ -44,6 +50,8 @@ def _corner(found: Outcome) -> Figure:
         return np.where(logs, np.log10(np.where(logs, values, 1.0)), values)
 
     figure, _ = new_figure(1.7 * len(parameters), 1.7 * len(parameters), nrows=len(parameters), ncols=len(parameters))
+    # corner places its panels itself; after the constrained engine alone that would be refused.
+    figure.set_layout_engine("tight")
     figure.set_layout_engine("none")
     corner.corner(
         drawn(posterior.unit),
@@ -135,12 +143,9 @@ def _band(axes: Axes, band: Band, found: Outcome) -> None:
     scale = unit_of(published[0][1])[1] if published else 1.0
     values, errors = ([getattr(one, name) * scale for _, one in published] for name in ("value", "deviation"))
     axes.errorbar([x for x, _ in published], values, errors, fmt="ks", ms=4, lw=1.0, label="published")
-    unit = table.attrs["units"].get(band.against, "")
-    axes.set(
-        title=band.title,
-        xlabel=band.against.replace("_", " ") + (f" ({unit})" if unit else ""),
-        ylabel=f"{band.quantity.replace('_', ' of bead ')} (mm/s)",
-    )
+    quantity, _, which = band.quantity.partition("_")
+    place = f" at contact {which}" if quantity == "sliding" else f" of bead {which}" if which else ""
+    axes.set(title=band.title, xlabel=_AGAINST[band.against], ylabel=f"{quantity}{place} (mm/s)")
 
 
 def _sobol(found: Outcome) -> Figure:
