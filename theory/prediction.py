@@ -169,7 +169,7 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
         f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}",
         f"  paper's model, κ = {paper['friction'] * 1e-3:g} s/mm      {_speed(paper)}",
         f"  Coulomb friction               {_speed(prediction['coulomb'])}{_details(prediction['coulomb'])}",
-        f"  Coulomb friction and bridges   {_speed(prediction['viscous'])}{_details(prediction['viscous'])}",
+        f"  Coulomb friction and drag      {_speed(prediction['viscous'])}{_details(prediction['viscous'])}",
     ]
     if result is not None:
         rotation, sliding = result["rotation"], result["sliding"]
