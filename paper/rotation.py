@@ -44,7 +44,7 @@ def fig4(sources: Sources) -> Figure:
             panel.annotate(
                 told, place, xycoords=("axes fraction", "data"), fontsize=7, va="center", annotation_clip=False
             )
-    figure.suptitle("markers: engine, lines: Coulomb friction, bridges and film, at the right: published means", fontsize=10)
+    figure.suptitle("markers: engine, lines: Coulomb friction and drag, at the right: published means", fontsize=10)
     return figure
 
 
