@@ -114,7 +114,7 @@ NUMBERS = (
         1.0,
         "",
         hangs_on="Speeds level off only with less viscous drag than the missing dependence on the frequency asks for: "
-        "no set of parameters gives both. In theory friction that is half as large again at rest as in motion gives "
+        "no set of parameters gives both. In theory friction that is 1.4 times as large at rest as in motion gives "
         "both; the engine knows one coefficient.",
     ),
     Published(
