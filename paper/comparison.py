@@ -146,7 +146,7 @@ def _speed(rows: pd.DataFrame, column: str = "velocity", theory: float = float("
     """The mean over some points; its range over walkers of one point, or over several points. NaN if one has none."""
     walkers = [steady_walkers(run)[column].to_numpy() * 1e3 for run in rows["run"]]
     left_out = int(rows["walkers"].sum()) - sum(map(len, walkers))
-    if not all(map(len, walkers)):
+    if not walkers or not all(map(len, walkers)):
         return replace(_NOTHING, theory=theory, left_out=left_out)
     means = np.array([one.mean() for one in walkers])
     ends = walkers[0] if len(rows) == 1 else means

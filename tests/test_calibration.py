@@ -1,5 +1,6 @@
 """Calibrations: files, emulators and posteriors of known functions, parameters found again from the engine's data."""
 
+import copy
 import json
 import subprocess
 import tomllib
@@ -228,7 +229,8 @@ def reduced(values: dict[str, float]) -> dict[str, Any]:
         for name, value in values.items()
     ]
     ratio = {"name": "ratio", "group": "r", "of": ["fast"], "over": ["slow"], "deviation": 0.03}
-    return {**REDUCED, "observations": [*observations, {**ratio, "value": values["fast"] / values["slow"]}]}
+    ratio["value"] = values["fast"] / values["slow"]
+    return {**copy.deepcopy(REDUCED), "observations": [*observations, ratio]}
 
 
 def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: Path) -> None:
