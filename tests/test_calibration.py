@@ -364,6 +364,17 @@ def test_the_example_of_the_docs_can_be_read(tmp_path: Path) -> None:
     assert read_calibration(document, source="docs", name="docs", folder=tmp_path).groups == ("fig2", "fig4a")
 
 
+@pytest.mark.parametrize("command", ["calibrate ruby --out", "calibrate ruby --to", "ingredients --to"])
+def test_a_file_is_no_folder_to_write_into(command: str, tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    arguments = [PROGRAM, *command.split(), str(file)]
+    told = subprocess.run(arguments, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert (told.returncode, told.stdout) == (2, "")
+    assert told.stderr == f"walkers: {command.split()[-1]}: expected a folder, {file} is a file\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
 @pytest.mark.parametrize("name", shipped_calibrations())
 def test_shipped_calibrations_can_be_run(name: str) -> None:
     found = load_calibration(name)

@@ -23,6 +23,11 @@ def refuse(option: str, wrong: bool, told: str) -> None:
         raise InputError(option, [Problem("", None, told)])
 
 
+def check_folder(option: str, folder: Path) -> None:
+    """Refuse a file as a folder."""
+    refuse(option, folder.exists() and not folder.is_dir(), f"expected a folder, {folder} is a file")
+
+
 def check_out(out: Path) -> None:
     """Refuse a file as the folder of the run directories."""
-    refuse("--out", out.exists() and not out.is_dir(), f"expected a folder, {out} is a file")
+    check_folder("--out", out)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import DespiteAudit, EngineName, Out
+from walkers.commands.arguments import DespiteAudit, EngineName, Out, check_folder, check_out
 from walkers.pipeline import DEFAULT_OUT
 
 File = Annotated[
@@ -36,6 +36,9 @@ def command(
     from walkers.progress import progress_of_sweep
 
     read = load_calibration(calibration)
+    check_out(out)
+    folder = to or out / read.name
+    check_folder("--to", folder)
     found = calibrate(
         read,
         out,
@@ -46,7 +49,6 @@ def command(
     )
     for sweep, failures in found.failures.items():
         print(f"walkers: {sweep}: {len(failures)} points failed", file=sys.stderr)
-    folder = to or out / read.name
     rows = rows_of(found)
     for file in [*write_tables(found, rows, folder), *draw(found, rows, folder)]:
         print(file)

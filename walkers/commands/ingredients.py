@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from walkers.commands.arguments import check_folder
+
 To = Annotated[Path, typer.Option("--to", help="Folder of the tables.")]
 Generations = Annotated[int, typer.Option("--generations", min=1, help="Of each search.")]
 
@@ -15,6 +17,7 @@ def command(to: To = Path("figures"), generations: Generations = 120) -> int:
     """Fit the theory to the published numbers with one ingredient after the other; no engine is needed."""
     from paper.ingredients import try_ingredients, write_ingredients
 
+    check_folder("--to", to)
     fits = try_ingredients(generations=generations)
     for one in fits:
         print(f"misfit {one.misfit:5.1f}, {one.met:2d} met: {one.name}")
