@@ -371,7 +371,7 @@ def test_a_file_is_no_folder_to_write_into(command: str, tmp_path: Path) -> None
     arguments = [PROGRAM, *command.split(), str(file)]
     told = subprocess.run(arguments, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert (told.returncode, told.stdout) == (2, "")
-    assert told.stderr == f"walkers: {command.split()[-1]}: expected a folder, {file} is a file\n"
+    assert told.stderr == f"walkers: {command.rsplit(maxsplit=1)[-1]}: expected a folder, {file} is a file\n"
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
