@@ -144,7 +144,7 @@ class Fit:
 
 @cache
 def walkers_of_the_paper() -> dict[str, WalkerCase]:
-    """The walkers of Figs. 2, 3 and 4 by name, as one would take them without a calibration (see `_bare`)."""
+    """The walkers of Figs. 2, 3 and 4a by name, as one would take them without a calibration (see `_bare`)."""
     base = dimers.shipped()
     found = {
         f"{f:g} Hz, {peak:g} g": dimers.driven(base, f, [peak * published.GRAVITY])[0]
@@ -155,7 +155,7 @@ def walkers_of_the_paper() -> dict[str, WalkerCase]:
         f"{one:g}/{other:g} mm": dimers.of_radii(base, (one * 1e-3, other * 1e-3), 0.5)
         for one, other in published.FIG3_FIT
     }
-    found |= {f"4{letter}": load_case(f"fig4{letter}") for letter in "ab"}
+    found["4a"] = load_case("fig4a")  # in Fig. 4b contacts open in every cycle: that is beyond the theory
     return {name: _bare(case) for name, case in found.items()}
 
 
@@ -201,8 +201,6 @@ def targets() -> list[Target]:
         ),
         speed("Fig. 4a, velocity", "velocity", ["4a"], published.FIG4_VELOCITY[0]),
         speed("Fig. 4a, sliding", "sliding", ["4a"], 0.0, 3e-4),
-        speed("Fig. 4b, velocity", "velocity", ["4b"], published.FIG4_VELOCITY[1]),
-        speed("Fig. 4b, rotation", "rotation", ["4b"], published.FIG4B_ROTATION),
     ]
 
 
@@ -237,7 +235,7 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
         [case.drive.peak_acceleration for case in cases.values()],
         cycles=_CYCLES,
     )
-    # Contacts that would open are let be: the engine's walkers hop there and walk on.
+    # Contacts that would open for a moment are let be: the engine's walkers hop there and walk on.
     sliding = np.where(motion.solved, motion.sliding, np.nan)
     velocity = translation(sliding)
     columns = {"velocity": velocity, "rotation": velocity - sliding[0], "sliding": sliding[0]}

@@ -113,9 +113,8 @@ NUMBERS = (
         "Fig. 2, v(10 g)/v(6 g): a plateau from Γ0 ≈ 0.6 on",
         1.0,
         "",
-        hangs_on="Speeds level off only with less viscous drag than the missing dependence on the frequency asks for: "
-        "no set of parameters gives both. In theory friction that is 1.4 times as large at rest as in motion gives "
-        "both; the engine knows one coefficient.",
+        hangs_on="Of all sets that the calibration ran none levels off. In theory friction that is larger at rest than "
+        "in motion gives the plateau (docs/calibration.md); the engine knows one coefficient.",
     ),
     Published(
         "fig2_threshold",
