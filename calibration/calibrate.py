@@ -21,6 +21,7 @@ from calibration.waves import Wave, run_wave, wave_sweep
 from inputs.calibration import Calibration
 from inputs.errors import InputError, Problem, WalkersError
 from paper.sources import ProgressOf
+from runner.failures import BeadsLost, BlowUp
 from runner.files import read_json, write_json
 from sweeps.conduct import Failure, Options
 
@@ -30,7 +31,7 @@ _STEPS_BETWEEN_WAVES = 800
 _PARENTS, _NEAR, _TRIED = 5, 0.06, 4000
 """How many of the best sets a wave looks around, how far (of the ranges), and how many sets it thinks of."""
 _QUANTILES = norm.ppf((np.arange(5) + 0.5) / 5.0)
-FINAL = frozenset({"BeadsLost", "BlowUp"})
+FINAL = frozenset(failure.__name__ for failure in (BeadsLost, BlowUp))
 """Failures of a set's own making: calling again would bring the same."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from calibration.calibrate import Outcome
-from calibration.report import Row, labelled, unit_of
+from calibration.report import Row, labelled
 from calibration.waves import seen_in
 from inputs.calibration import Band
 from postprocess.drawing import new_figure, save_figure
@@ -91,15 +91,10 @@ def _predictions(rows: list[Row]) -> Figure:
 
 
 def _bars(axes: Axes, rows: list[Row], places: np.ndarray[tuple[int], np.dtype[np.int64]]) -> None:
-    known = {name: [getattr(row, name) for row in rows] for name in ("low", "high", "engine")}
+    published, deviation = (np.array([getattr(row, name) for row in rows]) for name in ("value", "deviation"))
     low, high, best = (
-        np.array(
-            [
-                np.nan if value is None else (value - row.value) / row.deviation
-                for value, row in zip(values, rows, strict=True)
-            ]
-        )
-        for values in known.values()
+        (np.array([getattr(row, name) for row in rows], dtype=np.float64) - published) / deviation  # None is NaN
+        for name in ("low", "high", "engine")
     )
     axes.hlines(places, low, high, color="C0", lw=4.0, alpha=0.5, label="engine over the posterior")
     axes.plot(best, places, "o", ms=5, color="C1", label="engine at the best set")
@@ -126,7 +121,7 @@ def _band(axes: Axes, band: Band, found: Outcome) -> None:
     where = table[band.against].to_numpy()[chosen]
     order = np.argsort(where)
     many, best = (
-        seen_in(found.calibration, wave.table, band.quantity)[:, chosen] * 1e3
+        seen_in(found.calibration, wave.table, {band.quantity})[band.quantity][:, chosen] * 1e3
         for wave in (found.predictive, found.checks["best"])
     )
     order_seen = order[np.isfinite(many[:, order]).any(axis=0)]
@@ -140,8 +135,7 @@ def _band(axes: Axes, band: Band, found: Outcome) -> None:
         for of in one.of
         if of in band.of
     ]
-    scale = unit_of(published[0][1])[1] if published else 1.0
-    values, errors = ([getattr(one, name) * scale for _, one in published] for name in ("value", "deviation"))
+    values, errors = ([getattr(one, name) * 1e3 for _, one in published] for name in ("value", "deviation"))
     axes.errorbar([x for x, _ in published], values, errors, fmt="ks", ms=4, lw=1.0, label="published")
     quantity, _, which = band.quantity.partition("_")
     place = f" at contact {which}" if quantity == "sliding" else f" of bead {which}" if which else ""

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from calibration.calibrate import Outcome
 from calibration.emulator import Emulator, transformed
 from calibration.posterior import Posterior
-from calibration.waves import HOPELESS, Wave
+from calibration.waves import Wave
 from inputs.calibration import QUANTITIES, Observation, Parameter
 from inputs.units import SPEED
 from runner.files import write_bytes, write_json, write_text
@@ -79,10 +79,9 @@ def rows_of(found: Outcome) -> list[Row]:
     for place, observation in enumerate(found.calibration.observations):
         unit, scale = unit_of(observation)
         emulated, error = found.emulators[place].value(found.checks["best"].unit)
-        seen = _seen(found.predictive, place, observation, scale)
+        seen = _seen(found.predictive, place, scale)
         best, finer, longer = (
-            next(iter(_seen(found.checks[name], place, observation, scale)), None)
-            for name in ("best", "half-step", "twice-as-long")
+            next(iter(_seen(found.checks[name], place, scale)), None) for name in ("best", "half-step", "twice-as-long")
         )
         rows.append(
             Row(
@@ -111,11 +110,10 @@ def rows_of(found: Outcome) -> list[Row]:
     return rows
 
 
-def _seen(wave: Wave, place: int, observation: Observation, scale: float) -> list[float]:
-    """An observation of a wave's sets, but for those where a placeholder says that there was no walker."""
-    values = wave.outcome[:, place]
-    none = np.isclose(values, observation.value + HOPELESS * observation.deviation)
-    return [float(value) * scale for value in values[~none]]
+def _seen(wave: Wave, place: int, scale: float) -> list[float]:
+    """An observation of those of a wave's sets that have a walker."""
+    values = wave.seen[:, place]
+    return [float(value) * scale for value in values[~np.isnan(values)]]
 
 
 def _predicted(emulator: Emulator, posterior: Posterior, scale: float) -> tuple[float, float]:

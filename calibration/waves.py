@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,13 +38,16 @@ class Wave:
     ----------
     unit : ndarray, shape (P, D)
         The sets, in the unit cube.
+    seen : ndarray, shape (P, K)
+        Each observation, SI units and degrees; NaN where there is none.
     outcome : ndarray, shape (P, K)
-        Each observation, SI units and degrees; `HOPELESS` deviations off where there is none.
+        The same, but `HOPELESS` deviations off where there is none.
     table
         The sweep's, P times the number of experiments long.
     """
 
     unit: FloatArray
+    seen: FloatArray
     outcome: FloatArray
     table: pd.DataFrame
 
@@ -93,8 +96,7 @@ def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
     """What a wave's table says of each observation, shape (P, K).
 
     Speeds are means over the walkers that are some until the end (`postprocess.steady.steady_walkers`). Where there is
-    none, or the run failed, nothing was observed: that counts as `HOPELESS` deviations off, for an emulator has to know
-    that it is bad there.
+    none, or the run failed, nothing was observed: NaN.
 
     Parameters
     ----------
@@ -104,8 +106,7 @@ def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
         Of a wave's sweep (`sweeps.table.load`).
     """
     labels = list(calibration.experiments)
-    quantities = {observation.quantity for observation in calibration.observations}
-    seen = {quantity: seen_in(calibration, table, quantity) for quantity in quantities}
+    seen = seen_in(calibration, table, {observation.quantity for observation in calibration.observations})
 
     def mean(observation: Observation, experiments: tuple[str, ...]) -> FloatArray:
         return np.asarray(seen[observation.quantity][:, [labels.index(one) for one in experiments]].mean(axis=1))
@@ -117,23 +118,30 @@ def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
             below = mean(observation, observation.over)
             # A ratio of two speeds says nothing where the lower one is none.
             value = np.where(np.abs(below) > _LEAST_SPEED, value / np.where(below == 0.0, 1.0, below), np.nan)
-        columns.append(np.where(np.isnan(value), observation.value + HOPELESS * observation.deviation, value))
+        columns.append(value)
     return np.stack(columns, axis=1)
+
+
+def _hopeless(calibration: Calibration) -> FloatArray:
+    """What counts where nothing was observed, shape (K,): an emulator has to know that it is bad there."""
+    return np.array([one.value + HOPELESS * one.deviation for one in calibration.observations])
 
 
 _LEAST_SPEED = 5e-5
 
 
-def seen_in(calibration: Calibration, table: pd.DataFrame, quantity: str) -> FloatArray:
-    """A quantity of each run of a wave, NaN where there is none, shape (P, number of experiments)."""
-    found = np.full(len(table), np.nan)
+def seen_in(calibration: Calibration, table: pd.DataFrame, quantities: Collection[str]) -> dict[str, FloatArray]:
+    """Quantities of each run of a wave, NaN where there is none, each of shape (P, number of experiments)."""
+    found = {quantity: np.full(len(table), np.nan) for quantity in quantities}
     for place in np.flatnonzero(table["status"] == "finished"):
         run = table["run"].iloc[place]
-        if quantity == "misalignment":
-            found[place] = misalignment(run).max() if together(read_table(run, "walkers")).all() else np.nan
-        elif len(kept := steady_walkers(run)):
-            found[place] = kept[quantity].mean()
-    return found.reshape(-1, len(calibration.experiments))
+        kept = steady_walkers(run)
+        for quantity, values in found.items():
+            if quantity == "misalignment":
+                values[place] = misalignment(run).max() if together(read_table(run, "walkers")).all() else np.nan
+            elif len(kept):
+                values[place] = kept[quantity].mean()
+    return {quantity: values.reshape(-1, len(calibration.experiments)) for quantity, values in found.items()}
 
 
 def run_wave(  # noqa: PLR0913
@@ -167,4 +175,5 @@ def run_wave(  # noqa: PLR0913
         sweep, out, options, engine=engine, despite_audit=despite_audit, on_progress=on_progress
     )
     table = load(record.directory)
-    return Wave(unit, observed(calibration, table), table), failures
+    seen = observed(calibration, table)
+    return Wave(unit, seen, np.where(np.isnan(seen), _hopeless(calibration), seen), table), failures

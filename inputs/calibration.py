@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -37,8 +37,10 @@ from inputs.units import ANGLE, SPEED, Kind, parse_quantity
 
 _SHIPPED = Path(__file__).parent / "calibrations"
 _MOST = 10_000
+Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3"]
+"""A column of a sweep's table that is a speed."""
 QUANTITIES: dict[str, Kind] = {
-    **dict.fromkeys(("velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3"), SPEED),
+    **dict.fromkeys(get_args(Speed), SPEED),
     "misalignment": ANGLE,
 }
 """What an observation may be of: a column of a sweep's table, or the largest angle of a walker to the drive axis."""
@@ -72,9 +74,7 @@ class ObservationTable(_Table):
     name: str
     group: str
     title: str = ""
-    quantity: Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3", "misalignment"] = (
-        "velocity"
-    )
+    quantity: Literal[Speed, "misalignment"] = "velocity"
     of: Annotated[list[str], Field(min_length=1)]
     over: list[str] = []
     value: str | Number
@@ -88,7 +88,7 @@ class BandTable(_Table):
     title: str = ""
     of: Annotated[list[str], Field(min_length=1)]
     against: Literal["peak_acceleration", "gamma0", "frequency", "sin_delta"]
-    quantity: Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3"] = "velocity"
+    quantity: Speed = "velocity"
 
 
 class DesignTable(_Table):

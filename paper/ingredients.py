@@ -61,18 +61,18 @@ ALWAYS = Ingredient(
     },
 )
 """What the engine has: three frictions, and the bridges' viscosity over the liquid's."""
+KAPPA = Ingredient("drag in proportion to the load, the paper's κ (s/m)", {"log10_kappa": (-1.0, 2.0)})
 ADDED = (
     Ingredient("drag of a film on the beads' translation", {"log10_film_drag_ratio": (-2.0, 2.0)}),
     Ingredient("weaker or stronger bridges to the substrate", {"wall_bridge_factor": (0.5, 1.3)}),
     Ingredient("weaker or stronger bridges between the beads", {"bead_bridge_factor": (0.5, 1.3)}),
-    Ingredient("drag in proportion to the load, the paper's κ (s/m)", {"log10_kappa": (-1.0, 2.0)}),
+    KAPPA,
     Ingredient(
         "static friction above the kinetic",
         {"static_ratio": (1.0, 2.5), "log10_stribeck_velocity": (-4.0, -1.5)},
     ),
 )
 """Ingredients to be tried, one at a time and all together."""
-
 
 _NEUTRAL = {
     "log10_film_drag_ratio": -2.0,
@@ -82,7 +82,6 @@ _NEUTRAL = {
     "static_ratio": 1.0,
     "log10_stribeck_velocity": -3.0,
 }
-KAPPA = ADDED[3]
 NOTHING_ELSE = {
     **dict.fromkeys(("friction_wall", "friction_slide", "friction_bead"), 1e-6),
     "log10_viscosity_ratio": -9.0,

@@ -36,6 +36,8 @@ class SweepPlan:
         Of the points, see `sweeps.record.PointState`.
     workers
         How many decks run at once.
+    final
+        Points that failed before and are not run again.
     """
 
     record: SweepRecord
@@ -44,6 +46,7 @@ class SweepPlan:
     decks: Sequence[PlannedDeck]
     statuses: Sequence[str]
     workers: int
+    final: list[Failure]
 
     @property
     def core_seconds(self) -> float:
@@ -106,16 +109,19 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     record = describe_sweep(sweep, cases, binary, out)
     found = states(record)
     statuses = [state.status for state in found]
-    final = {failure.point for failure in final_failures(record, found, options)}
+    final = final_failures(record, found, options)
+    given_up = {failure.point for failure in final}
     numbered = dict(enumerate(cases))
     # The points of a descent come one after the other, so that few of them can share a deck.
     packed = [deck for point in numbered for deck in pack({point: cases[point]}, 1)] if record.descent else None
     decks = [
         part
         for deck in packed or pack(numbered, options.decks_at_once, options.longest_seconds)
-        for part in unfinished_parts(deck.points, numbered, lambda point: statuses[point] in _SETTLED or point in final)
+        for part in unfinished_parts(
+            deck.points, numbered, lambda point: statuses[point] in _SETTLED or point in given_up
+        )
     ]
-    return SweepPlan(record, cases, binary, decks, statuses, options.decks_at_once)
+    return SweepPlan(record, cases, binary, decks, statuses, options.decks_at_once, final)
 
 
 def run_sweep(
@@ -159,6 +165,6 @@ def run_sweep(
         check_audit(plan.engine, despite_audit)
     write_record(plan.record)
     if not plan.decks:
-        return plan.record, final_failures(plan.record, states(plan.record), options)
+        return plan.record, plan.final
     options = options.for_ranks(max(map(ranks_of, plan.cases)))
     return plan.record, conduct(plan.record, plan.cases, plan.engine, options, on_progress)
