@@ -157,6 +157,7 @@ def calibrate(
         If there is no engine, or its audit failed.
     """
     space, seed = Space(calibration.parameters), calibration.seed
+    check_ranges(calibration)
     folder = out / calibration.name
     folder.mkdir(parents=True, exist_ok=True)
     arguments = {"engine": engine, "despite_audit": despite_audit}
@@ -165,7 +166,7 @@ def calibrate(
     filling = 0
     for number, points in enumerate(calibration.waves, 1):
         make = partial(next_wave, calibration, unit, outcome, points, filling)
-        design = _kept(folder / f"wave-{number}.json", calibration, make)
+        design = _kept(folder / f"wave-{number}.json", _determinants(calibration, number), make)
         wave = runner.run(f"wave-{number}", design)
         unit, outcome = np.concatenate([unit, design]), np.concatenate([outcome, wave.outcome])
         filling = filling or len(design)
@@ -177,7 +178,8 @@ def calibrate(
     }
     seen = sha256(posterior.unit.tobytes() + posterior.log_density.tobytes())
     draw = partial(_drawn, posterior, calibration.predictive)
-    drawn = _kept(folder / "predictive.json", calibration, draw, follows=seen.hexdigest())
+    follows = f"{seen.hexdigest()} {calibration.predictive}"
+    drawn = _kept(folder / "predictive.json", _determinants(calibration, 0), draw, follows)
     predictive = runner.run("predictive", drawn)
     first_of_all = ranking(calibration, np.concatenate([outcome, predictive.outcome]))[:1]
     best = np.concatenate([unit, drawn])[first_of_all]
@@ -200,28 +202,69 @@ def calibrate(
     )
 
 
-def _kept(path: Path, calibration: Calibration, make: Callable[[], FloatArray], follows: str = "") -> FloatArray:
+def check_ranges(calibration: Calibration) -> None:
+    """Refuse parameters whose ranges go beyond what a case takes, before anything is written or run.
+
+    Raises
+    ------
+    InputError
+        If the experiments cannot be had at either end of all ranges, or at a guess.
+    """
+    ends = Space(calibration.parameters).values(np.array([[0.0], [1.0]]) * np.ones(len(calibration.parameters)))
+    guesses = np.reshape(np.array(calibration.guesses, np.float64), (-1, len(calibration.parameters)))
+    sweep = wave_sweep(calibration, np.concatenate([ends, guesses]), calibration.name)
+    try:
+        for _ in sweep.cases():
+            pass
+    except InputError as error:
+        problem = error.problems[0]
+        for one in calibration.parameters:
+            if problem.key in one.keys:
+                told = f"{problem.key} = {problem.value}: {problem.expected}"
+                key = f"parameters.{one.name}.range"
+                raise InputError(calibration.source, [Problem(key, f"[{one.low:g}, {one.high:g}]", told)]) from error
+        raise
+
+
+def _determinants(calibration: Calibration, wave: int) -> dict[str, Any]:
+    """What the parameter sets of a wave (from 1; of none: 0) were drawn from, beside what the engine said before."""
+    parameters = {one.name: [one.low, one.high, one.log, one.unit] for one in calibration.parameters}
+    if not wave:
+        return {"parameters": parameters}
+    guesses = [list(guess) for guess in calibration.guesses]
+    return {
+        "parameters": parameters,
+        "seed": calibration.seed,
+        "guesses": guesses,
+        "waves": [*calibration.waves[:wave]],
+    }
+
+
+def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArray], follows: str = "") -> FloatArray:
     """The parameter sets of a wave, as written down before, or made and written down.
 
     A calibration that goes on must not depend on whether the libraries would draw the same points again. What
     ``follows`` from something else is made anew where that has changed.
     """
-    ours = {one.name: [one.low, one.high, one.log, one.unit] for one in calibration.parameters}
     if path.exists():
         try:
             kept = read_json(path)
             unit = np.array(kept["unit"], dtype=np.float64)
-            if unit.ndim != 2 or unit.shape[1] != len(ours) or not ((unit >= 0.0) & (unit <= 1.0)).all():
+            if unit.ndim != 2 or unit.shape[1] != len(kept["parameters"]) or not ((unit >= 0.0) & (unit <= 1.0)).all():
                 raise ValueError("no points of the unit cube")
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InputError(str(path), [Problem("", None, f"cannot be read ({error}); delete it")]) from error
-        if kept.get("parameters") != ours:
-            told = "belongs to other parameters or ranges; delete it and what follows it, or give another --out"
-            raise InputError(str(path), [Problem("parameters", None, told)])
+        for key, now in determinants.items():
+            if kept.get(key) != now:
+                told = (
+                    f"was drawn with other {key} than the file has now; delete it and the waves after it to have them "
+                    "drawn again (runs that fit are kept), take the change back, or give another --out"
+                )
+                raise InputError(str(path), [Problem(key, None, told)])
         if kept.get("follows", "") == follows:
             return unit
     unit = make()
-    write_json(path, {"parameters": ours, "follows": follows, "unit": unit.tolist()})
+    write_json(path, {**determinants, "follows": follows, "unit": unit.tolist()})
     return unit
 
 

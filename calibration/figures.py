@@ -12,7 +12,7 @@ from calibration.calibrate import Outcome
 from calibration.report import Row, labelled
 from calibration.waves import seen_in
 from inputs.calibration import Band
-from postprocess.drawing import new_figure, save_figure
+from postprocess.drawing import new_figure, save_figure, styled
 
 _AGAINST = {
     "peak_acceleration": "peak acceleration (m/s²)",
@@ -45,6 +45,7 @@ def _corner(found: Outcome) -> Figure:
     parameters, posterior = found.space.parameters, found.posterior
     logs = np.array([one.log for one in parameters])
 
+    @styled
     def drawn(unit: FloatArray) -> FloatArray:
         values = found.space.values(unit)
         return np.where(logs, np.log10(np.where(logs, values, 1.0)), values)
@@ -69,6 +70,7 @@ def _corner(found: Outcome) -> Figure:
     return figure
 
 
+@styled
 def _predictions(rows: list[Row]) -> Figure:
     """Residuals in standard deviations: the engine at the best set and over the posterior, and what was held out."""
     figure, axes = new_figure(7.6, 0.34 * len(rows) + 1.4)
@@ -100,6 +102,7 @@ def _bars(axes: Axes, rows: list[Row], places: np.ndarray[tuple[int], np.dtype[n
     axes.plot(best, places, "o", ms=5, color="C1", label="engine at the best set")
 
 
+@styled
 def _bands(found: Outcome) -> Figure:
     """The engine over the posterior and at the best set, against what the experiments differ in."""
     bands = found.calibration.bands
@@ -142,6 +145,7 @@ def _band(axes: Axes, band: Band, found: Outcome) -> None:
     axes.set(title=band.title, xlabel=_AGAINST[band.against], ylabel=f"{quantity}{place} (mm/s)")
 
 
+@styled
 def _sobol(found: Outcome) -> Figure:
     names = [one.symbol for one in found.space.parameters]
     figure, axes = new_figure(1.0 * len(names) + 3.4, 0.28 * len(found.emulators) + 1.6)

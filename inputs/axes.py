@@ -158,6 +158,30 @@ def plain(value: Value) -> Any:
         return value
 
 
+def different(key: str, values: Sequence[Value]) -> Sequence[Value]:
+    """The values of an axis, if no two of them are the same.
+
+    Raises
+    ------
+    UnusableAxisError
+        If there are equal ones: points would be there twice.
+    """
+    known: set[str] = set()
+    for value in values:
+        same = repr([_comparable(part) for part in value] if isinstance(value, list) else _comparable(value))
+        if same in known:
+            raise UnusableAxisError(key, value, "expected different values: this one is there twice")
+        known.add(same)
+    return values
+
+
+def _comparable(value: Value) -> object:
+    try:
+        return number_of("", value)
+    except UnusableAxisError:
+        return value
+
+
 def zipped(table: Mapping[str, Any]) -> Axis:
     """Keys whose values go together, the first with the first."""
     columns = {key: values_of(key, axis) for key, axis in flatten(table, is_axis).items()}
@@ -196,6 +220,8 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
         if kind not in _DISTRIBUTIONS or not (isinstance(given[kind], list) and len(given[kind]) == 2):
             raise UnusableAxisError(key, given, "expected { uniform = [low, high] } or { loguniform = [low, high] }")
         low, high, unit = _range(key, given[kind], positive=kind == "loguniform")
+        if low >= high:
+            raise UnusableAxisError(key, given, "expected the smaller value first")
         ends[key] = (low, high, unit, kind == "loguniform")
     if not ends:
         raise UnusableAxisError("sample.ranges", dict(ranges), "expected keys and their ranges")

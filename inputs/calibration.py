@@ -315,6 +315,8 @@ def _problems(file: CalibrationFile) -> list[Problem]:
             found.append(Problem(f"{place}.name", f'"{observation.name}"', "expected a name of its own"))
         for key in ("of", "over"):
             found += _unknown(f"{place}.{key}", getattr(observation, key), file.experiments, "an experiment")
+        if observation.over and set(observation.over) == set(observation.of):
+            found.append(Problem(f"{place}.over", None, "expected other experiments than in of: the ratio would be 1"))
         for key in ("value", "deviation"):
             found += _unreadable(f"{place}.{key}", getattr(observation, key), observation)
     if all(observation.derived for observation in file.observations):

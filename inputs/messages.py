@@ -34,7 +34,7 @@ _EXAMPLES = {
 
 _BOUNDS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
 _BOUND_UNITS = {
-    "contact.youngs_modulus": " Pa (softer contacts change the speed)",
+    "contact.youngs_modulus": " Pa (softer contacts change the speed, harder ones the engine refuses)",
     "liquid.contact_angle": " rad",
 }
 _PLAIN = {

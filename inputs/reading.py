@@ -5,6 +5,7 @@ Whatever is wrong ends as one `InputError` that names the file, the key, the val
 
 from __future__ import annotations
 
+import stat
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -23,6 +24,7 @@ AnyCase = WalkerCase | PileCase
 _File = TypeVar("_File", bound=Table)
 _Case = TypeVar("_Case")
 _SHIPPED = Path(__file__).parent / "cases"
+_MOST_BYTES = 16 << 20
 
 
 def shipped_cases() -> dict[str, Path]:
@@ -75,6 +77,8 @@ def find_input(name: str | Path, shipped: Mapping[str, Path], kind: str) -> Path
     path = Path(name)
     try:
         if path.is_file() or (path.exists() and str(name) not in shipped):
+            if path.stem in (".", ".."):  # of "...toml"
+                raise InputError(str(name), [Problem("", None, "expected a name before .toml")])
             return path
     except OSError as error:
         raise InputError(str(name)[:80], [Problem("", None, f"cannot be read: {error.strerror}")]) from error
@@ -90,10 +94,13 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If it cannot be read or is no TOML.
+        If it cannot be read, is no TOML, no regular file, or larger than 16 MB.
     """
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8"))
+        about = path.stat()
+        if not stat.S_ISDIR(about.st_mode) and (not stat.S_ISREG(about.st_mode) or about.st_size > _MOST_BYTES):
+            raise InputError(str(path), [Problem("", None, f"expected a file of at most {_MOST_BYTES >> 20} MB")])
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         found = f"byte {error.object[error.start]:#04x} at offset {error.start}"
         raise InputError(str(path), [Problem("", None, f"expected UTF-8 text, found {found}")]) from error

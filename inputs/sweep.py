@@ -26,6 +26,7 @@ from inputs.axes import (
     UnusableAxisError,
     Value,
     combinations,
+    different,
     flatten,
     is_axis,
     number_of,
@@ -199,6 +200,8 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         settings = flatten(file.set, lambda _: False)
         given = read_toml(base)
         for key in (*settings, *keys):
+            if key == "title" and key in keys:
+                raise UnusableAxisError(key, None, "does not vary: points with other titles alone are the same run")
             _check_key(key, PileFile if given.get("kind") == "pile" else WalkerFile)
         tables = changed(given, settings)
         changed(tables, dict(zip(keys, rows[0], strict=True)))
@@ -243,7 +246,7 @@ def _points(
     file: SweepFile,
 ) -> tuple[tuple[str, ...], list[tuple[Value, ...]], tuple[str | None, ...], Descent | None]:
     axes = [
-        Axis((key,), tuple((value,) for value in values_of(key, given)))
+        Axis((key,), tuple((value,) for value in different(key, values_of(key, given))))
         for key, given in flatten(file.axes, is_axis).items()
     ]
     axes += [zipped(table) for table in file.zip]

@@ -12,7 +12,7 @@ from inputs.dimer import dimer_of
 from inputs.reading import load_case
 from paper import dimers, published
 from paper.sources import Sources
-from postprocess.drawing import new_figure
+from postprocess.drawing import new_figure, styled
 from theory.mathieu import Alignment, alignment, is_stable, turning
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ _SMALL = 0.15
 """… for so many seconds."""
 
 
+@styled
 def fig_alignment(sources: Sources) -> Figure:
     """ψ(t) of asymmetric and symmetric dimers, its beginning beside theory, and the chart of stability."""
     table = sources.finished("alignment")

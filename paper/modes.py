@@ -11,7 +11,7 @@ import numpy.typing as npt
 from inputs.dimer import dimer_of
 from paper import dimers
 from paper.sources import Sources
-from postprocess.drawing import new_figure
+from postprocess.drawing import new_figure, styled
 from postprocess.gait import gait, settled_samples
 from theory.prediction import MOVING, motion_of
 from theory.quasistatic import detachment, translation
@@ -65,6 +65,7 @@ def classify(table: pd.DataFrame, shares: Sequence[float]) -> npt.NDArray[np.int
     return modes
 
 
+@styled
 def fig_modes(sources: Sources) -> Figure:
     """Γ0 against sin δ: the engine's modes as symbols, velocity as lightness, the models' borders as lines."""
     table = sources.finished("modes")

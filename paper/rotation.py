@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from paper import dimers, published
 from paper.sources import Sources
-from postprocess.drawing import new_figure
+from postprocess.drawing import new_figure, styled
 from postprocess.gait import gait
 from theory.prediction import motion_of
 from theory.quasistatic import translation
@@ -25,6 +25,7 @@ _CYCLES = 2
 _SERIES = (("walker", "s", "#c4473a"), ("large bead", "o", "#111111"), ("small bead", "^", "#1f5fa8"))
 
 
+@styled
 def fig4(sources: Sources) -> Figure:
     """Velocity and rotation velocities through two cycles, large beads."""
     table = sources.finished("fig4")

@@ -11,7 +11,7 @@ import numpy as np
 
 from paper import published
 from paper.sources import Sources
-from postprocess.drawing import new_figure
+from postprocess.drawing import new_figure, styled
 from postprocess.steady import on_axis, steady_walkers
 from postprocess.tables import read_table
 
@@ -142,6 +142,7 @@ def _value(observation: Observation, experiments: pd.DataFrame) -> float:
         return np.nan
 
 
+@styled
 def fig_sensitivity(sources: Sources) -> Figure:
     """A tornado plot: a panel an observation, a bar a parameter from its lower to its higher value."""
     found = sensitivities(sources)

@@ -8,7 +8,7 @@ import numpy as np
 
 from paper import dimers
 from paper.sources import Sources
-from postprocess.drawing import new_figure
+from postprocess.drawing import new_figure, styled
 from postprocess.rendering import top_view
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ INTERVAL = 0.3
 _IMAGES = 6
 
 
+@styled
 def fig1b(sources: Sources) -> Figure:
     """The first walker of the alignment's dimers that start on the axis, seen from above."""
     table = sources.finished("alignment")

@@ -9,7 +9,7 @@ import numpy as np
 from inputs.dimer import dimer_of
 from paper import dimers, published
 from paper.sources import Sources
-from postprocess.drawing import new_figure
+from postprocess.drawing import new_figure, styled
 from sweeps.table import thresholds
 from theory.prediction import motion_of, threshold
 from theory.quasistatic import detachment, mean_velocity
@@ -32,6 +32,7 @@ _ASIDE = {"D": -0.06, "o": -0.02, "^": 0.02, "s": 0.06}
 """g by which symbols stand aside, so that their bars do not hide each other."""
 
 
+@styled
 def fig2(sources: Sources) -> Figure:
     """Velocity against peak acceleration at four frequencies, and the threshold of motion."""
     table, case = sources.finished("fig2"), dimers.shipped()
@@ -104,6 +105,7 @@ def _threshold_inset(inset: Axes, sources: Sources) -> None:
     inset.set_ylabel(r"$\Gamma_\mathrm{c}$", fontsize=7, labelpad=1)
 
 
+@styled
 def fig3(sources: Sources) -> Figure:
     """Velocity against asymmetry at Γ0 = 0.5."""
     table, case = sources.finished("fig3"), dimers.shipped()

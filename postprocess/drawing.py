@@ -2,20 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from inputs.errors import InputError, Problem
+from runner.files import beside
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STYLE = Path(__file__).parent / "style.mplstyle"
+_Given = ParamSpec("_Given")
+_Drawn = TypeVar("_Drawn")
+
+
+def styled(draw: Callable[_Given, _Drawn]) -> Callable[_Given, _Drawn]:
+    """Let a function draw in the project's style; the settings of whoever calls it are put back."""
+
+    @wraps(draw)
+    def drawn(*given: _Given.args, **options: _Given.kwargs) -> _Drawn:
+        import matplotlib.style
+
+        with matplotlib.style.context(_STYLE):
+            return draw(*given, **options)
+
+    return drawn
+
+
+def plain_text(text: str) -> str:
+    """A text of the user's as matplotlib shows it literally: a dollar begins no formula."""
+    return text.replace("$", r"\$")
 
 
 def new_figure(width: float, height: float, *, mosaic: Any = None, **options: Any) -> tuple[Figure, Any]:
-    """A figure in the project's style, without pyplot's global state.
+    """A figure without pyplot's global state, for functions that are `styled`.
 
     Parameters
     ----------
@@ -30,10 +52,8 @@ def new_figure(width: float, height: float, *, mosaic: Any = None, **options: An
     -------
     figure, axes
     """
-    import matplotlib.style
     from matplotlib.figure import Figure
 
-    matplotlib.style.use(_STYLE)
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, figure.subplots(**options) if mosaic is None else figure.subplot_mosaic(mosaic, **options)
 
@@ -81,8 +101,7 @@ def save_figure(
     written = []
     for form in formats:
         place = path.with_suffix(f".{form}")
-        beside = place.with_name(place.name + ".new")
-        figure.savefig(beside, format=form, metadata={**names, **extra[form]})
-        beside.replace(place)
+        with beside(place) as new:
+            styled(figure.savefig)(new, format=form, metadata={**names, **extra[form]})
         written.append(place)
     return written

@@ -9,7 +9,7 @@ import numpy as np
 
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
-from postprocess.drawing import new_figure, save_figure
+from postprocess.drawing import new_figure, plain_text, save_figure, styled
 from postprocess.gait import distance_walked, fit_slopes, gait
 from postprocess.trajectory import Trajectory, read_trajectory
 from templates.scene import vector_along
@@ -55,11 +55,12 @@ def _title(case: WalkerCase) -> str:
     gamma0 = dimer_of(case).gamma0(case.drive.peak_acceleration)
     first, second = (f"{radius * 1e3:g}" for radius in case.beads.radii)
     return (
-        f"{case.title or case.name}\nR = {first}/{second} mm, {case.drive.frequency:g} Hz, "
+        f"{plain_text(case.title or case.name)}\nR = {first}/{second} mm, {case.drive.frequency:g} Hz, "
         f"$a_0$ = {case.drive.peak_acceleration:.3g} m/s² ($\\Gamma_0$ = {gamma0:.3g})"
     )
 
 
+@styled
 def _walk_figure(trajectory: Trajectory) -> Figure:
     figure, axes = new_figure(7.6, 5.4, mosaic=[["strobe", "walked"], ["strobe", "turned"]], width_ratios=[1, 1.6])
     top, middle, bottom = axes["strobe"], axes["walked"], axes["turned"]
@@ -112,6 +113,7 @@ def _draw_strobe(axes: Axes, trajectory: Trajectory) -> None:
     axes.grid(visible=False)
 
 
+@styled
 def _gait_figure(trajectory: Trajectory) -> Figure:
     run = trajectory.case.run
     motion = gait(trajectory)

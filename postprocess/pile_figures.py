@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postprocess.drawing import new_figure, save_figure
+from postprocess.drawing import new_figure, plain_text, save_figure, styled
 from postprocess.pile_result import PileAnalysis, analyse
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def plot_pile(directory: Path, destination: Path | None = None) -> list[Path]:
     return save_figure(_climb_figure(analyse(directory)), place, [directory.name])
 
 
+@styled
 def _climb_figure(found: PileAnalysis) -> Figure:
     figure, axes = new_figure(7.6, 6.4, mosaic=[["height"], ["height"], ["index"], ["agitation"]], sharex=True)
     time, case = found.motion.time, found.motion.case
@@ -52,7 +53,7 @@ def _climb_figure(found: PileAnalysis) -> Figure:
         xlabel="time from the begin of the drive (s)", ylabel="mean square\nvelocity, strobed\n(m²/s²)"
     )
     figure.suptitle(
-        f"{case.title or case.name}\n{sum(case.beads.counts)} beads, {case.drive.frequency:g} Hz, "
+        f"{plain_text(case.title or case.name)}\n{sum(case.beads.counts)} beads, {case.drive.frequency:g} Hz, "
         f"{case.drive.peak_acceleration:.4g} m/s²",
         fontsize=10,
     )

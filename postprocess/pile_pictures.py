@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Generator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +13,11 @@ import numpy.typing as npt
 from inputs.errors import InputError, Problem, WalkersError
 from inputs.pile import PileCase
 from inputs.units import DURATION, parse_quantity
-from postprocess.drawing import check_picture, new_figure, save_figure
+from postprocess.drawing import check_picture, new_figure, save_figure, styled
 from postprocess.pile_result import PileAnalysis, analyse
 from postprocess.rendering import SideView
 from runner.directory import CASE_NAME
-from runner.files import read_json
+from runner.files import beside, read_json
 
 SERIES_NAME = "series.png"
 FILM_NAME = "pile.mp4"
@@ -31,6 +31,7 @@ _LEAST_WIDTH = 200
 """Pixels; on less the time has no room."""
 
 
+@styled
 def render_series(
     directory: Path, destination: Path | None = None, *, images: int = _SHOWN, apart: float | None = None
 ) -> list[Path]:
@@ -103,23 +104,18 @@ def render_film(directory: Path, destination: Path | None = None, *, slower: flo
     time = found.motion.time
     shown = range(found.motion.first_driven, len(time))
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.stem}.{os.getpid()}.mp4")
     pictures = _film(found, shown)
     first = next(pictures)
     rate = 1.0 / (float(np.median(np.diff(time[shown.start :]))) * slower) if len(shown) > 1 else 1.0
     size = (first.shape[1], first.shape[0])
-    writer = write_frames(beside, size, fps=rate, codec="libx264", quality=7, macro_block_size=2)
-    try:
+    with closing(pictures), beside(path) as new:
+        writer = write_frames(new, size, fps=rate, codec="libx264", quality=7, macro_block_size=2)
         writer.send(None)
         writer.send(np.ascontiguousarray(first))
         for picture in pictures:
             writer.send(np.ascontiguousarray(picture))
         writer.close()
-        _check_film(beside, len(shown))
-        beside.replace(path)
-    finally:
-        pictures.close()
-        beside.unlink(missing_ok=True)
+        _check_film(new, len(shown))
     return path
 
 

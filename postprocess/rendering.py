@@ -14,6 +14,7 @@ from postprocess.drawing import check_picture
 from postprocess.dump import FloatArray
 from postprocess.pile import PileMotion
 from postprocess.trajectory import Trajectory, read_trajectory
+from runner.files import beside
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -68,10 +69,9 @@ def render_run(
     trajectory = read_trajectory(directory)
     path.parent.mkdir(parents=True, exist_ok=True)
     plotter = _scene(trajectory, walker, images, size)
-    beside = path.with_name(f".{path.stem}.new.png")
-    plotter.screenshot(beside)
+    with beside(path) as new:
+        plotter.screenshot(new)
     plotter.close()
-    beside.replace(path)
     return path
 
 

@@ -5,13 +5,14 @@ Written with pyarrow alone (pandas takes a third of a second to import); read in
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+
+from runner.files import beside
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -165,16 +166,15 @@ def write_table(directory: Path, name: str, columns: Mapping[str, npt.NDArray[An
         pa.field(key, array.type, metadata={"unit": unit, "meaning": meaning})
         for (key, (unit, meaning)), array in zip(description.items(), arrays, strict=True)
     ]
-    beside = directory / f"{name}.parquet.{os.getpid()}.new"  # several may tabulate a run at once
     reals = [field.name for field in fields if pa.types.is_floating(field.type)]
-    pq.write_table(
-        pa.Table.from_arrays(arrays, schema=pa.schema(fields)),
-        beside,
-        compression="zstd",
-        use_dictionary=[field.name for field in fields if field.name not in reals],
-        use_byte_stream_split=reals,
-    )
-    beside.replace(directory / f"{name}.parquet")
+    with beside(directory / f"{name}.parquet") as new:
+        pq.write_table(
+            pa.Table.from_arrays(arrays, schema=pa.schema(fields)),
+            new,
+            compression="zstd",
+            use_dictionary=[field.name for field in fields if field.name not in reals],
+            use_byte_stream_split=reals,
+        )
 
 
 def intact(directory: Path, names: Iterable[str] = WALKER_TABLES) -> bool:

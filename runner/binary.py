@@ -67,6 +67,6 @@ def _identity(path: Path, _modified: int) -> str:
 
 
 def version_in(output: bytes) -> str | None:
-    """The version that the engine's banner names, such as ``LIGGGHTS-PUBLIC 3.8.0``."""
-    match = _BANNER.search(output[:4096])
+    """The version that a banner in the engine's output names, such as ``LIGGGHTS-PUBLIC 3.8.0``; None without one."""
+    match = _BANNER.search(output)
     return match.group(1).decode("utf-8", "replace").strip() if match else None

@@ -36,6 +36,7 @@ MANIFEST_NAME = "manifest.json"
 CASE_NAME = "case.json"
 FAILURE_NAME = "failure.json"
 UNFINISHED = ".part"
+REPLACED = ".replaced"
 _FORMAT = 1
 _LONGEST_NAME = 80
 
@@ -116,6 +117,7 @@ class OpenRun:
 def move_into_place(made: Path, place: Path) -> None:
     """Give a directory that has been made its name, safe on disk, in exchange for one that has it already."""
     settle(made)
+    recover(place)
     replaced = _aside(place)
     if place.exists():
         place.rename(replaced)
@@ -125,7 +127,7 @@ def move_into_place(made: Path, place: Path) -> None:
 
 
 def _aside(place: Path) -> Path:
-    return place.with_name(place.name + ".replaced")
+    return place.with_name(place.name + REPLACED)
 
 
 @contextmanager
@@ -185,9 +187,13 @@ def make_run(case: WalkerCase, deck: Deck, engine: Engine, place: Path, locks: S
 
 
 def recover(place: Path) -> None:
-    """Undo a replacement that was interrupted between its two renames."""
+    """Undo a replacement that was interrupted between its two renames; end one that was interrupted after them."""
     replaced = _aside(place)
-    if replaced.exists() and not place.exists():
+    if not replaced.exists():
+        return
+    if place.exists():
+        shutil.rmtree(replaced)
+    else:
         replaced.rename(place)
 
 

@@ -20,6 +20,7 @@ from runner.binary import Engine
 from runner.directory import (
     CASE_NAME,
     MANIFEST_NAME,
+    REPLACED,
     UNFINISHED,
     FinishedRun,
     manifest,
@@ -126,7 +127,7 @@ def finished_place(out: Path, name: str) -> Path | None:
     if (out / name / MANIFEST_NAME).is_file():
         return out / name
     try:
-        ensembles = [path for path in (out / FOLDER).iterdir() if path.suffix != UNFINISHED]
+        ensembles = [path for path in (out / FOLDER).iterdir() if path.suffix not in (UNFINISHED, REPLACED)]
     except FileNotFoundError:
         return None
     places = (ensemble / name for ensemble in ensembles if name in _runs_in(ensemble))
@@ -142,7 +143,9 @@ def _runs_in(ensemble: Path) -> frozenset[str]:
 def _folders(out: Path) -> list[Path]:
     try:
         with os.scandir(out) as entries:
-            return sorted(Path(entry) for entry in entries if entry.is_dir() and not entry.name.endswith(UNFINISHED))
+            return sorted(
+                Path(entry) for entry in entries if entry.is_dir() and not entry.name.endswith((UNFINISHED, REPLACED))
+            )
     except (FileNotFoundError, NotADirectoryError):
         return []
 

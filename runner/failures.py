@@ -58,6 +58,13 @@ class ProgramDiffers(EngineFailure):
         super().__init__(f"on {platform.node()} this program is another version than where the sweep was started")
 
 
+class EngineNeverStarted(EngineFailure):
+    """The engine ended before it named its version: nothing was done. It is tried again before this is raised."""
+
+    def __init__(self, last_words: str, directory: Path) -> None:
+        super().__init__(f"the engine never started: {last_words}", directory)
+
+
 class EngineError(EngineFailure):
     """The engine stopped with an ERROR line, or with a non-zero status and none. The line is quoted."""
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -51,9 +52,21 @@ def write_text(path: Path, text: str) -> None:
 
 def write_bytes(path: Path, contents: bytes) -> None:
     """Write a file."""
-    beside = path.with_name(f"{path.name}.{os.getpid()}.new")  # several may write it at once
-    with beside.open("wb") as file:
+    with beside(path) as new, new.open("wb") as file:
         file.write(contents)
         file.flush()
         os.fsync(file.fileno())
-    beside.replace(path)
+
+
+@contextmanager
+def beside(path: Path) -> Iterator[Path]:
+    """Yield a name beside a file's to write it under; it gets its own at the end, or goes if the block fails."""
+    # Several may write it at once; what writes pictures and films goes by the suffix.
+    new = path.with_name(f".{path.stem}.{os.getpid()}.new{path.suffix}")
+    try:
+        yield new
+        new.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            new.unlink(missing_ok=True)
+        raise

@@ -23,19 +23,25 @@ from runner.failures import (
     DiskFull,
     EngineError,
     EngineKilled,
+    EngineNeverStarted,
     EngineVersionWarning,
     MissingFrames,
     TimeLimitExceeded,
 )
 from templates.deck import DECK_NAME, OUTPUT_NAME, Deck
-from templates.engine import AUDITED_VERSION, POSITION_IS_NO_NUMBER, STEP_VARIABLES
+from templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, STEP_VARIABLES
 
 _POLL_SECONDS = 0.05
 # See templates.engine: without this the message of an abort is lost.
 _LINE_BUFFERED = ("stdbuf", "-oL")
 # The kernel ends the engine when whoever launched it dies, be it by SIGKILL.
 _MORTAL = ("setpriv", "--pdeathsig", "KILL")
+# Whoever died before that was asked of the kernel is not noticed by it: then the parent is another one by now.
+_UNLESS_ORPHAN = ("sh", "-c", '[ "$PPID" = "$0" ] && exec "$@"')
+_PAUSE_SECONDS = 0.2
 _GRACE_SECONDS = 2.0
+_CHUNK_BYTES = 1 << 20
+"""Read of the engine's output at once; a line is shorter."""
 _SPARE_BYTES = 64 * 1024
 _STATUS_LINE = re.compile(rb"^ *(\d+) +(\d+) +(\S+)((?: +[-+.\w]+){6}) *$", re.MULTILINE)
 _ERROR_LINE = re.compile(rb"^.*\bERROR\b.*$", re.MULTILINE)
@@ -70,6 +76,7 @@ def launch(
     on_progress: Callable[[Progress], None] | None = None,
     time_limit: float | None = None,
     keep_open: Sequence[int] = (),
+    starts: int = 3,
 ) -> EngineReport:
     """Run a deck that has been written into a directory, until its end or its first sign of failure.
 
@@ -87,6 +94,8 @@ def launch(
         Wall time in s after which the run is stopped.
     keep_open
         File descriptors that the engine inherits (the lock of the run).
+    starts
+        How often an engine is started that ends before it has done anything.
 
     Raises
     ------
@@ -94,6 +103,24 @@ def launch(
         One of the failures of `runner.failures`; the engine and its children have ended by then.
     """
     check_room(directory, deck.layout.bead_dump_bytes)
+    for left in reversed(range(starts)):
+        try:
+            return _launch_once(deck, directory, engine, on_progress, time_limit, keep_open)
+        except EngineNeverStarted:
+            if not left:
+                raise
+            time.sleep(_PAUSE_SECONDS)
+    raise ValueError("starts: expected at least 1")
+
+
+def _launch_once(
+    deck: Deck,
+    directory: Path,
+    engine: Engine,
+    on_progress: Callable[[Progress], None] | None,
+    time_limit: float | None,
+    keep_open: Sequence[int],
+) -> EngineReport:
     begin = time.perf_counter()
     watch = _Watch(deck, directory, begin)
     process = None
@@ -112,7 +139,7 @@ def launch(
         if process is not None:
             _end(process)
     wall_seconds = time.perf_counter() - begin
-    watch.look()
+    watch.end()
     watch.check(None)
     return _verdict(watch, process.returncode, wall_seconds)
 
@@ -127,6 +154,7 @@ def check_room(folder: Path, needed: int) -> None:
 def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]) -> subprocess.Popen[bytes]:
     # Unless told otherwise mpirun refuses root, more ranks than cores, and binds all decks to the same cores.
     mortal = _MORTAL if shutil.which(_MORTAL[0]) else ()
+    unless_orphan = (*_UNLESS_ORPHAN, str(os.getpid())) if mortal else ()
     parallel = (
         ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), *mortal]
         if ranks > 1
@@ -134,9 +162,9 @@ def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]
     )
     with (directory / OUTPUT_NAME).open("wb") as output:
         return subprocess.Popen(
-            [*mortal, *parallel, *_LINE_BUFFERED, str(engine.path), "-log", "none", "-in", DECK_NAME],
+            [*mortal, *unless_orphan, *parallel, *_LINE_BUFFERED, str(engine.path), "-log", "none", "-in", DECK_NAME],
             cwd=directory,
-            env={name: value for name, value in os.environ.items() if name not in STEP_VARIABLES},
+            env=_environment(ranks),
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=subprocess.STDOUT,
@@ -145,9 +173,14 @@ def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]
         )
 
 
+def _environment(ranks: int) -> dict[str, str]:
+    inherited = {name: value for name, value in os.environ.items() if name not in STEP_VARIABLES}
+    return inherited if ranks > 1 else {**inherited, **ALONE}
+
+
 @contextmanager
 def postponed_interrupts() -> Iterator[None]:
-    """Let SIGINT and SIGTERM take effect at the end of the block only.
+    """Let SIGINT, SIGTERM and SIGHUP take effect at the end of the block only.
 
     An exception out of `subprocess.Popen` would leave an engine behind that nobody knows of. Handlers are not inherited
     by the engine, as a mask of blocked signals would be.
@@ -158,7 +191,7 @@ def postponed_interrupts() -> Iterator[None]:
     caught: list[int] = []
     kept = {
         number: signal.signal(number, lambda number, _frame: caught.append(number))
-        for number in (signal.SIGINT, signal.SIGTERM)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     }
     try:
         yield
@@ -208,16 +241,20 @@ def complete_local_frames(path: Path) -> int:
 
 
 class _Watch:
-    """Reads the engine's output as it grows."""
+    """Reads the engine's output as it grows, and keeps of it what is asked for later."""
 
     def __init__(self, deck: Deck, directory: Path, begin: float) -> None:
         self.deck = deck
         self.directory = directory
         self.begin = begin
-        self.output = b""
         self.status: _Status | None = None
         self.failure: BlowUp | BeadsLost | None = None
-        self._parsed = 0
+        self.version: str | None = None
+        self.error: bytes | None = None
+        self.loop_seconds = math.nan
+        self.last_line = b""
+        self._read = 0
+        self._rest = b""
 
     @property
     def step(self) -> int:
@@ -231,14 +268,31 @@ class _Watch:
     def look(self) -> None:
         """Take in what the engine has written since the last look."""
         with (self.directory / OUTPUT_NAME).open("rb") as output:
-            output.seek(len(self.output))
-            self.output += output.read()
-        complete = self.output.rfind(b"\n") + 1
-        for match in _STATUS_LINE.finditer(self.output, self._parsed, complete):
+            output.seek(self._read)
+            while chunk := output.read(_CHUNK_BYTES):
+                self._read += len(chunk)
+                whole, newline, self._rest = (self._rest + chunk).rpartition(b"\n")
+                self._take_in(whole + newline)
+                if len(self._rest) > _CHUNK_BYTES:  # a line without end
+                    self._rest = b""
+
+    def end(self) -> None:
+        """Take in the last line, which may lack its end."""
+        self.look()
+        self._take_in(self._rest)
+
+    def _take_in(self, lines: bytes) -> None:
+        self.version = self.version or version_in(lines)
+        if self.error is None and (error := _ERROR_LINE.search(lines)):
+            self.error = error[0].strip()
+        for match in _STATUS_LINE.finditer(lines):
             status = _Status(int(match[1]), int(match[2]), float(match[3]), tuple(map(float, match[4].split())))
             self.failure = self.failure or self._judge(status)
             self.status = status
-        self._parsed = complete
+        if loops := _LOOP_TIME.findall(lines):
+            self.loop_seconds = float(loops[-1])
+        if words := lines.strip():
+            self.last_line = words.rsplit(b"\n", 1)[-1]
 
     def _judge(self, status: _Status) -> BlowUp | BeadsLost | None:
         """What a status line tells of the beads, given the one before."""
@@ -276,26 +330,28 @@ class _Watch:
 def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
     """Judge a run that has ended: raise its failure or report what it took."""
     layout, directory = watch.deck.layout, watch.directory
-    errors = _ERROR_LINE.findall(watch.output)
-    if errors:
-        line = errors[0].decode("utf-8", "backslashreplace").strip()
-        if POSITION_IS_NO_NUMBER in line:
+    if status > 0 and watch.version is None and not (watch.error or b"").startswith(b"ERROR"):
+        raise EngineNeverStarted(f"exit status {status}, last words: {_text(watch.last_line)}", directory)
+    if watch.error is not None:
+        if POSITION_IS_NO_NUMBER.encode() in watch.error:
             raise BlowUp(math.nan, watch.deck.fastest, watch.step, directory)
-        raise EngineError(line, directory)
+        raise EngineError(_text(watch.error), directory)
     if status < 0:
         raise EngineKilled(-status, directory)
     if status > 0:
-        last = watch.output.rstrip().rsplit(b"\n", 1)[-1].decode("utf-8", "backslashreplace")
-        raise EngineError(f"exit status {status}, last words: {last}", directory)
+        raise EngineError(f"exit status {status}, last words: {_text(watch.last_line)}", directory)
     if watch.written != layout.bead_dump_bytes:
         raise MissingFrames(watch.written / layout.bead_dump_bytes * layout.frames, layout.frames, directory)
     for name in (layout.pair_bridge_dump, layout.wall_bridge_dump):
         found = complete_local_frames(directory / name)
         if found != layout.bridge_frames:
             raise MissingFrames(found, layout.bridge_frames, directory)
-    version = version_in(watch.output) or "unknown"
+    version = watch.version or "unknown"
     if version != AUDITED_VERSION:
         message = f"the engine is {version}; the decks' remedies were measured on {AUDITED_VERSION}"
-        warnings.warn(message, EngineVersionWarning, stacklevel=3)
-    loop = _LOOP_TIME.findall(watch.output)
-    return EngineReport(version, wall_seconds, float(loop[-1]) if loop else math.nan, layout.steps)
+        warnings.warn(message, EngineVersionWarning, stacklevel=4)
+    return EngineReport(version, wall_seconds, watch.loop_seconds, layout.steps)
+
+
+def _text(line: bytes) -> str:
+    return line.decode("utf-8", "backslashreplace")

@@ -1,20 +1,26 @@
 """Locks on run directories: a file beside each, locked while the run is made.
 
 The lock is the kernel's (``flock``): it ends with the last process that has the file open, however that ends. Engines
-inherit it, so that one which outlives its launcher keeps others away from the directory that it writes into.
+inherit it, so that one which outlives its launcher keeps others away from the directory that it writes into; it does so
+for moments only, for the kernel ends it with its launcher. Who meets such a lock waits that long.
 """
 
 from __future__ import annotations
 
 import fcntl
 import os
+import platform
 import time
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 _SUFFIX = ".lock"
 _LOOK_SECONDS = 0.005
+_PATIENCE_SECONDS = 10.0
+"""How long the lock of an owner that has ended is waited for; its engines end within a fraction of a second."""
+_SILENT_SECONDS = 0.5
 
 
 def _lock_file(place: Path) -> Path:
@@ -24,6 +30,8 @@ def _lock_file(place: Path) -> Path:
 @contextmanager
 def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
     """Lock those of the places that nobody else has locked.
+
+    A lock whose owner has ended is waited for, ten seconds in all: the owner's engines are just ending.
 
     Parameters
     ----------
@@ -36,10 +44,11 @@ def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
         From the places that are ours until the end of the block to the descriptors of their lock files.
     """
     ours: dict[Path, int] = {}
+    patience = _Patience()
     try:
         # In the order of their names, so that of two who want the same places one gets them rather than each a half.
         for place in sorted(set(places)):
-            descriptor = _lock(_lock_file(place))
+            descriptor = _lock(_lock_file(place), patience)
             if descriptor is not None:
                 ours[place] = descriptor
         yield ours
@@ -49,24 +58,71 @@ def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
             os.close(descriptor)
 
 
-def _lock(file: Path) -> int | None:
+class OrphanLockWarning(UserWarning):
+    """A run is still locked by what is left of a killed one."""
+
+
+class _Patience:
+    """How long locks of owners that have ended are waited for, all together."""
+
+    def __init__(self) -> None:
+        self.begin: float | None = None
+        self.told = False
+
+    def is_left(self, file: Path) -> bool:
+        """Whether to wait on; says so once."""
+        now = time.monotonic()
+        if self.begin is None:
+            self.begin = now
+        if now - self.begin > _SILENT_SECONDS and not self.told:
+            self.told = True
+            message = f"waiting for what is left of a run that was killed ({file})"
+            warnings.warn(message, OrphanLockWarning, stacklevel=6)
+        return now - self.begin < _PATIENCE_SECONDS
+
+
+def _lock(file: Path, patience: _Patience) -> int | None:
     """Lock a file that others may be removing at this moment: the lock counts only on the file that has the name."""
-    patience = 1  # somebody who only looks (`is_locked`) is gone again by then
+    looks = 2  # somebody who only looks (`is_locked`) is gone again by then
     while True:
         descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if os.path.samestat(os.fstat(descriptor), file.stat()):
+                _sign(descriptor)
                 return descriptor
         except BlockingIOError:
-            if not patience:
+            looks -= 1
+            if looks <= 0 and not (_owner_has_ended(descriptor) and patience.is_left(file)):
                 os.close(descriptor)
                 return None
-            patience -= 1
             time.sleep(_LOOK_SECONDS)
         except FileNotFoundError:
             pass
         os.close(descriptor)
+
+
+def _sign(descriptor: int) -> None:
+    """Say in a lock file who has it: machine, process, time."""
+    os.ftruncate(descriptor, 0)
+    os.pwrite(descriptor, f"{platform.node()} {os.getpid()} {time.time():.3f}".encode(), 0)
+
+
+def _owner_has_ended(descriptor: int) -> bool:
+    """Whether the process that has a lock file is known to be none any more: only its engines keep the lock."""
+    import psutil
+
+    signature = os.pread(descriptor, 1000, 0).decode("utf-8", "replace").split()
+    if len(signature) != 3 or signature[0] != platform.node():
+        return False
+    try:
+        owner = psutil.Process(int(signature[1]))
+        # A number that was given to another process since, or a process that nobody has buried yet.
+        return owner.create_time() > float(signature[2]) + 1.0 or owner.status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True
+    except (psutil.Error, ValueError):
+        return False
 
 
 def is_locked(place: Path) -> bool:
