@@ -104,10 +104,20 @@ class BinaryDump:
         return _Frame(start, step, rows, columns, tuple(blocks)), offset
 
     def frame(self, number: int) -> FloatArray:
-        """One frame, shape (rows, columns)."""
+        """One frame, shape (rows, columns).
+
+        Raises
+        ------
+        DumpError
+            If it holds a NaN or an infinity: the engine goes on with them and says nothing.
+        """
         frame = self._frames[number]
         parts = [self._bytes[start : start + 8 * count].view(np.float64) for start, count in frame.blocks]
-        return np.concatenate(parts).reshape(frame.rows, frame.columns)
+        values = np.concatenate(parts).reshape(frame.rows, frame.columns)
+        if not np.isfinite(values).all():
+            column = self.columns[int(np.flatnonzero(~np.isfinite(values).all(axis=0))[0])]
+            raise DumpError(f"{self.path}: {column} is no number at step {frame.step}: the beads' motion blew up")
+        return values
 
     def stack(self) -> FloatArray:
         """All frames, shape (frames, rows, columns).
@@ -115,7 +125,7 @@ class BinaryDump:
         Raises
         ------
         DumpError
-            If the number of rows changes.
+            If the number of rows changes, or a number is none.
         """
         if not self._frames:
             return np.empty((0, 0, len(self.columns)))

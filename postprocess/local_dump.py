@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from postprocess.dump import DumpError, FloatArray
+
+_HEADER_LINES = 9
 
 
 def read_local_dump(path: Path, columns: tuple[str, ...]) -> tuple[npt.NDArray[np.int64], FloatArray]:
@@ -25,28 +29,64 @@ def read_local_dump(path: Path, columns: tuple[str, ...]) -> tuple[npt.NDArray[n
     steps : ndarray of int64, shape (rows,)
         Step of each row's frame.
     rows : ndarray, shape (rows, columns)
-        An incomplete last frame gives the rows that are complete.
 
     Raises
     ------
     DumpError
-        If the file is not such a dump.
+        As for `local_frames`.
     """
-    lines = path.read_text("ascii", errors="replace").split("\n")
-    steps: list[int] = []
-    rows: list[list[float]] = []
-    position = 0
-    while position + 9 <= len(lines) and lines[position].startswith("ITEM: TIMESTEP"):
-        try:
-            step, count = int(lines[position + 1]), int(lines[position + 3])
-        except ValueError as error:
-            raise DumpError(f"{path}: no header at line {position + 1}") from error
-        body = lines[position + 9 : position + 9 + count]
-        values = [[float(word) for word in line.split()] for line in body]
-        complete = [row for row in values if len(row) == len(columns)]
-        rows += complete
-        steps += [step] * len(complete)
-        position += 9 + count
-    if position == 0 and any(line.strip() for line in lines):
-        raise DumpError(f"{path}: not a local dump")
-    return np.array(steps, dtype=np.int64), np.array(rows, dtype=np.float64).reshape(len(rows), len(columns))
+    frames = list(local_frames(path, columns))
+    steps = np.repeat(
+        np.array([step for step, _ in frames], dtype=np.int64), [len(rows) for _, rows in frames] if frames else 0
+    )
+    return steps, np.concatenate([np.empty((0, len(columns))), *(rows for _, rows in frames)])
+
+
+def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, FloatArray]]:
+    """Step and rows of each frame of a local dump, one by one.
+
+    Parameters
+    ----------
+    path
+        The text file.
+    columns
+        Names of its columns.
+
+    Yields
+    ------
+    step : int
+    rows : ndarray, shape (rows, columns)
+
+    Raises
+    ------
+    DumpError
+        If the file is not such a dump, ends within a frame, or holds a NaN or an infinity.
+    """
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise DumpError(f"{path}: cannot be read ({error.strerror})") from error
+    with file:
+        while line := file.readline():
+            head = [line, *(file.readline() for _ in range(_HEADER_LINES - 1))]
+            if head[0] != b"ITEM: TIMESTEP\n":
+                raise DumpError(f"{path}: not a local dump")
+            try:
+                step, count = int(head[1]), int(head[3])
+            except ValueError as error:
+                raise DumpError(f"{path}: no header of a frame, or a part of one") from error
+            body = [file.readline() for _ in range(count)]
+            if not head[-1].endswith(b"\n") or (body and not body[-1].endswith(b"\n")):
+                raise DumpError(f"{path}: ends within the frame of step {step}")
+            yield step, _rows(path, step, body, len(columns))
+
+
+def _rows(path: Path, step: int, body: list[bytes], columns: int) -> FloatArray:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # where it meets no number it stops, which its length tells
+        values = np.fromstring(b"".join(body), dtype=np.float64, sep=" ")
+    if len(values) != len(body) * columns:
+        raise DumpError(f"{path}: expected {columns} columns in the frame of step {step}")
+    if not np.isfinite(values).all():
+        raise DumpError(f"{path}: a NaN or an infinity in the frame of step {step}")
+    return values.reshape(len(body), columns)

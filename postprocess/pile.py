@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from inputs.pile import PileCase
 from postprocess.dump import BinaryDump, DumpError, FloatArray
+from postprocess.local_dump import local_frames
 from runner.directory import CASE_NAME
 from runner.files import read_json
 from runner.parts import PART_NAME, part_directories
@@ -19,7 +20,6 @@ from templates.deck import LAYOUT_NAME
 from templates.layout import Layout
 
 IntArray = npt.NDArray[np.int64]
-_HEAD_LINES = 9
 FLOOR = 0
 """Number of the floor among the walls; the others are the side walls."""
 _WALLS = {"box": ("floor", "-x", "+x", "-y", "+y"), "cylinder": ("floor", "side")}
@@ -179,10 +179,10 @@ def read_bridges(motion: PileMotion) -> Iterator[Bridges]:
     for part in dict.fromkeys(part for part, _ in motion.frames):
         wanted = [number for place, number in motion.frames if place == part]
         layout = Layout.from_dict(read_json(part / LAYOUT_NAME))
-        pairs = _local_frames(part / layout.pair_bridge_dump, len(layout.pair_bridge_columns))
-        walls = _local_frames(part / layout.wall_bridge_dump, len(layout.wall_bridge_columns))
+        pairs = local_frames(part / layout.pair_bridge_dump, layout.pair_bridge_columns)
+        walls = local_frames(part / layout.wall_bridge_dump, layout.wall_bridge_columns)
         pair, wall = layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
-        for number, (between, against) in enumerate(zip(pairs, walls, strict=False)):
+        for number, ((_, between), (_, against)) in enumerate(zip(pairs, walls, strict=False)):
             if number not in wanted:
                 continue
             frame += 1
@@ -200,25 +200,3 @@ def read_bridges(motion: PileMotion) -> Iterator[Bridges]:
             arm = motion.position[frame, ids[:, 1]] - motion.position[frame, ids[:, 0]]
             pull = np.einsum("kx,kx->k", force[real], arm) / np.linalg.norm(arm, axis=1)
             yield Bridges(ids, pull, gap, on_wall[:, 0] - motion.first_id, on_wall[:, 1])
-
-
-def _local_frames(path: Path, columns: int) -> Iterator[FloatArray]:
-    """Rows of each frame of a local dump, shape (rows, columns)."""
-    try:
-        file = path.open("rb")
-    except OSError as error:
-        raise DumpError(f"{path}: cannot be read ({error.strerror})") from error
-    with file:
-        while line := file.readline():
-            if not line.startswith(b"ITEM: TIMESTEP"):
-                raise DumpError(f"{path}: not a local dump")
-            head = [file.readline() for _ in range(_HEAD_LINES - 1)]
-            try:
-                count = int(head[2])
-            except ValueError as error:
-                raise DumpError(f"{path}: no header") from error
-            body = b"".join(file.readline() for _ in range(count))
-            values = np.fromstring(body, dtype=np.float64, sep=" ")
-            if len(values) != count * columns:
-                raise DumpError(f"{path}: a frame of {count} rows is incomplete")
-            yield values.reshape(count, columns)

@@ -21,24 +21,17 @@ def describe_result(directory: Path, result: dict[str, Any], *, found: bool = Fa
     found
         Whether the run was there before.
     """
-    velocity, rotation, turned = result["velocity"], result["rotation"], result["orientation_end"]
-    error = velocity["standard_error"]
-    count = velocity["n"]
-    of_what = f"over {count} walkers" if count > 1 else "of the fit"
-    doubt = f" (standard error {_speed(error)} {of_what})" if error is not None else ""
-    toward = "toward the large bead" if result["sin_delta"] else "toward bead 1"
-    ways = ("up", "down") if result.get("kind") == "climber" else ("right", "left")  # older results have no kind
-    steady = f"{result['steady']} of {result['walkers']} steady"
+    rotation, end = result["rotation"], result["orientation_end"]
+    drive = (
+        f"{result['frequency']:g} Hz, a0 = {result['peak_acceleration']:.4g} m/s², "
+        f"Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}" + (" (already run)" if found else "")
+    )
     sliding = ", ".join(f"{name} {_speed(result['sliding'][contact])}" for contact, name in _CONTACTS.items())
     lines = [
-        f"{result['case']}: {result['frequency']:g} Hz, a0 = {result['peak_acceleration']:.4g} m/s², "
-        f"Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}" + (" (already run)" if found else ""),
-        f"  velocity   {_speed(velocity['mean'])} mm/s, positive {toward}{doubt}",
-        f"    smallest {_speed(velocity['smallest'])}, largest {_speed(velocity['largest'])}; {steady}",
-        f"    started facing {ways[0]} {_side(result['right_facing'])}, {ways[1]} {_side(result['left_facing'])}",
+        *(_of_turned(result, drive) if result["turned_round"] else _of_walkers(result, drive)),
         f"  rotation   bead 1 {_speed(rotation['bead_1'])}, bead 2 {_speed(rotation['bead_2'])} mm/s",
         f"  sliding    {sliding} mm/s",
-        f"  orientation at the end {degrees(turned['smallest']):.2f}° to {degrees(turned['largest']):.2f}°",
+        f"  orientation at the end {degrees(end['smallest']):.2f}° to {degrees(end['largest']):.2f}°",
     ]
     if any(result["open"].values()):
         shares = ", ".join(f"{name} {100 * result['open'][contact]:.1f} %" for contact, name in _CONTACTS.items())
@@ -46,6 +39,43 @@ def describe_result(directory: Path, result: dict[str, Any], *, found: bool = Fa
     lines += [f"  warning: {warning}" for warning in _warnings(result)]
     lines.append(f"  run        {directory}")
     return "\n".join(lines)
+
+
+def _of_walkers(result: dict[str, Any], drive: str) -> list[str]:
+    """How fast walkers are that kept their heading."""
+    velocity = result["velocity"]
+    error, count = velocity["standard_error"], velocity["n"]
+    of_what = f"over {count} walkers" if count > 1 else "of the fit"
+    doubt = f" (standard error {_speed(error)} {of_what})" if error is not None else ""
+    toward = "toward the large bead" if result["sin_delta"] else "toward bead 1"
+    ways = ("up", "down") if result["kind"] == "climber" else ("right", "left")
+    return [
+        f"{result['case']}: {drive}",
+        f"  velocity   {_speed(velocity['mean'])} mm/s, positive {toward}{doubt}",
+        f"    smallest {_speed(velocity['smallest'])}, largest {_speed(velocity['largest'])}; {_steady(result)}",
+        f"    started facing {ways[0]} {_side(result['right_facing'])}, {ways[1]} {_side(result['left_facing'])}",
+    ]
+
+
+def _of_turned(result: dict[str, Any], drive: str) -> list[str]:
+    """What became of walkers of which some turned by more than 90°: a velocity along their heading says nothing."""
+    axial, kept = result["axial_velocity"], result["kept_heading"]
+    climber = result["kind"] == "climber"
+    what, (first, second) = ("over", ("up", "down")) if climber else ("round", ("right", "left"))
+    return [
+        f"{result['case']}: {result['turned_round']} of {result['walkers']} turned {what}, "
+        f"axial velocity {_speed(axial['mean'])} mm/s",
+        f"  drive      {drive}",
+        f"  axial velocity, positive {'up' if climber else 'to the right'}: started facing {first} "
+        f"{_speed(axial['right_facing'])}, {second} {_speed(axial['left_facing'])} mm/s; {_steady(result)}",
+        f"  velocity   of the {kept['n']} others {_speed(kept['mean'])} mm/s, along their heading"
+        if kept["n"]
+        else "  velocity   none: no walker kept its heading",
+    ]
+
+
+def _steady(result: dict[str, Any]) -> str:
+    return f"{result['steady']} of {result['walkers']} steady"
 
 
 def _speed(value: float | None) -> str:
@@ -63,11 +93,6 @@ def _warnings(result: dict[str, Any]) -> list[str]:
     warnings = []
     if result["steady"] < result["walkers"]:
         warnings.append("some walkers are not steady: the velocity depends on the length of the run")
-    if result["turned_round"]:
-        warnings.append(
-            f"{result['turned_round']} of {result['walkers']} walkers turned by more than 90°: "
-            "their velocity follows the heading, not the drive axis"
-        )
     if result["walkers_met"]:
         warnings.append("walkers came close to each other and are not independent: give them more start.spacing")
     if result["truncated"]:

@@ -66,7 +66,7 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     directory = Path(directory)
     try:
         result = read_result(directory)
-        if result.keys() >= {"velocity", "walkers", "gamma0", "parted"} and intact(directory):
+        if result.keys() >= {"velocity", "walkers", "gamma0", "parted", "kept_heading"} and intact(directory):
             return result
     except (OSError, ValueError):
         pass
@@ -139,6 +139,7 @@ def _spread(values: FloatArray, error_of_one: float = nan) -> dict[str, Any]:
 def _result(trajectory: Trajectory, walkers: Columns) -> dict[str, Any]:
     case = trajectory.case
     velocity, facing = walkers["velocity"], walkers["facing"]
+    turned = np.abs(trajectory.orientation).max(axis=0) > np.pi / 2.0
     return {
         "case": case.name,
         "kind": case.kind,
@@ -146,7 +147,9 @@ def _result(trajectory: Trajectory, walkers: Columns) -> dict[str, Any]:
         "velocity": _spread(velocity, float(walkers["standard_error"][0])),
         "right_facing": _spread(velocity[facing > 0]),
         "left_facing": _spread(velocity[facing < 0]),
+        "kept_heading": _spread(velocity[~turned]),
         "axial_velocity": {
+            "mean": _mean(walkers["axial_velocity"]),
             "right_facing": _mean(walkers["axial_velocity"][facing > 0]),
             "left_facing": _mean(walkers["axial_velocity"][facing < 0]),
         },
@@ -156,7 +159,7 @@ def _result(trajectory: Trajectory, walkers: Columns) -> dict[str, Any]:
         "parted": _mean(walkers["parted"]),
         "orientation_end": _spread(walkers["orientation_end"]),
         "steady": int(np.sum(walkers["steady"])),
-        "turned_round": int(np.sum(np.abs(trajectory.orientation).max(axis=0) > np.pi / 2.0)),
+        "turned_round": int(np.sum(turned)),
         "walkers": len(velocity),
         "walkers_met": walkers_met(trajectory),
         "truncated": trajectory.truncated,

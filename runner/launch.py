@@ -29,7 +29,7 @@ from runner.failures import (
     TimeLimitExceeded,
 )
 from templates.deck import DECK_NAME, OUTPUT_NAME, Deck
-from templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, STEP_VARIABLES
+from templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, RANKS, STEP_VARIABLES
 
 _POLL_SECONDS = 0.05
 # See templates.engine: without this the message of an abort is lost.
@@ -175,7 +175,7 @@ def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]
 
 def _environment(ranks: int) -> dict[str, str]:
     inherited = {name: value for name, value in os.environ.items() if name not in STEP_VARIABLES}
-    return inherited if ranks > 1 else {**inherited, **ALONE}
+    return {**inherited, **(RANKS if ranks > 1 else ALONE)}
 
 
 @contextmanager

@@ -119,7 +119,8 @@ def _text_of_dimer(summary: dict[str, Any]) -> str:
     return (
         f"dimer      M = {dimer['total_mass'] * 1e6:.4g} mg, mean radius {dimer['mean_radius'] * 1e3:.4g} mm, "
         f"sin δ = {dimer['sin_delta']:.4g}, μ = {dimer['mass_asymmetry']:.4g}{softened}\n"
-        f"drive      a0 = {summary['case']['drive']['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g, "
+        f"drive      a0 = {summary['case']['drive']['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g "
+        f"(the paper's, {ACCELERATION_OF_ONE_G:g} m/s²; gravity is {summary['case']['gravity']:g} m/s²), "
         f"Γ0 = {dimer['gamma0']:.4g}, amplitude {dimer['amplitude'] * 1e3:.4g} mm, "
         f"peak velocity {dimer['peak_velocity'] * 1e3:.4g} mm/s{order}"
     )

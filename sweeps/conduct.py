@@ -108,14 +108,15 @@ class Progress:
 
 
 _WORST_FIRST = (
-    *("EngineMissing", "EngineDiffers", "DiskFull"),  # these threaten all other points
+    *("EngineMissing", "EngineDiffers", "ProgramDiffers", "DiskFull", "EngineNeverStarted"),  # threaten all points
     *("EngineError", "MissingFrames", "EngineKilled"),
-    *("BlowUp", "BeadsLost", "TimeLimitExceeded"),
+    "",  # what is not in this list
+    *("BlowUp", "BeadsLost", "WalkersMet", "TimeLimitExceeded", "RunBusy"),
 )
 
 
 def _mildness(failure: Failure) -> int:
-    return _WORST_FIRST.index(failure.reason) if failure.reason in _WORST_FIRST else -1
+    return _WORST_FIRST.index(failure.reason if failure.reason in _WORST_FIRST else "")
 
 
 @dataclass(eq=False)
@@ -196,9 +197,9 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[_Workers]:
     """Start Parsl; at the end its workers and their engines have ended, however the block is left."""
     import parsl
 
+    folder = record.directory / "parsl"
     sweep = uuid4().hex
     stop = STOPS[sweep] = threading.Event()
-    folder = record.directory / "parsl"
     config = threads(options.workers, folder) if options.site is None else pilots(options.site, folder)
     try:
         kernel = parsl.DataFlowKernel(config)

@@ -13,6 +13,7 @@ from sweeps.conduct import Failure, Options, Progress, conduct, final_failures
 from sweeps.kinds import ranks_of, seconds_of
 from sweeps.packing import PlannedDeck, makespan, pack, unfinished_parts
 from sweeps.record import SweepRecord, describe_sweep, states, write_record
+from sweeps.site import check_path
 from sweeps.together import check_audit
 
 _SETTLED = ("finished", "not needed")
@@ -99,7 +100,7 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     Raises
     ------
     InputError
-        If a point cannot be used.
+        If a point cannot be used, or a cluster's shell would not take the folder for one.
     runner.EngineFailure
         If there is no engine.
     """
@@ -107,6 +108,8 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     cases = list(sweep.cases())
     options = options.for_ranks(max(map(ranks_of, cases)))
     record = describe_sweep(sweep, cases, binary, out)
+    if options.site is not None:
+        check_path(record.directory)
     found = states(record)
     statuses = [state.status for state in found]
     final = final_failures(record, found, options)

@@ -14,11 +14,13 @@ from __future__ import annotations
 
 import inspect
 import os
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -56,6 +58,7 @@ _SCHEDULERS = {
 """Names of our own; the class names of Parsl's other providers are taken as they are."""
 
 
+_ODD = re.compile(r"[^\w./+@%=,:-]")
 MOST = 10_000
 """Of anything that a site file counts."""
 
@@ -177,6 +180,20 @@ def _launchers() -> Mapping[str, str]:
     return {name.removesuffix("Launcher").lower(): name for name in parsl.launchers.__all__ if name[:4] != "Wrap"}
 
 
+def check_path(folder: Path) -> None:
+    """Refuse a folder that Parsl's shell scripts would take for something else: it writes paths into them as they are.
+
+    Raises
+    ------
+    InputError
+        If there is a space, a quote, a dollar or the like in the whole path.
+    """
+    whole = str(folder.resolve())
+    if odd := _ODD.search(whole):
+        told = f"with a site file expected letters, digits and . _ / + @ % = , : - in the path, found {odd[0]!r}"
+        raise InputError("--out", [Problem("", None, f"{whole!r}: {told}")])
+
+
 def threads(workers: int, run_dir: Path) -> Config:
     """Parsl's configuration for so many decks at once on this machine: threads, no server, no open port."""
     from parsl.config import Config
@@ -241,5 +258,5 @@ def _as_tuples(table: Mapping[str, Any]) -> dict[str, Any]:
 
 def _worker_init(file: SiteFile) -> str:
     """Shell lines before the workers: the modules, the site's own lines, and this Python first on the path."""
-    modules = [f"module load {name}" for name in file.modules]
-    return "\n".join([*modules, *file.shell, f'export PATH="{Path(sys.executable).parent}:$PATH"'])
+    modules = [f"module load {quote(name)}" for name in file.modules]
+    return "\n".join([*modules, *file.shell, f'export PATH={quote(str(Path(sys.executable).parent))}:"$PATH"'])

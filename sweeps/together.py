@@ -12,7 +12,7 @@ from inputs.pile import PileCase
 from inputs.reading import AnyCase
 from runner.audits import read_audit
 from runner.binary import Engine
-from runner.directory import FinishedRun, finished_run, make_run, run_place
+from runner.directory import FinishedRun, finished_run, make_run, recover, run_place
 from runner.ensemble import finished_place, make_ensemble
 from runner.failures import AuditFailed, RunBusy, UnauditedEngineWarning
 from runner.launch import Progress, launch
@@ -77,6 +77,8 @@ def make_together(
     out.mkdir(parents=True, exist_ok=True)
     places = {run_place(case, engine, out): case for case in cases}
     with locked(places) as ours:
+        for place in ours:
+            recover(place)
         runs = {} if force else {place.name: run for place in places if (run := _finished(out, place.name))}
         busy = frozenset(place.name for place in places if place not in ours and place.name not in runs)
         missing = {place: case for place, case in places.items() if place in ours and place.name not in runs}

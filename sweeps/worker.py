@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,7 +11,7 @@ from pathlib import Path
 from inputs.errors import Stopped, WalkersError
 from inputs.reading import AnyCase
 from runner.binary import find_engine
-from runner.failures import EngineDiffers, EngineFailure, ProgramDiffers
+from runner.failures import DiskFull, EngineDiffers, EngineFailure, ProgramDiffers
 from sweeps.kinds import current_result_of, place_of, velocity_in
 from sweeps.together import make_any
 
@@ -89,7 +90,11 @@ def work(task: Task) -> Report:
     except EngineFailure as failure:
         directory = str(failure.directory) if failure.directory else None
         return Report(failure=failure.reason, message=str(failure), directory=directory)
-    except (WalkersError, OSError) as error:
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return Report(failure=DiskFull.__name__, message=f"disk full: {error.filename or task.out}")
+        return Report(failure=type(error).__name__, message=str(error))
+    except WalkersError as error:
         return Report(failure=type(error).__name__, message=str(error))
 
 

@@ -1,10 +1,12 @@
-"""The program ``walkers``. Exit status: 0 done, 1 a run failed, 2 bad input, 130 interrupted, 143 terminated."""
+"""The program ``walkers``. Exit status: 0 done, 1 a run failed, 2 bad input, 130 interrupted, 143 or 129 terminated."""
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import warnings
+from io import TextIOWrapper
 from types import FrameType
 from typing import Any, NoReturn, TextIO
 
@@ -61,18 +63,42 @@ INTERRUPTED = 130
 
 
 class _Terminated(BaseException):
-    """SIGTERM, as an exception so that engines are stopped on the way out."""
+    """SIGTERM, or SIGHUP of a terminal that is closed, as an exception: engines are stopped on the way out."""
+
+    def __init__(self, number: int) -> None:
+        self.status = 128 + number
+        super().__init__("terminated" if number == signal.SIGTERM else "the terminal was closed")
 
 
-def _on_sigterm(_number: int, _frame: FrameType | None) -> NoReturn:
-    raise _Terminated
+def _on_signal(number: int, _frame: FrameType | None) -> NoReturn:
+    raise _Terminated(number)
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run the program and exit."""
-    signal.signal(signal.SIGTERM, _on_sigterm)
+    signal.signal(signal.SIGTERM, _on_signal)
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
+        signal.signal(signal.SIGHUP, _on_signal)
+    _open_streams()
     warnings.showwarning = _show_warning
     sys.exit(_status(arguments))
+
+
+def _open_streams() -> None:
+    """Give the program the streams that it was started without, and let none fail on a character.
+
+    A file that is opened later would get the number of a closed stream, and what is printed would go into it.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
+    sys.stdout = sys.stdout or open(1, "w", closefd=False)  # noqa: SIM115
+    sys.stderr = sys.stderr or open(2, "w", closefd=False)  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _show_warning(
@@ -88,28 +114,36 @@ def _show_warning(
 
 
 def _status(arguments: list[str] | None) -> int:
-    from inputs.errors import InputError, WalkersError
-
+    """Run the program: its exit status. What is not known to happen is raised."""
     try:
         outcome: Any = app(arguments, standalone_mode=False)
-    except (WalkersError, KeyboardInterrupt, typer.Abort, _Terminated) as stop:
-        statuses = ((InputError, 2), (WalkersError, 1), (_Terminated, 143), (BaseException, INTERRUPTED))
-        status = next(status for kind, status in statuses if isinstance(stop, kind))
-        return _tell(str(stop) or {143: "terminated", INTERRUPTED: "interrupted"}[status], status)
-    except BrokenPipeError:  # the reader of our output has had enough
-        sys.stderr.close()
-        return 0
-    except OSError as error:  # a path that was given cannot be read or written
-        return _tell(f"{error.filename}: {error.strerror}" if error.filename else str(error), 2)
-    except Exception as error:
-        # Typer's usage errors know how to show themselves and which status they are.
-        if not hasattr(error, "show") or not hasattr(error, "exit_code"):
-            raise
-        error.show()
-        return int(error.exit_code)
+        sys.stdout.flush()
+    except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
+        return _told(stop)
     if outcome == INTERRUPTED:  # typer turns Ctrl-C into a status
         return _tell("interrupted", INTERRUPTED)
     return outcome if isinstance(outcome, int) else 0
+
+
+def _told(stop: BaseException) -> int:
+    """Tell why the program stopped; the exit status of that."""
+    from inputs.errors import InputError, WalkersError
+
+    known = ((InputError, 2), (WalkersError, 1), (KeyboardInterrupt, INTERRUPTED), (typer.Abort, INTERRUPTED))
+    status = stop.status if isinstance(stop, _Terminated) else next((s for k, s in known if isinstance(stop, k)), None)
+    if status is not None:
+        return _tell(str(stop) or "interrupted", status)
+    # Click ends so where nobody reads what is printed; it is no failure that the reader has had enough.
+    if isinstance(stop if isinstance(stop, OSError) else stop.__context__, BrokenPipeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 0
+    if isinstance(stop, OSError):  # a path that was given cannot be read or written
+        return _tell(f"{stop.filename}: {stop.strerror}" if stop.filename else str(stop), 2)
+    # Typer's usage errors know how to show themselves and which status they are.
+    if hasattr(stop, "show") and hasattr(stop, "exit_code"):
+        stop.show()
+        return int(stop.exit_code)
+    raise stop
 
 
 def _tell(message: str, status: int) -> int:
