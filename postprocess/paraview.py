@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Mapping
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 
 FOLDER_NAME = "vtk"
 COLLECTION_NAME = "walkers.pvd"
+_END_OF_VTK = b"</VTKFile>\n"
 
 
 def write_vtk(
@@ -101,20 +104,40 @@ def write_series(destination: Path, name: str, frames: Iterable[Frame], *, vtu: 
     _check_replaceable(place)
     place.parent.mkdir(parents=True, exist_ok=True)
     beside = Path(tempfile.mkdtemp(prefix=f".{place.name}-", dir=place.parent))
-    beside.chmod(0o755)
-    entries: list[_Entry] = []
-    for frame in frames:
-        for part, (kind, mesh) in frame.meshes.items():
-            file = f"{kind}_{frame.number:06d}.vtp"
-            mesh.save(beside / file, binary=True)
-            entries.append(_Entry(frame.time, part, file))
-            if vtu and part == 0:
-                _write_vtu((beside / file).with_suffix(".vtu"), mesh)
-    _write_collection(beside / name, entries)
-    if place.exists():
-        shutil.rmtree(place)
-    beside.rename(place)
+    try:
+        beside.chmod(0o755)
+        entries: list[_Entry] = []
+        for frame in frames:
+            for part, (kind, mesh) in frame.meshes.items():
+                file = f"{kind}_{frame.number:06d}.vtp"
+                _save(mesh, beside / file)
+                entries.append(_Entry(frame.time, part, file))
+                if vtu and part == 0:
+                    _write_vtu((beside / file).with_suffix(".vtu"), mesh)
+        _write_collection(beside / name, entries)
+        if place.exists():
+            shutil.rmtree(place)
+        beside.rename(place)
+    except BaseException:
+        shutil.rmtree(beside, ignore_errors=True)
+        raise
     return destination / name
+
+
+def _save(mesh: pv.PolyData, path: Path) -> None:
+    """Write a mesh; VTK only prints, at length, that it could not."""
+    from vtkmodules.vtkCommonCore import vtkObject
+
+    shown = vtkObject.GetGlobalWarningDisplay()
+    vtkObject.GlobalWarningDisplayOff()
+    try:
+        mesh.save(path, binary=True)
+    finally:
+        vtkObject.SetGlobalWarningDisplay(shown)
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - len(_END_OF_VTK)))
+        if file.read() != _END_OF_VTK:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path.parent))
 
 
 def _check_replaceable(place: Path) -> None:

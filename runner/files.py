@@ -66,7 +66,9 @@ def beside(path: Path) -> Iterator[Path]:
     try:
         yield new
         new.replace(path)
-    except BaseException:
+    except BaseException as error:
+        if isinstance(error, OSError) and error.filename is None:  # a disk that is full does not say which
+            error.filename = str(path)
         with suppress(OSError):
             new.unlink(missing_ok=True)
         raise

@@ -13,7 +13,7 @@ import platform
 import time
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 _SUFFIX = ".lock"
@@ -104,8 +104,9 @@ def _lock(file: Path, patience: _Patience) -> int | None:
 
 def _sign(descriptor: int) -> None:
     """Say in a lock file who has it: machine, process, time."""
-    os.ftruncate(descriptor, 0)
-    os.pwrite(descriptor, f"{platform.node()} {os.getpid()} {time.time():.3f}".encode(), 0)
+    with suppress(OSError):  # a full disk: the lock is the kernel's and needs no room
+        os.ftruncate(descriptor, 0)
+        os.pwrite(descriptor, f"{platform.node()} {os.getpid()} {time.time():.3f}".encode(), 0)
 
 
 def _owner_has_ended(descriptor: int) -> bool:

@@ -14,9 +14,9 @@ from inputs.errors import InputError, Problem, WalkersError
 if TYPE_CHECKING:
     from inputs.case import WalkerCase
     from inputs.pile import PileCase
+    from inputs.reading import AnyCase
+    from runner.binary import Engine
     from runner.directory import FinishedRun
-    from runner.launch import Progress
-    from runner.parts import PileProgress
 
 DEFAULT_OUT = Path("runs")
 
@@ -31,21 +31,21 @@ class Outcome:
 
 
 def run_case(
-    case: WalkerCase,
+    case: AnyCase,
     out: Path = DEFAULT_OUT,
     *,
     engine: str | None = None,
     force: bool = False,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[Any], None] | None = None,
     time_limit: float | None = None,
     despite_audit: bool = False,
 ) -> Outcome:
-    """Run a case, unless its run is there already, and tabulate it.
+    """Run a case, unless its run is there already, and tabulate it; an interrupted pile goes on.
 
     Parameters
     ----------
     case
-        A resolved case (`inputs.load_case`).
+        A resolved case: of walkers (`inputs.load_case`) or of a pile (`inputs.load_pile`).
     out
         Folder of the run directories.
     engine
@@ -53,9 +53,10 @@ def run_case(
     force
         Run again; the old run is replaced only by a finished one.
     on_progress
-        Called a few times a second while the engine runs.
+        Called a few times a second while the engine runs, with a `runner.launch.Progress`, of a pile with a
+        `runner.parts.PileProgress`.
     time_limit
-        Wall time in s that the engine may take.
+        Wall time in s that the engine may take, of a pile for each part.
     despite_audit
         Run on an engine that failed its audit.
 
@@ -68,26 +69,46 @@ def run_case(
     runner.EngineFailure
         If the engine fails in one of the known ways.
     """
+    from inputs.pile import PileCase
     from runner.binary import find_engine
+
+    options = {"force": force, "on_progress": on_progress, "time_limit": time_limit}
+    if isinstance(case, PileCase):
+        return _run_pile(case, out, find_engine(engine), despite_audit, options)
+    return _run_walkers(case, out, find_engine(engine), despite_audit, options)
+
+
+def _run_walkers(case: WalkerCase, out: Path, engine: Engine, despite_audit: bool, options: dict[str, Any]) -> Outcome:
     from runner.directory import finished_run, run_place, unfinished
     from runner.ensemble import finished_place
     from runner.failures import RunBusy
     from sweeps.together import check_audit, make_together
 
-    binary = find_engine(engine)
-    place = run_place(case, binary, out)
+    place = run_place(case, engine, out)
     there = finished_place(out, place.name)
-    old = finished_run(there) if there and not force else None
+    old = finished_run(there) if there and not options["force"] else None
     if old is not None:
         return Outcome(old, _result_of(old), found=True)
-    check_audit(binary, despite_audit)
+    check_audit(engine, despite_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
     threading.Thread(target=_load_postprocess, daemon=True).start()
-    made = make_together([case], out, binary, force=force, on_progress=on_progress, time_limit=time_limit)
+    made = make_together([case], out, engine, **options)
     if made.busy:
         raise RunBusy(unfinished(place))
     run = made.runs[place.name]
     return Outcome(run, _result_of(run), found=place.name in made.found)
+
+
+def _run_pile(case: PileCase, out: Path, engine: Engine, despite_audit: bool, options: dict[str, Any]) -> Outcome:
+    from postprocess.pile_result import current_pile_result
+    from runner.directory import finished_run
+    from runner.parts import pile_place, run_pile
+    from sweeps.together import check_audit
+
+    if options["force"] or finished_run(pile_place(case, engine, out)) is None:
+        check_audit(engine, despite_audit)
+    run, found = run_pile(case, engine, out, **options)
+    return Outcome(run, current_pile_result(run.directory), found)
 
 
 def _load_postprocess() -> None:
@@ -100,33 +121,6 @@ def _result_of(run: FinishedRun) -> dict[str, Any]:
     from postprocess.result import current_result
 
     return current_result(run.directory)
-
-
-def run_pile_case(
-    case: PileCase,
-    out: Path = DEFAULT_OUT,
-    *,
-    engine: str | None = None,
-    force: bool = False,
-    on_progress: Callable[[PileProgress], None] | None = None,
-    time_limit: float | None = None,
-    despite_audit: bool = False,
-) -> Outcome:
-    """Run a pile, or go on with it, and measure it; parameters and errors as for `run_case`.
-
-    ``time_limit`` is for each part of the run.
-    """
-    from postprocess.pile_result import current_pile_result
-    from runner.binary import find_engine
-    from runner.directory import finished_run
-    from runner.parts import pile_place, run_pile
-    from sweeps.together import check_audit
-
-    binary = find_engine(engine)
-    if force or finished_run(pile_place(case, binary, out)) is None:
-        check_audit(binary, despite_audit)
-    run, found = run_pile(case, binary, out, force=force, on_progress=on_progress, time_limit=time_limit)
-    return Outcome(run, current_pile_result(run.directory), found)
 
 
 def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from inputs.case import WalkerCase
     from inputs.pile import PileCase
+    from inputs.reading import AnyCase
     from runner.launch import Progress
     from runner.parts import PileProgress
     from sweeps.conduct import Progress as SweepProgress
@@ -19,9 +20,14 @@ _LONGEST_SILENCE_SECONDS = 60.0
 
 
 @contextmanager
-def progress_of(case: WalkerCase) -> Iterator[Callable[[Progress], None]]:
+def progress_of(case: AnyCase) -> Iterator[Callable[[Any], None]]:
     """Yield a function that shows how far a run of a case is."""
-    if sys.stderr.isatty():
+    from inputs.pile import PileCase
+
+    if isinstance(case, PileCase):
+        with _progress_of_pile(case) as advance:
+            yield advance
+    elif sys.stderr.isatty():
         with _bar(case) as advance:
             yield advance
     else:
@@ -82,8 +88,7 @@ def _lines(case: WalkerCase) -> Callable[[Progress], None]:
 
 
 @contextmanager
-def progress_of_pile(case: PileCase) -> Iterator[Callable[[PileProgress], None]]:
-    """Yield a function that shows how far a run of a pile is."""
+def _progress_of_pile(case: PileCase) -> Iterator[Callable[[PileProgress], None]]:
     if sys.stderr.isatty():
         with _told_bar(case.name) as show:
             yield lambda progress: show(1.0, progress.share, _told_of_pile(progress))

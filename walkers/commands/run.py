@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -28,25 +28,26 @@ def command(
     despite_audit: DespiteAudit = False,
 ) -> int:
     """Run cases, unless they have been run, and print their results (with --json an object a line)."""
-    from inputs.pile import PileCase
     from inputs.reading import load_any
     from runner.failures import EngineFailure
-    from walkers.pipeline import described, run_case, run_pile_case
-    from walkers.progress import progress_of, progress_of_pile
+    from walkers.pipeline import described, run_case
+    from walkers.progress import progress_of
 
     loaded = [load_any(case) for case in cases]  # a mistake in the last file shows before the first run starts
     check_out(out)
     failed = 0
     for case in loaded:
         try:
-            options: dict[str, Any] = {"engine": engine, "force": force, "time_limit": limit}
-            options["despite_audit"] = despite_audit
-            if isinstance(case, PileCase):
-                with progress_of_pile(case) as tell:
-                    outcome = run_pile_case(case, out, on_progress=tell, **options)
-            else:
-                with progress_of(case) as advance:
-                    outcome = run_case(case, out, on_progress=advance, **options)
+            with progress_of(case) as advance:
+                outcome = run_case(
+                    case,
+                    out,
+                    engine=engine,
+                    force=force,
+                    on_progress=advance,
+                    time_limit=limit,
+                    despite_audit=despite_audit,
+                )
         except EngineFailure as failure:
             print(f"walkers: {case.name}: {failure}", file=sys.stderr)
             failed += 1
