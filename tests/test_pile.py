@@ -29,7 +29,7 @@ from sweeps.record import states
 from sweeps.run import plan_sweep, run_sweep
 from sweeps.site import Site, SiteFile
 from sweeps.table import load
-from tests.conftest import PROGRAM, engines_in, to_toml, wait_for
+from tests.conftest import PROGRAM, call, engines_in, to_toml, wait_for
 
 
 def document(**changes: dict[str, Any]) -> dict[str, Any]:
@@ -207,7 +207,7 @@ def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
     text.write_text(text.read_text()[:-200])
     for place in (gap, cut, said, lines):
         for command in ("plot", "vtk"):
-            done = subprocess.run([PROGRAM, command, str(place)], capture_output=True, text=True, check=False)
+            done = call(command, str(place))
             assert done.returncode in (1, 2)
             assert len(done.stderr.splitlines()) == 1, done.stderr
 
@@ -295,7 +295,7 @@ def test_shares_by_mass_and_by_number() -> None:
 
 def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     def told(*command: str) -> str:
-        return subprocess.run([PROGRAM, *command], capture_output=True, text=True, check=True).stdout
+        return call(*command, check=True).stdout
 
     assert "climbs  " in told("result", str(run))
     assert told("plot", str(run), "--to", "here").strip() == "here/climb.png"
@@ -338,11 +338,9 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
         ["vtk", "--as-placed"],
     ]
     for option in refusals:
-        refused = subprocess.run(
-            [PROGRAM, option[0], str(run), *option[1:]], capture_output=True, text=True, check=False
-        )
+        refused = call(option[0], str(run), *option[1:])
         assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
-    refused = subprocess.run([PROGRAM, "theory", "pile-ci"], capture_output=True, text=True, check=False)
+    refused = call("theory", "pile-ci")
     assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
 
 
@@ -375,7 +373,7 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     apart = piles_in(out)
     assert sorted(len(runs) for runs in apart.values()) == [1, 2]
     assert all("drive.peak_acceleration = " in label for label in apart)
-    told = subprocess.run([PROGRAM, "climb", str(out)], capture_output=True, text=True, check=True).stdout
+    told = call("climb", str(out), check=True).stdout
     assert told.count("runs climbed") == 2
     with pytest.raises(InputError, match="descend"):
         sweep = expand(

@@ -10,7 +10,7 @@ import pytest
 
 from sweeps.table import load
 from tests.cluster import slurm_cluster, why_not
-from tests.conftest import PROGRAM, document, to_toml, wait_for
+from tests.conftest import PROGRAM, call, document, to_toml, wait_for
 from tests.test_sweeps import contents_of
 
 SITE = """
@@ -93,7 +93,7 @@ def test_a_sweep_through_slurm(cluster: dict[str, str], files: Path) -> None:
     wait_for(lambda: not _jobs(cluster), 30.0)
     frame = load(files / "cluster" / "test")
     assert list(frame["status"]) == ["finished"] * 4 + ["failed"] + ["finished"] * 7
-    local = subprocess.run([PROGRAM, "sweep", "test.toml", "--out", "local"], capture_output=True, check=False)
+    local = call("sweep", "test.toml", "--out", "local")
     assert local.returncode == 1
     assert contents_of(files / "cluster") == contents_of(files / "local")
     assert len(contents_of(files / "local")) == 11

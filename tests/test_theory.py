@@ -18,7 +18,7 @@ from postprocess.result import read_result
 from sweeps.conduct import Options
 from sweeps.run import run_sweep
 from sweeps.table import thresholds
-from tests.conftest import PROGRAM, document, make_case, to_toml
+from tests.conftest import PROGRAM, call, document, make_case, to_toml
 from theory.friction import Friction
 from theory.mathieu import alignment, is_stable, largest_stable_v
 from theory.motion import Walker, walk
@@ -243,10 +243,10 @@ def test_the_program_prints_theory_beside_the_engine(in_folder: Path) -> None:
     (in_folder / "test.toml").write_text(to_toml(document(run={"cycles": 20, "settling_cycles": 10})))
     told = subprocess.run([PROGRAM, "theory", "test.toml"], capture_output=True, text=True, check=True).stdout
     assert "not run" in told
-    subprocess.run([PROGRAM, "run", "test.toml"], capture_output=True, check=True)
-    told = subprocess.run([PROGRAM, "theory", "test.toml", "--json"], capture_output=True, text=True, check=True).stdout
+    call("run", "test.toml", check=True)
+    told = call("theory", "test.toml", "--json", check=True).stdout
     contents = json.loads(told)
     assert contents["engine"]["velocity"]["mean"] == pytest.approx(contents["viscous"]["velocity"], rel=0.08)
     (in_folder / "up.toml").write_text(to_toml(document(drive={"axis": "z"})))
-    done = subprocess.run([PROGRAM, "theory", "up.toml"], capture_output=True, text=True, check=False)
+    done = call("theory", "up.toml")
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
