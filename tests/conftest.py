@@ -221,7 +221,7 @@ def call(*arguments: str, check: bool = False, folder: Path | None = None) -> su
     or the interpreter's end matter, tests start `PROGRAM`.
     """
     out, errors = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
-    handler = signal.getsignal(signal.SIGTERM)
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
     with redirect_stdout(out), redirect_stderr(errors), chdir(folder or "."), warnings.catch_warnings():
         warnings.resetwarnings()
         for kind in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
@@ -231,7 +231,8 @@ def call(*arguments: str, check: bool = False, folder: Path | None = None) -> su
         except SystemExit as end:
             status = end.code
         finally:
-            signal.signal(signal.SIGTERM, handler)
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
     told = [stream.buffer.getvalue().decode() for stream in (out, errors)]  # type: ignore[attr-defined]
     done = subprocess.CompletedProcess([PROGRAM, *arguments], int(status or 0), *told)
     if check:

@@ -175,14 +175,13 @@ def test_the_sensitivity_study_covers_each_parameter_both_ways(sensitivity: Sour
     assert len(figure.axes) == len(OBSERVATIONS)
 
 
-def test_the_style_is_readable_in_grey(tmp_path: Path) -> None:
+def test_the_style_is_readable_in_grey() -> None:
     from matplotlib import rcParams
     from matplotlib.colors import to_rgb
 
-    from postprocess.drawing import new_figure
+    from postprocess.drawing import styled
 
-    new_figure(1.0, 1.0)
-    colours = rcParams["axes.prop_cycle"].by_key()["color"][:5]
+    colours = styled(lambda: rcParams["axes.prop_cycle"].by_key()["color"][:5])()
     lightness = [float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114))) for colour in colours]
     assert (np.diff(lightness) > 0.1).all()
 
