@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import signal
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,10 +35,15 @@ from tests.conftest import (
 from walkers import run_case
 
 
-@pytest.fixture(scope="module")
-def report() -> AuditReport:
+@pytest.fixture(scope="session")
+def report(once: Callable[[str, Callable[[Path], object]], Path]) -> AuditReport:
     """The quick audit of the installed engine."""
-    return run_audit(selected(quick=True))
+
+    def audit(folder: Path) -> None:
+        (folder / "report").write_bytes(pickle.dumps(run_audit(selected(quick=True))))
+
+    found: AuditReport = pickle.loads((once("audit", audit) / "report").read_bytes())
+    return found
 
 
 @pytest.fixture
