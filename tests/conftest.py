@@ -57,7 +57,7 @@ REFERENCE: dict[str, Any] = {
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 # MPI processes that wait for each other give way to others meanwhile: on a busy machine they are ten times as fast so.
-os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"
+os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112
 # The user's cache is not ours to read or write: audits of the engine are kept there.
 os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="walkers-tests-")
 
