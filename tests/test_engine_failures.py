@@ -268,7 +268,7 @@ def test_a_failed_run_is_reported_and_the_next_one_goes_on(in_folder: Path) -> N
         to_toml(
             document(
                 liquid={"name": "glycerol 87 %"},
-                run={"time_step": "40 us", "allow_unstable": True, "samples_per_cycle": 1},
+                run={"time_step": "40 us", "allow_unstable": True, "samples_per_cycle": 1, "cycles": 60},
             )
         )
     )

@@ -36,7 +36,7 @@ from theory.mathieu import alignment, turning
 from theory.prediction import motion_of
 from theory.quasistatic import mean_velocity
 
-SHORT = {"start.replicates": 2, "run.cycles": 12, "run.settling_cycles": 6}
+SHORT = {"start.replicates": 2, "run.cycles": 8, "run.settling_cycles": 4}
 FEWER = {
     "fig2": {
         "drive.frequency": ["60 Hz", "90 Hz"],
@@ -73,14 +73,14 @@ def _run_shortened(out: Path) -> None:
 
 @pytest.fixture(scope="session")
 def sensitivity(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
-    """The shipped sensitivity study, three cycles a run."""
-    return Sources(once("sensitivity", _run_three_cycles))
+    """The shipped sensitivity study, two cycles a run."""
+    return Sources(once("sensitivity", _run_two_cycles))
 
 
-def _run_three_cycles(out: Path) -> None:
+def _run_two_cycles(out: Path) -> None:
     given = read_toml(shipped_sweeps()["sensitivity"])
     experiments = len(given["zip"][0]["run"]["cycles"])
-    given["zip"][0]["run"] = {"cycles": [3] * experiments, "settling_cycles": [1] * experiments}
+    given["zip"][0]["run"] = {"cycles": [2] * experiments, "settling_cycles": [0] * experiments}
     _, failures = run_sweep(
         expand(given, source="test", name="sensitivity", folder=shipped_sweeps()["sensitivity"].parent), out, Options(2)
     )
@@ -169,7 +169,7 @@ def test_the_sensitivity_study_covers_each_parameter_both_ways(sensitivity: Sour
     for name in PARAMETERS:
         lower, higher = sorted(found["value"][found["parameter"] == name])
         assert lower < higher
-    # Three cycles are too few for a walker to be steady.
+    # Two cycles are too few for a walker to be steady.
     assert found[[one.name for one in OBSERVATIONS if "(%)" in one.name or "(°)" in one.name]].notna().all().all()
     figure = FIGURES["sensitivity"].draw(sensitivity)
     assert len(figure.axes) == len(OBSERVATIONS)
