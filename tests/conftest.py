@@ -133,7 +133,8 @@ def engines_in(directory: Path) -> list[int]:
     for process in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):  # gone by now, or none of ours
             command, folder = (process / "cmdline").read_bytes(), (process / "cwd").resolve()
-            if b"liggghts" in command and folder.is_relative_to(directory):
+            # Not ldd, which asks what the engine is linked to.
+            if b"liggghts" in command and b"\0-in\0" in command and folder.is_relative_to(directory):
                 found.append(int(process.name))
     return found
 
