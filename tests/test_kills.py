@@ -20,7 +20,7 @@ from templates import render_deck
 from tests.conftest import PROGRAM, document, engines_in, make_case, to_toml, wait_for
 from walkers import run_case
 
-BRIEF = {"time_step": "2 us", "cycles": 8, "settling_cycles": 1, "samples_per_cycle": 2}
+BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cycle": 2}
 LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
 
 
@@ -41,7 +41,7 @@ def test_after_each_of_fifty_kills_the_next_call_runs(tmp_path: Path) -> None:
     for kill in range(50):
         case = make_case(run=BRIEF, start={"seed": kill})
         child = _forked(lambda case=case: run_case(case, tmp_path, force=True))  # type: ignore[misc]
-        time.sleep(draw.uniform(0.0, 0.15))
+        time.sleep(draw.uniform(0.0, 0.12))
         begun["running" if engines_in(tmp_path) else "waiting"] += 1
         os.kill(child, signal.SIGKILL)
         outcome = run_case(case, tmp_path)
