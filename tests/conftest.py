@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import copy
+import fcntl
+import io
 import json
 import os
+import shutil
+import signal
+import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import chdir, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 
@@ -19,7 +25,9 @@ from inputs import resolve_case
 from inputs.case import WalkerCase
 from postprocess.gait import Walk, walk
 from postprocess.trajectory import Trajectory, read_trajectory
+from runner.failures import RunBusy
 from walkers import run_case
+from walkers.main import main
 
 # The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, no rolling friction, one walker that starts on the
 # axis in equilibrium.
@@ -42,10 +50,18 @@ REFERENCE: dict[str, Any] = {
     },
     "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
     "start": {"replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
+    # Its speed is that of 60 cycles, 20 of them to settle, to nine digits.
+    "run": {"cycles": 24, "settling_cycles": 8},
 }
+# Whoever starts the tests in the background of a shell has SIGINT ignored, and so would all that they start.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+# MPI processes that wait for each other give way to others meanwhile: on a busy machine they are ten times as fast so.
+os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112
 # The user's cache is not ours to read or write: audits of the engine are kept there.
 os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="walkers-tests-")
 
+T = TypeVar("T")
 PROGRAM = str(Path(sys.executable).with_name("walkers"))
 SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
 
@@ -85,9 +101,36 @@ def _inline(value: Any) -> str:
 
 
 @pytest.fixture(scope="session")
-def runs_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def session_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of all workers of the session."""
+    folder = tmp_path_factory.getbasetemp()
+    return folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+
+
+@pytest.fixture(scope="session")
+def once(session_folder: Path) -> Callable[[str, Callable[[Path], object]], Path]:
+    """Folders that are filled once a session, by the worker that asks first; the others wait for it."""
+
+    def filled(name: str, fill: Callable[[Path], object]) -> Path:
+        folder, mark = session_folder / name, session_folder / f"{name}.filled"
+        with (session_folder / f"{name}.filling").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not mark.exists():
+                shutil.rmtree(folder, ignore_errors=True)  # somebody failed to fill it
+                folder.mkdir()
+                fill(folder)
+                mark.touch()
+        return folder
+
+    return filled
+
+
+@pytest.fixture(scope="session")
+def runs_folder(session_folder: Path) -> Path:
     """Where the session's runs are kept, so that no case is run twice."""
-    return tmp_path_factory.mktemp("runs")
+    folder = session_folder / "runs"
+    folder.mkdir(exist_ok=True)
+    return folder
 
 
 @pytest.fixture(scope="session")
@@ -95,7 +138,14 @@ def run_directory(runs_folder: Path) -> Callable[..., Path]:
     """Run the changed reference case (or a given one) and return its run directory."""
 
     def run(case: WalkerCase | None = None, **changes: Any) -> Path:
-        return run_case(case or make_case(**changes), runs_folder).run.directory
+        wanted = case or make_case(**changes)
+
+        def directory() -> Path | None:
+            with suppress(RunBusy):  # another worker is just making it
+                return run_case(wanted, runs_folder).run.directory
+            return None
+
+        return wait_for(directory)
 
     return run
 
@@ -129,20 +179,66 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
 
 def engines_in(directory: Path) -> list[int]:
     """Process ids of the engines that work in a directory or below."""
+    return processes_in(directory, b"liggghts", b"\0-in\0")  # not ldd, which asks what the engine is linked to
+
+
+def processes_in(directory: Path, *words: bytes) -> list[int]:
+    """Process ids of those that work in a directory or below and whose command has some words in it."""
     found = []
     for process in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):  # gone by now, or none of ours
             command, folder = (process / "cmdline").read_bytes(), (process / "cwd").resolve()
-            # Not ldd, which asks what the engine is linked to.
-            if b"liggghts" in command and b"\0-in\0" in command and folder.is_relative_to(directory):
+            if all(word in command for word in words) and folder.is_relative_to(directory):
                 found.append(int(process.name))
     return found
 
 
-def wait_for(condition: Callable[[], Any], seconds: float = 60.0) -> Any:
+PATIENCE = 300.0
+"""How long is waited for what is to happen, in s: many times what it takes on a machine that is busy elsewhere."""
+
+
+def wait_for(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T:
+    """What a condition gives as soon as that is anything."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if found := condition():
             return found
         time.sleep(0.02)
     raise AssertionError("waited in vain")
+
+
+def wait_for_engines(directory: Path, program: subprocess.Popen[Any] | None = None, number: int = 1) -> list[int]:
+    """Process ids of the engines in a directory, as soon as there are so many; the program that starts them lives."""
+
+    def found() -> list[int] | None:
+        assert program is None or program.poll() is None, f"ended with status {program.returncode}"
+        engines = engines_in(directory)
+        return engines if len(engines) == number else None
+
+    return wait_for(found)
+
+
+def call(*arguments: str, check: bool = False, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """What the program does with these arguments, without the half second that a process of its own takes.
+
+    Its warnings are those of a process of its own, and the handlers that it sets are taken back. Where signals, pipes
+    or the interpreter's end matter, tests start `PROGRAM`.
+    """
+    out, errors = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    with redirect_stdout(out), redirect_stderr(errors), chdir(folder or "."), warnings.catch_warnings():
+        warnings.resetwarnings()
+        for kind in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
+            warnings.simplefilter("ignore", kind)
+        try:
+            main([*arguments])
+        except SystemExit as end:
+            status = end.code
+        finally:
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+    told = [stream.buffer.getvalue().decode() for stream in (out, errors)]  # type: ignore[attr-defined]
+    done = subprocess.CompletedProcess([PROGRAM, *arguments], int(status or 0), *told)
+    if check:
+        assert done.returncode == 0, done.stderr
+    return done

@@ -31,9 +31,21 @@ from runner.failures import (
     MissingFrames,
     TimeLimitExceeded,
 )
-from runner.launch import postponed_interrupts
+from runner.launch import Progress, postponed_interrupts
 from templates import Deck, render_deck
-from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml
+from tests.conftest import (
+    PATIENCE,
+    PROGRAM,
+    SHORT,
+    call,
+    document,
+    engines_in,
+    make_case,
+    processes_in,
+    to_toml,
+    wait_for,
+    wait_for_engines,
+)
 from walkers import run_case
 
 LONG = {"cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
@@ -103,10 +115,8 @@ def test_crash_of_the_engine(tmp_path: Path) -> None:
 
 def test_engine_killed(tmp_path: Path) -> None:
     def kill_soon() -> None:
-        while not (engines := engines_in(tmp_path)):
-            time.sleep(0.02)
-        time.sleep(0.3)
-        for engine in engines:
+        wait_for(lambda: list(tmp_path.glob("*.part/beads.bin")))
+        for engine in engines_in(tmp_path):
             os.kill(engine, signal.SIGKILL)
 
     killer = threading.Thread(target=kill_soon)
@@ -171,12 +181,17 @@ def test_dumps_of_bridges_that_are_cut_short(tmp_path: Path, dump: str, cut: str
 
 
 def test_children_that_do_not_care_for_sigterm_are_ended_too(tmp_path: Path) -> None:
-    front = tmp_path / "front"
-    front.write_text('#!/bin/sh\n(trap "" TERM; exec sleep 4711) &\nexec sleep 100\n')
+    front, deaf = tmp_path / "front", tmp_path / "deaf"
+    front.write_text(f'#!/bin/sh\n(trap "" TERM; echo > {deaf}; exec sleep 4711) &\nexec sleep 4711\n')
     front.chmod(0o755)
-    with pytest.raises(TimeLimitExceeded):
-        run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front), time_limit=0.3)
-    assert subprocess.run(["pgrep", "-f", "sleep 4711"], capture_output=True, check=False).returncode == 1
+
+    def interrupt(_: Progress) -> None:
+        if deaf.exists():
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front), on_progress=interrupt)
+    wait_for(lambda: not processes_in(tmp_path, b"sleep"))
 
 
 def test_time_limit(tmp_path: Path) -> None:
@@ -211,8 +226,7 @@ def test_a_disk_that_fills_up_during_the_run(small_disk: Path) -> None:
     case = make_case(run={"cycles": 180, "settling_cycles": 2, "samples_per_cycle": 20})
 
     def fill() -> None:
-        while not list(small_disk.glob("runs/*.part/beads.bin")):
-            time.sleep(0.01)
+        wait_for(lambda: list(small_disk.glob("runs/*.part/beads.bin")))
         with suppress(OSError), (small_disk / "ballast").open("wb", buffering=0) as file:
             while file.write(b"\0" * 4096):
                 pass
@@ -239,11 +253,9 @@ def test_an_interrupt_while_the_engine_is_being_started_comes_after() -> None:
 def test_interrupts_stop_the_engine_and_leave_no_run(number: signal.Signals, status: int, in_folder: Path) -> None:
     (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
     program = subprocess.Popen([PROGRAM, "run", "long.toml"], stderr=subprocess.PIPE, text=True, start_new_session=True)
-    while not engines_in(in_folder):
-        assert program.poll() is None
-        time.sleep(0.02)
+    wait_for_engines(in_folder, program)
     program.send_signal(number)
-    _, errors = program.communicate(timeout=60)
+    _, errors = program.communicate(timeout=PATIENCE)
     assert program.returncode == status
     assert errors.splitlines()[-1] == {130: "walkers: interrupted", 143: "walkers: terminated"}[status]
     assert "Traceback" not in errors
@@ -261,9 +273,7 @@ def test_a_failed_run_is_reported_and_the_next_one_goes_on(in_folder: Path) -> N
         )
     )
     (in_folder / "good.toml").write_text(to_toml(document(run=SHORT)))
-    done = subprocess.run(
-        [PROGRAM, "run", "hot.toml", "good.toml", "--json"], capture_output=True, text=True, check=False
-    )
+    done = call("run", "hot.toml", "good.toml", "--json")
     assert done.returncode == 1
     assert "walkers: hot: blow-up" in done.stderr
     assert json.loads(done.stdout)["case"] == "good"

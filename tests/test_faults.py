@@ -28,7 +28,7 @@ from runner.launch import launch
 from sweeps.conduct import Failure, Options, _mildness
 from sweeps.worker import Task, work
 from templates import render_deck
-from tests.conftest import PROGRAM, SHORT, document, make_case, to_toml
+from tests.conftest import PROGRAM, SHORT, call, document, make_case, to_toml
 from tests.test_calibration import reduced
 from walkers import run_case
 
@@ -172,8 +172,8 @@ def test_a_reader_who_has_had_enough_is_no_failure(short_case: Path) -> None:
 
 
 def test_a_dollar_in_a_title_is_a_dollar(short_case: Path) -> None:
-    subprocess.run([PROGRAM, "run", "short.toml"], capture_output=True, check=True)
-    done = subprocess.run([PROGRAM, "plot", "short.toml"], capture_output=True, text=True, check=False)
+    call("run", "short.toml", check=True)
+    done = call("plot", "short.toml")
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
 
 
@@ -235,7 +235,7 @@ def full_disk(tmp_path: Path) -> Iterator[Path]:
 def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(full_disk: Path, in_folder: Path) -> None:
     (in_folder / "short.toml").write_text(to_toml(document(run=SHORT)))
     (in_folder / "sweep.toml").write_text('case = "short.toml"\n')
-    subprocess.run([PROGRAM, "run", "short.toml", "--out", "runs"], capture_output=True, check=True)
+    call("run", "short.toml", check=True)
     commands = {
         "run short.toml": f"--out {full_disk}/a",
         "run pile-ci": f"--out {full_disk}/b",
@@ -245,10 +245,9 @@ def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(full_disk:
         "render short.toml": f"--to {full_disk}/f.png",
         "table runs/sweep": f"--to {full_disk}/g.csv",
     }
-    subprocess.run([PROGRAM, "sweep", "sweep.toml"], capture_output=True, check=True)
+    call("sweep", "sweep.toml", check=True)
     for command, place in commands.items():
-        arguments = [PROGRAM, *command.split(), *place.split()]
-        done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+        done = call(*command.split(), *place.split())
         lines = [line for line in done.stderr.splitlines() if "never audited" not in line]
         assert (done.returncode in (1, 2), len(lines)) == (True, 1), (command, done)
         assert "No space left on device" in lines[0] or "disk full" in lines[0]

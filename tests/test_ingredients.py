@@ -69,7 +69,7 @@ def test_what_the_theory_made_is_found_again_and_what_it_lacks_is_missed(tmp_pat
     assert (alone.met, alone.missed) == (len(wanted), [])
     assert alone.misfit < 0.2
     assert alone.parameters["friction_wall"] == pytest.approx(KNOWN["friction_wall"], rel=0.15)
-    without, static = fit((), wet, generations=14), fit((ADDED[-1],), wet, generations=14)
+    without, static = fit((), wet, generations=9), fit((ADDED[-1],), wet, generations=9)
     assert static.misfit < 0.5 * without.misfit
     assert set(static.parameters) == set(ALWAYS.ranges) | set(ADDED[-1].ranges)
     full = [replace(one, values=dict(values_of(one.parameters, targets()))) for one in (without, static)]

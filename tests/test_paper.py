@@ -3,6 +3,7 @@
 import json
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -30,7 +31,7 @@ from postprocess.gait import gait
 from postprocess.steady import steady_walkers
 from sweeps.conduct import Options
 from sweeps.run import run_sweep
-from tests.conftest import PROGRAM
+from tests.conftest import PROGRAM, call
 from theory.mathieu import alignment, turning
 from theory.prediction import motion_of
 from theory.quasistatic import mean_velocity
@@ -49,10 +50,13 @@ FEWER = {
 }
 
 
-@pytest.fixture(scope="module")
-def sources(tmp_path_factory: pytest.TempPathFactory) -> Sources:
+@pytest.fixture(scope="session")
+def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
     """The shipped sweeps with fewer points and cycles, under their names."""
-    out = tmp_path_factory.mktemp("paper")
+    return Sources(once("paper", _run_shortened))
+
+
+def _run_shortened(out: Path) -> None:
     for name, axes in FEWER.items():
         given = read_toml(shipped_sweeps()[name])
         given["set"] = {**flatten(given.get("set", {}), lambda _: False), **SHORT}
@@ -65,13 +69,15 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> Sources:
         sweep = expand(given, source=name, name=name, folder=shipped_sweeps()[name].parent)
         _, failures = run_sweep(sweep, out, Options(2))
         assert not failures
-    return Sources(out)
 
 
-@pytest.fixture(scope="module")
-def sensitivity(tmp_path_factory: pytest.TempPathFactory) -> Sources:
+@pytest.fixture(scope="session")
+def sensitivity(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
     """The shipped sensitivity study, three cycles a run."""
-    out = tmp_path_factory.mktemp("sensitivity")
+    return Sources(once("sensitivity", _run_three_cycles))
+
+
+def _run_three_cycles(out: Path) -> None:
     given = read_toml(shipped_sweeps()["sensitivity"])
     experiments = len(given["zip"][0]["run"]["cycles"])
     given["zip"][0]["run"] = {"cycles": [3] * experiments, "settling_cycles": [1] * experiments}
@@ -79,7 +85,6 @@ def sensitivity(tmp_path_factory: pytest.TempPathFactory) -> Sources:
         expand(given, source="test", name="sensitivity", folder=shipped_sweeps()["sensitivity"].parent), out, Options(2)
     )
     assert not failures
-    return Sources(out)
 
 
 def test_the_published_fits_are_the_papers_model() -> None:
@@ -170,14 +175,13 @@ def test_the_sensitivity_study_covers_each_parameter_both_ways(sensitivity: Sour
     assert len(figure.axes) == len(OBSERVATIONS)
 
 
-def test_the_style_is_readable_in_grey(tmp_path: Path) -> None:
+def test_the_style_is_readable_in_grey() -> None:
     from matplotlib import rcParams
     from matplotlib.colors import to_rgb
 
-    from postprocess.drawing import new_figure
+    from postprocess.drawing import styled
 
-    new_figure(1.0, 1.0)
-    colours = rcParams["axes.prop_cycle"].by_key()["color"][:5]
+    colours = styled(lambda: rcParams["axes.prop_cycle"].by_key()["color"][:5])()
     lightness = [float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114))) for colour in colours]
     assert (np.diff(lightness) > 0.1).all()
 
@@ -248,15 +252,13 @@ def test_modes_are_told_apart(sources: Sources) -> None:
 
 
 def test_the_program_draws_what_is_asked_for(in_folder: Path) -> None:
-    done = subprocess.run([PROGRAM, "figures", "--only", "fig4"], capture_output=True, text=True, check=True)
+    done = call("figures", "--only", "fig4", check=True)
     assert done.stdout.splitlines() == ["figures/fig4.png", "figures/fig4.svg"]
     done = subprocess.run([PROGRAM, "figures", "--only", "fig9"], capture_output=True, text=True, check=False)
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
     assert "fig9" in done.stderr
     (in_folder / "file").write_text("mine")
-    done = subprocess.run(
-        [PROGRAM, "figures", "--only", "fig4", "--to", "file"], capture_output=True, text=True, check=False
-    )
+    done = call("figures", "--only", "fig4", "--to", "file")
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
     assert (in_folder / "file").read_text() == "mine"
 

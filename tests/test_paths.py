@@ -9,7 +9,7 @@ from inputs import InputError, load_case
 from inputs.sweep import load_sweep
 from sweeps.site import SiteFile, _worker_init, check_path
 from sweeps.table import load
-from tests.conftest import PROGRAM, SHORT, document, to_toml
+from tests.conftest import SHORT, call, document, to_toml
 
 ODD = {
     "a space": "sp ace",
@@ -28,10 +28,6 @@ ODD = {
 FOR_SHELLS = {"umlauts", "two hundred characters", "a dash"}
 
 
-def _program(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, check=False)
-
-
 @pytest.fixture
 def case_file(in_folder: Path) -> Path:
     file = in_folder / "base.toml"
@@ -48,7 +44,7 @@ def _nothing_was_executed(folder: Path) -> bool:
 def test_odd_paths_without_a_site_file_are_paths(name: str, case_file: Path, in_folder: Path) -> None:
     odd = ODD[name]
     (in_folder / f"{odd}.toml").write_text('case = "base.toml"\n[axes]\nstart.angle = ["0 deg", "10 deg"]\n')
-    done = _program("sweep", f"./{odd}.toml", "--out", f"./{odd}", "-j", "1")
+    done = call("sweep", f"./{odd}.toml", "--out", f"./{odd}", "-j", "1")
     assert (done.returncode, done.stderr.count("Traceback")) == (0, 0), done.stderr
     assert list(load(in_folder / odd / odd)["status"]) == ["finished"] * 2
     assert _nothing_was_executed(in_folder)
@@ -59,7 +55,7 @@ def test_a_case_of_an_odd_name_is_run_and_drawn(name: str, case_file: Path, in_f
     odd = ODD[name]
     case_file.rename(f"{odd}.toml")
     for command in ("run", "plot", "vtk"):
-        done = _program(command, f"./{odd}.toml", "--out", f"./{odd}")
+        done = call(command, f"./{odd}.toml", "--out", f"./{odd}")
         assert (done.returncode, done.stderr.count("Traceback")) == (0, 0), done.stderr
     assert _nothing_was_executed(in_folder)
 
@@ -72,7 +68,7 @@ def test_with_a_site_file_odd_paths_are_refused_before_anything_is_done(
     (in_folder / f"{ODD[name]}.toml").write_text('case = "base.toml"\n')
     before = sorted(in_folder.rglob("*"))
     for sweep, out in (("plain.toml", f"./{ODD[name]}"), (f"./{ODD[name]}.toml", "runs")):
-        done = _program("sweep", sweep, "--out", out, "--site", "site.toml")
+        done = call("sweep", sweep, "--out", out, "--site", "site.toml")
         assert (done.returncode, done.stdout) == (2, "")
         assert len(done.stderr.splitlines()) == 1
         assert done.stderr.startswith("walkers: --out: ")
@@ -101,7 +97,7 @@ def test_files_without_a_name_are_refused(name: str, case_file: Path, in_folder:
     for read in (load_sweep, load_case):
         with pytest.raises(InputError, match=r"expected a name before \.toml"):
             read(name)
-    done = _program("sweep", name)
+    done = call("sweep", name)
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
     assert not (in_folder / "runs").exists()
     assert not (in_folder / "sweep.json").exists()

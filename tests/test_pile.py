@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import tomllib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ from sweeps.record import states
 from sweeps.run import plan_sweep, run_sweep
 from sweeps.site import Site, SiteFile
 from sweeps.table import load
-from tests.conftest import PROGRAM, engines_in, to_toml, wait_for
+from tests.conftest import PROGRAM, call, engines_in, to_toml, wait_for
 
 
 def document(**changes: dict[str, Any]) -> dict[str, Any]:
@@ -43,13 +44,55 @@ def small(**changes: dict[str, Any]) -> PileCase:
     return resolve_pile_case(document(**changes), name="pile-ci")
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("piles")
-    finished, found = run_pile(load_pile("pile-ci"), find_engine(None), out)
-    assert not found
-    tabulate_pile(finished.directory)
-    return finished.directory
+@pytest.fixture(scope="session")
+def run(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+    """The shipped pile of 60 beads."""
+
+    def make(out: Path) -> None:
+        finished, found = run_pile(load_pile("pile-ci"), find_engine(None), out)
+        assert not found
+        tabulate_pile(finished.directory)
+
+    (directory,) = once("piles", make).glob("pile-ci-*")
+    return directory
+
+
+# Three parts of the drive, each as short as it can be and still have frames.
+BRIEF = {"duration": "0.045 s", "part": "0.015 s"}
+
+
+@pytest.fixture
+def halting(tmp_path: Path) -> Callable[..., str]:
+    """An engine that stops in the midst of some parts when it makes them for the first time."""
+
+    def engine(*parts: int) -> str:
+        front = tmp_path / "front"
+        halts = "|".join(f"{part:04d}.new" for part in parts)
+        front.write_text(
+            f"""#!/bin/sh
+            part=$(basename "$PWD")
+            mark={tmp_path}/halted-${{part%.new}}
+            case $part in {halts})
+                [ -e $mark ] || (while ! [ -e beads.bin ]; do sleep 0.02; done; kill -STOP $$; touch $mark) &
+            esac
+            exec liggghts "$@"
+            """
+        )
+        front.chmod(0o755)
+        return str(front)
+
+    return engine
+
+
+def start_brief(folder: Path, engine: str) -> subprocess.Popen[bytes]:
+    """A brief pile in a process of its own, by a given engine, in the folder ``out``."""
+    (folder / "brief.toml").write_text(to_toml(document(run=BRIEF)))
+    command = [PROGRAM, "run", str(folder / "brief.toml"), "--out", str(folder / "out"), "--engine", engine]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def brief() -> PileCase:
+    return resolve_pile_case(document(run=BRIEF), name="brief")
 
 
 def test_a_pile_settles_is_shaken_and_is_whole(run: Path) -> None:
@@ -109,25 +152,28 @@ def test_tables_of_a_pile(run: Path) -> None:
     assert held == pytest.approx(bed["liquid_in_bridges"][driven].mean(), rel=1e-6)
 
 
-def test_an_interrupted_pile_goes_on_bit_for_bit(run: Path, tmp_path: Path) -> None:
+def test_an_interrupted_pile_goes_on_bit_for_bit(halting: Callable[..., str], tmp_path: Path) -> None:
     """Killed while it makes its second part, and the engine alone while it makes the third."""
-    case = load_pile("pile-ci")
-    place = pile_place(case, find_engine(None), tmp_path)
+    uninterrupted, _ = run_pile(brief(), find_engine(None), tmp_path)
+    run = uninterrupted.directory
+    tabulate_pile(run)
+    engine = halting(1, 2)
+    place = pile_place(brief(), find_engine(engine), tmp_path / "out")
     unfinished = place.with_name(place.name + ".part")
-    command = [PROGRAM, "run", "pile-ci", "--out", str(tmp_path)]
-    for parts in (1, 2):
-        program = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        wait_for(lambda parts=parts: len(part_directories(unfinished)) >= parts and engines_in(unfinished))
-        if parts == 1:
+    for part in (1, 2):
+        program = start_brief(tmp_path, engine)
+        wait_for((tmp_path / f"halted-{part:04d}").exists)
+        assert len(part_directories(unfinished)) == part
+        if part == 1:
             program.kill()
         else:
-            for engine in engines_in(unfinished):
-                os.kill(engine, signal.SIGKILL)
-        program.wait()
-        assert program.returncode != 0
+            for process in engines_in(unfinished):
+                os.kill(process, signal.SIGKILL)
+        assert program.wait() != 0
         wait_for(lambda: not engines_in(unfinished))
     assert not place.exists()
-    subprocess.run(command, check=True, capture_output=True)
+    assert start_brief(tmp_path, engine).wait() == 0
+    assert len(part_directories(run)) == 4
     assert [path.name for path in part_directories(place)] == [path.name for path in part_directories(run)]
     for here, there in zip(part_directories(place), part_directories(run), strict=True):
         for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"):
@@ -141,14 +187,13 @@ def test_restart_files_are_kept_for_the_last_two_parts_only(run: Path) -> None:
     assert kept == [path.name for path in part_directories(run)][-2:]
 
 
-def test_a_pile_is_run_once_at_a_time(tmp_path: Path) -> None:
-    program = subprocess.Popen([PROGRAM, "run", "pile-ci", "--out", str(tmp_path)], stderr=subprocess.DEVNULL)
-    case, engine = load_pile("pile-ci"), find_engine(None)
-    place = pile_place(case, engine, tmp_path)
+def test_a_pile_is_run_once_at_a_time(halting: Callable[..., str], tmp_path: Path) -> None:
+    engine = halting(1)
+    program = start_brief(tmp_path, engine)
     try:
-        wait_for(lambda: part_directories(place.with_name(place.name + ".part")))
+        wait_for((tmp_path / "halted-0001").exists)
         with pytest.raises(RunBusy):
-            run_pile(case, engine, tmp_path)
+            run_pile(brief(), find_engine(engine), tmp_path / "out")
     finally:
         program.kill()
         program.wait()
@@ -156,7 +201,7 @@ def test_a_pile_is_run_once_at_a_time(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
 def test_two_ranks_make_the_same_kind_of_pile(run: Path, tmp_path: Path) -> None:
-    finished, _ = run_pile(small(run={"ranks": 2, "duration": "0.1 s"}), find_engine(None), tmp_path)
+    finished, _ = run_pile(small(run={"ranks": 2, "duration": "0.02 s"}), find_engine(None), tmp_path)
     one, two = (current_pile_result(directory) for directory in (run, finished.directory))
     assert two["surface"]["start"] == pytest.approx(one["surface"]["start"], rel=0.05)
     assert two["beads"] == one["beads"]
@@ -207,28 +252,28 @@ def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
     text.write_text(text.read_text()[:-200])
     for place in (gap, cut, said, lines):
         for command in ("plot", "vtk"):
-            done = subprocess.run([PROGRAM, command, str(place)], capture_output=True, text=True, check=False)
+            done = call(command, str(place))
             assert done.returncode in (1, 2)
             assert len(done.stderr.splitlines()) == 1, done.stderr
 
 
-def test_looking_before_the_end_leaves_nothing_stale(tmp_path: Path) -> None:
-    case, engine = load_pile("pile-ci"), find_engine(None)
-    place = pile_place(case, engine, tmp_path)
+def test_looking_before_the_end_leaves_nothing_stale(halting: Callable[..., str], tmp_path: Path) -> None:
+    case, engine = brief(), find_engine(halting(1))
+    place = pile_place(case, engine, tmp_path / "out")
     unfinished = place.with_name(place.name + ".part")
-    program = subprocess.Popen([PROGRAM, "run", "pile-ci", "--out", str(tmp_path)], stderr=subprocess.DEVNULL)
-    wait_for(lambda: part_directories(unfinished))
+    program = start_brief(tmp_path, str(engine.path))
+    wait_for((tmp_path / "halted-0001").exists)
     program.kill()
     program.wait()
     (unfinished / "failure.json").write_text("{}")
     assert tabulate_pile(unfinished)["driven"] == 0.0
-    finished, _ = run_pile(case, engine, tmp_path)
-    assert current_pile_result(finished.directory)["driven"] > 0.1
+    finished, _ = run_pile(case, engine, tmp_path / "out")
+    assert current_pile_result(finished.directory)["driven"] > 0.04
     assert not (finished.directory / "failure.json").exists()
 
 
 def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    case, engine = load_pile("pile-ci"), find_engine(None)
+    case, engine = brief(), find_engine(None)
     place = pile_place(case, engine, tmp_path)
     from runner import parts
 
@@ -295,7 +340,7 @@ def test_shares_by_mass_and_by_number() -> None:
 
 def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     def told(*command: str) -> str:
-        return subprocess.run([PROGRAM, *command], capture_output=True, text=True, check=True).stdout
+        return call(*command, check=True).stdout
 
     assert "climbs  " in told("result", str(run))
     assert told("plot", str(run), "--to", "here").strip() == "here/climb.png"
@@ -338,17 +383,15 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
         ["vtk", "--as-placed"],
     ]
     for option in refusals:
-        refused = subprocess.run(
-            [PROGRAM, option[0], str(run), *option[1:]], capture_output=True, text=True, check=False
-        )
+        refused = call(option[0], str(run), *option[1:])
         assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
-    refused = subprocess.run([PROGRAM, "theory", "pile-ci"], capture_output=True, text=True, check=False)
+    refused = call("theory", "pile-ci")
     assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
 
 
 def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     """Two starts and an interruption; the table has a pile's columns."""
-    tables = document(run={"duration": "0.06 s"})
+    tables = document(run={"duration": "0.04 s"})
     (tmp_path / "base.toml").write_text(to_toml(tables))
     sweep = expand({"case": "base.toml", "axes": {"start.seed": [1, 2]}}, source="test", name="test", folder=tmp_path)
     out = tmp_path / "runs"

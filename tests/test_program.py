@@ -9,20 +9,21 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import PROGRAM, SHORT, document, to_toml
+from tests.conftest import PROGRAM, SHORT, call, document, to_toml
 
 ROOT = Path(__file__).parent.parent
 
 
-def _walkers(*arguments: str, folder: Path | None = None) -> str:
-    return subprocess.run([PROGRAM, *arguments], cwd=folder, capture_output=True, text=True, check=True).stdout
+def _walkers(*arguments: str) -> str:
+    """The installed program, as a process of its own."""
+    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, check=True).stdout
 
 
 def test_help_names_every_command() -> None:
     shown = _walkers("--help")
     for command in ("show", "deck", "run", "result", "plot", "vtk", "render", "audit"):
         assert command in shown
-        assert _walkers(command, "--help").strip()
+        assert call(command, "--help", check=True).stdout.strip()
 
 
 def test_show_tells_what_follows_from_a_case() -> None:
@@ -38,7 +39,7 @@ def test_show_tells_what_follows_from_a_case() -> None:
         " a cycle",
     ):
         assert part in shown
-    summary = json.loads(_walkers("show", "fig1b", "--json"))
+    summary = json.loads(call("show", "fig1b", "--json", check=True).stdout)
     assert summary["dimer"]["gamma0"] == pytest.approx(0.3811, abs=1e-4)
     assert summary["case"]["beads"]["radii"] == [3e-4, 2e-4]
     assert summary["time_step"]["share"]["rayleigh"] < 0.2
@@ -49,28 +50,28 @@ def test_show_tells_what_follows_from_a_case() -> None:
 
 def test_deck_is_printed_or_written(tmp_path: Path) -> None:
     printed = _walkers("deck", "fig1b")
-    _walkers("deck", "fig1b", "--to", str(tmp_path / "deck"))
+    call("deck", "fig1b", "--to", str(tmp_path / "deck"), check=True)
     assert (tmp_path / "deck" / "walker.lig").read_text() == printed
     assert (tmp_path / "deck" / "walls.stl").exists()
-    again = subprocess.run([PROGRAM, "deck", "fig1b", "--to", str(tmp_path / "deck")], capture_output=True, check=False)
+    again = call("deck", "fig1b", "--to", str(tmp_path / "deck"))
     assert again.returncode == 2
 
 
 def test_from_a_case_file_to_pictures(in_folder: Path) -> None:
     (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
     assert "toward the large bead" in _walkers("run", "mine.toml")
-    assert "(already run)" in _walkers("run", "mine.toml")
+    assert "(already run)" in call("run", "mine.toml", check=True).stdout
     for command, last in (("plot", "gait.png"), ("vtk", "walkers.pvd"), ("render", "walker.png")):
         path = Path(_walkers(command, "mine.toml").split()[-1])
         assert path.name == last
         assert path.exists()
 
 
-def test_progress_is_plain_lines_without_a_terminal(in_folder: Path) -> None:
-    (in_folder / "mine.toml").write_text(
-        to_toml(document(run={"cycles": 120, "settling_cycles": 2, "samples_per_cycle": 1}))
-    )
-    done = subprocess.run([PROGRAM, "run", "mine.toml"], capture_output=True, text=True, check=True)
+def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first one is due after a second; here at once, so that a run need not last that long on a fast machine."""
+    monkeypatch.setattr("walkers.progress._FIRST_LINE_SECONDS", 0.0)
+    (in_folder / "mine.toml").write_text(to_toml(document(run={**SHORT, "cycles": 30})))
+    done = call("run", "mine.toml", check=True)
     lines = [line for line in done.stderr.splitlines() if not line.startswith("walkers: warning:")]
     assert lines
     assert all("s simulated" in line and "steps/s" in line and ("left" in line or "starting" in line) for line in lines)

@@ -6,7 +6,7 @@ import json
 import os
 import signal
 import subprocess
-import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +16,17 @@ from inputs import InputError
 from runner import find_engine, finished_run, open_run, run_name
 from runner.failures import RunBusy
 from templates import render_deck
-from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml
+from tests.conftest import (
+    PROGRAM,
+    SHORT,
+    call,
+    document,
+    engines_in,
+    make_case,
+    to_toml,
+    wait_for,
+    wait_for_engines,
+)
 from walkers import find_run, run_case
 
 
@@ -37,11 +47,12 @@ def test_a_finished_run_is_not_run_again(tmp_path: Path) -> None:
 
 def test_force_runs_again(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
-    first = run_case(case, tmp_path).run.manifest["finished"]
-    time.sleep(1.1)
-    again = run_case(case, tmp_path, force=True)
+    first = run_case(case, tmp_path).run
+    node = (first.directory / "beads.bin").stat().st_ino
+    with (first.directory / "beads.bin").open("rb"):  # as long as it is open no other file gets its number
+        again = run_case(case, tmp_path, force=True)
     assert not again.found
-    assert again.run.manifest["finished"] > first
+    assert (again.run.directory / "beads.bin").stat().st_ino != node
     assert [path.name for path in tmp_path.iterdir()] == [again.run.directory.name]
 
 
@@ -118,7 +129,7 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
 
 def test_the_deck_of_a_run_can_be_run_by_hand(tmp_path: Path) -> None:
     run = run_case(make_case(run=SHORT), tmp_path / "runs").run
-    subprocess.run([PROGRAM, "deck", _toml(tmp_path), "--to", str(tmp_path / "byhand")], check=True, stdout=-3)
+    call("deck", _toml(tmp_path), "--to", str(tmp_path / "byhand"), check=True)
     by_hand = tmp_path / "byhand"
     with (by_hand / "engine.log").open("wb") as log:
         subprocess.run(["liggghts", "-in", "walker.lig"], cwd=by_hand, stdout=log, check=True)
@@ -147,9 +158,8 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(in_folder: Path)
     front.write_text('#!/bin/sh\nliggghts "$@"\nexit 0\n')
     front.chmod(0o755)
     program = subprocess.Popen([PROGRAM, "run", "test.toml", "--engine", str(front)], stderr=subprocess.DEVNULL)
-    while not list(in_folder.glob("runs/*.part/beads.bin")):
-        assert program.poll() is None
-        time.sleep(0.02)
+    wait_for(lambda: program.poll() is not None or list(in_folder.glob("runs/*.part/beads.bin")))
+    assert program.poll() is None
     program.kill()
     program.wait()
     case = make_case(run=long).renamed("test")
@@ -159,28 +169,22 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(in_folder: Path)
     finally:
         for engine in engines_in(in_folder):
             os.kill(engine, signal.SIGKILL)
-    for _ in range(100):  # a dying process lets go of its files a moment after it has left the process table
-        try:
-            with open_run(case, render_deck(case), find_engine(str(front)), in_folder / "runs"):
-                return
-        except RunBusy:
-            time.sleep(0.05)
-    pytest.fail("the lock outlived the engine")
+
+    def is_free() -> bool:
+        with suppress(RunBusy), open_run(case, render_deck(case), find_engine(str(front)), in_folder / "runs"):
+            return True
+        return False
+
+    wait_for(is_free)  # a dying process lets go of its files a moment after it has left the process table
 
 
 def test_an_engine_dies_with_its_launcher(in_folder: Path) -> None:
     (in_folder / "test.toml").write_text(to_toml(document(run={"cycles": 4000, "samples_per_cycle": 1})))
     program = subprocess.Popen([PROGRAM, "run", "test.toml"], stderr=subprocess.DEVNULL)
-    while not engines_in(in_folder):
-        assert program.poll() is None
-        time.sleep(0.02)
+    wait_for_engines(in_folder, program)
     program.kill()
     program.wait()
-    for _ in range(100):
-        if not engines_in(in_folder):
-            return
-        time.sleep(0.05)
-    pytest.fail("an engine runs on for nobody")
+    wait_for(lambda: not engines_in(in_folder))
 
 
 def test_a_run_is_found_by_its_directory_or_its_case(tmp_path: Path) -> None:
@@ -192,10 +196,7 @@ def test_a_run_is_found_by_its_directory_or_its_case(tmp_path: Path) -> None:
 
 def test_json_result_of_the_program(in_folder: Path) -> None:
     _toml(in_folder)
-    first, second = (
-        json.loads(subprocess.run([PROGRAM, "run", "test.toml", "--json"], capture_output=True, check=True).stdout)
-        for _ in range(2)
-    )
+    first, second = (json.loads(call("run", "test.toml", "--json", check=True).stdout) for _ in range(2))
     assert (first["found"], second["found"]) == (False, True)
     assert first["velocity"] == second["velocity"]
     shown = subprocess.run([PROGRAM, "result", first["run"]], capture_output=True, text=True, check=True).stdout
@@ -241,12 +242,12 @@ def test_a_cut_dump_is_drawn_as_far_as_it_goes(tmp_path: Path) -> None:
     dump = directory / "beads.bin"
     dump.write_bytes(dump.read_bytes()[: dump.stat().st_size // 2])
     for command in ("plot", "vtk", "result"):
-        done = subprocess.run([PROGRAM, command, str(directory)], capture_output=True, text=True, check=True)
+        done = call(command, str(directory), check=True)
         assert "walkers: warning:" in done.stderr
         assert "is incomplete" in done.stderr
     dump.write_bytes(dump.read_bytes()[:1000])
     (directory / "result.json").unlink()
-    done = subprocess.run([PROGRAM, "plot", str(directory)], capture_output=True, text=True, check=False)
+    done = call("plot", str(directory))
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
 
@@ -256,7 +257,7 @@ def test_a_cut_dump_is_drawn_as_far_as_it_goes(tmp_path: Path) -> None:
 )
 def test_places_that_cannot_be_written(in_folder: Path, arguments: list[str]) -> None:
     _toml(in_folder)
-    done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, check=False)
+    done = call(*arguments)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert done.stderr.startswith("walkers: ")

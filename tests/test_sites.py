@@ -12,7 +12,7 @@ import pytest
 from inputs import InputError
 from sweeps.site import load_site, pilots
 from sweeps.table import load
-from tests.conftest import PROGRAM, document, engines_in, to_toml, wait_for
+from tests.conftest import PATIENCE, PROGRAM, document, engines_in, to_toml, wait_for, wait_for_engines
 from tests.test_sweeps import SLOW, TINY, contents_of
 
 SLURM = 'scheduler = "slurm"\ncores = 16\n'
@@ -133,12 +133,12 @@ def test_a_sweep_of_pilots_leaves_nobody_behind(in_folder: Path, number: signal.
     (in_folder / "site.toml").write_text(LOCAL)
     command = [PROGRAM, "sweep", "test.toml", "--site", "site.toml"]
     program = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE, text=True)
-    wait_for(lambda: len(engines_in(in_folder)) == 2)
+    wait_for_engines(in_folder, program, 2)
     if number == signal.SIGINT:
         os.killpg(program.pid, number)
     else:
         program.kill()
-    _, errors = program.communicate(timeout=60)
+    _, errors = program.communicate(timeout=PATIENCE)
     assert "Traceback" not in errors
     assert program.returncode == (130 if number == signal.SIGINT else -signal.SIGKILL)
-    wait_for(lambda: not engines_in(in_folder) and not _helpers(in_folder), 60.0)
+    wait_for(lambda: not engines_in(in_folder) and not _helpers(in_folder))

@@ -1,7 +1,6 @@
 """Sweep files: what may be varied and how, and what is said of one that makes no sense."""
 
 import json
-import subprocess
 from collections.abc import Callable
 from math import asin
 from pathlib import Path
@@ -15,7 +14,7 @@ from inputs import InputError
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
 from inputs.sweep import Sweep, expand, load_sweep, shipped_sweeps
-from tests.conftest import PROGRAM, document, to_toml
+from tests.conftest import call, document, to_toml
 
 Make = Callable[..., Sweep]
 
@@ -208,7 +207,7 @@ def test_a_point_that_makes_no_sense_is_named(make: Make) -> None:
 def test_bad_sweeps_end_with_status_2_and_leave_nothing(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text('case = "fig1b"\naxes.drive.frequency = ["60 Hz", "0 Hz"]\n')
     for arguments in (["bad.toml"], ["nosuch"], ["fig2", "--site", "nosite.toml"], ["fig2", "--out", "bad.toml"]):
-        done = subprocess.run([PROGRAM, "sweep", *arguments], cwd=tmp_path, capture_output=True, text=True, check=False)
+        done = call("sweep", *arguments, folder=tmp_path)
         assert done.returncode == 2, arguments
         assert "Traceback" not in done.stderr
         assert len(done.stderr.splitlines()) == 1

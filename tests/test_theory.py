@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy
+from sympy.polys.fields import field
 
 from inputs import load_case
 from inputs.case import WalkerCase
@@ -18,7 +19,7 @@ from postprocess.result import read_result
 from sweeps.conduct import Options
 from sweeps.run import run_sweep
 from sweeps.table import thresholds
-from tests.conftest import PROGRAM, document, make_case, to_toml
+from tests.conftest import PROGRAM, call, document, make_case, to_toml
 from theory.friction import Friction
 from theory.mathieu import alignment, is_stable, largest_stable_v
 from theory.motion import Walker, walk
@@ -88,25 +89,36 @@ def test_matrices_and_closed_form_are_the_same_model() -> None:
 
 
 def test_matrices_and_closed_form_agree_identically() -> None:
-    """Symbolically, for beads of equal density: the difference of the two is zero on c² = 1 - s²."""
-    s, mu, gamma, c = sympy.symbols("s mu gamma c")
+    """In exact fractions of polynomials, for beads of equal density: the difference of the two is zero.
+
+    Sine and cosine of δ are the rational functions of t that make up the unit circle, and Γ is the square root of two
+    times g.
+    """
+    _, t, g = field("t,g", sympy.QQ)
+    s, c = 2 * t / (1 + t**2), (1 - t**2) / (1 + t**2)
+    mu = (3 * s + s**3) / (1 + 3 * s**2)
     heavy, light = (1 + mu) / 2, (1 - mu) / 2
-    matrix = sympy.Matrix([[-light * s, heavy * s, -1], [light * s, -heavy * s, 1], [light, -heavy, s]]) / c
+    matrix = [[-light * s, heavy * s, -1], [light * s, -heavy * s, 1], [light, -heavy, s]]
     one, two = 5 / (1 + mu), 5 / (1 - mu)
-    gains = sympy.Matrix([[1 + one, 1, one], [1, 1 + two, two], [one, two, one + two]])
-    unit = sympy.simplify(gains.inv() * sympy.Matrix([-1, -1, 0]))
-    assert unit == sympy.Matrix([-1, -1, 1]) / 2
+    gains = [[1 + one, 1, one], [1, 1 + two, two], [one, two, one + two]]
+    unit = [sympy.QQ(-1, 2), sympy.QQ(-1, 2), sympy.QQ(1, 2)]
+    assert [_product(row, unit) for row in gains] == [-1, -1, 0]
     velocity = 0
-    for force in (gamma / sympy.sqrt(2), -gamma / sympy.sqrt(2)):
-        normal = sympy.Matrix([1 + s, 1 - s, c**2 / 2]) + matrix * unit * force
-        sliding = [unit[contact] * force / normal[contact] for contact in range(3)]
+    for force in (g, -g):
+        at_rest = (1 + s, 1 - s, c**2 / 2)
+        normal = [load + _product(row, unit) * force / c for load, row in zip(at_rest, matrix, strict=True)]
+        sliding = [share * force / load for share, load in zip(unit, normal, strict=True)]
         velocity += (sliding[0] + sliding[1] - sliding[2]) / 4
+    gamma_squared = 2 * g**2
     first = c**3 * (1 + mu * s)
-    first /= (c**2 * (1 + s**2) - gamma**2 / 8 * (1 + mu * s) ** 2) ** 2 - (2 * c**2 * s) ** 2
-    second = 4 * c * (1 + s**2) / ((c**6 - gamma**2 / 2 * (mu + s) ** 2) * (1 + 3 * s**2))
-    difference = sympy.numer(sympy.together(velocity - gamma**2 * s / 4 * (first + second)))
-    on_circle = sympy.rem(sympy.expand(difference), c**2 - (1 - s**2), c)
-    assert sympy.simplify(on_circle.subs(mu, (3 * s + s**3) / (1 + 3 * s**2))) == 0
+    first /= (c**2 * (1 + s**2) - gamma_squared / 8 * (1 + mu * s) ** 2) ** 2 - (2 * c**2 * s) ** 2
+    second = 4 * c * (1 + s**2) / ((c**6 - gamma_squared / 2 * (mu + s) ** 2) * (1 + 3 * s**2))
+    assert velocity != 0
+    assert velocity - gamma_squared * s / 4 * (first + second) == 0
+
+
+def _product(row: list[Any], column: list[Any]) -> Any:
+    return sum(one * other for one, other in zip(row, column, strict=True))
 
 
 def test_exchanged_beads_walk_the_other_way() -> None:
@@ -243,10 +255,10 @@ def test_the_program_prints_theory_beside_the_engine(in_folder: Path) -> None:
     (in_folder / "test.toml").write_text(to_toml(document(run={"cycles": 20, "settling_cycles": 10})))
     told = subprocess.run([PROGRAM, "theory", "test.toml"], capture_output=True, text=True, check=True).stdout
     assert "not run" in told
-    subprocess.run([PROGRAM, "run", "test.toml"], capture_output=True, check=True)
-    told = subprocess.run([PROGRAM, "theory", "test.toml", "--json"], capture_output=True, text=True, check=True).stdout
+    call("run", "test.toml", check=True)
+    told = call("theory", "test.toml", "--json", check=True).stdout
     contents = json.loads(told)
     assert contents["engine"]["velocity"]["mean"] == pytest.approx(contents["viscous"]["velocity"], rel=0.08)
     (in_folder / "up.toml").write_text(to_toml(document(drive={"axis": "z"})))
-    done = subprocess.run([PROGRAM, "theory", "up.toml"], capture_output=True, text=True, check=False)
+    done = call("theory", "up.toml")
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
