@@ -278,13 +278,16 @@ def test_an_edit_of_the_design_is_told_and_not_dropped(tmp_path: Path) -> None:
     unit = np.full((4, 2), 0.5)
     file = tmp_path / "wave-1.json"
     assert _kept(file, _determinants(first, 1), lambda: unit) is unit
-    for key, value in (("seed", 3), ("waves", [12, 8]), ("guesses", [{"friction": 0.1, "drag": 1.0}])):
+    for key, value in (("seed", 3), ("waves", [20, 8]), ("guesses", [{"friction": 0.1, "drag": 1.0}])):
         table = document if key == "guesses" else document["design"]
         changed = {**document, key: value} if table is document else {**document, "design": {**table, key: value}}
         edited = read_calibration(changed, source="test", name="test", folder=tmp_path)
         with pytest.raises(InputError, match=rf"wave-1\.json: {key}: was drawn with other {key}"):
             _kept(file, _determinants(edited, 1), lambda: unit)
-    longer = {**document, "design": {**document["design"], "waves": [16, 8, 8]}}  # another wave at the end is welcome
+    longer = {
+        **document,
+        "design": {**document["design"], "waves": [*document["design"]["waves"], 8]},
+    }  # another wave at the end is welcome
     more = read_calibration(longer, source="test", name="test", folder=tmp_path)
     np.testing.assert_array_equal(_kept(file, _determinants(more, 1), lambda: 1.0 - unit), unit)
 
