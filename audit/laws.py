@@ -10,8 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputs import forces
 from inputs.case import WalkerCase
+from physics.capillary import (
+    bridge_volume_at_wall,
+    bridge_volume_between_beads,
+    capillary_force,
+    capillary_force_at_wall,
+    rupture_distance,
+)
+from physics.contact import hertz_repulsion, hertz_repulsion_at_wall, reduced_modulus
+from physics.lubrication import normal_drag, normal_drag_at_wall, tangential_drag, tangential_drag_at_wall
+from physics.wall import WALL_COPIES
 from postprocess.dump import FloatArray
 
 
@@ -23,53 +32,42 @@ class Partner:
     wall: bool = False
 
     @property
-    def copies(self) -> float:
+    def copies(self) -> int:
         """How often it stands in the deck."""
-        return 2.0 if self.wall else 1.0
+        return WALL_COPIES if self.wall else 1
 
     def reduced_radius(self, radius: float) -> float:
         """R* of the elastic contact with a bead, m."""
         return radius if self.wall else radius * self.radius / (radius + self.radius)
 
-    def viscous_radius(self, radius: float) -> float:
-        """R* of the lubrication forces, m: a wall counts as an equal sphere."""
-        return radius / 2.0 if self.wall else self.reduced_radius(radius)
-
 
 def capillary_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
-    """Attraction at each gap, N: Soulié et al. (2006); at a wall twice that of equal spheres; zero past rupture."""
+    """Attraction at each gap, N (`physics.capillary`); zero past rupture."""
     liquid = case.liquid
+    tension, angle = liquid.surface_tension, liquid.contact_angle
     if partner.wall:
-        volume = forces.bridge_volume_at_wall(radius, liquid.volume_fraction)
+        volume = bridge_volume_at_wall(radius, liquid.volume_fraction)
+        values = [capillary_force_at_wall(tension, radius, volume, angle, float(h)) for h in gap]
     else:
-        volume = forces.bridge_volume_between_beads(radius, partner.radius, liquid.volume_fraction)
-    rupture = forces.rupture_distance(volume, liquid.contact_angle)
-    other = radius if partner.wall else partner.radius
-    values = [
-        partner.copies
-        * forces.capillary_force(liquid.surface_tension, radius, other, volume, liquid.contact_angle, float(h))
-        for h in gap
-    ]
-    return np.where(gap < rupture, values, 0.0)
+        volume = bridge_volume_between_beads(radius, partner.radius, liquid.volume_fraction)
+        values = [capillary_force(tension, radius, partner.radius, volume, angle, float(h)) for h in gap]
+    return np.where(gap < rupture_distance(volume, angle), values, 0.0)
 
 
 def hertz_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
-    """Repulsion 4/3 E* √R* δ^(3/2), N; a wall stands twice."""
-    modulus = forces.reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
-    root = np.sqrt(partner.reduced_radius(radius))
-    law: FloatArray = partner.copies * 4.0 / 3.0 * modulus * root * np.maximum(-gap, 0.0) ** 1.5
-    return law
+    """Repulsion, N (`physics.contact`)."""
+    modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
+    if partner.wall:
+        return np.array([hertz_repulsion_at_wall(-float(h), radius, modulus) for h in gap])
+    return np.array([hertz_repulsion(-float(h), partner.reduced_radius(radius), modulus) for h in gap])
 
 
-def lubrication_drags(case: WalkerCase, reduced: float, gap: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Coefficients of the normal and the tangential viscous force of one bridge, N s/m, at each gap.
-
-    6πηR*/max(ε, h/R*) and (8/15 ln(1/max(ε, h/R*)) + 0.9588) 6πηR*, after Nase et al. as in Shi and McCarthy, Powder
-    Technology 184 (2008) 65, Eqs. 40, 41.
-    """
-    stokes = 6.0 * np.pi * case.liquid.dynamic_viscosity * reduced
-    nearness = np.maximum(case.contact.minimum_separation_ratio, gap / reduced)
-    return stokes / nearness, stokes * (8.0 / 15.0 * np.log(1.0 / nearness) + 0.9588)
+def lubrication_drags(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
+    """Coefficients of the normal and the tangential viscous force (`physics.lubrication`), N s/m, shape (2, F)."""
+    size = partner.reduced_radius(radius)
+    laws = (normal_drag_at_wall, tangential_drag_at_wall) if partner.wall else (normal_drag, tangential_drag)
+    viscosity, nearest = case.liquid.dynamic_viscosity, case.contact.minimum_separation_ratio
+    return np.array([[law(viscosity, size, nearest, float(h)) for h in gap] for law in laws])
 
 
 @dataclass(frozen=True)
@@ -102,7 +100,7 @@ def bridge_law(  # noqa: PLR0913, PLR0917, the kinematics of a contact
 ) -> Exerted:
     """Force on a bead and torque about its centre by capillarity, viscosity and elasticity, without friction.
 
-    The viscous forces are those of `lubrication_drags`, at a wall twice. The arms of overlapping surfaces end half way
+    The viscous forces are those of `lubrication_drags`. The arms of overlapping surfaces end half way
     into the overlap.
 
     Parameters
@@ -116,15 +114,14 @@ def bridge_law(  # noqa: PLR0913, PLR0917, the kinematics of a contact
     arm, other_arm = radius + inside, partner.radius + inside
     turning = arm[:, None] * spin + (0.0 if partner_spin is None else other_arm[:, None] * partner_spin)
     bound = capillary_law(case, radius, partner, gap)
-    drags = lubrication_drags(case, partner.viscous_radius(radius), gap)
-    normal_drag, tangential_drag = (partner.copies * drag * (bound > 0.0) for drag in drags)
+    along_normal, along_surface = lubrication_drags(case, radius, partner, gap) * (bound > 0.0)
     normal_speed = np.einsum("fx,fx->f", velocity, normal)
     sliding = velocity - normal_speed[:, None] * normal - np.cross(turning, normal)
-    tangential = -tangential_drag[:, None] * sliding
+    tangential = -along_surface[:, None] * sliding
     return Exerted(
         normal=normal,
         steady=(hertz_law(case, radius, partner, gap) - bound)[:, None] * normal,
-        viscous=-(normal_drag * normal_speed)[:, None] * normal + tangential,
+        viscous=-(along_normal * normal_speed)[:, None] * normal + tangential,
         torque=-arm[:, None] * np.cross(normal, tangential),
     )
 

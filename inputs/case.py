@@ -9,6 +9,8 @@ from dataclasses import dataclass, is_dataclass, replace
 from math import pi
 from typing import Any, Literal
 
+from physics.matter import Contact, Liquid
+
 
 @dataclass(frozen=True)
 class Beads:
@@ -19,41 +21,10 @@ class Beads:
     material: str | None
 
 
-@dataclass(frozen=True)
-class Liquid:
-    """Surface tension (N/m), dynamic viscosity (Pa s), density (kg/m³), effective contact angle (rad).
-
-    The viscosity is that of the bridges: the liquid's, times the case's ``viscosity_ratio``. ``volume_fraction`` is the
-    liquid on a bead over the bead's volume. ``film_viscosity`` (Pa s) is that of the film on the substrate through
-    which beads plough: 6π R times it drags a bead's centre in proportion to its velocity against the substrate.
-    """
-
-    surface_tension: float
-    dynamic_viscosity: float
-    density: float | None
-    volume_fraction: float
-    contact_angle: float
-    name: str | None
-    film_viscosity: float = 0.0
-
-
 def without_no_film(liquid: dict[str, Any]) -> None:
     """Leave out a film that is none, in place: what ran before there were films keeps its name."""
     if not liquid["film_viscosity"]:
         del liquid["film_viscosity"]
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Contact model: Young's modulus (Pa) of the softened beads and walls; the rest is dimensionless."""
-
-    youngs_modulus: float
-    poissons_ratio: float
-    restitution: float
-    friction_bead_bead: float
-    friction_bead_wall: float
-    rolling_friction: float
-    minimum_separation_ratio: float
 
 
 @dataclass(frozen=True)

@@ -1,75 +1,15 @@
-"""What follows from a case's two beads: masses, asymmetry, Γ0, loads at rest, and the room that they need."""
+"""What follows from a case's two beads: loads at rest, and the room that they need."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import asin, cos, pi, sqrt
+from math import sqrt
 
-from inputs import forces
 from inputs.case import WalkerCase
-
-
-@dataclass(frozen=True)
-class Dimer:
-    """What follows from a case's two beads: the paper's symbols, SI units.
-
-    Bead 1 is the case's first. Khan et al.: sin δ = (R1 − R2)/(R1 + R2), μ = (m1 − m2)/M, R̄ = (R1 + R2)/2,
-    Γ0 = a0 M/(4πγR̄) (their Eq. 1).
-    """
-
-    radii: tuple[float, float]
-    density: float
-    surface_tension: float
-
-    @property
-    def masses(self) -> tuple[float, float]:
-        """m1, m2, kg."""
-        first, second = (4.0 / 3.0 * pi * radius**3 * self.density for radius in self.radii)
-        return first, second
-
-    @property
-    def total_mass(self) -> float:
-        """M, kg."""
-        return sum(self.masses)
-
-    @property
-    def mean_radius(self) -> float:
-        """R̄, m."""
-        return sum(self.radii) / 2.0
-
-    @property
-    def sin_delta(self) -> float:
-        """The asymmetry parameter sin δ."""
-        return (self.radii[0] - self.radii[1]) / sum(self.radii)
-
-    @property
-    def mass_asymmetry(self) -> float:
-        """μ."""
-        return (self.masses[0] - self.masses[1]) / self.total_mass
-
-    @property
-    def capillary_scale(self) -> float:
-        """4πγR̄, the mean capillary force on the substrate in the limit of perfect wetting, N."""
-        return forces.capillary_force_limit_at_wall(self.surface_tension, self.mean_radius)
-
-    @property
-    def reduced_radius(self) -> float:
-        """R1 R2/(R1 + R2), m."""
-        return self.radii[0] * self.radii[1] / sum(self.radii)
-
-    @property
-    def length(self) -> float:
-        """From the outermost point of one bead to that of the other, seen from above, m."""
-        return sum(self.radii) * cos(asin(self.sin_delta)) + sum(self.radii)
-
-    def gamma0(self, peak_acceleration: float) -> float:
-        """Γ0 for a peak acceleration in m/s²."""
-        return peak_acceleration * self.total_mass / self.capillary_scale
-
-    def peak_acceleration(self, gamma0: float) -> float:
-        """The peak acceleration in m/s² that gives a Γ0."""
-        return gamma0 * self.capillary_scale / self.total_mass
+from physics import capillary
+from physics.contact import hertz_overlap, hertz_overlap_at_wall, reduced_modulus
+from physics.dimer import Dimer
 
 
 def dimer_of(case: WalkerCase) -> Dimer:
@@ -95,26 +35,25 @@ def contact_loads(case: WalkerCase) -> ContactLoads:
     """Capillary load of each contact and the overlap at which the Hertz force carries it."""
     liquid, radii = case.liquid, case.beads.radii
     dimer = dimer_of(case)
-    at_wall = [forces.bridge_volume_at_wall(radius, liquid.volume_fraction) for radius in radii]
-    between = forces.bridge_volume_between_beads(*radii, liquid.volume_fraction)
+    at_wall = [capillary.bridge_volume_at_wall(radius, liquid.volume_fraction) for radius in radii]
+    between = capillary.bridge_volume_between_beads(*radii, liquid.volume_fraction)
     walls = [
-        forces.capillary_force_at_wall(liquid.surface_tension, radius, volume, liquid.contact_angle)
+        capillary.capillary_force_at_wall(liquid.surface_tension, radius, volume, liquid.contact_angle)
         for radius, volume in zip(radii, at_wall, strict=True)
     ]
-    pair = forces.capillary_force(liquid.surface_tension, *radii, between, liquid.contact_angle)
-    modulus = forces.reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
-    # The wall stands twice in the deck, so that each of the two carries half of the load.
+    pair = capillary.capillary_force(liquid.surface_tension, *radii, between, liquid.contact_angle)
+    modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     sunk = [
-        forces.hertz_overlap(0.5 * (force + mass * case.pressing_gravity), radius, modulus)
+        hertz_overlap_at_wall(force + mass * case.pressing_gravity, radius, modulus)
         for force, mass, radius in zip(walls, dimer.masses, radii, strict=True)
     ]
     volumes = (at_wall[0], at_wall[1], between)
-    first, second, third = (forces.rupture_distance(volume, liquid.contact_angle) for volume in volumes)
+    first, second, third = (capillary.rupture_distance(volume, liquid.contact_angle) for volume in volumes)
     return ContactLoads(
         bridge_volumes=volumes,
         capillary=(walls[0], walls[1], pair),
         rupture=(first, second, third),
-        overlaps=(sunk[0], sunk[1], forces.hertz_overlap(pair, dimer.reduced_radius, modulus)),
+        overlaps=(sunk[0], sunk[1], hertz_overlap(pair, dimer.reduced_radius, modulus)),
     )
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, is_dataclass
 from math import cos, hypot, inf, pi, sin
 from typing import Any, Literal
 
-from inputs.case import Contact, Drive, Liquid, without_no_film
+from inputs.case import Drive, without_no_film
+from physics.matter import Contact, Liquid
 
 
 @dataclass(frozen=True)

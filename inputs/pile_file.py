@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from inputs import library
-from inputs.case import Contact, Drive, Liquid
-from inputs.dimer import Dimer
+from inputs.case import Drive
 from inputs.pile import Container, PileBeads, PileCase, PileRun, distance_from_axis, lattice
 from inputs.resolving import (
     MOST_STEPS,
@@ -20,8 +19,10 @@ from inputs.resolving import (
     resolve_liquid,
 )
 from inputs.schema import AUTO, ContactTable, EnvironmentTable, LiquidTable, Number, Table, Whole
-from inputs.timestep import TimeStepLimits, fit_into_cycle, time_step_limits
 from inputs.units import Acceleration, Density, Duration, Frequency, Length, Radius, SignedLength, Speed, Time
+from physics.dimer import Dimer
+from physics.matter import Contact, Liquid
+from physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 
 MOST_BEADS = 20_000
 _PACKING = 0.55
@@ -219,7 +220,7 @@ def limits_of(beads: PileBeads, contact: Contact, liquid: Liquid, drive: Drive) 
     glycerol pile at 0.4 of it is agitated as at a quarter of that step, within 0.1 %, and at 0.8 it heats up.
     """
     dimer = Dimer((max(beads.large or beads.small), min(beads.small)), beads.density, liquid.surface_tension)
-    return time_step_limits(dimer, contact, liquid, drive)
+    return time_step_limits(dimer, contact, liquid, drive.peak_velocity)
 
 
 def _run(table: PileRunTable, beads: PileBeads, contact: Contact, liquid: Liquid, drive: Drive) -> PileRun:

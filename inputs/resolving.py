@@ -6,11 +6,13 @@ from dataclasses import replace
 from typing import Literal
 
 from inputs import library
-from inputs.case import Beads, Contact, Drive, Liquid, Run, Start, WalkerCase
-from inputs.dimer import Dimer, contact_loads, horizontal_distance, reach
+from inputs.case import Beads, Drive, Run, Start, WalkerCase
+from inputs.dimer import contact_loads, horizontal_distance, reach
 from inputs.library import suggestion
 from inputs.schema import BeadsTable, ContactTable, LiquidTable, WalkerFile
-from inputs.timestep import TimeStepLimits, fit_into_cycle, time_step_limits
+from physics.dimer import Dimer
+from physics.matter import Contact, Liquid
+from physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 
 MOST_STEPS = 2**31 - 1
 _MINIMUM_SEPARATION_RATIO = 0.01
@@ -230,7 +232,7 @@ def _run(file: WalkerFile, dimer: Dimer, contact: Contact, liquid: Liquid, drive
         raise UnusableKeyError(
             "run.bridge_samples_per_cycle", f"expected a divisor of samples_per_cycle = {table.samples_per_cycle}"
         )
-    limits = time_step_limits(dimer, contact, liquid, drive)
+    limits = time_step_limits(dimer, contact, liquid, drive.peak_velocity)
     largest = largest_time_step(table.time_step, limits, allow_unstable=table.allow_unstable)
     time_step, steps = fit_into_cycle(largest, drive.frequency, table.samples_per_cycle)
     if steps * table.cycles > MOST_STEPS:

@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from inputs.case import WalkerCase
-from inputs.forces import film_drag
 from inputs.reading import load_case
 from paper import dimers, published
+from physics.film import film_drag
 from runner.files import write_json, write_text
 from theory.friction import Friction
 from theory.motion import Walker, walk

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -82,9 +81,10 @@ def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, Fl
 
 
 def _rows(path: Path, step: int, body: list[bytes], columns: int) -> FloatArray:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # where it meets no number it stops, which its length tells
+    try:
         values = np.fromstring(b"".join(body), dtype=np.float64, sep=" ")
+    except ValueError as error:
+        raise DumpError(f"{path}: no number in the frame of step {step} ({error})") from error
     if len(values) != len(body) * columns:
         raise DumpError(f"{path}: expected {columns} columns in the frame of step {step}")
     if not np.isfinite(values).all():

@@ -10,17 +10,26 @@ from __future__ import annotations
 import fcntl
 import os
 import platform
+import re
+import signal
 import time
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 _SUFFIX = ".lock"
 _LOOK_SECONDS = 0.005
+_LOOKS = 6
+"""Before a lock is taken for another's: by then somebody who only looks (`is_locked`) is gone again, and a process that
+is being killed is seen to be."""
 _PATIENCE_SECONDS = 10.0
 """How long the lock of an owner that has ended is waited for; its engines end within a fraction of a second."""
 _SILENT_SECONDS = 0.5
+_SIGNATURE_BYTES = 200
+_EXITING = 0x4
+"""PF_EXITING of the kernel's flags: the process is being torn down, and cannot be seen as a zombie yet."""
 
 
 def _lock_file(place: Path) -> Path:
@@ -83,7 +92,7 @@ class _Patience:
 
 def _lock(file: Path, patience: _Patience) -> int | None:
     """Lock a file that others may be removing at this moment: the lock counts only on the file that has the name."""
-    looks = 2  # somebody who only looks (`is_locked`) is gone again by then
+    looks = _LOOKS
     while True:
         descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
         try:
@@ -103,27 +112,41 @@ def _lock(file: Path, patience: _Patience) -> int | None:
 
 
 def _sign(descriptor: int) -> None:
-    """Say in a lock file who has it: machine, process, time."""
+    """Say in a lock file who has it: machine, process, and when that began."""
     with suppress(OSError):  # a full disk: the lock is the kernel's and needs no room
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, f"{platform.node()} {os.getpid()} {time.time():.3f}".encode(), 0)
+        signature = f"{platform.node()} {os.getpid()} {_process(os.getpid()).begin}"
+        os.pwrite(descriptor, signature.ljust(_SIGNATURE_BYTES).encode(), 0)  # at once, for somebody may be reading
 
 
 def _owner_has_ended(descriptor: int) -> bool:
     """Whether the process that has a lock file is known to be none any more: only its engines keep the lock."""
-    import psutil
-
-    signature = os.pread(descriptor, 1000, 0).decode("utf-8", "replace").split()
+    signature = os.pread(descriptor, _SIGNATURE_BYTES, 0).decode("utf-8", "replace").split()
     if len(signature) != 3 or signature[0] != platform.node():
         return False
     try:
-        owner = psutil.Process(int(signature[1]))
-        # A number that was given to another process since, or a process that nobody has buried yet.
-        return owner.create_time() > float(signature[2]) + 1.0 or owner.status() == psutil.STATUS_ZOMBIE
-    except psutil.NoSuchProcess:
+        owner = _process(int(signature[1]))
+    except FileNotFoundError:
         return True
-    except (psutil.Error, ValueError):
+    except (OSError, ValueError):
         return False
+    return owner.is_ending or owner.begin != signature[2]  # a number that was given to another process since
+
+
+@dataclass(frozen=True)
+class _Process:
+    """What the kernel says of a process: when it began (ticks since the boot), whether it is ending or has ended."""
+
+    begin: str
+    is_ending: bool
+
+
+def _process(number: int) -> _Process:
+    """A process, by ``/proc/PID/stat`` and ``status`` (proc(5))."""
+    fields = Path(f"/proc/{number}/stat").read_text("utf-8", "replace").rpartition(") ")[2].split()
+    state, flags, begin = fields[0], int(fields[6]), fields[19]
+    pending = re.findall(r"^(?:SigPnd|ShdPnd):\s*(\w+)", Path(f"/proc/{number}/status").read_text(), re.MULTILINE)
+    killed = any(int(one, 16) >> (signal.SIGKILL - 1) & 1 for one in pending)
+    return _Process(begin, killed or bool(flags & _EXITING) or state in "ZX")
 
 
 def is_locked(place: Path) -> bool:

@@ -8,9 +8,9 @@ from typing import Any
 from inputs import library
 from inputs.case import WalkerCase
 from inputs.dimer import contact_loads, dimer_of
-from inputs.forces import capillary_force_limit_at_wall
-from inputs.timestep import AUTO_FRACTIONS, TimeStepLimits, time_step_limits
 from inputs.units import ACCELERATION_OF_ONE_G
+from physics.capillary import capillary_force_limit_at_wall
+from physics.time_step import AUTO_FRACTIONS, TimeStepLimits, time_step_limits
 from runner.cost import predicted_seconds
 
 _CONTACTS = ("bead 1 on substrate", "bead 2 on substrate", "bead on bead")
@@ -26,7 +26,7 @@ def summarise(case: WalkerCase) -> dict[str, Any]:
         (limits, the chosen step and its share of each), ``run`` (steps, frames, predicted seconds).
     """
     dimer, loads, run = dimer_of(case), contact_loads(case), case.run
-    limits = time_step_limits(dimer, case.contact, case.liquid, case.drive)
+    limits = time_step_limits(dimer, case.contact, case.liquid, case.drive.peak_velocity)
     planes = [capillary_force_limit_at_wall(case.liquid.surface_tension, radius) for radius in case.beads.radii]
     return {
         "case": case.as_dict(),

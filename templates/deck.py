@@ -8,10 +8,11 @@ from functools import cache
 from math import degrees, inf, sqrt
 from typing import TYPE_CHECKING
 
-from inputs.case import Contact, WalkerCase
+from inputs.case import WalkerCase
 from inputs.dimer import contact_loads, dimer_of, hop_height, reach
-from inputs.forces import film_drag
 from inputs.pile import PileCase
+from physics.film import film_drag
+from physics.matter import Contact
 from templates.engine import ALL_REMEDIES, Remedies, contact_angle_setting, separation_cap, wall_mesh
 from templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
 from templates.placement import place_walkers

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from math import degrees, sqrt
 
-from inputs import forces
+from physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
+from physics.wall import WALL_COPIES
 from templates.scene import AXES, Face, turned
 
 
@@ -122,7 +123,7 @@ DEFECTS = (
         "Too large a time step is no error",
         "The lubrication force is stiff: past its limit beads heat up, and at several times the limit are lost, "
         "in silence.",
-        "The time step respects a viscous limit beside Rayleigh's and Hertz's (`inputs.timestep`).",
+        "The time step respects a viscous limit beside Rayleigh's and Hertz's (`physics.time_step`).",
         (
             "step-walker",
             "step-pile",
@@ -216,7 +217,7 @@ class Remedies:
     """
 
     riders: bool = True
-    wall_copies: int = 2
+    wall_copies: int = WALL_COPIES
     contact_angle: bool = True
 
 
@@ -246,11 +247,11 @@ def separation_cap(radii: Iterable[float], volume_fraction: float, contact_angle
     sizes = sorted(set(radii))
     ratios = []
     for radius in sizes:
-        at_wall = forces.rupture_distance(forces.bridge_volume_at_wall(radius, volume_fraction), contact_angle) / radius
+        at_wall = rupture_distance(bridge_volume_at_wall(radius, volume_fraction), contact_angle) / radius
         ratios += [at_wall / 2.0, (1.0 + at_wall) / _SIGHT - 1.0]
     for first, second in combinations_with_replacement(sizes, 2):
-        volume = forces.bridge_volume_between_beads(first, second, volume_fraction)
-        ratios.append(forces.rupture_distance(volume, contact_angle) / (first + second))
+        volume = bridge_volume_between_beads(first, second, volume_fraction)
+        ratios.append(rupture_distance(volume, contact_angle) / (first + second))
     return max(SMALLEST_SEPARATION_CAP, 1.0 + 1.05 * max(ratios))
 
 

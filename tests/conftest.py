@@ -179,16 +179,16 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
 
 def engines_in(directory: Path) -> list[int]:
     """Process ids of the engines that work in a directory or below."""
-    return processes_in(directory, b"liggghts")
+    return processes_in(directory, b"liggghts", b"\0-in\0")  # not ldd, which asks what the engine is linked to
 
 
-def processes_in(directory: Path, word: bytes) -> list[int]:
-    """Process ids of those that work in a directory or below and whose command has a word in it."""
+def processes_in(directory: Path, *words: bytes) -> list[int]:
+    """Process ids of those that work in a directory or below and whose command has some words in it."""
     found = []
     for process in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):  # gone by now, or none of ours
             command, folder = (process / "cmdline").read_bytes(), (process / "cwd").resolve()
-            if word in command and folder.is_relative_to(directory):
+            if all(word in command for word in words) and folder.is_relative_to(directory):
                 found.append(int(process.name))
     return found
 

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from inputs.forces import bridge_volume_between_beads
 from inputs.pile import Container
+from physics.capillary import bridge_volume_between_beads
 from postprocess.bed import liquid_of_beads, packing_profile, segregation
 from postprocess.clusters import Climb, Definition, Track, bulk_of, components, follow, held_clusters, judge
 from postprocess.events import events_of

@@ -7,9 +7,10 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from inputs import forces, load_case, shipped_cases
+from inputs import load_case, shipped_cases
 from inputs.case import WalkerCase
 from inputs.reading import load_any
+from physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
 from templates import render_deck
 from templates.engine import contact_angle_setting, face_triangle, separation_cap
 from templates.placement import place_walkers
@@ -87,11 +88,11 @@ def test_no_bridge_is_cut_before_it_ruptures() -> None:
     for fraction, angle in ((0.2, 0.0), (0.05, 1.0), (0.5, 1.5)):
         cap = separation_cap(radii, fraction, angle)
         for radius in radii:
-            at_wall = forces.bridge_volume_at_wall(radius, fraction)
-            assert (cap - 1) * 2 * radius > forces.rupture_distance(at_wall, angle)
-            assert (1.1 * cap - 1) * radius > forces.rupture_distance(at_wall, angle)
-        between = forces.bridge_volume_between_beads(*radii, fraction)
-        assert (cap - 1) * sum(radii) > forces.rupture_distance(between, angle)
+            at_wall = bridge_volume_at_wall(radius, fraction)
+            assert (cap - 1) * 2 * radius > rupture_distance(at_wall, angle)
+            assert (1.1 * cap - 1) * radius > rupture_distance(at_wall, angle)
+        between = bridge_volume_between_beads(*radii, fraction)
+        assert (cap - 1) * sum(radii) > rupture_distance(between, angle)
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])

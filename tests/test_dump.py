@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inputs import forces
 from inputs.dimer import contact_loads, dimer_of
+from physics.capillary import capillary_force, capillary_force_at_wall, rupture_distance
 from postprocess import read_table, tabulate
 from postprocess.dump import BinaryDump, DumpError
 from postprocess.local_dump import read_local_dump
@@ -95,10 +95,10 @@ def test_an_open_bridge_pulls_with_the_capillary_force(tmp_path: Path) -> None:
     for contact, gap, found in opened[["contact", "gap", "normal_force"]].itertuples(index=False):
         volume = volumes[contact - 1]
         if contact == 3:
-            expected = forces.capillary_force(0.0192, *radii, volume, 0.0, gap)
+            expected = capillary_force(0.0192, *radii, volume, 0.0, gap)
         else:
-            expected = forces.capillary_force_at_wall(0.0192, radii[contact - 1], volume, 0.0, gap)
-        assert gap < forces.rupture_distance(volume, 0.0)
+            expected = capillary_force_at_wall(0.0192, radii[contact - 1], volume, 0.0, gap)
+        assert gap < rupture_distance(volume, 0.0)
         assert found == pytest.approx(expected, rel=1e-8)
 
 

@@ -5,9 +5,19 @@ from math import pi
 
 import pytest
 
-from inputs import forces, load_case, resolve_case
-from inputs.dimer import Dimer, contact_loads, dimer_of
-from inputs.timestep import AUTO_FRACTIONS, fit_into_cycle, time_step_limits
+from inputs import load_case, resolve_case
+from inputs.dimer import contact_loads, dimer_of
+from physics.capillary import (
+    bridge_volume_at_wall,
+    bridge_volume_between_beads,
+    capillary_force,
+    capillary_force_at_wall,
+    capillary_force_limit_at_wall,
+    rupture_distance,
+)
+from physics.contact import hertz_overlap, reduced_modulus
+from physics.dimer import Dimer
+from physics.time_step import AUTO_FRACTIONS, fit_into_cycle, time_step_limits
 from tests.conftest import document, make_case
 
 GAMMA = 0.0192
@@ -16,32 +26,30 @@ GAMMA = 0.0192
 def test_wall_force_of_one_per_cent_liquid() -> None:
     """Twice the 1.74 πγR that the engine gives per wall; the sphere-plane limit is 4πγR."""
     radius = 3e-4
-    volume = forces.bridge_volume_at_wall(radius, 0.01)
-    force = forces.capillary_force_at_wall(GAMMA, radius, volume, 0.0)
+    volume = bridge_volume_at_wall(radius, 0.01)
+    force = capillary_force_at_wall(GAMMA, radius, volume, 0.0)
     assert force / (pi * GAMMA * radius) == pytest.approx(3.48, abs=0.005)
-    assert force < forces.capillary_force_limit_at_wall(GAMMA, radius)
+    assert force < capillary_force_limit_at_wall(GAMMA, radius)
 
 
 def test_capillary_force_of_equal_spheres_tends_to_two_pi_gamma_r() -> None:
     """Soulié's fit at small volume stays within some per cent of the exact 2πγR."""
-    force = forces.capillary_force(GAMMA, 3e-4, 3e-4, 1e-4 * (3e-4) ** 3, 0.0)
+    force = capillary_force(GAMMA, 3e-4, 3e-4, 1e-4 * (3e-4) ** 3, 0.0)
     assert force == pytest.approx(2 * pi * GAMMA * 3e-4, rel=0.12)
 
 
 def test_capillary_force_falls_with_the_gap_and_ends_small_at_rupture() -> None:
-    volume = forces.bridge_volume_between_beads(3e-4, 2e-4, 0.01)
-    rupture = forces.rupture_distance(volume, 0.0)
-    touching, half, last = (
-        forces.capillary_force(GAMMA, 3e-4, 2e-4, volume, 0.0, gap) for gap in (0.0, rupture / 2, rupture)
-    )
+    volume = bridge_volume_between_beads(3e-4, 2e-4, 0.01)
+    rupture = rupture_distance(volume, 0.0)
+    touching, half, last = (capillary_force(GAMMA, 3e-4, 2e-4, volume, 0.0, gap) for gap in (0.0, rupture / 2, rupture))
     assert touching > half > last > 0.0
-    assert forces.capillary_force(GAMMA, 3e-4, 2e-4, volume, 0.0, -1e-6) == touching
-    assert forces.rupture_distance(volume, 1.0) == pytest.approx(1.5 * rupture)
+    assert capillary_force(GAMMA, 3e-4, 2e-4, volume, 0.0, -1e-6) == touching
+    assert rupture_distance(volume, 1.0) == pytest.approx(1.5 * rupture)
 
 
 def test_hertz_overlap_carries_the_load() -> None:
-    modulus = forces.reduced_modulus(5e7, 0.3)
-    overlap = forces.hertz_overlap(3e-5, 2e-4, modulus)
+    modulus = reduced_modulus(5e7, 0.3)
+    overlap = hertz_overlap(3e-5, 2e-4, modulus)
     assert 4.0 / 3.0 * modulus * (2e-4) ** 0.5 * overlap**1.5 == pytest.approx(3e-5)
 
 
@@ -77,7 +85,7 @@ def test_drive_given_as_gamma0() -> None:
 def test_time_step_limits_of_the_walker() -> None:
     """By hand for R 0.2 mm, ρ 4000, E 50 MPa, ν 0.3: π R √(ρ/G)/(0.1631 ν + 0.8766) = 9.79 µs."""
     case = make_case()
-    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive)
+    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive.peak_velocity)
     assert limits.rayleigh == pytest.approx(9.79e-6, rel=1e-3)
     assert limits.rayleigh < limits.hertz < limits.viscous
 
@@ -89,7 +97,7 @@ def test_viscous_limit_rules_in_glycerol() -> None:
         liquid={"name": "glycerol 87 %"},
         drive={"frequency": "170 Hz", "peak_acceleration": "16.2 g"},
     )
-    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive)
+    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive.peak_velocity)
     assert 2e-6 < limits.viscous < 6e-6
     assert limits.exceeded_by(6e-6) == ["viscous"]
     assert case.run.time_step < 2.1e-6
@@ -98,7 +106,7 @@ def test_viscous_limit_rules_in_glycerol() -> None:
 @pytest.mark.parametrize("name", ["fig1b", "fig4a", "fig4b", "symmetric"])
 def test_auto_respects_every_limit_with_margin(name: str) -> None:
     case = load_case(name)
-    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive).as_dict()
+    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive.peak_velocity).as_dict()
     for limit, share in AUTO_FRACTIONS.items():
         assert case.run.time_step <= share * limits[limit]
 

@@ -14,7 +14,7 @@ from sympy.polys.fields import field
 
 from inputs import load_case
 from inputs.case import WalkerCase
-from inputs.dimer import Dimer
+from physics.dimer import Dimer
 from postprocess.result import read_result
 from sweeps.conduct import Options
 from sweeps.run import run_sweep

@@ -17,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from inputs.case import WalkerCase
-from inputs.dimer import Dimer, contact_loads, dimer_of
-from inputs.forces import film_drag
+from inputs.dimer import contact_loads, dimer_of
+from physics.dimer import Dimer
+from physics.film import film_drag
 from theory.friction import Friction
 from theory.quasistatic import forces_at_rest, inertia_matrix, normal_force_matrix, translation
 

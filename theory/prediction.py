@@ -9,7 +9,7 @@ import numpy as np
 
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
-from inputs.forces import largest_tangential_drag
+from physics.lubrication import tangential_drag, tangential_drag_at_wall
 from theory.friction import Friction
 from theory.mathieu import alignment, largest_stable_v
 from theory.motion import FloatArray, Motion, Walker, walk
@@ -24,14 +24,11 @@ _ROUNDS = 3
 def bridge_drag(case: WalkerCase) -> FloatArray:
     """Coefficient of the tangential viscous force at each contact as in the engine, N s/m, shape (3,).
 
-    Lubrication of touching bridges (Nase et al., in Shi and McCarthy 2008); a wall is an equal sphere, twice.
+    Lubrication of touching bridges (`physics.lubrication`).
     """
-
-    def drag(reduced_radius: float) -> float:
-        contact = case.contact
-        return largest_tangential_drag(case.liquid.dynamic_viscosity, reduced_radius, contact.minimum_separation_ratio)
-
-    return np.array([*(2.0 * drag(radius / 2.0) for radius in case.beads.radii), drag(dimer_of(case).reduced_radius)])
+    viscosity, nearest = case.liquid.dynamic_viscosity, case.contact.minimum_separation_ratio
+    on_walls = [tangential_drag_at_wall(viscosity, radius, nearest) for radius in case.beads.radii]
+    return np.array([*on_walls, tangential_drag(viscosity, dimer_of(case).reduced_radius, nearest)])
 
 
 def friction_of(*cases: WalkerCase, viscous: bool) -> Friction:

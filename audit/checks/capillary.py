@@ -10,8 +10,14 @@ import numpy as np
 from audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
 from audit.check import Check, Line
 from audit.laws import Partner, bridge_law, capillary_law, hertz_law, largest_error
-from inputs import forces
 from inputs.case import WalkerCase
+from physics.capillary import (
+    bridge_volume_at_wall,
+    bridge_volume_between_beads,
+    capillary_force,
+    capillary_force_at_wall,
+    rupture_distance,
+)
 from postprocess.dump import FloatArray
 from templates.deck import Plan
 from templates.engine import Remedies
@@ -58,8 +64,8 @@ def bead_on_bead(bench: Bench) -> Iterator[Line]:
     for fraction in (0.005, 0.01, 0.03):
         case = bench_case(liquid={"volume_fraction": fraction})
         scene = scene_on_floor(_pairs(_RATIOS, -_OVERLAP, _SPEED))
-        volumes = [forces.bridge_volume_between_beads(ratio * _SMALL, _SMALL, fraction) for ratio in _RATIOS]
-        ruptures = [forces.rupture_distance(volume, 0.0) for volume in volumes]
+        volumes = [bridge_volume_between_beads(ratio * _SMALL, _SMALL, fraction) for ratio in _RATIOS]
+        ruptures = [rupture_distance(volume, 0.0) for volume in volumes]
         steps, every = _steps_to(1.1 * max(ruptures), case)
         series = bench.run(Plan(case, scene, bench_recording(steps, every), remedies=bench.remedies, prescribed=True))
         for number, ratio in enumerate(_RATIOS):
@@ -114,8 +120,8 @@ def before_contact(bench: Bench) -> Iterator[Line]:
 def _retract_from_wall(bench: Bench, case: WalkerCase, remedies: Remedies) -> tuple[FloatArray, FloatArray]:
     radius = case.beads.radii[0]
     bead = Bead(0, (0.0, 0.0, radius - _OVERLAP), radius, velocity=(0.0, 0.0, _SPEED))
-    volume = forces.bridge_volume_at_wall(radius, case.liquid.volume_fraction)
-    steps, every = _steps_to(1.1 * forces.rupture_distance(volume, case.liquid.contact_angle), case)
+    volume = bridge_volume_at_wall(radius, case.liquid.volume_fraction)
+    steps, every = _steps_to(1.1 * rupture_distance(volume, case.liquid.contact_angle), case)
     plan = Plan(case, scene_on_floor([bead]), bench_recording(steps, every), remedies=remedies, prescribed=True)
     series = bench.run(plan)
     row = series.row(FIRST_BEAD)
@@ -131,13 +137,13 @@ def at_wall(bench: Bench) -> Iterator[Line]:
     still = np.zeros((len(gap), 3))
     normal = still + np.array([0.0, 0.0, 1.0])
     law = -bridge_law(case, radius, Partner(radius, wall=True), normal, gap, still, still).force[:, 2]
-    volume = forces.bridge_volume_at_wall(radius, case.liquid.volume_fraction)
+    volume = bridge_volume_at_wall(radius, case.liquid.volume_fraction)
     first_open = int(np.argmax(gap > 0))
     yield Line(
         "doubled wall, force against gap, over πγR", f"2 × equal spheres, {_SOULIE}", float(law[first_open] / scale),
         float(pull[first_open] / scale), "", 1e-4, largest_error(pull[:, None], law[:, None]), _WALL,
     )  # fmt: skip
-    rupture = forces.rupture_distance(volume, 0.0)
+    rupture = rupture_distance(volume, 0.0)
     measured = _rupture(gap, pull)
     resolution = float((gap[1] - gap[0]) / rupture)
     yield Line(
@@ -145,7 +151,7 @@ def at_wall(bench: Bench) -> Iterator[Line]:
     )
     raw_gap, raw_pull = _retract_from_wall(bench, case, Remedies(wall_copies=1))
     first_open = int(np.argmax(raw_gap > 0))
-    raw = forces.capillary_force(tension, radius, radius, volume, 0.0, float(raw_gap[first_open])) / scale
+    raw = capillary_force(tension, radius, radius, volume, 0.0, float(raw_gap[first_open])) / scale
     yield Line(
         "a single wall pulls half as hard, over πγR", f"equal spheres, {_SOULIE}", raw,
         float(raw_pull[first_open] / scale), "", 1e-4, defect=True,
@@ -179,10 +185,10 @@ def contact_angle(bench: Bench) -> Iterator[Line]:
     # The raw engine takes ½ θi θj: solve its force at the first open gap for the angle that it used.
     number = int(np.argmax(gap > 0))
     radius, tension = case.beads.radii[0], case.liquid.surface_tension
-    volume = forces.bridge_volume_at_wall(radius, case.liquid.volume_fraction)
+    volume = bridge_volume_at_wall(radius, case.liquid.volume_fraction)
     angles = np.radians(np.linspace(0.0, 60.0, 6001))
     candidates = [
-        forces.capillary_force_at_wall(tension, radius, volume, float(angle), float(gap[number])) for angle in angles
+        capillary_force_at_wall(tension, radius, volume, float(angle), float(gap[number])) for angle in angles
     ]
     used = degrees(angles[int(np.argmin(np.abs(np.array(candidates) - pull[number])))])
     acting = degrees(0.5 * radians(30.0) ** 2)
@@ -205,8 +211,8 @@ def _angle_line(what: str, gap: FloatArray, pull: FloatArray, law: FloatArray, n
 
 
 def _part_beads(bench: Bench, case: WalkerCase) -> tuple[FloatArray, FloatArray]:
-    volume = forces.bridge_volume_between_beads(_SMALL, _SMALL, case.liquid.volume_fraction)
-    steps, every = _steps_to(1.1 * forces.rupture_distance(volume, case.liquid.contact_angle), case)
+    volume = bridge_volume_between_beads(_SMALL, _SMALL, case.liquid.volume_fraction)
+    steps, every = _steps_to(1.1 * rupture_distance(volume, case.liquid.contact_angle), case)
     scene = scene_on_floor(_pairs((1.0,), -_OVERLAP, _SPEED))
     series = bench.run(Plan(case, scene, bench_recording(steps, every), remedies=bench.remedies, prescribed=True))
     return _gap(series, 3, 2, 2.0 * _SMALL), -series.force[:, series.row(3), 2]

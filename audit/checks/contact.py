@@ -11,9 +11,9 @@ import numpy as np
 from audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
 from audit.check import Check, Line
 from audit.laws import Partner, hertz_law, largest_error
-from inputs import forces
 from inputs.case import WalkerCase
 from inputs.dimer import contact_loads
+from physics.contact import damping_ratio, reduced_shear_modulus
 from templates.deck import Plan
 from templates.engine import Remedies
 from templates.scene import Bead
@@ -49,7 +49,7 @@ def friction(bench: Bench) -> Iterator[Line]:
         _WALL,
     )
     overlap = contact_loads(case).overlaps[0]
-    reduced_shear = forces.reduced_shear_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
+    reduced_shear = reduced_shear_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     spring = 2.0 * 8.0 * reduced_shear * sqrt(bead.radius * overlap)
     moved = speed * case.run.time_step * series.steps.astype(np.float64)
     held = spring * moved < 0.9 * coefficient * load
@@ -163,7 +163,7 @@ def _rebound(series: Measured, bead: int, speed: float) -> float:
 
 def doubled_restitution(coefficient: float) -> float:
     """Restitution at a wall that stands twice: stiffness and damping double, the damping ratio grows by √2."""
-    ratio = sqrt(2.0) * forces.damping_ratio(coefficient)
+    ratio = sqrt(2.0) * damping_ratio(coefficient)
     return exp(-pi * ratio / sqrt(1.0 - ratio**2)) if ratio < 1.0 else 0.0
 
 

@@ -12,7 +12,7 @@ from audit.bench import FIRST_BEAD, Bench, bench_case, changed_case
 from audit.check import Check, Line
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
-from inputs.forces import film_drag
+from physics.film import film_drag
 from postprocess.gait import walk
 from postprocess.trajectory import prescribed_motion, read_trajectory
 from runner.directory import CASE_NAME

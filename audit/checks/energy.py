@@ -18,10 +18,10 @@ import numpy as np
 from audit.bench import Bench
 from audit.check import Check, Line
 from audit.checks.drive import reference_walker
-from audit.laws import lubrication_drags
-from inputs import forces
+from audit.laws import Partner, lubrication_drags
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
+from physics.contact import damping_ratio, reduced_modulus, reduced_shear_modulus
 from postprocess.dump import FloatArray
 from postprocess.trajectory import prescribed_motion
 from templates.deck import walker_plan
@@ -35,17 +35,17 @@ _LEAD = 2
 class Touch:
     """Kinematics of a contact in the plane of motion, arrays of shape (F,), and its constants.
 
-    ``copies`` is 2 for a wall. Speeds are positive for parting and along the tangent.
+    ``radius`` is the bead's and ``mass`` the one that the contact slows. Speeds are positive for parting and along the
+    tangent.
     """
 
     gap: FloatArray
     normal_speed: FloatArray
     sliding_speed: FloatArray
-    reduced_radius: float
-    viscous_radius: float
+    radius: float
+    partner: Partner
     mass: float
     friction: float
-    copies: int
 
 
 @dataclass(frozen=True)
@@ -70,22 +70,19 @@ def dissipation(case: WalkerCase, touch: Touch, begin: int) -> Dissipated:
     """
     contact, step = case.contact, case.run.time_step
     overlap = np.maximum(-touch.gap, 0.0)
-    root = np.sqrt(touch.reduced_radius * overlap)
-    modulus = forces.reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
-    shear_modulus = forces.reduced_shear_modulus(contact.youngs_modulus, contact.poissons_ratio)
-    damping = forces.damping_ratio(contact.restitution)
+    root = np.sqrt(touch.partner.reduced_radius(touch.radius) * overlap)
+    modulus = reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
+    shear_modulus = reduced_shear_modulus(contact.youngs_modulus, contact.poissons_ratio)
+    damping = damping_ratio(contact.restitution)
     normal_damping = 2.0 * sqrt(5.0 / 6.0) * damping * np.sqrt(2.0 * modulus * root * touch.mass)
     stiffness = 8.0 * shear_modulus * root
     tangential_damping = 2.0 * sqrt(5.0 / 6.0) * damping * np.sqrt(stiffness * touch.mass)
     limit = touch.friction * np.abs(4.0 / 3.0 * modulus * root * overlap - normal_damping * touch.normal_speed)
     power = _friction_power(touch.sliding_speed, stiffness, tangential_damping, limit, step)
-    normal_drag, tangential_drag = lubrication_drags(case, touch.viscous_radius, touch.gap)
+    normal_drag, tangential_drag = lubrication_drags(case, touch.radius, touch.partner, touch.gap)
     viscous = normal_drag * touch.normal_speed**2 + tangential_drag * touch.sliding_speed**2
-    total = (
-        touch.copies
-        * step
-        * np.array([power[begin:].sum(), viscous[begin:].sum(), (normal_damping * touch.normal_speed**2)[begin:].sum()])
-    )
+    damped, copies = normal_damping * touch.normal_speed**2, touch.partner.copies
+    total = step * np.array([copies * power[begin:].sum(), viscous[begin:].sum(), copies * damped[begin:].sum()])
     return Dissipated(*map(float, total))
 
 
@@ -161,11 +158,10 @@ def _touches(
             gap=position[:, bead, 2] - radius,
             normal_speed=velocity[:, bead, 2],
             sliding_speed=velocity[:, bead, 0] - wall_speed - radius * spin[:, bead, 1],
-            reduced_radius=radius,
-            viscous_radius=radius / 2.0,
+            radius=radius,
+            partner=Partner(radius, wall=True),
             mass=masses[bead],
             friction=contact.friction_bead_wall,
-            copies=2,
         )
         for bead, radius in enumerate(radii)
     ]
@@ -174,17 +170,15 @@ def _touches(
     normal = arm / distance[:, None]
     tangent = np.stack([normal[:, 2], np.zeros(len(arm)), -normal[:, 0]], axis=1)
     relative = velocity[:, 0] - velocity[:, 1]
-    reduced = dimer_of(case).reduced_radius
     touches.append(
         Touch(
             gap=distance - sum(radii),
             normal_speed=np.einsum("fx,fx->f", relative, normal),
             sliding_speed=np.einsum("fx,fx->f", relative, tangent) - spin[:, :, 1] @ np.array(radii),
-            reduced_radius=reduced,
-            viscous_radius=reduced,
+            radius=radii[0],
+            partner=Partner(radii[1]),
             mass=masses[0] * masses[1] / sum(masses),
             friction=contact.friction_bead_bead,
-            copies=1,
         )
     )
     return touches

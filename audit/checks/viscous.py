@@ -10,8 +10,8 @@ import numpy as np
 from audit.bench import Bench, Measured, bench_case, bench_recording, scene_on_floor
 from audit.check import Check, Line
 from audit.laws import Partner, bridge_law, frame_by_frame_error
-from inputs import forces
 from inputs.case import WalkerCase
+from physics.capillary import bridge_volume_at_wall, rupture_distance
 from postprocess.dump import FloatArray
 from postprocess.trajectory import prescribed_motion
 from templates.deck import Plan
@@ -99,7 +99,7 @@ def run_box(bench: Bench, case: WalkerCase, remedies: Remedies, ranks: int = 1) 
     """Retract the 26 beads from their walls, from touching to past rupture."""
     radius = case.beads.radii[0]
     scene = box_scene(radius, ranks)
-    rupture = forces.rupture_distance(forces.bridge_volume_at_wall(radius, case.liquid.volume_fraction), 0.0)
+    rupture = rupture_distance(bridge_volume_at_wall(radius, case.liquid.volume_fraction), 0.0)
     steps = int(1.4 * rupture / (_RETREAT * case.run.time_step) / 100) * 100
     plan = Plan(case, scene, bench_recording(steps, 5), remedies=remedies, prescribed=True, ranks=ranks)
     return scene, bench.run(plan)

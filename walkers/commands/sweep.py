@@ -16,6 +16,7 @@ Jobs = Annotated[int | None, typer.Option("-j", "--jobs", min=1, help="Decks at 
 SitePath = Annotated[Path | None, typer.Option("--site", help="A site file: run on that cluster instead.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be done, and its cost; write nothing.")]
 Retries = Annotated[int, typer.Option("--retries", min=0, help="How often a failed point is tried again.")]
+_MANY = 10_000
 Limit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Stop an engine after this many seconds.")]
 
 
@@ -41,6 +42,8 @@ def command(
     loaded = load_sweep(sweep)
     check_out(out)
     refuse("--jobs", jobs is not None and site is not None, "a site says by itself how many decks run at once")
+    if len(loaded.rows) > _MANY:
+        print(f"{loaded.name}: resolving {len(loaded.rows)} points, some 2,000 a second", file=sys.stderr)
     options = Options(jobs or cores_here(), load_site(site) if site else None, retries, limit)
     if dry_run:
         print(plan_sweep(loaded, out, options, engine).as_text())

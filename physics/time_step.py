@@ -17,9 +17,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil, inf, pi, sqrt
 
-from inputs import forces
-from inputs.case import Contact, Drive, Liquid
-from inputs.dimer import Dimer
+from physics.contact import reduced_modulus
+from physics.dimer import Dimer
+from physics.film import film_drag
+from physics.lubrication import normal_drag, normal_drag_at_wall
+from physics.matter import Contact, Liquid
 
 AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
 """Share of each limit that ``"auto"`` stays under: at 0.2 of Rayleigh (2 µs at 50 MPa) the walker's speed, and at
@@ -47,11 +49,11 @@ class TimeStepLimits:
         return [name for name, limit in self.as_dict().items() if time_step > limit]
 
 
-def time_step_limits(dimer: Dimer, contact: Contact, liquid: Liquid, drive: Drive) -> TimeStepLimits:
-    """Limits of the time step for a dimer (see the module)."""
+def time_step_limits(dimer: Dimer, contact: Contact, liquid: Liquid, peak_velocity: float) -> TimeStepLimits:
+    """Limits of the time step for a dimer on a substrate of this peak velocity (m/s); see the module."""
     return TimeStepLimits(
         rayleigh=_rayleigh_time(dimer, contact),
-        hertz=_hertz_time(dimer, contact, drive.peak_velocity),
+        hertz=_hertz_time(dimer, contact, peak_velocity),
         viscous=_viscous_limit(dimer, contact, liquid),
     )
 
@@ -65,7 +67,7 @@ def _rayleigh_time(dimer: Dimer, contact: Contact) -> float:
 def _hertz_time(dimer: Dimer, contact: Contact, velocity: float) -> float:
     if velocity == 0.0:
         return inf
-    modulus = forces.reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
+    modulus = reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
     first, second = dimer.masses
     colliding = [(first * second / (first + second), dimer.reduced_radius)]
     colliding += list(zip(dimer.masses, dimer.radii, strict=True))
@@ -73,15 +75,15 @@ def _hertz_time(dimer: Dimer, contact: Contact, velocity: float) -> float:
 
 
 def _viscous_limit(dimer: Dimer, contact: Contact, liquid: Liquid) -> float:
-    def drag(reduced_radius: float) -> float:
-        return forces.largest_normal_drag(liquid.dynamic_viscosity, reduced_radius, contact.minimum_separation_ratio)
-
+    viscosity, nearest = liquid.dynamic_viscosity, contact.minimum_separation_ratio
     first, second = dimer.masses
-    between_beads = drag(dimer.reduced_radius) * (1.0 / first + 1.0 / second)
-    rates = [drag(radius) / mass + between_beads for radius, mass in zip(dimer.radii, dimer.masses, strict=True)]
-    rates += [
-        forces.film_drag(liquid.film_viscosity, radius) / mass
+    between_beads = normal_drag(viscosity, dimer.reduced_radius, nearest) * (1.0 / first + 1.0 / second)
+    rates = [
+        normal_drag_at_wall(viscosity, radius, nearest) / mass + between_beads
         for radius, mass in zip(dimer.radii, dimer.masses, strict=True)
+    ]
+    rates += [
+        film_drag(liquid.film_viscosity, radius) / mass for radius, mass in zip(dimer.radii, dimer.masses, strict=True)
     ]
     return 2.0 / max(rates) if max(rates) > 0.0 else inf
 

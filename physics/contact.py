@@ -1,0 +1,62 @@
+"""Contacts of softened beads: Hertz's repulsion 4/3 E* √R* δ^(3/2), its damping, Mindlin's tangential modulus.
+
+E* = E/(2(1 − ν²)) and G* = E/(4(1 + ν)(2 − ν)) of two bodies of the same modulus. Hertz 1881; Mindlin 1949; K. L.
+Johnson, Contact Mechanics (1985). Friction is limited to μ times the normal force of the contact without its bridge.
+"""
+
+from __future__ import annotations
+
+from math import log, pi, sqrt
+
+from physics.wall import WALL_COPIES
+
+
+def reduced_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
+    """E* of two bodies of the same modulus, Pa."""
+    return youngs_modulus / (2.0 * (1.0 - poissons_ratio**2))
+
+
+def reduced_shear_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
+    """G* of two bodies of the same modulus, Pa."""
+    return youngs_modulus / (4.0 * (1.0 + poissons_ratio) * (2.0 - poissons_ratio))
+
+
+def hertz_repulsion(overlap: float, reduced_radius: float, reduced_modulus: float) -> float:
+    """Repulsion of two beads, N.
+
+    Parameters
+    ----------
+    overlap
+        δ, m; none for a gap (negative).
+    reduced_radius, reduced_modulus
+        R* in m, E* in Pa.
+    """
+    return float(4.0 / 3.0 * reduced_modulus * sqrt(reduced_radius) * max(overlap, 0.0) ** 1.5)
+
+
+def hertz_repulsion_at_wall(overlap: float, radius: float, reduced_modulus: float) -> float:
+    """Repulsion of a bead of ``radius`` (m) by a wall (`physics.wall`), N."""
+    return WALL_COPIES * hertz_repulsion(overlap, radius, reduced_modulus)
+
+
+def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -> float:
+    """Overlap at which the repulsion of two beads carries a load, m.
+
+    Parameters
+    ----------
+    force
+        Load, N.
+    reduced_radius, reduced_modulus
+        R* in m, E* in Pa.
+    """
+    return float((3.0 * force / (4.0 * reduced_modulus * sqrt(reduced_radius))) ** (2.0 / 3.0))
+
+
+def hertz_overlap_at_wall(force: float, radius: float, reduced_modulus: float) -> float:
+    """Overlap at which the repulsion by a wall (`physics.wall`) carries a load (N), m; of a bead of ``radius`` (m)."""
+    return hertz_overlap(force / WALL_COPIES, radius, reduced_modulus)
+
+
+def damping_ratio(restitution: float) -> float:
+    """β of the damped Hertz contact that rebounds with a coefficient e, −ln e/√(ln²e + π²)."""
+    return -log(restitution) / sqrt(log(restitution) ** 2 + pi**2)

@@ -1,0 +1,70 @@
+"""Two beads as the paper describes them: masses, asymmetry, Γ0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import asin, cos, pi
+
+from physics.capillary import capillary_force_limit_at_wall
+
+
+@dataclass(frozen=True)
+class Dimer:
+    """What follows from a case's two beads: the paper's symbols, SI units.
+
+    Bead 1 is the case's first. Khan et al.: sin δ = (R1 − R2)/(R1 + R2), μ = (m1 − m2)/M, R̄ = (R1 + R2)/2,
+    Γ0 = a0 M/(4πγR̄) (their Eq. 1).
+    """
+
+    radii: tuple[float, float]
+    density: float
+    surface_tension: float
+
+    @property
+    def masses(self) -> tuple[float, float]:
+        """m1, m2, kg."""
+        first, second = (4.0 / 3.0 * pi * radius**3 * self.density for radius in self.radii)
+        return first, second
+
+    @property
+    def total_mass(self) -> float:
+        """M, kg."""
+        return sum(self.masses)
+
+    @property
+    def mean_radius(self) -> float:
+        """R̄, m."""
+        return sum(self.radii) / 2.0
+
+    @property
+    def sin_delta(self) -> float:
+        """The asymmetry parameter sin δ."""
+        return (self.radii[0] - self.radii[1]) / sum(self.radii)
+
+    @property
+    def mass_asymmetry(self) -> float:
+        """μ."""
+        return (self.masses[0] - self.masses[1]) / self.total_mass
+
+    @property
+    def capillary_scale(self) -> float:
+        """4πγR̄, the mean capillary force on the substrate in the limit of perfect wetting, N."""
+        return capillary_force_limit_at_wall(self.surface_tension, self.mean_radius)
+
+    @property
+    def reduced_radius(self) -> float:
+        """R1 R2/(R1 + R2), m."""
+        return self.radii[0] * self.radii[1] / sum(self.radii)
+
+    @property
+    def length(self) -> float:
+        """From the outermost point of one bead to that of the other, seen from above, m."""
+        return sum(self.radii) * cos(asin(self.sin_delta)) + sum(self.radii)
+
+    def gamma0(self, peak_acceleration: float) -> float:
+        """Γ0 for a peak acceleration in m/s²."""
+        return peak_acceleration * self.total_mass / self.capillary_scale
+
+    def peak_acceleration(self, gamma0: float) -> float:
+        """The peak acceleration in m/s² that gives a Γ0."""
+        return gamma0 * self.capillary_scale / self.total_mass

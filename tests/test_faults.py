@@ -1,0 +1,388 @@
+"""Bad surroundings: files cut or filled with nonsense, disks and pipes that take no more, edits behind the back."""
+
+import json
+import os
+import shutil
+import struct
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibration.calibrate import _determinants, _kept, calibrate
+from inputs import InputError, load_case
+from inputs.calibration import read_calibration
+from inputs.reading import read_toml
+from inputs.sweep import expand
+from postprocess import read_result, tabulate
+from postprocess.drawing import new_figure, save_figure, styled
+from postprocess.dump import DumpError
+from postprocess.local_dump import local_frames, read_local_dump
+from postprocess.report import describe_result
+from postprocess.result import current_result
+from runner.failures import EngineError, EngineFailure
+from runner.launch import launch
+from sweeps.conduct import Failure, Options, _mildness
+from sweeps.worker import Task, work
+from templates import render_deck
+from tests.conftest import PROGRAM, SHORT, call, document, make_case, to_toml
+from tests.test_calibration import reduced
+from walkers import run_case
+
+# --- what the engine takes --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("contact", "beyond"),
+    [
+        ({"restitution": 0.0501}, {"restitution": 0.05}),
+        ({"youngs_modulus": "1 GPa"}, {"youngs_modulus": "1.001 GPa"}),
+    ],
+)
+def test_bounds_of_a_case_are_the_engines(
+    tmp_path: Path, contact: dict[str, object], beyond: dict[str, object]
+) -> None:
+    """The last value that the case check takes runs; the first that it refuses stops the engine."""
+    run = {"time_step": "0.4 us", "cycles": 2, "settling_cycles": 0, "samples_per_cycle": 1, "allow_unstable": True}
+    drive = {"frequency": "2 kHz"}
+    case = make_case(contact=contact, run=run, drive=drive)
+    assert not run_case(case, tmp_path).found
+    (key,) = beyond
+    with pytest.raises(InputError, match=rf"contact\.{key} = .*: expected .*(more than 0\.05|at most 1e\+09)"):
+        make_case(contact=beyond)
+    value = {"restitution": 0.05, "youngs_modulus": 1.001e9}[key]
+    further = replace(case, contact=replace(case.contact, **{key: value}))
+    with pytest.raises(EngineError, match=r"coefficientRestitution <= 1 required|youngsModulus <= 1e9 required"):
+        run_case(further, tmp_path)
+
+
+# --- dumps ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def unnumbered(tmp_path: Path) -> str:
+    """The real engine with a deck in which a force stops being a number some steps before the end of the last cycle."""
+    front = tmp_path / "front"
+    late = "fix motion beads nve/sphere"
+    front.write_text(
+        "#!/bin/sh\n"
+        "last=$(awk '/^run /{print $2 - 20}' walker.lig)\n"
+        'awk -v last="$last" \'/^fix +motion/{print "variable late equal (step>" last ")*(1e308*100-1e308*100)"; '
+        'print "fix late beads addforce v_late 0 0"} {print}\' walker.lig > late.lig && mv late.lig walker.lig\n'
+        f'exec liggghts "$@" # {late}\n'
+    )
+    front.chmod(0o755)
+    return str(front)
+
+
+def test_a_number_that_is_none_at_the_end_of_a_dump_is_a_failure(unnumbered: str, tmp_path: Path) -> None:
+    """The engine itself ends as if nothing had happened."""
+    run = {"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 500, "time_step": "2 us"}
+    with pytest.raises((DumpError, EngineFailure), match="no number"):
+        run_case(make_case(run=run), tmp_path / "runs", engine=unnumbered)
+    assert not list(tmp_path.glob("runs/*/manifest.json"))
+    assert list(tmp_path.glob("runs/*.part/failure.json"))
+
+
+def test_a_dump_that_holds_no_number_is_not_tabulated(run_directory: Callable[..., Path], tmp_path: Path) -> None:
+    directory = tmp_path / "copy"
+    shutil.copytree(run_directory(start={"replicates": 2}, run=SHORT), directory)
+    dump = (directory / "beads.bin").read_bytes()
+    (directory / "beads.bin").write_bytes(dump[:-8] + struct.pack("=d", np.nan))
+    with pytest.raises(DumpError, match=r"beads\.bin: .* is no number at step"):
+        tabulate(directory)
+
+
+@pytest.fixture(scope="module")
+def local_dump(run_directory: Callable[..., Path]) -> tuple[Path, tuple[str, ...]]:
+    directory = run_directory(start={"replicates": 2}, run=SHORT)
+    columns = json.loads((directory / "layout.json").read_text())["pair_bridge_columns"]
+    return directory / "bridges.pairs.txt", tuple(columns)
+
+
+def test_a_local_dump_is_read_whole_or_not_at_all(local_dump: tuple[Path, tuple[str, ...]], tmp_path: Path) -> None:
+    path, columns = local_dump
+    steps, rows = read_local_dump(path, columns)
+    assert len(steps) == len(rows) == sum(len(frame) for _, frame in local_frames(path, columns)) == 7 * 2
+    whole = path.read_bytes()
+    cut = tmp_path / "cut.txt"
+    last_frame = whole.rindex(b"ITEM: TIMESTEP")
+    for end in range(last_frame + 1, len(whole), 7):  # within the header, a row, a number, before the last newline
+        cut.write_bytes(whole[:end])
+        with pytest.raises(DumpError, match=r"cut\.txt"):
+            read_local_dump(cut, columns)
+    cut.write_bytes(whole[:-1])
+    with pytest.raises(DumpError, match=r"cut\.txt: ends within the frame"):
+        read_local_dump(cut, columns)
+    cut.write_bytes(whole[:last_frame])
+    assert len(read_local_dump(cut, columns)[0]) == 6 * 2
+
+
+@pytest.mark.parametrize("nonsense", [b"nan", b"inf", b"x", b"1 2", b""])
+def test_nonsense_in_a_local_dump_is_told(
+    local_dump: tuple[Path, tuple[str, ...]], tmp_path: Path, nonsense: bytes
+) -> None:
+    path, columns = local_dump
+    lines = path.read_bytes().split(b"\n")
+    words = lines[9].split()
+    lines[9] = b" ".join([nonsense, *words[1:]])
+    (tmp_path / "odd.txt").write_bytes(b"\n".join(lines))
+    with pytest.raises(DumpError, match=r"odd\.txt: .*the frame of step 0"):
+        read_local_dump(tmp_path / "odd.txt", columns)
+
+
+# --- streams ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def short_case(in_folder: Path) -> Path:
+    file = in_folder / "short.toml"
+    file.write_text(to_toml({"title": "price: 5$ and 3$", **document(run=SHORT)}))
+    return file
+
+
+def test_output_in_another_encoding_is_printed(short_case: Path) -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
+    done = subprocess.run([PROGRAM, "run", "short.toml"], capture_output=True, env=environment, check=False)
+    assert (done.returncode, b"Traceback" in done.stderr) == (0, False)
+    assert rb"\u0393" in done.stdout  # Γ0
+
+
+@pytest.mark.parametrize("closed", ["2>&-", ">&-", "<&-", "<&- >&- 2>&-"])
+def test_closed_streams_do_not_matter(short_case: Path, in_folder: Path, closed: str) -> None:
+    for command in ("run short.toml", "sweep sweep.toml"):
+        (in_folder / "sweep.toml").write_text('case = "short.toml"\n')
+        done = subprocess.run(
+            ["sh", "-c", f"{PROGRAM} {command} --out runs {closed}"], capture_output=True, check=False
+        )
+        assert (done.returncode, b"Traceback" in done.stderr) == (0, False), done.stderr
+    (directory,) = in_folder.glob("runs/short-*")
+    assert read_result(directory)["velocity"]["mean"] > 0.0
+    assert b"walkers" not in (directory / "engine.log").read_bytes()
+
+
+def test_a_reader_who_has_had_enough_is_no_failure(short_case: Path) -> None:
+    for command in ("run short.toml", "show short.toml", "deck short.toml", "--help"):
+        script = f'{PROGRAM} {command} | true; echo "${{PIPESTATUS[0]}}"'
+        done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
+        assert (done.stdout.strip(), "Traceback" in done.stderr, "BrokenPipe" in done.stderr) == ("0", False, False)
+
+
+def test_a_dollar_in_a_title_is_a_dollar(short_case: Path) -> None:
+    call("run", "short.toml", check=True)
+    done = call("plot", "short.toml")
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+
+
+# --- files ------------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_no_file_to_read_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "fifo.toml")
+    (tmp_path / "large.toml").write_text(f'title = "{"x" * (17 << 20)}"\n')
+    for path in (Path("/dev/zero"), tmp_path / "fifo.toml", tmp_path / "large.toml"):
+        with pytest.raises(InputError, match="expected a file of at most 16 MB"):
+            read_toml(path)
+
+
+def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
+    (tmp_path / "windows.toml").write_text(to_toml(document()), encoding="utf-8-sig")
+    assert load_case(tmp_path / "windows.toml") == make_case().renamed("windows")
+
+
+BAD_SWEEPS = {
+    "twice": ({"axes": {"start.seed": [1, 2, 1]}}, r"start\.seed = 1: expected different values"),
+    "twice in other words": ({"axes": {"drive.frequency": ["80 Hz", "80.0 Hz"]}}, r'"80\.0 Hz": expected different'),
+    "a range without a width": (
+        {"axes": {"drive.frequency": {"linspace": ["80 Hz", "80 Hz", 3]}}},
+        r"drive\.frequency = .*: expected different values",
+    ),
+    "a range upside down": (
+        {"sample": [{"points": 4, "ranges": {"contact.restitution": {"uniform": [0.3, 0.2]}}}]},
+        r"contact\.restitution = .*uniform.*: expected the smaller value first",
+    ),
+    "titles": ({"axes": {"title": ["a", "b"]}}, "title: does not vary"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_SWEEPS)
+def test_axes_that_would_make_the_same_point_twice_are_refused(name: str, tmp_path: Path) -> None:
+    document, told = BAD_SWEEPS[name]
+    with pytest.raises(InputError, match=told):
+        expand({"case": "fig1b", **document}, source="test", name="test", folder=tmp_path)
+
+
+@pytest.fixture
+def full_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system without a byte left."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(place)], capture_output=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip("a small file system can only be mounted by root")
+    with pytest.raises(OSError, match="No space left"), (place / "ballast").open("wb", buffering=0) as ballast:
+        while True:
+            ballast.write(b"\0" * 4096)
+    yield place
+    subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(full_disk: Path, in_folder: Path) -> None:
+    (in_folder / "short.toml").write_text(to_toml(document(run=SHORT)))
+    (in_folder / "sweep.toml").write_text('case = "short.toml"\n')
+    call("run", "short.toml", check=True)
+    commands = {
+        "run short.toml": f"--out {full_disk}/a",
+        "run pile-ci": f"--out {full_disk}/b",
+        "sweep sweep.toml": f"--out {full_disk}/c",
+        "plot short.toml": f"--to {full_disk}/d",
+        "vtk short.toml": f"--to {full_disk}/e",
+        "render short.toml": f"--to {full_disk}/f.png",
+        "table runs/sweep": f"--to {full_disk}/g.csv",
+    }
+    call("sweep", "sweep.toml", check=True)
+    for command, place in commands.items():
+        done = call(*command.split(), *place.split())
+        lines = [line for line in done.stderr.splitlines() if "never audited" not in line]
+        assert (done.returncode in (1, 2), len(lines)) == (True, 1), (command, done)
+        assert "No space left on device" in lines[0] or "disk full" in lines[0]
+        assert str(full_disk) in lines[0]
+    left = [path for path in full_disk.rglob("*") if path.is_file() and path.stat().st_size]
+    assert left == [full_disk / "ballast"]
+    assert not [path for path in full_disk.rglob("*") if ".new" in path.name or path.suffix == ".lock"]
+
+
+def test_a_worker_tells_a_full_disk_by_its_name(full_disk: Path) -> None:
+    from runner import find_engine
+    from runner.directory import run_place
+
+    case, engine = make_case(run=SHORT), find_engine()
+    name = run_place(case, engine, full_disk).name
+    task = Task("", (name,), (case,), full_disk, str(engine.path), engine.sha256, None)
+    report = work(task)
+    assert report.failure == "DiskFull"
+    assert str(full_disk) in report.message
+
+
+# --- calibrations -----------------------------------------------------------------------------------------------------
+
+
+def test_an_edit_of_the_design_is_told_and_not_dropped(tmp_path: Path) -> None:
+    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
+    first = read_calibration(document, source="test", name="test", folder=tmp_path)
+    unit = np.full((4, 2), 0.5)
+    file = tmp_path / "wave-1.json"
+    assert _kept(file, _determinants(first, 1), lambda: unit) is unit
+    for key, value in (("seed", 3), ("waves", [20, 8]), ("guesses", [{"friction": 0.1, "drag": 1.0}])):
+        table = document if key == "guesses" else document["design"]
+        changed = {**document, key: value} if table is document else {**document, "design": {**table, key: value}}
+        edited = read_calibration(changed, source="test", name="test", folder=tmp_path)
+        with pytest.raises(InputError, match=rf"wave-1\.json: {key}: was drawn with other {key}"):
+            _kept(file, _determinants(edited, 1), lambda: unit)
+    longer = {
+        **document,
+        "design": {**document["design"], "waves": [*document["design"]["waves"], 8]},
+    }  # another wave at the end is welcome
+    more = read_calibration(longer, source="test", name="test", folder=tmp_path)
+    np.testing.assert_array_equal(_kept(file, _determinants(more, 1), lambda: 1.0 - unit), unit)
+
+
+def test_ranges_beyond_a_key_are_refused_before_anything_is_written(tmp_path: Path) -> None:
+    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
+    document["parameters"]["drag"] = {"keys": ["contact.restitution"], "range": [0.01, 0.9]}
+    found = read_calibration(document, source="bad.toml", name="bad", folder=tmp_path)
+    with pytest.raises(InputError, match=r"bad\.toml: parameters\.drag\.range = \[0\.01, 0\.9\]: contact\.restitution"):
+        calibrate(found, tmp_path / "runs", Options(1))
+    assert not (tmp_path / "runs").exists()
+
+
+def test_an_observation_over_itself_is_refused(tmp_path: Path) -> None:
+    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
+    document["observations"][3]["over"] = document["observations"][3]["of"]
+    with pytest.raises(InputError, match=r"observations\[3\]\.over: expected other experiments"):
+        read_calibration(document, source="bad.toml", name="bad", folder=tmp_path)
+
+
+# --- what is told -----------------------------------------------------------------------------------------------------
+
+
+def test_failures_that_threaten_all_points_come_first() -> None:
+    reasons = ["WalkersMet", "BeadsLost", "SomethingNew", "EngineKilled", "RunBusy", "DiskFull", "EngineNeverStarted"]
+    failures = [Failure(number, "run", reason, "", None) for number, reason in enumerate(reasons)]
+    order = [failure.reason for failure in sorted(failures, key=_mildness)]
+    expected = ["DiskFull", "EngineNeverStarted", "EngineKilled", "SomethingNew", "BeadsLost", "WalkersMet", "RunBusy"]
+    assert order == expected
+
+
+def test_figures_leave_the_settings_of_whoever_calls(tmp_path: Path) -> None:
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    seen = {}
+
+    @styled
+    def draw() -> object:
+        seen.update(mpl.rcParams)
+        return new_figure(1.0, 1.0)[0]
+
+    save_figure(draw(), tmp_path / "figure.png", [])  # type: ignore[arg-type]
+    assert dict(mpl.rcParams) == before
+    assert seen["axes.spines.top"] is False
+
+
+def test_walkers_that_turned_over_are_told_first(run_directory: Callable[..., Path]) -> None:
+    """The shipped climber as it ships: all six hang with the large bead below before the run ends."""
+    directory = run_directory(load_case("climber"))
+    result = read_result(directory)
+    lines = describe_result(directory, result).splitlines()
+    assert result["turned_round"] == 6
+    assert result["kept_heading"]["n"] == 0
+    assert lines[0] == f"climber: 6 of 6 turned over, axial velocity {result['axial_velocity']['mean'] * 1e3:.3f} mm/s"
+    assert result["axial_velocity"]["mean"] < -5e-3
+    assert "none: no walker kept its heading" in describe_result(directory, result)
+    assert f"{result['velocity']['mean'] * 1e3:.3f}" not in describe_result(directory, result)
+
+
+def test_a_result_says_what_the_walkers_do_that_kept_their_heading(run_directory: Callable[..., Path]) -> None:
+    """Two of three start across the axis, off by more than a right angle; the third walks on."""
+    directory = run_directory(start={"replicates": 3, "facing": "right"}, run=SHORT)
+    result = {**current_result(directory)}
+    result |= {"turned_round": 2, "kept_heading": {**result["kept_heading"], "n": 1, "mean": 1.5e-3}}
+    lines = describe_result(directory, result).splitlines()
+    assert lines[0].startswith("test: 2 of 3 turned round, axial velocity ")
+    assert "  velocity   of the 1 others 1.500 mm/s, along their heading" in lines
+
+
+def test_piles_are_run_from_python_as_walkers_are(tmp_path: Path) -> None:
+    from inputs import load_pile
+
+    case = load_pile("pile-ci")
+    brief = replace(case, run=replace(case.run, cycles=case.run.cycles_per_part, longest_settling=0.02))
+    seen: list[object] = []
+    outcome = run_case(brief, tmp_path, on_progress=seen.append)
+    assert (outcome.found, outcome.result["beads"]) == (False, sum(case.beads.counts))
+    assert seen
+    assert run_case(brief, tmp_path).found
+
+
+def test_the_engines_log_is_not_kept_in_memory(tmp_path: Path) -> None:
+    """A front that writes 100 MB of lines before the real engine: the launcher does not grow by that."""
+    import resource
+
+    from runner import find_engine
+    from runner.directory import write_deck
+
+    front = tmp_path / "front"
+    front.write_text('#!/bin/sh\nyes "a line that says nothing at all" | head -c 100000000\nexec liggghts "$@"\n')
+    front.chmod(0o755)
+    deck = render_deck(make_case(run=SHORT))
+    (tmp_path / "run").mkdir()
+    write_deck(deck, tmp_path / "run")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert launch(deck, tmp_path / "run", find_engine(str(front))).version.startswith("LIGGGHTS")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 40_000  # kB

@@ -1,0 +1,178 @@
+"""Programs that are killed at any moment, and called again at once."""
+
+import os
+import random
+import signal
+import subprocess
+import time
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from inputs.case import WalkerCase
+from runner.directory import finished_run, open_run
+from runner.failures import RunBusy
+from runner.locks import OrphanLockWarning, is_locked, locked
+from templates import render_deck
+from tests.conftest import PROGRAM, document, engines_in, make_case, to_toml, wait_for
+from walkers import run_case
+
+BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cycle": 2}
+LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
+
+
+def _forked(work: Callable[[], object]) -> int:
+    """Do something in a process of its own, which spares it the imports; its number."""
+    child = os.fork()
+    if child:
+        return child
+    with suppress(BaseException):
+        work()
+    os._exit(0)
+
+
+def test_after_each_of_fifty_kills_the_next_call_runs(tmp_path: Path) -> None:
+    """The launcher is killed before, at and after the birth of its engine; whoever calls then gets the run."""
+    draw = random.Random(14)
+    begun = {"waiting": 0, "running": 0}
+    for kill in range(50):
+        case = make_case(run=BRIEF, start={"seed": kill})
+        child = _forked(lambda case=case: run_case(case, tmp_path, force=True))  # type: ignore[misc]
+        time.sleep(draw.uniform(0.0, 0.12))
+        begun["running" if engines_in(tmp_path) else "waiting"] += 1
+        os.kill(child, signal.SIGKILL)
+        outcome = run_case(case, tmp_path)
+        os.waitpid(child, 0)
+        assert finished_run(outcome.run.directory) is not None
+        assert not is_locked(outcome.run.directory)
+    assert begun["running"] > 5  # the moments are spread, and some have an engine
+    wait_for(lambda: not engines_in(tmp_path))
+    assert not list(tmp_path.glob("*.part"))
+    assert not list(tmp_path.glob("*.lock"))
+
+
+def test_no_engine_is_orphaned_by_a_kill_at_its_birth(tmp_path: Path) -> None:
+    """Decks that would run for minutes: an engine that its launcher's death did not reach would still be there."""
+    case, draw = make_case(run=LONG), random.Random(3)
+    for kill in range(40):
+        folder = tmp_path / str(kill)
+        child = _forked(lambda folder=folder: run_case(case, folder))  # type: ignore[misc]
+        wait_for(lambda folder=folder: list(folder.glob("*.part/engine.log")))  # type: ignore[misc]
+        time.sleep(draw.uniform(0.0, 0.02))  # the fork, setpriv, sh and the engine follow within that time
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    wait_for(lambda: not engines_in(tmp_path))
+    time.sleep(0.5)  # one that was still being born
+    assert not engines_in(tmp_path)
+
+
+def test_a_lock_whose_owner_lives_is_refused_at_once(tmp_path: Path) -> None:
+    case = make_case(run=BRIEF)
+    with locked([tmp_path / "x"]) as ours, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert ours
+        with locked([tmp_path / "x"]) as theirs:
+            assert not theirs
+    assert not list(tmp_path.iterdir())
+    assert case
+
+
+def test_a_dying_engine_is_waited_for_with_a_line(tmp_path: Path) -> None:
+    """A child that outlives its dead owner for a second keeps the lock; the next call says that it waits, and runs."""
+    case = make_case(run=BRIEF)
+    front = _front_that_lingers(tmp_path, seconds=2)
+    child = _forked(lambda: run_case(case, tmp_path / "runs", engine=front))
+    wait_for((tmp_path / "lingering").exists)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    with pytest.warns(OrphanLockWarning, match="waiting for what is left of a run that was killed"):
+        outcome = run_case(case, tmp_path / "runs", engine=front)
+    assert not outcome.found
+
+
+def _front_that_lingers(folder: Path, seconds: int) -> str:
+    """An engine that first starts, once, a child which the kernel does not end and which keeps all that is open."""
+    front = folder / "front"
+    mark = folder / "lingering"
+    front.write_text(
+        f'#!/bin/sh\n[ -e "{mark}" ] || {{ sleep {seconds} & touch "{mark}"; exec sleep 60; }}\nexec liggghts "$@"\n'
+    )
+    front.chmod(0o755)
+    return str(front)
+
+
+def test_what_keeps_a_lock_for_long_is_refused_in_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("runner.locks._PATIENCE_SECONDS", 1.0)
+    case = make_case(run=BRIEF)
+    front = _front_that_lingers(tmp_path, seconds=600)
+    child = _forked(lambda: run_case(case, tmp_path / "runs", engine=front))
+    wait_for((tmp_path / "lingering").exists)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    try:
+        with pytest.warns(OrphanLockWarning), pytest.raises(RunBusy):
+            run_case(case, tmp_path / "runs", engine=front)
+    finally:
+        subprocess.run(["pkill", "-f", "sleep 600"], check=False)
+
+
+def test_a_closed_terminal_ends_the_engine_and_the_lock(in_folder: Path) -> None:
+    (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
+    program = subprocess.Popen([PROGRAM, "run", "long.toml"], stderr=subprocess.PIPE, text=True)
+    wait_for(lambda: engines_in(in_folder))
+    program.send_signal(signal.SIGHUP)
+    _, errors = program.communicate()
+    assert program.returncode == 129
+    assert errors.splitlines()[-1] == "walkers: the terminal was closed"
+    assert not engines_in(in_folder)
+    assert not list(in_folder.glob("runs/*.lock"))
+
+
+def test_nohup_outlives_a_closed_terminal(in_folder: Path) -> None:
+    (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
+    program = subprocess.Popen(
+        ["nohup", PROGRAM, "run", "long.toml"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    engines = wait_for(lambda: engines_in(in_folder))
+    program.send_signal(signal.SIGHUP)
+    time.sleep(0.3)
+    assert engines_in(in_folder) == engines
+    program.terminate()
+    assert program.wait() == 143
+    assert not engines_in(in_folder)
+
+
+def _replaced(case: WalkerCase, out: Path) -> tuple[Path, Path]:
+    """A finished run, and beside it what a crash within a replacement leaves of the one before."""
+    place = run_case(case, out).run.directory
+    left = place.with_name(place.name + ".replaced")
+    left.mkdir()
+    (left / "manifest.json").write_text((place / "manifest.json").read_text())
+    return place, left
+
+
+def test_a_crash_between_renaming_and_removing_leaves_no_trace(tmp_path: Path) -> None:
+    case = make_case(run=BRIEF)
+    place, left = _replaced(case, tmp_path)
+    assert run_case(case, tmp_path, force=True).run.directory == place
+    assert not left.exists()
+    place, left = _replaced(case, tmp_path)
+    assert run_case(case, tmp_path).found
+    with open_run(case, render_deck(case), _engine(), tmp_path):
+        assert not left.exists()
+
+
+def _engine() -> object:
+    from runner import find_engine
+
+    return find_engine()
+
+
+def test_what_a_replacement_left_is_no_run(tmp_path: Path) -> None:
+    from runner.ensemble import finished_places
+
+    place, _ = _replaced(make_case(run=BRIEF), tmp_path)
+    assert finished_places(tmp_path) == {place.name: place}

@@ -1,0 +1,103 @@
+"""Names and folders that a shell, a deck or a file name could stumble over."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from inputs import InputError, load_case
+from inputs.sweep import load_sweep
+from sweeps.site import SiteFile, _worker_init, check_path
+from sweeps.table import load
+from tests.conftest import SHORT, call, document, to_toml
+
+ODD = {
+    "a space": "sp ace",
+    "quotes": 'it\'s "so"',
+    "a command": "$(touch executed)",
+    "backquotes": "`touch executed`",
+    "a variable": "${HOME}",
+    "several commands": "a;touch executed;&& b",
+    "umlauts": "äöü-γ-走",
+    "a newline": "two\nlines",
+    "a backslash": "back\\slash",
+    "wild cards": "[a]*?",
+    "two hundred characters": "x" * 200,
+    "a dash": "--dash",
+}
+FOR_SHELLS = {"umlauts", "two hundred characters", "a dash"}
+
+
+@pytest.fixture
+def case_file(in_folder: Path) -> Path:
+    file = in_folder / "base.toml"
+    file.write_text(to_toml(document(run=SHORT)))
+    (in_folder / "site.toml").write_text('scheduler = "local"\ncores = 2\n[executor]\naddress = "127.0.0.1"\n')
+    return file
+
+
+def _nothing_was_executed(folder: Path) -> bool:
+    return not [path for path in folder.rglob("*") if path.name == "executed"]
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_paths_without_a_site_file_are_paths(name: str, case_file: Path, in_folder: Path) -> None:
+    odd = ODD[name]
+    (in_folder / f"{odd}.toml").write_text('case = "base.toml"\n[axes]\nstart.angle = ["0 deg", "10 deg"]\n')
+    done = call("sweep", f"./{odd}.toml", "--out", f"./{odd}", "-j", "1")
+    assert (done.returncode, done.stderr.count("Traceback")) == (0, 0), done.stderr
+    assert list(load(in_folder / odd / odd)["status"]) == ["finished"] * 2
+    assert _nothing_was_executed(in_folder)
+
+
+@pytest.mark.parametrize("name", ["a command", "a newline", "two hundred characters"])
+def test_a_case_of_an_odd_name_is_run_and_drawn(name: str, case_file: Path, in_folder: Path) -> None:
+    odd = ODD[name]
+    case_file.rename(f"{odd}.toml")
+    for command in ("run", "plot", "vtk"):
+        done = call(command, f"./{odd}.toml", "--out", f"./{odd}")
+        assert (done.returncode, done.stderr.count("Traceback")) == (0, 0), done.stderr
+    assert _nothing_was_executed(in_folder)
+
+
+@pytest.mark.parametrize("name", [name for name in ODD if name not in FOR_SHELLS])
+def test_with_a_site_file_odd_paths_are_refused_before_anything_is_done(
+    name: str, case_file: Path, in_folder: Path
+) -> None:
+    (in_folder / "plain.toml").write_text('case = "base.toml"\n')
+    (in_folder / f"{ODD[name]}.toml").write_text('case = "base.toml"\n')
+    before = sorted(in_folder.rglob("*"))
+    for sweep, out in (("plain.toml", f"./{ODD[name]}"), (f"./{ODD[name]}.toml", "runs")):
+        done = call("sweep", sweep, "--out", out, "--site", "site.toml")
+        assert (done.returncode, done.stdout) == (2, "")
+        assert len(done.stderr.splitlines()) == 1
+        assert done.stderr.startswith("walkers: --out: ")
+        assert "expected letters, digits and" in done.stderr
+    assert sorted(in_folder.rglob("*")) == before
+
+
+@pytest.mark.parametrize("name", FOR_SHELLS)
+def test_what_a_shell_takes_as_it_is_is_not_refused(name: str, tmp_path: Path) -> None:
+    check_path(tmp_path / ODD[name])
+    with pytest.raises(InputError, match="found ' '"):
+        check_path(tmp_path / ODD[name] / "sp ace")
+
+
+def test_modules_of_a_site_reach_the_shell_as_one_word() -> None:
+    lines = _worker_init(SiteFile(scheduler="local", cores=1, modules=["gcc/12", "a; touch executed"]))
+    script = f'module() {{ echo "$# $2"; }}\n{lines}\n'
+    told = subprocess.run(["sh", "-c", script], capture_output=True, text=True, check=True).stdout
+    assert told.splitlines() == ["2 gcc/12", "2 a; touch executed"]
+
+
+@pytest.mark.parametrize("name", ["...toml", "..toml"])
+def test_files_without_a_name_are_refused(name: str, case_file: Path, in_folder: Path) -> None:
+    """Their stems are the folder and the one above: a sweep would write there."""
+    (in_folder / name).write_text('case = "base.toml"\n')
+    for read in (load_sweep, load_case):
+        with pytest.raises(InputError, match=r"expected a name before \.toml"):
+            read(name)
+    done = call("sweep", name)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert not (in_folder / "runs").exists()
+    assert not (in_folder / "sweep.json").exists()
