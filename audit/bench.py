@@ -37,7 +37,7 @@ def bench_case(**changes: dict[str, Any]) -> WalkerCase:
     tables: dict[str, dict[str, Any]] = {
         "beads": {"radii": ["0.3 mm", "0.2 mm"], "density": "4.0 g/cm^3"},
         "liquid": {"surface_tension": "19.2 mN/m", "dynamic_viscosity": "0 Pa*s"},
-        "substrate": {"material": "glass"},
+        "boundary": {"material": "glass"},
         "contact": {"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": 0.0, "restitution": 1.0},
         "drive": {"frequency": "80 Hz", "peak_acceleration": "0 g", "frame": "container"},
         "run": {"time_step": "1 us", "samples_per_cycle": 1},

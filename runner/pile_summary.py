@@ -34,6 +34,7 @@ def summarise_pile(case: PileCase) -> dict[str, Any]:
     steps = run.cycles * run.steps_per_cycle
     return {
         "case": case.as_dict(),
+        "peak_acceleration": case.drive.peak_acceleration,
         "beads": {
             "small": case.beads.counts[0],
             "large": case.beads.counts[1],
@@ -54,12 +55,12 @@ def summarise_pile(case: PileCase) -> dict[str, Any]:
 
 def describe_pile_case(summary: dict[str, Any]) -> str:
     """The summary of a pile as text."""
-    beads, step, run, drive = summary["beads"], summary["time_step"], summary["run"], summary["case"]["drive"]
+    beads, step, run = summary["beads"], summary["time_step"], summary["run"]
     lines = [
         text_of_case(summary["case"]),
         f"pile       {beads['small']} small and {beads['large']} large beads, {beads['mass'] * 1e6:.4g} mg, "
         f"{beads['volume'] * 1e9:.4g} µL with {beads['liquid'] * 1e9:.3g} µL of liquid",
-        f"drive      a0 = {drive['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g",
+        f"drive      a0 = {summary['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g",
         f"time step  {step['step'] * 1e6:.5g} µs",
         *lines_of_limits(step),
         f"run        {run['steps']} steps after the settling, {run['simulated_seconds']:.4g} s, in {run['parts']} "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -49,8 +49,8 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
     if not finished:
         raise InputError(str(directory), [Problem("", None, "expected a finished run of a pile, or a folder or sweep")])
     try:
-        cases = {path: flatten(read_json(path / CASE_NAME), lambda _: False) for path in finished.values()}
-    except (OSError, ValueError) as error:
+        cases = {path: _conditions(read_json(path / CASE_NAME)) for path in finished.values()}
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(str(directory), [Problem("", None, f"a case cannot be read ({error})")]) from error
     first = next(iter(cases.values()))
     differ = [
@@ -60,6 +60,13 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
     for path, case in cases.items():
         groups.setdefault(", ".join(f"{key} = {_short(case.get(key))}" for key in differ), []).append(path)
     return groups
+
+
+def _conditions(case: Mapping[str, Any]) -> dict[str, Any]:
+    """Dotted keys of a resolved case, its harmonics one by one."""
+    drive = case["drive"]
+    harmonics = {f"harmonics[{number}]": one for number, one in enumerate(drive["harmonics"])}
+    return flatten({**case, "drive": {"frame": drive["frame"], **harmonics}}, lambda _: False)
 
 
 def _short(value: Any) -> str:

@@ -417,7 +417,7 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     run_pile(slower, find_engine(None), out)
     apart = piles_in(out)
     assert sorted(len(runs) for runs in apart.values()) == [1, 2]
-    assert all("drive.peak_acceleration = " in label for label in apart)
+    assert all("drive.harmonics[0].peak_acceleration = " in label for label in apart)
     told = subprocess.run([PROGRAM, "climb", str(out)], capture_output=True, text=True, check=True).stdout
     assert told.count("runs climbed") == 2
     with pytest.raises(InputError, match="descend"):
