@@ -13,6 +13,7 @@ import numpy.typing as npt
 from calibration.space import Space
 from inputs.calibration import Calibration, Observation
 from inputs.errors import InputError, Problem
+from inputs.reading import is_of_a_pile
 from inputs.sweep import Sweep, expand
 from paper.sensitivity import misalignment
 from postprocess.steady import steady_walkers, together
@@ -87,7 +88,7 @@ def wave_sweep(
                 columns.setdefault(key, []).append(value)
     document = {"title": calibration.title, "case": calibration.case, "set": calibration.settings, "zip": [columns]}
     sweep = expand(document, source=calibration.source, name=name, folder=calibration.folder)
-    if sweep.document.get("kind") == "pile":
+    if is_of_a_pile(sweep.document):
         raise InputError(calibration.source, [Problem("case", f'"{calibration.case}"', "expected a walker's case")])
     return sweep
 

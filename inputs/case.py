@@ -6,9 +6,11 @@ This is what the deck is rendered from, what a run directory stores as ``case.js
 from __future__ import annotations
 
 from dataclasses import dataclass, is_dataclass, replace
-from math import pi
+from math import hypot
 from typing import Any, Literal
 
+from inputs.drive import AXES, Drive, Vector
+from inputs.plane import Plane
 from physics.matter import Contact, Liquid
 
 
@@ -25,31 +27,6 @@ def without_no_film(liquid: dict[str, Any]) -> None:
     """Leave out a film that is none, in place: what ran before there were films keeps its name."""
     if not liquid["film_viscosity"]:
         del liquid["film_viscosity"]
-
-
-@dataclass(frozen=True)
-class Drive:
-    """The substrate's displacement A sin ωt along ``axis``: frequency (Hz), peak acceleration a0 = Aω² (m/s²)."""
-
-    axis: Literal["x", "y", "z"]
-    frequency: float
-    peak_acceleration: float
-    frame: Literal["lab", "container"]
-
-    @property
-    def angular_frequency(self) -> float:
-        """ω = 2πf, rad/s."""
-        return 2.0 * pi * self.frequency
-
-    @property
-    def amplitude(self) -> float:
-        """A = a0/ω², m."""
-        return self.peak_acceleration / self.angular_frequency**2
-
-    @property
-    def peak_velocity(self) -> float:
-        """Aω, m/s."""
-        return self.peak_acceleration / self.angular_frequency
 
 
 @dataclass(frozen=True)
@@ -85,33 +62,43 @@ class Run:
 
 @dataclass(frozen=True)
 class WalkerCase:
-    """A dimer on a shaken wet substrate, resolved.
+    """A dimer on a shaken wet plane, resolved.
 
-    A walker's substrate is level; a climber's is a wall, with the drive axis pointing up. Attributes are SI;
-    ``name`` and ``title`` do not determine the run and stay out of `determinants`.
+    Attributes are SI; ``name`` and ``title`` do not determine the run and stay out of `determinants`.
     """
 
     name: str
     title: str
     beads: Beads
     liquid: Liquid
-    substrate_material: str
+    boundary: Plane
     contact: Contact
     drive: Drive
     start: Start
     run: Run
     gravity: float
-    kind: Literal["walker", "climber"] = "walker"
+
+    @property
+    def drive_axis(self) -> Vector:
+        """Direction from which orientations are measured: the drive's within the plane, or x where it has none."""
+        x, y, _ = self.drive.direction
+        length = hypot(x, y)
+        return (x / length, y / length, 0.0) if length else AXES["x"]
+
+    @property
+    def gravity_vector(self) -> Vector:
+        """Acceleration of gravity in the frame of the plane, m/s²."""
+        return self.boundary.gravity(self.gravity)
 
     @property
     def pressing_gravity(self) -> float:
-        """The part of gravity that presses the beads to the substrate, m/s²."""
-        return self.gravity if self.kind == "walker" else 0.0
+        """The part of gravity that presses the beads to the plane, m/s²."""
+        return -self.gravity_vector[2]
 
     @property
     def axial_gravity(self) -> float:
-        """The part of gravity that pulls them down along the drive axis, m/s²."""
-        return self.gravity - self.pressing_gravity
+        """The part of gravity that pulls them back along the drive axis, m/s²."""
+        return -sum(one * along for one, along in zip(self.gravity_vector, self.drive_axis, strict=True))
 
     def determinants(self) -> dict[str, Any]:
         """Everything that the run's outcome depends on, as plain JSON types."""
@@ -122,6 +109,7 @@ class WalkerCase:
             if key not in ("name", "title")
         }
         values["beads"]["radii"] = list(self.beads.radii)
+        values["drive"] = self.drive.as_dict()
         without_no_film(values["liquid"])
         return values
 
@@ -138,13 +126,12 @@ class WalkerCase:
             title=values["title"],
             beads=Beads(**beads),
             liquid=Liquid(**values["liquid"]),
-            substrate_material=values["substrate_material"],
+            boundary=Plane(**values["boundary"]),
             contact=Contact(**values["contact"]),
-            drive=Drive(**values["drive"]),
+            drive=Drive.from_dict(values["drive"]),
             start=Start(**values["start"]),
             run=Run(**values["run"]),
             gravity=values["gravity"],
-            kind=values["kind"],
         )
 
     def renamed(self, name: str) -> WalkerCase:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, is_dataclass
 from math import cos, hypot, inf, pi, sin
 from typing import Any, Literal
 
-from inputs.case import Drive, without_no_film
+from inputs.case import without_no_film
+from inputs.drive import Drive, Vector
 from physics.matter import Contact, Liquid
 
 
@@ -177,7 +178,11 @@ class PileCase:
     seed: int
     run: PileRun
     gravity: float
-    kind: Literal["pile"] = "pile"
+
+    @property
+    def gravity_vector(self) -> Vector:
+        """Acceleration of gravity, m/s²."""
+        return (0.0, 0.0, -self.gravity)
 
     def determinants(self) -> dict[str, Any]:
         """Everything that the run's outcome depends on, as plain JSON types."""
@@ -188,6 +193,7 @@ class PileCase:
         }
         if not self.beads.placed:
             del told["beads"]["placed"]
+        told["drive"] = self.drive.as_dict()
         without_no_film(told["liquid"])
         return told
 
@@ -201,12 +207,12 @@ class PileCase:
         beads = {**values["beads"], **{key: tuple(values["beads"][key]) for key in ("small", "large", "counts")}}
         beads["placed"] = tuple(tuple(bead) for bead in beads.get("placed", ()))
         return cls(
-            **{key: values[key] for key in ("name", "title", "seed", "gravity", "kind")},
+            **{key: values[key] for key in ("name", "title", "seed", "gravity")},
             container=Container(**values["container"]),
             beads=PileBeads(**beads),
             liquid=Liquid(**values["liquid"]),
             contact=Contact(**values["contact"]),
-            drive=Drive(**values["drive"]),
+            drive=Drive.from_dict(values["drive"]),
             run=PileRun(**values["run"]),
         )
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from inputs import library
-from inputs.case import Drive
+from inputs.drive import Drive
 from inputs.pile import Container, PileBeads, PileCase, PileRun, distance_from_axis, lattice
 from inputs.resolving import (
     MOST_STEPS,
@@ -16,10 +16,11 @@ from inputs.resolving import (
     density_of,
     largest_time_step,
     resolve_contact,
+    resolve_drive,
     resolve_liquid,
 )
-from inputs.schema import AUTO, ContactTable, EnvironmentTable, LiquidTable, Number, Table, Whole
-from inputs.units import Acceleration, Density, Duration, Frequency, Length, Radius, SignedLength, Speed, Time
+from inputs.schema import AUTO, ContactTable, DriveTable, EnvironmentTable, LiquidTable, Number, Table, Whole
+from inputs.units import Density, Duration, Length, Radius, SignedLength, Speed, Time
 from physics.dimer import Dimer
 from physics.matter import Contact, Liquid
 from physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
@@ -32,9 +33,9 @@ _OVERLAP = 0.01
 
 
 class ContainerTable(Table):
-    """``[container]``: inner measures, open above."""
+    """``[boundary]`` of a pile: a container's inner measures, open above."""
 
-    shape: Literal["box", "cylinder"] = "box"
+    shape: Literal["box", "cylinder"]
     width: Length
     height: Length
     material: str
@@ -62,14 +63,6 @@ class PileBeadsTable(Table):
     density: Density | None = None
 
 
-class PileDriveTable(Table):
-    """``[drive]``: along the vertical."""
-
-    frequency: Frequency
-    peak_acceleration: Acceleration
-    frame: Literal["container", "lab"] = "container"
-
-
 class PileRunTable(Table):
     """``[run]``."""
 
@@ -92,13 +85,12 @@ class PileStartTable(Table):
 class PileFile(Table):
     """A case file of a pile."""
 
-    kind: Literal["pile"]
     title: str = ""
-    container: ContainerTable
+    boundary: ContainerTable
     beads: PileBeadsTable
     liquid: LiquidTable
     contact: ContactTable = ContactTable()
-    drive: PileDriveTable
+    drive: DriveTable
     start: PileStartTable = PileStartTable()
     run: PileRunTable
     environment: EnvironmentTable = EnvironmentTable()
@@ -113,14 +105,14 @@ def resolve_pile(file: PileFile, name: str) -> PileCase:
         If something is missing that the library does not know, or keys contradict each other.
     """
     beads = _beads(file)
-    wall = file.container.material
+    wall = file.boundary.material
     if file.liquid.film_drag_ratio:
         raise UnusableKeyError("liquid.film_drag_ratio", "expected 0: most beads of a pile touch no wall's film")
     pair = library.surface_pair(beads.material, wall) or {}
     liquid = resolve_liquid(file.liquid, {**pair, "film_drag_ratio": 0.0})
-    contact = resolve_contact(file.contact, beads.material, "container.material", wall)
-    drive = Drive("z", file.drive.frequency, file.drive.peak_acceleration, file.drive.frame)
-    container = Container(file.container.shape, file.container.width, file.container.height, wall)
+    contact = resolve_contact(file.contact, beads.material, "boundary.material", wall)
+    drive = resolve_drive(file.drive, "z", None)
+    container = Container(file.boundary.shape, file.boundary.width, file.boundary.height, wall)
     (_check_places if beads.placed else _check_room)(beads, container)
     run = _run(file.run, beads, contact, liquid, drive)
     return PileCase(
@@ -192,8 +184,8 @@ def _beads(file: PileFile) -> PileBeads:
         share = by_number[0] / sum(by_number)
     count = table.count
     if count is None:
-        shape, width = file.container.shape, file.container.width
-        area = Container(shape, width, file.container.height, "").cross_section
+        shape, width = file.boundary.shape, file.boundary.width
+        area = Container(shape, width, file.boundary.height, "").cross_section
         mean = share * volumes[0] + (1.0 - share) * volumes[1]
         count = round(_PACKING * area * (table.fill_height or 0.0) / mean)
         if not 1 <= count <= MOST_BEADS:
@@ -204,13 +196,13 @@ def _beads(file: PileFile) -> PileBeads:
 
 def _check_room(beads: PileBeads, container: Container) -> None:
     if container.width < 4.0 * max(beads.large):
-        raise UnusableKeyError("container.width", "expected at least two of the large beads side by side")
+        raise UnusableKeyError("boundary.width", "expected at least two of the large beads side by side")
     if container.shape == "cylinder" and container.width < 8.0 * max(beads.large):
-        raise UnusableKeyError("container.width", "expected at least four of the large beads across a cylinder")
+        raise UnusableKeyError("boundary.width", "expected at least four of the large beads across a cylinder")
     level = lattice(beads, container)[1]
     if level > 2.0 * container.height:  # walls and simulation go on to there
         needed = f"{level / 2.0 * 1e3:.3g} mm"
-        raise UnusableKeyError("container.height", f"too low for {sum(beads.counts)} beads; expected {needed} or more")
+        raise UnusableKeyError("boundary.height", f"too low for {sum(beads.counts)} beads; expected {needed} or more")
 
 
 def limits_of(beads: PileBeads, contact: Contact, liquid: Liquid, drive: Drive) -> TimeStepLimits:

@@ -5,6 +5,7 @@ Whatever is wrong ends as one `InputError` that names the file, the key, the val
 
 from __future__ import annotations
 
+import re
 import stat
 import tomllib
 from collections.abc import Callable, Mapping
@@ -127,15 +128,15 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     InputError
         If anything in it cannot be used.
     """
-    if document.get("kind") == "pile":
-        problem = Problem("kind", '"pile"', 'expected "walker" or "climber": piles are run, measured and drawn only')
+    if is_of_a_pile(document):
+        problem = Problem("boundary.shape", quoted(document, ["boundary", "shape"]), 'expected "plane", for walkers')
         raise InputError(source, [problem])
     return _resolved(WalkerFile, resolve, document, source, name)
 
 
 def resolve_any(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> AnyCase:
     """`resolve_case` for a case of any kind."""
-    resolver = resolve_pile_case if document.get("kind") == "pile" else resolve_case
+    resolver = resolve_pile_case if is_of_a_pile(document) else resolve_case
     return resolver(document, source=source, name=name)
 
 
@@ -144,14 +145,37 @@ def resolve_pile_case(document: Mapping[str, Any], *, source: str = "<case>", na
     return _resolved(PileFile, resolve_pile, document, source, name)
 
 
+def is_of_a_pile(document: Mapping[str, Any]) -> bool:
+    """Whether a case's boundary is a container, into which a pile is poured."""
+    boundary = document.get("boundary")
+    return isinstance(boundary, Mapping) and boundary.get("shape", "plane") != "plane"
+
+
+_OLD_WORDS = {
+    "kind": "there are no kinds any more: [boundary] says where the beads are (a climber's tilt is 90 deg, a pile's "
+    'shape "box" or "cylinder")',
+    "substrate": "[substrate] is now [boundary]: its material, and its tilt if it is not level",
+    "container": "[container] is now [boundary], with its shape",
+}
+
+
+def _refuse_old_words(document: Mapping[str, Any], source: str) -> None:
+    """Say what the words of older case files are called now."""
+    problems = [Problem(key, quoted(document, [key]), told) for key, told in _OLD_WORDS.items() if key in document]
+    if problems:
+        raise InputError(source, problems)
+
+
 def _resolved(
     model: type[_File], resolver: Callable[[_File, str], _Case], document: Mapping[str, Any], source: str, name: str
 ) -> _Case:
+    _refuse_old_words(document, source)
     file = validated(model, document, source)
     try:
         return resolver(file, name)
     except ArithmeticError as error:
         raise InputError(source, [Problem("", None, f"the numbers do not go together ({error})")]) from error
     except UnusableKeyError as unusable:
-        value = quoted(document, unusable.key.split("."))
+        parts = re.findall(r"[^.\[\]]+", unusable.key)
+        value = quoted(document, [int(part) if part.isdigit() else part for part in parts])
         raise InputError(source, [Problem(unusable.key, value, unusable.expected)]) from unusable

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import atan2
 from typing import Literal
 
 from inputs import library
-from inputs.case import Beads, Drive, Run, Start, WalkerCase
+from inputs.case import Beads, Run, Start, WalkerCase
 from inputs.dimer import contact_loads, horizontal_distance, reach
+from inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector
 from inputs.library import suggestion
-from inputs.schema import BeadsTable, ContactTable, LiquidTable, WalkerFile
+from inputs.plane import Plane
+from inputs.schema import BeadsTable, ContactTable, DriveTable, HarmonicTable, LiquidTable, WalkerFile
 from physics.dimer import Dimer
 from physics.matter import Contact, Liquid
 from physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
@@ -43,13 +46,13 @@ def resolve(file: WalkerFile, name: str) -> WalkerCase:
         If something is missing that the library does not know, or keys contradict each other.
     """
     beads = _beads(file)
-    pair = library.surface_pair(beads.material, file.substrate.material)
+    pair = library.surface_pair(beads.material, file.boundary.material)
     liquid = resolve_liquid(file.liquid, pair)
-    contact = resolve_contact(file.contact, beads.material, "substrate.material", file.substrate.material)
+    contact = resolve_contact(file.contact, beads.material, "boundary.material", file.boundary.material)
     dimer = Dimer(beads.radii, beads.density, liquid.surface_tension)
-    drive = _drive(file, dimer)
+    drive = resolve_drive(file.drive, "x", dimer)
     run = _run(file, dimer, contact, liquid, drive)
-    _check_climber(file)
+    _check_facing(file)
     table = file.start
     start = Start(
         replicates=table.replicates,
@@ -62,17 +65,19 @@ def resolve(file: WalkerFile, name: str) -> WalkerCase:
         seed=table.seed,
     )
     gravity = file.environment.gravity
-    case = WalkerCase(
-        name, file.title, beads, liquid, file.substrate.material, contact, drive, start, run, gravity, file.kind
+    level = WalkerCase(
+        name, file.title, beads, liquid, Plane(file.boundary.material), contact, drive, start, run, gravity
     )
-    return _placed(case, table.spacing)
+    along, across, _ = level.drive_axis
+    tilt, uphill = file.boundary.tilt, atan2(across, along) + file.boundary.uphill
+    plane = Plane(file.boundary.material, tilt, uphill if tilt else 0.0)
+    return _placed(replace(level, boundary=plane), table.spacing)
 
 
-def _check_climber(file: WalkerFile) -> None:
-    if file.kind == "walker" and file.start.facing in ("up", "down"):
-        raise UnusableKeyError("start.facing", 'expected "both", "right" or "left": climbers alone face up or down')
-    if file.kind == "climber" and file.drive.axis == "z":
-        raise UnusableKeyError("drive.axis", 'expected "x" or "y": the wall is the plane z = 0, and the axis goes up')
+def _check_facing(file: WalkerFile) -> None:
+    if file.start.facing in ("up", "down") and (not file.boundary.tilt or file.boundary.uphill):
+        told = "on a plane that is tilted along the drive alone walkers face up or down"
+        raise UnusableKeyError("start.facing", f'expected "both", "right" or "left": {told}')
 
 
 def known_name(key: str, name: str, names: tuple[str, ...], *, described: bool = False) -> str:
@@ -212,16 +217,63 @@ def _first(given: float | None, pair: dict[str, float] | None, key: str) -> floa
     return pair.get(key) if pair is not None else None
 
 
-def _drive(file: WalkerFile, dimer: Dimer) -> Drive:
-    table = file.drive
+def resolve_drive(table: DriveTable, axis: str, dimer: Dimer | None) -> Drive:
+    """A drive of one harmonic or of several.
+
+    Parameters
+    ----------
+    table
+        What the case says.
+    axis
+        Along which it is shaken if the case does not say.
+    dimer
+        Whose Γ0 a drive may be given by; None where there is none.
+
+    Raises
+    ------
+    UnusableKeyError
+        If something is missing, said twice or contradictory.
+    """
+    besides = sorted(table.model_fields_set - {"harmonics", "frame"})
+    if table.harmonics and besides:
+        raise UnusableKeyError(f"drive.{besides[0]}", "expected none beside drive.harmonics")
+    if table.harmonics:
+        harmonics = tuple(
+            _harmonic(one, f"drive.harmonics[{number}]", axis, dimer) for number, one in enumerate(table.harmonics)
+        )
+    else:
+        harmonics = (_harmonic(table, "drive", axis, dimer),)
+    try:
+        common_frequency([one.frequency for one in harmonics])
+    except ValueError as error:
+        raise UnusableKeyError("drive.harmonics", f"expected frequencies with a common period: {error}") from error
+    drive = Drive(harmonics, table.frame or "container")
+    if table.frame is None and axis == "x" and drive.is_plain:
+        return replace(drive, frame="lab")
+    if table.frame == "lab" and not drive.is_plain:
+        told = "several harmonics, or one with a phase, are driven in the container's frame"
+        raise UnusableKeyError("drive.frame", f'expected "container": {told}')
+    return drive
+
+
+def _harmonic(table: DriveTable | HarmonicTable, key: str, axis: str, dimer: Dimer | None) -> Harmonic:
+    if table.frequency is None:
+        raise UnusableKeyError(f"{key}.frequency", 'missing; expected such as "80 Hz"')
+    if dimer is None and table.gamma0 is not None:
+        raise UnusableKeyError(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")
     if (table.peak_acceleration is None) == (table.gamma0 is None):
         if table.gamma0 is None:
-            raise UnusableKeyError("drive.peak_acceleration", 'missing; expected it (such as "4 g") or gamma0')
-        raise UnusableKeyError("drive.gamma0", "expected either peak_acceleration or gamma0, not both")
+            raise UnusableKeyError(f"{key}.peak_acceleration", 'missing; expected it (such as "4 g") or gamma0')
+        raise UnusableKeyError(f"{key}.gamma0", "expected either peak_acceleration or gamma0, not both")
     acceleration = table.peak_acceleration
     if acceleration is None:
-        acceleration = dimer.peak_acceleration(table.gamma0 or 0.0)
-    return Drive(table.axis, table.frequency, acceleration, table.frame)
+        acceleration = dimer.peak_acceleration(table.gamma0 or 0.0) if dimer else 0.0
+    given = axis if table.axis is None else table.axis
+    try:
+        direction = AXES[given] if isinstance(given, str) else unit_vector(given)
+    except ValueError as error:
+        raise UnusableKeyError(f"{key}.axis", str(error)) from error
+    return Harmonic(direction, table.frequency, acceleration, table.phase)
 
 
 def _run(file: WalkerFile, dimer: Dimer, contact: Contact, liquid: Liquid, drive: Drive) -> Run:

@@ -6,7 +6,8 @@ materials and liquids can supply are optional; `inputs.reading` fills them in.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from math import isfinite
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
@@ -103,10 +104,16 @@ class LiquidTable(Table):
     contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] | None = None
 
 
-class SubstrateTable(Table):
-    """``[substrate]``."""
+class PlaneTable(Table):
+    """``[boundary]`` of walkers: a plane, level (0°), tilted or a wall (90°).
 
+    ``uphill`` is the direction of the steepest way up, from that of the drive within the plane.
+    """
+
+    shape: Literal["plane"] = "plane"
     material: str
+    tilt: Annotated[NonNegativeAngle, Field(le=3.1416)] = 0.0
+    uphill: Angle = 0.0
 
 
 class FrictionTable(Table):
@@ -131,14 +138,46 @@ class ContactTable(Table):
     minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] | None = None
 
 
-class DriveTable(Table):
-    """``[drive]``: how the substrate is shaken; exactly one of ``peak_acceleration`` and ``gamma0``."""
+def _axis(value: object) -> object:
+    """An axis by its name, or a direction by its components."""
+    if value in ("x", "y", "z"):
+        return value
+    if isinstance(value, list) and len(value) == 3 and any(value):
+        numbers = tuple(float(one) for one in value if type(one) in (int, float) and isfinite(one))
+        if len(numbers) == 3:
+            return numbers
+    expected = "expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]"
+    raise PydanticCustomError("axis", "{expected}", {"expected": expected})
 
-    axis: Literal["x", "y", "z"] = "x"
+
+Axis = Annotated[Any, BeforeValidator(_axis)]
+"""The name of an axis, or a direction: its components, in any length."""
+
+
+class HarmonicTable(Table):
+    """One of ``[[drive.harmonics]]``; exactly one of ``peak_acceleration`` and ``gamma0``."""
+
+    axis: Axis | None = None
     frequency: Frequency
     peak_acceleration: Acceleration | None = None
     gamma0: Coefficient | None = None
-    frame: Literal["lab", "container"] = "lab"
+    phase: Angle = 0.0
+
+
+class DriveTable(Table):
+    """``[drive]``: one harmonic by its keys, or several as ``[[drive.harmonics]]``.
+
+    ``axis``, left out, is x on a plane, and the vertical z in a container. ``frame``, left out, is the laboratory's for
+    one harmonic without a phase on a plane, else the container's.
+    """
+
+    axis: Axis | None = None
+    frequency: Frequency | None = None
+    peak_acceleration: Acceleration | None = None
+    gamma0: Coefficient | None = None
+    phase: Angle = 0.0
+    frame: Literal["lab", "container"] | None = None
+    harmonics: Annotated[list[HarmonicTable], Field(max_length=24)] = []
 
 
 class StartTable(Table):
@@ -172,13 +211,12 @@ class EnvironmentTable(Table):
 
 
 class WalkerFile(Table):
-    """A case file of a walker on a level substrate, or of a climber: the same on a wall, the drive axis going up."""
+    """A case file of walkers on a plane."""
 
-    kind: Literal["walker", "climber"] = "walker"
     title: str = ""
     beads: BeadsTable
     liquid: LiquidTable
-    substrate: SubstrateTable
+    boundary: PlaneTable
     contact: ContactTable = ContactTable()
     drive: DriveTable
     start: StartTable = StartTable()

@@ -39,12 +39,14 @@ from inputs.axes import (
 from inputs.errors import InputError, Problem
 from inputs.messages import quoted, suggested_key, validated
 from inputs.pile_file import PileFile
-from inputs.reading import AnyCase, find_input, read_toml, resolve_any, shipped_cases
+from inputs.reading import AnyCase, find_input, is_of_a_pile, read_toml, resolve_any, shipped_cases
 from inputs.schema import ALTERNATIVES, Table, WalkerFile, Whole
 from inputs.units import Speed
 
 _SHIPPED = Path(__file__).parent / "sweeps"
-_INDEXED = re.compile(r"(?P<key>.+)\[(?P<index>\d)\]")
+_PART = re.compile(r"(?P<name>[^.\[\]]+)(?:\[(?P<index>\d+)\])?")
+_INDEX = re.compile(r"\[\d+\]")
+_LAST_INDEX = re.compile(r"\[\d+\][^\[]*$")
 
 
 class _Table(BaseModel):
@@ -202,7 +204,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         for key in (*settings, *keys):
             if key == "title" and key in keys:
                 raise UnusableAxisError(key, None, "does not vary: points with other titles alone are the same run")
-            _check_key(key, PileFile if given.get("kind") == "pile" else WalkerFile)
+            _check_key(key, PileFile if is_of_a_pile(given) else WalkerFile)
         tables = changed(given, settings)
         changed(tables, dict(zip(keys, rows[0], strict=True)))
     except UnusableAxisError as unusable:
@@ -234,10 +236,9 @@ def _base(case: str, source: str, folder: Path) -> Path:
 
 
 def _check_key(key: str, file: type[Table]) -> None:
-    match = _INDEXED.fullmatch(key)
     if "" in key.split("."):
         raise UnusableAxisError(key, None, "is no key of a case")
-    unknown = suggested_key(match["key"] if match else key, file)
+    unknown = suggested_key(_INDEX.sub("", key), file)
     if unknown is not None:
         raise UnusableAxisError(key, None, unknown)
 
@@ -301,16 +302,23 @@ def _remove(document: dict[str, Any], key: str) -> None:
 
 
 def _put(document: dict[str, Any], key: str, value: Value) -> None:
-    match = _INDEXED.fullmatch(key)
-    *tables, name = (match["key"] if match else key).split(".")
+    """Give the place of a dotted key, such as ``drive.harmonics[1].phase``, another value."""
+    *tables, last = [(match["name"], match["index"]) for match in _PART.finditer(key)]
     table: Any = document
-    for part in tables:
-        table = table.setdefault(part, {})
+    for name, index in tables:
+        table = table.setdefault(name, {}) if index is None else _entry(table, name, int(index), key, value)
         if not isinstance(table, dict):  # the base case is wrong there, which its own check tells
             return
-    if match is None:
+    name, index = last
+    if index is None:
         table[name] = value
-    elif isinstance(table.get(name), list) and int(match["index"]) < len(table[name]):
-        table[name] = [value if place == int(match["index"]) else one for place, one in enumerate(table[name])]
     else:
-        raise UnusableAxisError(key, value, f"the base case has no {match['key']} of that length")
+        _entry(table, name, int(index), key, value)
+        table[name] = [value if place == int(index) else one for place, one in enumerate(table[name])]
+
+
+def _entry(table: dict[str, Any], name: str, index: int, key: str, value: Value) -> Any:
+    entries = table.get(name)
+    if not isinstance(entries, list) or index >= len(entries):
+        raise UnusableAxisError(key, value, f"the base case has no {_LAST_INDEX.sub('', key)} of that length")
+    return entries[index]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
+from inputs.drive import Drive, Harmonic
 from inputs.reading import load_case
 from paper.published import GRAVITY
 
@@ -31,7 +32,7 @@ def symmetric(table: pd.DataFrame) -> pd.Series[bool]:
 def driven(case: WalkerCase, frequency: float, accelerations: Iterable[float]) -> list[WalkerCase]:
     """A case at another frequency, Hz, and peak accelerations, m/s²."""
     return [
-        replace(case, drive=replace(case.drive, frequency=float(frequency), peak_acceleration=float(peak)))
+        replace(case, drive=Drive((Harmonic(case.drive.direction, float(frequency), float(peak)),), case.drive.frame))
         for peak in accelerations
     ]
 
@@ -45,7 +46,7 @@ def of_asymmetry(case: WalkerCase, sin_delta: float, gamma0: float) -> WalkerCas
 def of_radii(case: WalkerCase, radii: tuple[float, float], gamma0: float) -> WalkerCase:
     """A case with other beads, radii in m, driven at a Γ0."""
     dimer = replace(case, beads=replace(case.beads, radii=radii))
-    return replace(dimer, drive=replace(case.drive, peak_acceleration=dimer_of(dimer).peak_acceleration(gamma0)))
+    return replace(dimer, drive=case.drive.with_peak(dimer_of(dimer).peak_acceleration(gamma0)))
 
 
 def described(case: WalkerCase) -> str:

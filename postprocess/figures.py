@@ -12,7 +12,6 @@ from inputs.dimer import dimer_of
 from postprocess.drawing import new_figure, plain_text, save_figure, styled
 from postprocess.gait import distance_walked, fit_slopes, gait
 from postprocess.trajectory import Trajectory, read_trajectory
-from templates.scene import vector_along
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -130,7 +129,7 @@ def _gait_figure(trajectory: Trajectory) -> Figure:
     for label, values, marker, colour in series:
         mean = values[:-1].mean() * 1e3
         axes.plot(phase, values * 1e3, marker=marker, color=colour, label=f"{label} (mean {mean:.2f} mm/s)")
-    shaken = trajectory.substrate_velocity[last] @ np.array(vector_along(trajectory.case.drive.axis))
+    shaken = trajectory.substrate_velocity[last] @ trajectory.drive_axis
     if np.any(shaken):
         facing = trajectory.layout.walkers[0].facing
         axes.plot(phase, facing * shaken * 1e3, color="0.6", ls=":", label="substrate")

@@ -202,7 +202,7 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
     start = motion.first_driven
     return {
         "case": case.name,
-        "kind": case.kind,
+        "kind": "pile",
         "units": "SI: m, s, m/s",
         "beads": len(motion.radius),
         "large": int(motion.large.sum()),

@@ -48,7 +48,7 @@ def _of_walkers(result: dict[str, Any], drive: str) -> list[str]:
     of_what = f"over {count} walkers" if count > 1 else "of the fit"
     doubt = f" (standard error {_speed(error)} {of_what})" if error is not None else ""
     toward = "toward the large bead" if result["sin_delta"] else "toward bead 1"
-    ways = ("up", "down") if result["kind"] == "climber" else ("right", "left")
+    ways = ("up", "down") if result["tilt"] else ("right", "left")
     return [
         f"{result['case']}: {drive}",
         f"  velocity   {_speed(velocity['mean'])} mm/s, positive {toward}{doubt}",
@@ -60,13 +60,13 @@ def _of_walkers(result: dict[str, Any], drive: str) -> list[str]:
 def _of_turned(result: dict[str, Any], drive: str) -> list[str]:
     """What became of walkers of which some turned by more than 90°: a velocity along their heading says nothing."""
     axial, kept = result["axial_velocity"], result["kept_heading"]
-    climber = result["kind"] == "climber"
-    what, (first, second) = ("over", ("up", "down")) if climber else ("round", ("right", "left"))
+    tilted = bool(result["tilt"])
+    what, (first, second) = ("over", ("up", "down")) if tilted else ("round", ("right", "left"))
     return [
         f"{result['case']}: {result['turned_round']} of {result['walkers']} turned {what}, "
         f"axial velocity {_speed(axial['mean'])} mm/s",
         f"  drive      {drive}",
-        f"  axial velocity, positive {'up' if climber else 'to the right'}: started facing {first} "
+        f"  axial velocity, positive {'up' if tilted else 'to the right'}: started facing {first} "
         f"{_speed(axial['right_facing'])}, {second} {_speed(axial['left_facing'])} mm/s; {_steady(result)}",
         f"  velocity   of the {kept['n']} others {_speed(kept['mean'])} mm/s, along their heading"
         if kept["n"]

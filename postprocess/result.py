@@ -66,7 +66,7 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     directory = Path(directory)
     try:
         result = read_result(directory)
-        if result.keys() >= {"velocity", "walkers", "gamma0", "parted", "kept_heading"} and intact(directory):
+        if result.keys() >= {"velocity", "walkers", "gamma0", "parted", "kept_heading", "tilt"} and intact(directory):
             return result
     except (OSError, ValueError):
         pass
@@ -142,7 +142,8 @@ def _result(trajectory: Trajectory, walkers: Columns) -> dict[str, Any]:
     turned = np.abs(trajectory.orientation).max(axis=0) > np.pi / 2.0
     return {
         "case": case.name,
-        "kind": case.kind,
+        "kind": "walker",
+        "tilt": case.boundary.tilt,
         "units": "SI: m/s, rad, s",
         "velocity": _spread(velocity, float(walkers["standard_error"][0])),
         "right_facing": _spread(velocity[facing > 0]),

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from inputs.case import Drive, WalkerCase
+from inputs.case import WalkerCase
 from inputs.dimer import dimer_of
+from inputs.drive import Drive
 from postprocess.dump import BinaryDump, DumpError, FloatArray
 from runner.directory import CASE_NAME
 from runner.files import read_json
 from templates.deck import LAYOUT_NAME
 from templates.layout import Layout
-from templates.scene import vector_along
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,7 @@ class Trajectory:
     @property
     def drive_axis(self) -> FloatArray:
         """Direction from which orientations are measured, in the plane of the substrate: the drive's, or x."""
-        axis = np.array(vector_along(self.case.drive.axis))
-        return axis if axis[2] == 0.0 else np.array([1.0, 0.0, 0.0])
+        return np.array(self.case.drive_axis)
 
     @property
     def across_axis(self) -> FloatArray:
@@ -158,7 +157,10 @@ def _substrate(
 
 
 def prescribed_motion(drive: Drive, time: npt.NDArray[np.floating[Any]]) -> tuple[FloatArray, FloatArray]:
-    """Displacement A sin ωt and velocity of the walls in the frame of the run, m and m/s, each of shape (F, 3)."""
-    along = np.array(vector_along(drive.axis)) * (drive.frame == "lab")
-    displacement = np.outer(drive.amplitude * np.sin(drive.angular_frequency * time), along)
-    return displacement, np.outer(drive.peak_velocity * np.cos(drive.angular_frequency * time), along)
+    """Displacement and velocity of the walls in the frame of the run, m and m/s, each of shape (F, 3)."""
+    displacement, velocity = np.zeros((len(time), 3)), np.zeros((len(time), 3))
+    for one in drive.harmonics if drive.frame == "lab" else ():
+        phase = one.angular_frequency * time + one.phase
+        displacement += np.outer(one.amplitude * np.sin(phase), one.direction)
+        velocity += np.outer(one.peak_velocity * np.cos(phase), one.direction)
+    return displacement, velocity

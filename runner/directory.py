@@ -29,7 +29,7 @@ from runner.failures import DiskFull, RunBusy
 from runner.files import read_json, settle, settle_entry, write_json
 from runner.launch import EngineReport
 from runner.locks import locked
-from templates.deck import DECK_NAME, LAYOUT_NAME, Deck, render_deck
+from templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck
 from templates.layout import Layout
 
 MANIFEST_NAME = "manifest.json"
@@ -41,15 +41,12 @@ _FORMAT = 1
 _LONGEST_NAME = 80
 
 
-def run_name(case: WalkerCase, deck: Deck, engine: Engine) -> str:
-    """Name of a run's directory: the case's name and 12 hex digits over resolved case, deck, its files and engine."""
-    determinants = {
-        "case": case.determinants(),
-        "deck": deck.text,
-        "files": dict(deck.files),
-        "engine": engine.sha256,
-        "format": _FORMAT,
-    }
+def run_name(case: WalkerCase | PileCase, engine: Engine) -> str:
+    """Name of a run's directory: the case's name and 12 hex digits over resolved case, engine and the decks' version.
+
+    The wording of a deck is not among it: a comment in a template leaves the runs that are there.
+    """
+    determinants = {"case": case.determinants(), "deck": CONTENT_VERSION, "engine": engine.sha256, "format": _FORMAT}
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
     return f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
 
@@ -59,9 +56,9 @@ def name_of(case_name: str) -> str:
     return re.sub(r"[^\w.+-]+", "_", case_name)[:_LONGEST_NAME]
 
 
-def run_place(case: WalkerCase, engine: Engine, out: Path) -> Path:
-    """Where the run of a case by itself belongs."""
-    return out / run_name(case, render_deck(case), engine)
+def run_place(case: WalkerCase | PileCase, engine: Engine, out: Path) -> Path:
+    """Where the run of a case belongs; one that shared a deck is within an ensemble."""
+    return out / run_name(case, engine)
 
 
 @dataclass(frozen=True)
@@ -154,7 +151,7 @@ def open_run(case: WalkerCase, deck: Deck, engine: Engine, out: Path) -> Iterato
     DiskFull
         If there is no room even for the deck.
     """
-    place = out / run_name(case, deck, engine)
+    place = run_place(case, engine, out)
     out.mkdir(parents=True, exist_ok=True)
     with locked([place]) as ours:
         if place not in ours:

@@ -7,8 +7,6 @@ the parts are the same whether the run was interrupted or not, so is all that co
 
 from __future__ import annotations
 
-import hashlib
-import json
 import re
 import shutil
 import time
@@ -28,10 +26,10 @@ from runner.directory import (
     finished_run,
     manifest,
     move_into_place,
-    name_of,
     record_failure,
     recover,
     room_on_disk,
+    run_place,
     unfinished,
     write_deck,
 )
@@ -56,21 +54,6 @@ class PileProgress:
     elapsed: float
     driven: bool
     share: float
-
-
-def pile_place(case: PileCase, engine: Engine, out: Path) -> Path:
-    """Where the run of a pile belongs."""
-    first = Part(0, settling_steps(case), None)
-    drive = Part(first.end, first.end + case.run.cycles_per_part * case.run.steps_per_cycle, first.end)
-    decks = [render_part(case, part) for part in (first, drive)]
-    determinants = {
-        "case": case.determinants(),
-        "decks": [deck.text for deck in decks],
-        "files": dict(decks[0].files),
-        "engine": engine.sha256,
-    }
-    text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
-    return out / f"{name_of(case.name)}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
 
 
 def run_pile(
@@ -111,7 +94,7 @@ def run_pile(
     EngineFailure
         If the engine fails; the parts before stay, and the next call goes on after them.
     """
-    place = pile_place(case, engine, out)
+    place = run_place(case, engine, out)
     out.mkdir(parents=True, exist_ok=True)
     with locked([place]) as ours:
         if place not in ours:

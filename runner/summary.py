@@ -37,6 +37,7 @@ def summarise(case: WalkerCase) -> dict[str, Any]:
             "gamma0": dimer.gamma0(case.drive.peak_acceleration),
             "sin_delta": dimer.sin_delta,
             "mass_asymmetry": dimer.mass_asymmetry,
+            "peak_acceleration": case.drive.peak_acceleration,
             "amplitude": case.drive.amplitude,
             "peak_velocity": case.drive.peak_velocity,
             "stiffness_ratio": _stiffness_ratio(case),
@@ -108,6 +109,8 @@ def _short(value: object) -> str:
         return f"{value:.6g}"
     if isinstance(value, list):
         return "[" + ", ".join(_short(entry) for entry in value) + "]"
+    if isinstance(value, dict):
+        return " ".join(f"{key} {_short(entry)}" for key, entry in value.items())
     return str(value)
 
 
@@ -119,7 +122,7 @@ def _text_of_dimer(summary: dict[str, Any]) -> str:
     return (
         f"dimer      M = {dimer['total_mass'] * 1e6:.4g} mg, mean radius {dimer['mean_radius'] * 1e3:.4g} mm, "
         f"sin δ = {dimer['sin_delta']:.4g}, μ = {dimer['mass_asymmetry']:.4g}{softened}\n"
-        f"drive      a0 = {summary['case']['drive']['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g "
+        f"drive      a0 = {dimer['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g "
         f"(the paper's, {ACCELERATION_OF_ONE_G:g} m/s²; gravity is {summary['case']['gravity']:g} m/s²), "
         f"Γ0 = {dimer['gamma0']:.4g}, amplitude {dimer['amplitude'] * 1e3:.4g} mm, "
         f"peak velocity {dimer['peak_velocity'] * 1e3:.4g} mm/s{order}"

@@ -11,10 +11,8 @@ from inputs.dimer import dimer_of
 from inputs.pile import PileCase
 from inputs.reading import AnyCase
 from postprocess.tables import WALKERS
-from runner.binary import Engine
 from runner.cost import predicted_seconds
-from runner.directory import run_place
-from runner.parts import is_pile, pile_place
+from runner.parts import is_pile
 from runner.pile_summary import predicted_pile_seconds
 from templates.sharing import sharing_key
 
@@ -74,11 +72,6 @@ RESULTS = {"walker": _WALKER_RESULTS, "pile": _PILE_RESULTS}
 def kind_of(case: AnyCase) -> str:
     """Which table a sweep of such cases has."""
     return "pile" if isinstance(case, PileCase) else "walker"
-
-
-def place_of(case: AnyCase, engine: Engine, out: Path) -> Path:
-    """Where the run of a case by itself belongs."""
-    return pile_place(case, engine, out) if isinstance(case, PileCase) else run_place(case, engine, out)
 
 
 def sharing_of(case: AnyCase) -> Hashable:

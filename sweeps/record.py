@@ -17,11 +17,11 @@ from inputs.errors import InputError, Problem, WalkersError
 from inputs.reading import AnyCase
 from inputs.sweep import Descent, Sweep
 from runner.binary import Engine
-from runner.directory import FAILURE_NAME, unfinished
+from runner.directory import FAILURE_NAME, run_place, unfinished
 from runner.ensemble import FOLDER, finished_places
 from runner.files import read_json, write_json
 from runner.locks import is_locked
-from sweeps.kinds import DERIVED, current_result_of, derived_of, kind_of, place_of, velocity_in
+from sweeps.kinds import DERIVED, current_result_of, derived_of, kind_of, velocity_in
 
 RECORD_NAME = "sweep.json"
 _FORMAT = 1
@@ -86,7 +86,7 @@ def describe_sweep(sweep: Sweep, cases: Sequence[AnyCase], engine: Engine, out: 
         units=dict(zip(sweep.keys, sweep.units, strict=True)),
         values=[[_plain(value) for value in row] for row in sweep.rows],
         derived=[derived_of(case) for case in cases],
-        runs=[place_of(case, engine, out).name for case in cases],
+        runs=[run_place(case, engine, out).name for case in cases],
         descent=sweep.descent,
         kind=kind_of(cases[0]) if cases else "walker",
     )

@@ -17,7 +17,7 @@ from runner.ensemble import finished_place, make_ensemble
 from runner.failures import AuditFailed, RunBusy, UnauditedEngineWarning
 from runner.launch import Progress, launch
 from runner.locks import locked
-from runner.parts import pile_place, run_pile
+from runner.parts import run_pile
 from templates.deck import render_deck, render_shared_deck
 
 
@@ -110,7 +110,7 @@ def _make_pile(
 ) -> Made:
     from postprocess.pile_result import current_pile_result
 
-    name = pile_place(case, engine, out).name
+    name = run_place(case, engine, out).name
     try:
         run, found = run_pile(case, engine, out, on_progress=on_progress, time_limit=time_limit)
     except RunBusy:

@@ -11,8 +11,9 @@ from pathlib import Path
 from inputs.errors import Stopped, WalkersError
 from inputs.reading import AnyCase
 from runner.binary import find_engine
+from runner.directory import run_place
 from runner.failures import DiskFull, EngineDiffers, EngineFailure, ProgramDiffers
-from sweeps.kinds import current_result_of, place_of, velocity_in
+from sweeps.kinds import current_result_of, velocity_in
 from sweeps.together import make_any
 
 STOPS: dict[str, threading.Event] = {}
@@ -102,7 +103,7 @@ def _made(task: Task, look: Callable[[object], None]) -> Report:
     engine = find_engine(task.engine)
     if engine.sha256 != task.sha256:
         raise EngineDiffers(engine.path)
-    if task.runs != tuple(place_of(case, engine, task.out).name for case in task.cases):
+    if task.runs != tuple(run_place(case, engine, task.out).name for case in task.cases):
         raise ProgramDiffers
     made = make_any(task.cases, task.out, engine, look, task.time_limit)
     finished = {

@@ -16,7 +16,7 @@ from physics.matter import Contact
 from templates.engine import ALL_REMEDIES, Remedies, contact_angle_setting, separation_cap, wall_mesh
 from templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
 from templates.placement import place_walkers
-from templates.scene import Point, Scene, vector_along, without_riders
+from templates.scene import Point, Scene, without_riders
 from templates.sharing import check_sharing, surfaces_of
 
 if TYPE_CHECKING:
@@ -27,6 +27,8 @@ OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
 WALL_NAME = "walls.stl"
 STATUS_LINES_PER_CYCLE = 4
+CONTENT_VERSION = 1
+"""Of what decks compute: to be raised where the same case gives another deck, comments aside. Runs are named by it."""
 
 __all__ = ["DECK_NAME", "LAYOUT_NAME", "OUTPUT_NAME", "Deck", "Layout", "PlacedWalker", "render_deck"]
 
@@ -197,7 +199,7 @@ def compose(plan: Plan) -> Deck:
         gone = len(scene.riders)
         scene = without_riders(scene)
         walkers = tuple(replace(one, beads=(one.beads[0] - gone, one.beads[1] - gone)) for one in walkers)
-    drive, axis = case.drive, vector_along(case.drive.axis)
+    first = case.drive.harmonics[0]
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
     angle = case.liquid.contact_angle
     surfaces = plan.surfaces or (case.contact,)
@@ -219,11 +221,11 @@ def compose(plan: Plan) -> Deck:
         contact_angle_setting=contact_angle_setting(angle) if remedies.contact_angle else degrees(angle),
         separation_cap=separation_cap((bead.radius for bead in scene.beads), case.liquid.volume_fraction, angle),
         bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
-        axis=axis,
-        down=[-int(component) for component in vector_along("z" if case.kind != "climber" else drive.axis)],
+        down=[component / case.gravity for component in case.gravity_vector] if case.gravity else [],
         plan=plan,
-        amplitude=[drive.amplitude * component for component in axis],
-        peak_velocity=[drive.peak_velocity * component for component in axis],
+        # Of a drive that moves the walls; it has one harmonic.
+        amplitude=[first.amplitude * component for component in first.direction],
+        peak_velocity=[first.peak_velocity * component for component in first.direction],
         films=_films(case, scene),
         prescribed=plan.prescribed,
         ranks=plan.ranks,
@@ -294,7 +296,7 @@ def fastest_of(case: WalkerCase) -> float:
     """Ten times the substrate's peak velocity, plus a fall from the highest hop, plus what a bridge's pull can give."""
     loads = contact_loads(case)
     pull = sqrt(2.0 * max(loads.capillary) * max(loads.rupture) / min(dimer_of(case).masses))
-    fall = sqrt(2.0 * case.gravity * (hop_height(case) if case.kind == "walker" else reach(case)))
+    fall = sqrt(2.0 * case.gravity * (hop_height(case) if case.boundary.tilt == 0.0 else reach(case)))
     return 10.0 * case.drive.peak_velocity + fall + pull
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from math import ceil, cos, pi, sin, sqrt
+from math import atan2, ceil, cos, pi, sin, sqrt
 
 from inputs.case import WalkerCase
 from inputs.dimer import contact_loads, hop_height, horizontal_distance, reach
@@ -83,7 +83,7 @@ def _place(
     at_rest = contact_loads(case).overlaps if case.start.gap is None else (-case.start.gap,) * 3
     overlaps = (at_rest[0] * factor, at_rest[1] * factor, at_rest[2] * factor)
     distance = horizontal_distance(radii, overlaps)
-    heading = (pi / 2.0 if case.drive.axis == "y" else 0.0) + angle + (0.0 if facing > 0 else pi)
+    heading = atan2(case.drive_axis[1], case.drive_axis[0]) + angle + (0.0 if facing > 0 else pi)
     # The point of contact of the two beads lies over the origin.
     lever = distance * radii[0] / sum(radii)
     arms = (lever, lever - distance)

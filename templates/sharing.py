@@ -36,7 +36,8 @@ def sharing_key(case: WalkerCase) -> Hashable:
         rolling_friction=float(case.contact.rolling_friction > 0.0),
     )
     liquid = replace(case.liquid, name=None, density=None)
-    return (case.kind, liquid, contact, case.drive, case.run, case.gravity, case.beads.density, crowded)
+    boundary = replace(case.boundary, material="")
+    return (boundary, liquid, contact, case.drive, case.run, case.gravity, case.beads.density, crowded)
 
 
 def check_sharing(cases: Sequence[WalkerCase]) -> None:

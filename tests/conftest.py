@@ -40,7 +40,7 @@ REFERENCE: dict[str, Any] = {
         "film_drag_ratio": 0.0,
         "contact_angle": "0 deg",
     },
-    "substrate": {"material": "chromium-coated glass"},
+    "boundary": {"material": "chromium-coated glass"},
     "contact": {
         "friction": {"bead_bead": 0.1, "bead_wall": 0.1},
         "rolling_friction": 0.0,

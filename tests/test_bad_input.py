@@ -47,9 +47,9 @@ BAD: dict[str, tuple[dict[str, Any], str, str, str]] = {
         "not both",
     ),
     "unknown key": ({"liquid": {"volume_fracton": 0.01}}, "liquid.volume_fracton", "0.01", '"volume_fraction"?'),
-    "unknown table": ({"substrat": {"material": "glass"}}, "substrat", "glass", 'did you mean "substrate"'),
+    "unknown table": ({"boundry": {"material": "glass"}}, "boundry", "glass", 'did you mean "boundary"'),
     "key in the wrong table": ({"frequency": "80 Hz"}, "frequency", '"80 Hz"', 'did you mean "drive.frequency"'),
-    "unknown substrate": ({"substrate": {"material": "glas"}}, "substrate.material", '"glas"', "glass"),
+    "unknown boundary": ({"boundary": {"material": "glas"}}, "boundary.material", '"glas"', "glass"),
     "negative friction": (
         {"contact": {"friction": {"bead_wall": -0.1}}},
         "contact.friction.bead_wall",
@@ -123,7 +123,25 @@ BAD: dict[str, tuple[dict[str, Any], str, str, str]] = {
         "yes please",
         "true or false",
     ),
-    "unknown kind": ({"kind": "pendulum"}, "kind", '"pendulum"', "'walker'"),
+    "kind of old": ({"kind": "climber"}, "kind", '"climber"', "[boundary] says where the beads are"),
+    "substrate of old": ({"substrate": {"material": "glass"}}, "substrate", '"glass"', "is now [boundary]"),
+    "container of old": ({"container": {"width": "5 mm"}}, "container", '"5 mm"', "is now [boundary]"),
+    "tilt of a number": ({"boundary": {"tilt": 30}}, "boundary.tilt", "30", "angle with its unit"),
+    "tilt too far": ({"boundary": {"tilt": "200 deg"}}, "boundary.tilt", '"200 deg"', "at most"),
+    "direction of nothing": ({"drive": {"axis": [0, 0, 0]}}, "drive.axis", "[0, 0, 0]", "[1, 0, 1]"),
+    "direction of two": ({"drive": {"axis": [1, 0]}}, "drive.axis", "[1, 0]", "[1, 0, 1]"),
+    "harmonics and a frequency": (
+        {"drive": {"harmonics": [{"frequency": "80 Hz", "peak_acceleration": "1 g"}]}},
+        "drive.frequency",
+        '"80 Hz"',
+        "none beside drive.harmonics",
+    ),
+    "a phase in the laboratory": (
+        {"drive": {"phase": "10 deg", "frame": "lab"}},
+        "drive.frame",
+        '"lab"',
+        '"container"',
+    ),
     "table given as text": ({"drive": "x"}, "drive", '"x"', "table"),
 }
 
@@ -183,22 +201,22 @@ def test_a_right_angle_is_a_contact_angle() -> None:
 
 
 def test_a_substrate_of_ones_own_needs_its_friction() -> None:
-    values = document(substrate={"material": "teflon"})
-    assert resolve_case(values).substrate_material == "teflon"
+    values = document(boundary={"material": "teflon"})
+    assert resolve_case(values).boundary.material == "teflon"
     del values["contact"]["rolling_friction"]
-    with pytest.raises(InputError, match=r'substrate\.material = "teflon": not in the library'):
+    with pytest.raises(InputError, match=r'boundary\.material = "teflon": not in the library'):
         resolve_case(values)
 
 
 MISSING = {
     "beads": "beads: missing",
     "liquid": "liquid: missing",
-    "substrate": "substrate: missing",
+    "boundary": "boundary: missing",
     "drive": "drive: missing",
     "beads.radii": "beads.radii: missing",
     "beads.material": "beads.material: missing",
     "liquid.name": "liquid.surface_tension: missing",
-    "substrate.material": "substrate.material: missing",
+    "boundary.material": "boundary.material: missing",
     "drive.frequency": "drive.frequency: missing",
     "drive.peak_acceleration": "drive.peak_acceleration: missing",
 }

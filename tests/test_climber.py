@@ -66,7 +66,7 @@ def test_a_climbers_weight_pulls_along_the_axis() -> None:
     case = climber()
     assert (case.pressing_gravity, case.axial_gravity) == (0.0, case.gravity)
     assert predict(case)["alignment"]["u"] < 0.0  # it stands on its head
-    with pytest.raises(InputError, match=r"drive\.axis"):
-        resolve_case(document(kind="climber", drive={"axis": "z"}))
+    with pytest.raises(InputError, match=r"start\.facing"):
+        resolve_case(document(boundary={"uphill": "90 deg", "tilt": "90 deg"}, start={"facing": "up"}))
     with pytest.raises(InputError, match=r"start\.facing"):
         resolve_case(document(start={"facing": "up"}))

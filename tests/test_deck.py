@@ -67,7 +67,7 @@ def test_the_container_frame_has_a_signed_gravity_and_walls_at_rest() -> None:
     deck = render_deck(make_case(drive={"frame": "container"})).text
     assert "wiggle" not in deck
     assert not _lines(deck, "velocity")
-    (drive,) = [line for line in _lines(deck, "fix") if "v_drive" in line]
+    (drive,) = [line for line in _lines(deck, "fix") if "v_drive_1" in line]
     assert drive[-4:] == ["vector", "1.0", "0.0", "0.0"]
     (gravity,) = [line for line in _lines(deck, "fix") if line[1] == "gravity"]
     assert gravity[2:5] == ["beads", "gravity", "9.81"]

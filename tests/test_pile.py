@@ -22,8 +22,9 @@ from postprocess.pile import FLOOR, read_bridges, read_pile
 from postprocess.pile_result import current_pile_result, tabulate_pile
 from postprocess.tables import PILE_TABLES, TABLES, read_table
 from runner.binary import find_engine
+from runner.directory import run_place
 from runner.failures import EngineError, RunBusy
-from runner.parts import part_directories, pile_place, run_pile
+from runner.parts import part_directories, run_pile
 from sweeps.climbing import describe_climbs, piles_in, summarise_climbs
 from sweeps.conduct import Options
 from sweeps.record import states
@@ -158,7 +159,7 @@ def test_an_interrupted_pile_goes_on_bit_for_bit(halting: Callable[..., str], tm
     run = uninterrupted.directory
     tabulate_pile(run)
     engine = halting(1, 2)
-    place = pile_place(brief(), find_engine(engine), tmp_path / "out")
+    place = run_place(brief(), find_engine(engine), tmp_path / "out")
     unfinished = place.with_name(place.name + ".part")
     for part in (1, 2):
         program = start_brief(tmp_path, engine)
@@ -259,7 +260,7 @@ def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
 
 def test_looking_before_the_end_leaves_nothing_stale(halting: Callable[..., str], tmp_path: Path) -> None:
     case, engine = brief(), find_engine(halting(1))
-    place = pile_place(case, engine, tmp_path / "out")
+    place = run_place(case, engine, tmp_path / "out")
     unfinished = place.with_name(place.name + ".part")
     program = start_brief(tmp_path, str(engine.path))
     wait_for((tmp_path / "halted-0001").exists)
@@ -274,7 +275,7 @@ def test_looking_before_the_end_leaves_nothing_stale(halting: Callable[..., str]
 
 def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     case, engine = brief(), find_engine(None)
-    place = pile_place(case, engine, tmp_path)
+    place = run_place(case, engine, tmp_path)
     from runner import parts
 
     honest = parts.render_part
@@ -284,7 +285,6 @@ def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path, monkeypa
         return deck if part.drive_from is None else replace(deck, text=deck.text.replace("nve/sphere", "nve/cube"))
 
     monkeypatch.setattr(parts, "render_part", broken)
-    monkeypatch.setattr(parts, "pile_place", lambda *_: place)
     with pytest.raises(EngineError, match="nve/cube"):
         run_pile(case, engine, tmp_path)
     monkeypatch.undo()
@@ -301,14 +301,14 @@ BAD: dict[str, tuple[dict[str, dict[str, Any]], str]] = {
     "both": ({"beads": {"fill_height": "3 mm"}}, "beads.count"),
     "classes": ({"beads": {"large": ["0.29 mm", "0.4 mm"]}}, "beads.large"),
     "range": ({"beads": {"small": ["0.32 mm", "0.3 mm"]}}, "beads.small"),
-    "narrow": ({"container": {"width": "1.5 mm"}}, "container.width"),
-    "low": ({"container": {"height": "2 mm"}}, "container.height"),
+    "narrow": ({"boundary": {"width": "1.5 mm"}}, "boundary.width"),
+    "low": ({"boundary": {"height": "2 mm"}}, "boundary.height"),
     "long": ({"run": {"duration": "9000 s"}}, "run.duration"),
     "step": ({"run": {"time_step": "6 us"}}, "run.time_step"),
     "friction": ({"contact": {"friction": {}}}, "contact.friction.bead_bead"),
-    "unknown": ({"container": {"depth": "3 mm"}}, "container.depth"),
+    "unknown": ({"boundary": {"depth": "3 mm"}}, "boundary.depth"),
     "film": ({"liquid": {"film_drag_ratio": 1.0}}, "liquid.film_drag_ratio"),
-    "material": ({"container": {"material": "glas"}, "contact": {"friction": {}}}, "container.material"),
+    "material": ({"boundary": {"material": "glas"}, "contact": {"friction": {}}}, "boundary.material"),
 }
 
 
@@ -437,8 +437,8 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
             folder=tmp_path,
         )
         plan_sweep(sweep, out, Options(1))
-    with pytest.raises(InputError, match=r"container\.depth"):
-        expand({"case": "base.toml", "axes": {"container.depth": [1]}}, source="test", name="no", folder=tmp_path)
+    with pytest.raises(InputError, match=r"boundary\.depth"):
+        expand({"case": "base.toml", "axes": {"boundary.depth": [1]}}, source="test", name="no", folder=tmp_path)
 
 
 def cluster(friction: float, beads: list[tuple[float, float]], seconds: float = 0.3) -> PileCase:
@@ -496,7 +496,7 @@ def test_what_has_no_meaning_for_placed_beads_is_refused(table: str, key: str) -
 def test_placed_beads_reach_the_faces_of_a_cylinders_prism() -> None:
     """Toward an edge of the prism its wall is farther out than toward the middle of a face."""
     tables = tomllib.loads(shipped_cases()["cluster"].read_text())
-    tables["container"]["shape"] = "cylinder"
+    tables["boundary"]["shape"] = "cylinder"
     assert resolve_pile_case(tables, name="cylinder").beads.counts == (2, 1)
     half, turn = 2.5, np.pi / 24.0
     for beyond, refused in ((0.0, False), (0.02, True)):
@@ -531,7 +531,7 @@ def test_ranks_take_cores_of_this_machine_and_of_a_cluster() -> None:
 
 
 def test_a_cylinder_holds_its_beads(tmp_path: Path) -> None:
-    case = small(container={"shape": "cylinder", "width": "5 mm"}, run={"duration": "0.05 s"})
+    case = small(boundary={"shape": "cylinder", "width": "5 mm"}, run={"duration": "0.05 s"})
     finished, _ = run_pile(case, find_engine(None), tmp_path)
     motion = read_pile(finished.directory)
     out = np.linalg.norm(motion.position[..., :2], axis=2) + motion.radius

@@ -31,8 +31,7 @@ from walkers import find_run, run_case
 
 
 def _name(**changes: object) -> str:
-    case = make_case(**changes)
-    return run_name(case, render_deck(case), find_engine())
+    return run_name(make_case(**changes), find_engine())
 
 
 def test_a_finished_run_is_not_run_again(tmp_path: Path) -> None:
@@ -104,8 +103,8 @@ def test_the_name_depends_on_what_determines_the_run() -> None:
 
 def test_the_name_depends_on_the_engine() -> None:
     case = make_case()
-    deck, engine = render_deck(case), find_engine()
-    assert run_name(case, deck, engine) != run_name(case, deck, replace(engine, sha256="0" * 64))
+    engine = find_engine()
+    assert run_name(case, engine) != run_name(case, replace(engine, sha256="0" * 64))
 
 
 def test_contents_of_a_run_directory(tmp_path: Path) -> None:
@@ -268,6 +267,6 @@ def test_places_that_cannot_be_written(in_folder: Path, arguments: list[str]) ->
 
 def test_a_long_name_is_cut() -> None:
     case = make_case().renamed("a b/" * 100)
-    name = run_name(case, render_deck(case), find_engine())
+    name = run_name(case, find_engine())
     assert len(name) < 100
     assert "/" not in name

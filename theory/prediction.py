@@ -69,7 +69,7 @@ def _walker_of(case: WalkerCase, *, viscous: bool) -> Walker:
 
 
 def _check(*cases: WalkerCase) -> None:
-    if any(case.drive.axis == "z" for case in cases):
+    if any(not case.drive.is_plain or case.drive.direction[2] != 0.0 for case in cases):
         raise ValueError("the theory is one of drives along the substrate")
 
 

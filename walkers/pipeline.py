@@ -101,11 +101,11 @@ def _run_walkers(case: WalkerCase, out: Path, engine: Engine, despite_audit: boo
 
 def _run_pile(case: PileCase, out: Path, engine: Engine, despite_audit: bool, options: dict[str, Any]) -> Outcome:
     from postprocess.pile_result import current_pile_result
-    from runner.directory import finished_run
-    from runner.parts import pile_place, run_pile
+    from runner.directory import finished_run, run_place
+    from runner.parts import run_pile
     from sweeps.together import check_audit
 
-    if options["force"] or finished_run(pile_place(case, engine, out)) is None:
+    if options["force"] or finished_run(run_place(case, engine, out)) is None:
         check_audit(engine, despite_audit)
     run, found = run_pile(case, engine, out, **options)
     return Outcome(run, current_pile_result(run.directory), found)
@@ -161,10 +161,10 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
 def _place_of(case: Path, out: Path) -> Path | None:
     from inputs.reading import load_any
     from runner.binary import find_engine
+    from runner.directory import run_place
     from runner.ensemble import finished_place
-    from sweeps.kinds import place_of
 
-    return finished_place(out, place_of(load_any(case), find_engine(), out).name)
+    return finished_place(out, run_place(load_any(case), find_engine(), out).name)
 
 
 def described(directory: Path, result: dict[str, Any], *, found: bool = False) -> str:

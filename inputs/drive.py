@@ -1,0 +1,155 @@
+"""How the boundary is shaken: harmonics A sin(2π f t + φ), each along a direction of its own.
+
+The cycle of a drive is the common period of its harmonics; its peak acceleration, and Γ0, are those of the largest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import gcd, isclose, lcm, pi, sqrt
+from typing import Any, Literal
+
+Vector = tuple[float, float, float]
+Frame = Literal["lab", "container"]
+AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+LARGEST_RATIO = 24
+"""Of the frequencies of two harmonics, as a fraction: 24/1 and 23/24 are taken, 25/1 is not."""
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """A sin(2π f t + φ) along a unit vector: frequency f (Hz), peak acceleration A (2πf)² (m/s²), phase φ (rad)."""
+
+    direction: Vector
+    frequency: float
+    peak_acceleration: float
+    phase: float = 0.0
+
+    @property
+    def angular_frequency(self) -> float:
+        """2πf, rad/s."""
+        return 2.0 * pi * self.frequency
+
+    @property
+    def amplitude(self) -> float:
+        """A, m."""
+        return self.peak_acceleration / self.angular_frequency**2
+
+    @property
+    def peak_velocity(self) -> float:
+        """A 2πf, m/s."""
+        return self.peak_acceleration / self.angular_frequency
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A sum of harmonics, and the engine's frame: the walls move, or the beads feel the inertial force."""
+
+    harmonics: tuple[Harmonic, ...]
+    frame: Frame
+
+    @classmethod
+    def along(cls, axis: str, frequency: float, peak_acceleration: float, frame: Frame) -> Drive:
+        """One harmonic along x, y or z."""
+        return cls((Harmonic(AXES[axis], frequency, peak_acceleration),), frame)
+
+    @property
+    def largest(self) -> Harmonic:
+        """The harmonic of the largest peak acceleration, the first of equal ones."""
+        return max(self.harmonics, key=lambda one: one.peak_acceleration)
+
+    @property
+    def direction(self) -> Vector:
+        """Direction of the largest harmonic, a unit vector."""
+        return self.largest.direction
+
+    @property
+    def peak_acceleration(self) -> float:
+        """That of the largest harmonic, m/s²."""
+        return self.largest.peak_acceleration
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is one sine that begins at its zero: only such a one moves the walls in the laboratory frame."""
+        return len(self.harmonics) == 1 and self.harmonics[0].phase == 0.0
+
+    @property
+    def frequency(self) -> float:
+        """Of the cycle, the common period of the harmonics, Hz.
+
+        Raises
+        ------
+        ValueError
+            If they have none.
+        """
+        return common_frequency([one.frequency for one in self.harmonics])
+
+    @property
+    def angular_frequency(self) -> float:
+        """2π times that of the cycle, rad/s."""
+        return 2.0 * pi * self.frequency
+
+    @property
+    def amplitude(self) -> float:
+        """Largest displacement that the harmonics could add up to, m."""
+        return sum(one.amplitude for one in self.harmonics)
+
+    @property
+    def peak_velocity(self) -> float:
+        """Largest speed that the harmonics could add up to, m/s."""
+        return sum(one.peak_velocity for one in self.harmonics)
+
+    def with_peak(self, peak_acceleration: float) -> Drive:
+        """The same drive, its largest harmonic with another peak acceleration (m/s²) and the others in proportion."""
+        if len(self.harmonics) == 1:
+            return replace(self, harmonics=(replace(self.harmonics[0], peak_acceleration=peak_acceleration),))
+        share = peak_acceleration / self.peak_acceleration
+        return replace(
+            self,
+            harmonics=tuple(replace(one, peak_acceleration=share * one.peak_acceleration) for one in self.harmonics),
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types."""
+        harmonics = [{**vars(one), "direction": list(one.direction)} for one in self.harmonics]
+        return {"harmonics": harmonics, "frame": self.frame}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Drive:
+        """Rebuild a drive from `as_dict`."""
+        harmonics = (Harmonic(**{**one, "direction": tuple(one["direction"])}) for one in values["harmonics"])
+        return cls(tuple(harmonics), values["frame"])
+
+
+def common_frequency(frequencies: list[float]) -> float:
+    """Frequency of the common period of several, Hz.
+
+    Raises
+    ------
+    ValueError
+        If two of them are not in a ratio of whole numbers up to `LARGEST_RATIO`.
+    """
+    first = frequencies[0]
+    ratios = [Fraction(one / first).limit_denominator(LARGEST_RATIO) for one in frequencies]
+    for one, ratio in zip(frequencies, ratios, strict=True):
+        if not isclose(float(ratio) * first, one, rel_tol=1e-9) or ratio.numerator > LARGEST_RATIO:
+            raise ValueError(f"{one:g} Hz and {first:g} Hz are in no ratio of whole numbers up to {LARGEST_RATIO}")
+    below = lcm(*(ratio.denominator for ratio in ratios))
+    return first * gcd(*(int(ratio * below) for ratio in ratios)) / below
+
+
+def unit_vector(vector: Vector) -> Vector:
+    """A direction of length one.
+
+    Raises
+    ------
+    ValueError
+        If the vector is zero.
+    """
+    length = sqrt(sum(component**2 for component in vector))
+    if length == 0.0:
+        raise ValueError("expected a direction, not zero")
+    x, y, z = (component / length for component in vector)
+    return (x, y, z)

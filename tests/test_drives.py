@@ -1,0 +1,115 @@
+"""Drives of one harmonic and of several, and planes that are tilted, by the real engine."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import cos, pi, radians, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from inputs import load_case, resolve_case
+from inputs.drive import Drive, Harmonic, common_frequency
+from inputs.plane import Plane
+from postprocess import read_result
+from tests.conftest import document, make_case
+
+BRIEF = {"cycles": 20, "settling_cycles": 8, "samples_per_cycle": 10}
+ONE = {"frequency": "80 Hz", "peak_acceleration": "4 g"}
+
+
+def shipped(**changes: Any) -> Any:
+    """The shipped walker of Fig. 1b, one of it, briefly."""
+    case = load_case("fig1b")
+    start = replace(case.start, replicates=1, facing="right", angle_spread=0.0, gap_spread=0.0)
+    run = replace(case.run, cycles=20, settling_cycles=8)
+    return replace(case, start=start, run=run, **changes)
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "common"),
+    [([80.0], 80.0), ([80.0, 160.0], 80.0), ([60.0, 90.0], 30.0), ([90.0, 60.0, 40.0], 10.0), ([0.1, 0.3], 0.1)],
+)
+def test_a_cycle_is_the_common_period(frequencies: list[float], common: float) -> None:
+    assert common_frequency(frequencies) == pytest.approx(common, rel=1e-12)
+
+
+@pytest.mark.parametrize("other", [80.0 * 25, 80.0 * 2**0.5, 81.3])
+def test_frequencies_without_one_are_refused(other: float) -> None:
+    with pytest.raises(ValueError, match="no ratio of whole numbers"):
+        common_frequency([80.0, other])
+
+
+def test_a_drive_is_its_largest_harmonic_where_one_number_is_asked_for() -> None:
+    drive = Drive((Harmonic((1.0, 0.0, 0.0), 160.0, 10.0), Harmonic((0.0, 0.0, 1.0), 80.0, 30.0, 1.0)), "container")
+    assert (drive.direction, drive.peak_acceleration, drive.frequency) == ((0.0, 0.0, 1.0), 30.0, 80.0)
+    assert [one.peak_acceleration for one in drive.with_peak(60.0).harmonics] == [20.0, 60.0]
+    assert Drive.from_dict(drive.as_dict()) == drive
+
+
+def test_one_harmonic_is_the_drive_that_its_keys_describe(run_directory: Callable[..., Path]) -> None:
+    case = make_case(run=BRIEF)
+    written = document(run=BRIEF)
+    written["drive"] = {"harmonics": [{**ONE, "axis": "x"}]}
+    assert resolve_case(written, name="test") == case
+    moved = read_result(run_directory(make_case(run=BRIEF, drive={"axis": [1, 1, 0]})))["velocity"]["mean"]
+    assert moved == pytest.approx(read_result(run_directory(case))["velocity"]["mean"], rel=0.01)
+
+
+def test_a_phase_changes_the_start_and_not_the_walk(run_directory: Callable[..., Path]) -> None:
+    drives = [{"phase": phase, "frame": "container"} for phase in ("0 deg", "90 deg")]
+    runs = [run_directory(make_case(run=BRIEF, drive=drive)) for drive in drives]
+    speeds = [read_result(run)["velocity"]["mean"] for run in runs]
+    assert speeds[0] == pytest.approx(speeds[1], rel=0.02)
+
+
+def _two_tone(phase: float) -> Drive:
+    x = (1.0, 0.0, 0.0)
+    return Drive((Harmonic(x, 80.0, 39.2), Harmonic(x, 160.0, 29.4, phase)), "container")
+
+
+def test_two_tones_move_a_symmetric_dimer_and_their_phase_says_which_way(run_directory: Callable[..., Path]) -> None:
+    """f + 2f breaks the symmetry under half a period; shifted by π, 2f is the mirrored drive. Measured: ∓1.62 mm/s."""
+    case = shipped()
+    case = replace(case, beads=replace(case.beads, radii=(0.25e-3, 0.25e-3)))
+
+    def speed(drive: Drive) -> float:
+        return float(read_result(run_directory(replace(case, drive=drive)))["velocity"]["mean"])
+
+    one_way, other_way = speed(_two_tone(pi / 2.0)), speed(_two_tone(1.5 * pi))
+    assert one_way == pytest.approx(-1.62e-3, rel=0.03)
+    assert other_way == pytest.approx(-one_way, rel=0.01)
+    assert abs(speed(case.drive)) < 1e-6
+    assert abs(speed(_two_tone(0.0))) < 0.1 * abs(one_way)
+
+
+@pytest.mark.parametrize(("tilt", "uphill"), [(0.0, 0.0), (30.0, 0.0), (90.0, 0.0), (30.0, 90.0), (90.0, 180.0)])
+def test_gravity_on_a_plane(tilt: float, uphill: float) -> None:
+    found = Plane("glass", radians(tilt), radians(uphill)).gravity(9.81)
+    way = (cos(radians(uphill)), sin(radians(uphill)))
+    down = 9.81 * sin(radians(tilt))
+    np.testing.assert_allclose(found, (-down * way[0], -down * way[1], -9.81 * cos(radians(tilt))), atol=1e-14)
+    assert (found[2] == 0.0) == (tilt == 90.0)
+
+
+TILTS = {0.0: 1.335, 5.0: 0.934, 10.0: 0.536, 20.0: -8.0}
+"""Speeds up the slope, mm/s, measured: the walker's falls with the tilt and changes sign between 10° and 20°."""
+
+
+@pytest.mark.parametrize("tilt", TILTS)
+def test_a_walker_walks_up_a_slope_until_it_is_too_steep(tilt: float, run_directory: Callable[..., Path]) -> None:
+    case = shipped(boundary=Plane("chromium-coated glass", radians(tilt)))
+    result = read_result(run_directory(case))
+    if TILTS[tilt] > 0.0:
+        assert result["velocity"]["mean"] == pytest.approx(TILTS[tilt] * 1e-3, rel=0.03)
+    else:
+        assert result["axial_velocity"]["right_facing"] < 0.0
+
+
+def test_downhill_it_is_faster_and_across_the_slope_it_slides(run_directory: Callable[..., Path]) -> None:
+    down = shipped(boundary=Plane("chromium-coated glass", radians(5.0), pi))
+    assert read_result(run_directory(down))["velocity"]["mean"] > 1.5e-3
+    climber = load_case("climber")
+    assert climber.boundary.tilt == pytest.approx(pi / 2.0)
+    assert (climber.pressing_gravity, climber.axial_gravity) == (0.0, climber.gravity)
