@@ -205,7 +205,7 @@ REDUCED: dict[str, Any] = {
     "case": "fig1b",
     "set": {
         "start": {"replicates": 1},
-        "run": {"cycles": 10, "settling_cycles": 6, "samples_per_cycle": 10, "time_step": "3.5 us"},
+        "run": {"cycles": 10, "settling_cycles": 6, "samples_per_cycle": 10, "time_step": "4.5 us"},
     },
     "parameters": {
         "friction": {

@@ -19,9 +19,9 @@ from walkers import run_case
 
 @pytest.fixture(scope="module")
 def ensemble() -> WalkerCase:
-    """The shipped walker of Fig. 1b, six replicates, a third of its length."""
+    """The shipped walker of Fig. 1b, six replicates, ten cycles."""
     case = load_case("fig1b")
-    return replace(case, run=replace(case.run, cycles=20, settling_cycles=5))
+    return replace(case, run=replace(case.run, cycles=10, settling_cycles=4))
 
 
 def test_walkers_of_an_ensemble_move_as_they_do_alone(

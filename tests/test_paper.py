@@ -36,7 +36,7 @@ from theory.mathieu import alignment, turning
 from theory.prediction import motion_of
 from theory.quasistatic import mean_velocity
 
-SHORT = {"start.replicates": 2, "run.cycles": 8, "run.settling_cycles": 4}
+SHORT = {"start.replicates": 2, "run.cycles": 8, "run.settling_cycles": 4, "run.time_step": "3 us"}
 FEWER = {
     "fig2": {
         "drive.frequency": ["60 Hz", "90 Hz"],

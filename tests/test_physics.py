@@ -1,6 +1,7 @@
 """The walker's speeds against measured values and symmetries, by the real engine."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import sin
 
 import numpy as np
@@ -57,7 +58,9 @@ def test_at_strong_drive_the_large_bead_slides_as_well(trajectory: Moved) -> Non
 def test_symmetric_dimer_does_not_walk(walked: Walked) -> None:
     assert abs(walked(beads={"radii": ["0.25 mm", "0.25 mm"]}).velocity[0]) < 0.01 * MM_PER_S
     # As shipped it leaves the axis meanwhile: a hundredth of a walker's 1.3 mm/s.
-    assert np.all(np.abs(walked(load_case("symmetric")).velocity) < 0.02 * MM_PER_S)
+    shipped = load_case("symmetric")
+    shorter = replace(shipped, run=replace(shipped.run, cycles=30, settling_cycles=10))
+    assert np.all(np.abs(walked(shorter).velocity) < 0.02 * MM_PER_S)
 
 
 def test_exchanged_beads_walk_the_other_way_at_the_same_speed(walked: Walked) -> None:

@@ -391,7 +391,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
 
 def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     """Two starts and an interruption; the table has a pile's columns."""
-    tables = document(run={"duration": "0.04 s"})
+    tables = document(run={"duration": "0.03 s"})
     (tmp_path / "base.toml").write_text(to_toml(tables))
     sweep = expand({"case": "base.toml", "axes": {"start.seed": [1, 2]}}, source="test", name="test", folder=tmp_path)
     out = tmp_path / "runs"

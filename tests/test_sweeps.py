@@ -504,8 +504,8 @@ def test_a_sweep_that_is_killed_eight_times(
     """SIGKILL at random moments, of the sweep and at times of an engine: nothing lost, nothing twice, bit for bit."""
     text = """
     [axes]
-    drive.frequency         = ["60 Hz", "70 Hz", "80 Hz"]
-    drive.peak_acceleration = { linspace = ["1 g", "5 g", 5] }
+    drive.frequency         = ["60 Hz", "80 Hz"]
+    drive.peak_acceleration = { linspace = ["1 g", "5 g", 6] }
     start.angle             = ["0 deg", "20 deg"]
     """
     name = sweep_file(text=text, run={**TINY, "cycles": 10, "settling_cycles": 2})
@@ -531,9 +531,9 @@ def test_a_sweep_that_is_killed_eight_times(
     assert finished
     before = len(launches())
     done = _sweep(name, "--engine", engine)
-    assert (done.returncode, "30 points, 30 finished" in done.stdout) == (0, True)
+    assert (done.returncode, "24 points, 24 finished" in done.stdout) == (0, True)
     frame = load(in_folder / "runs" / "test")
-    assert len(frame) == frame["run"].nunique() == 30
+    assert len(frame) == frame["run"].nunique() == 24
     assert contents_of(in_folder / "runs") == contents_of(in_folder / "undisturbed")
     # The last call made no finished point again: each of its decks holds points that were missing before.
     again = {Path(place).name.removesuffix(".part") for place in launches()[before:]}
