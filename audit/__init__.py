@@ -3,7 +3,7 @@
 Knows all rooms before it. A check is an entry in one of the modules of ``audit/checks``.
 """
 
-from audit.check import Check, Line, Verdict
-from audit.run import AuditReport, run_audit
+from walkers.audit.check import Check, Line, Verdict
+from walkers.audit.run import AuditReport, run_audit
 
 __all__ = ["AuditReport", "Check", "Line", "Verdict", "run_audit"]

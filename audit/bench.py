@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from inputs import resolve_case
-from inputs.case import WalkerCase
-from inputs.errors import Stopped
-from postprocess.dump import BinaryDump, FloatArray
-from postprocess.local_dump import read_local_dump
-from runner.binary import Engine
-from runner.directory import write_deck
-from runner.launch import Progress, launch
-from templates.deck import Deck, Plan, Recording, compose
-from templates.engine import ALL_REMEDIES, Remedies
-from templates.layout import BEAD_COLUMNS, Layout
-from templates.scene import Bead, Face, Point, Scene
+from walkers.inputs import resolve_case
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.errors import Stopped
+from walkers.postprocess.dump import BinaryDump, FloatArray
+from walkers.postprocess.local_dump import read_local_dump
+from walkers.runner.binary import Engine
+from walkers.runner.directory import write_deck
+from walkers.runner.launch import Progress, launch
+from walkers.templates.deck import Deck, Plan, Recording, compose
+from walkers.templates.engine import ALL_REMEDIES, Remedies
+from walkers.templates.layout import BEAD_COLUMNS, Layout
+from walkers.templates.scene import Bead, Face, Point, Scene
 
 TORQUE_COLUMNS = ("tqx", "tqy", "tqz")
 FIRST_BEAD = 2

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
 
-from audit.bench import Bench
+from walkers.audit.bench import Bench
 
 
 class Verdict(StrEnum):

@@ -10,18 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputs.case import WalkerCase
-from physics.capillary import (
+from walkers.inputs.case import WalkerCase
+from walkers.physics.capillary import (
     bridge_volume_at_wall,
     bridge_volume_between_beads,
     capillary_force,
     capillary_force_at_wall,
     rupture_distance,
 )
-from physics.contact import hertz_repulsion, hertz_repulsion_at_wall, reduced_modulus
-from physics.lubrication import normal_drag, normal_drag_at_wall, tangential_drag, tangential_drag_at_wall
-from physics.wall import WALL_COPIES
-from postprocess.dump import FloatArray
+from walkers.physics.contact import hertz_repulsion, hertz_repulsion_at_wall, reduced_modulus
+from walkers.physics.lubrication import normal_drag, normal_drag_at_wall, tangential_drag, tangential_drag_at_wall
+from walkers.physics.wall import WALL_COPIES
+from walkers.postprocess.dump import FloatArray
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,14 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-from audit.bench import Bench
-from audit.check import Check, Line, Verdict
-from audit.checks import capillary, contact, drive, energy, repeatability, timestep, viscous
-from inputs.errors import InputError, Problem
-from inputs.library import suggestion
-from runner.audits import AuditRecord, write_audit
-from runner.binary import Engine, find_engine
-from templates.engine import ALL_REMEDIES, Remedies
+from walkers.audit.bench import Bench
+from walkers.audit.check import Check, Line, Verdict
+from walkers.audit.checks import capillary, contact, drive, energy, repeatability, timestep, viscous
+from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.library import suggestion
+from walkers.runner.audits import AuditRecord, write_audit
+from walkers.runner.binary import Engine, find_engine
+from walkers.templates.engine import ALL_REMEDIES, Remedies
 
 CHECKS: tuple[Check, ...] = (
     *capillary.CHECKS,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from audit.check import Line, Verdict
-from audit.run import AuditReport
-from templates.engine import DEFECTS
+from walkers.audit.check import Line, Verdict
+from walkers.audit.run import AuditReport
+from walkers.templates.engine import DEFECTS
 
 GROUPS = {
     1: "Capillary force between beads",

@@ -14,16 +14,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import norm
 
-from calibration.emulator import Emulator, fit_emulators
-from calibration.posterior import Posterior, sample_posterior
-from calibration.space import Space, spread_out
-from calibration.waves import Wave, run_wave, wave_sweep
-from inputs.calibration import Calibration
-from inputs.errors import InputError, Problem, WalkersError
-from paper.sources import ProgressOf
-from runner.failures import BeadsLost, BlowUp
-from runner.files import read_json, write_json
-from sweeps.conduct import Failure, Options
+from walkers.calibration.emulator import Emulator, fit_emulators
+from walkers.calibration.posterior import Posterior, sample_posterior
+from walkers.calibration.space import Space, spread_out
+from walkers.calibration.waves import Wave, run_wave, wave_sweep
+from walkers.inputs.calibration import Calibration
+from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.paper.sources import ProgressOf
+from walkers.runner.failures import BeadsLost, BlowUp
+from walkers.runner.files import read_json, write_json
+from walkers.sweeps.conduct import Failure, Options
 
 FloatArray = npt.NDArray[np.float64]
 _STEPS_BETWEEN_WAVES = 800

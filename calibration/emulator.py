@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from inputs.calibration import Observation
+from walkers.inputs.calibration import Observation
 
 FloatArray = npt.NDArray[np.float64]
 _FOLDS = 10

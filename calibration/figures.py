@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from calibration.calibrate import Outcome
-from calibration.report import Row, labelled
-from calibration.waves import seen_in
-from inputs.calibration import Band
-from postprocess.drawing import new_figure, save_figure, styled
+from walkers.calibration.calibrate import Outcome
+from walkers.calibration.report import Row, labelled
+from walkers.calibration.waves import seen_in
+from walkers.inputs.calibration import Band
+from walkers.postprocess.drawing import new_figure, save_figure, styled
 
 _AGAINST = {
     "peak_acceleration": "peak acceleration (m/s²)",

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from calibration.emulator import LARGEST, Emulator
-from calibration.space import Space
+from walkers.calibration.emulator import LARGEST, Emulator
+from walkers.calibration.space import Space
 
 FloatArray = npt.NDArray[np.float64]
 _WALKERS_PER_DIMENSION = 8

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from calibration.calibrate import Outcome
-from calibration.emulator import Emulator, transformed
-from calibration.posterior import Posterior
-from calibration.waves import Wave
-from inputs.calibration import QUANTITIES, Observation, Parameter
-from inputs.units import SPEED
-from runner.files import write_bytes, write_json, write_text
+from walkers.calibration.calibrate import Outcome
+from walkers.calibration.emulator import Emulator, transformed
+from walkers.calibration.posterior import Posterior
+from walkers.calibration.waves import Wave
+from walkers.inputs.calibration import QUANTITIES, Observation, Parameter
+from walkers.inputs.units import SPEED
+from walkers.runner.files import write_bytes, write_json, write_text
 
 FloatArray = npt.NDArray[np.float64]
 _SIGMAS = 2.0

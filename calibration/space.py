@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import norm, qmc
 
-from inputs.calibration import Parameter
+from walkers.inputs.calibration import Parameter
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from calibration.space import Space
-from inputs.calibration import Calibration, Observation
-from inputs.errors import InputError, Problem
-from inputs.reading import is_of_a_pile
-from inputs.sweep import Sweep, expand
-from paper.sensitivity import misalignment
-from postprocess.steady import steady_walkers, together
-from postprocess.tables import read_table
-from sweeps.conduct import Failure, Options, Progress
-from sweeps.run import run_sweep
-from sweeps.table import load
+from walkers.calibration.space import Space
+from walkers.inputs.calibration import Calibration, Observation
+from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.reading import is_of_a_pile
+from walkers.inputs.sweep import Sweep, expand
+from walkers.paper.sensitivity import misalignment
+from walkers.postprocess.steady import steady_walkers, together
+from walkers.postprocess.tables import read_table
+from walkers.sweeps.conduct import Failure, Options, Progress
+from walkers.sweeps.run import run_sweep
+from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
     import pandas as pd

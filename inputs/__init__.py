@@ -3,10 +3,10 @@
 The first room of the project: it knows nothing of the engine's language.
 """
 
-from inputs.case import WalkerCase
-from inputs.errors import InputError, Problem, WalkersError
-from inputs.pile import PileCase
-from inputs.reading import load_any, load_case, load_pile, resolve_case, resolve_pile_case, shipped_cases
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.pile import PileCase
+from walkers.inputs.reading import load_any, load_case, load_pile, resolve_case, resolve_pile_case, shipped_cases
 
 __all__ = [
     "InputError",

@@ -13,7 +13,7 @@ from itertools import product
 from math import isfinite, log
 from typing import Any
 
-from inputs.units import split_quantity
+from walkers.inputs.units import split_quantity
 
 Value = Any
 """A TOML value: text with a unit, a number, or a list of such."""

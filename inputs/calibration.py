@@ -27,13 +27,13 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from inputs.axes import Value, flatten
-from inputs.errors import InputError, Problem
-from inputs.library import suggestion
-from inputs.messages import validated
-from inputs.reading import find_input, read_toml
-from inputs.schema import Number, Whole
-from inputs.units import ANGLE, SPEED, Kind, parse_quantity
+from walkers.inputs.axes import Value, flatten
+from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.library import suggestion
+from walkers.inputs.messages import validated
+from walkers.inputs.reading import find_input, read_toml
+from walkers.inputs.schema import Number, Whole
+from walkers.inputs.units import ANGLE, SPEED, Kind, parse_quantity
 
 _SHIPPED = Path(__file__).parent / "calibrations"
 _MOST = 10_000

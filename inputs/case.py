@@ -9,9 +9,9 @@ from dataclasses import dataclass, is_dataclass, replace
 from math import hypot
 from typing import Any, Literal
 
-from inputs.drive import AXES, Drive, Vector
-from inputs.plane import Plane
-from physics.matter import Contact, Liquid
+from walkers.inputs.drive import AXES, Drive, Vector
+from walkers.inputs.plane import Plane
+from walkers.physics.matter import Contact, Liquid
 
 
 @dataclass(frozen=True)

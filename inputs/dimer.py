@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import sqrt
 
-from inputs.case import WalkerCase
-from physics import capillary
-from physics.contact import hertz_overlap, hertz_overlap_at_wall, reduced_modulus
-from physics.dimer import Dimer
+from walkers.inputs.case import WalkerCase
+from walkers.physics import capillary
+from walkers.physics.contact import hertz_overlap, hertz_overlap_at_wall, reduced_modulus
+from walkers.physics.dimer import Dimer
 
 
 def dimer_of(case: WalkerCase) -> Dimer:

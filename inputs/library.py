@@ -9,7 +9,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from inputs import units
+from walkers.inputs import units
 
 _KINDS = {
     "density": units.DENSITY,
@@ -22,7 +22,7 @@ _KINDS = {
 
 @cache
 def _contents() -> dict[str, Any]:
-    return tomllib.loads(resources.files("inputs").joinpath("library.toml").read_text("utf-8"))
+    return tomllib.loads(resources.files("walkers.inputs").joinpath("library.toml").read_text("utf-8"))
 
 
 def materials() -> tuple[str, ...]:

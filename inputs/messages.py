@@ -10,9 +10,9 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from inputs.errors import InputError, Problem
-from inputs.library import suggestion
-from inputs.schema import WalkerFile
+from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.library import suggestion
+from walkers.inputs.schema import WalkerFile
 
 File = TypeVar("File", bound=BaseModel)
 

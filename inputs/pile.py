@@ -6,9 +6,9 @@ from dataclasses import dataclass, is_dataclass
 from math import cos, hypot, inf, pi, sin
 from typing import Any, Literal
 
-from inputs.case import without_no_film
-from inputs.drive import Drive, Vector
-from physics.matter import Contact, Liquid
+from walkers.inputs.case import without_no_film
+from walkers.inputs.drive import Drive, Vector
+from walkers.physics.matter import Contact, Liquid
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from inputs import library
-from inputs.drive import Drive
-from inputs.pile import Container, PileBeads, PileCase, PileRun, distance_from_axis, lattice
-from inputs.resolving import (
+from walkers.inputs import library
+from walkers.inputs.drive import Drive
+from walkers.inputs.pile import Container, PileBeads, PileCase, PileRun, distance_from_axis, lattice
+from walkers.inputs.resolving import (
     MOST_STEPS,
     UnusableKeyError,
     density_of,
@@ -19,11 +19,11 @@ from inputs.resolving import (
     resolve_drive,
     resolve_liquid,
 )
-from inputs.schema import AUTO, ContactTable, DriveTable, EnvironmentTable, LiquidTable, Number, Table, Whole
-from inputs.units import Density, Duration, Length, Radius, SignedLength, Speed, Time
-from physics.dimer import Dimer
-from physics.matter import Contact, Liquid
-from physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
+from walkers.inputs.schema import AUTO, ContactTable, DriveTable, EnvironmentTable, LiquidTable, Number, Table, Whole
+from walkers.inputs.units import Density, Duration, Length, Radius, SignedLength, Speed, Time
+from walkers.physics.dimer import Dimer
+from walkers.physics.matter import Contact, Liquid
+from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 
 MOST_BEADS = 20_000
 _PACKING = 0.55

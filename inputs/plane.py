@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, sin
 
-from inputs.drive import Vector
+from walkers.inputs.drive import Vector
 
 _EXACT = 1e-15
 

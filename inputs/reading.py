@@ -12,14 +12,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from inputs.case import WalkerCase
-from inputs.errors import InputError, Problem
-from inputs.library import suggestion
-from inputs.messages import quoted, validated
-from inputs.pile import PileCase
-from inputs.pile_file import PileFile, resolve_pile
-from inputs.resolving import UnusableKeyError, resolve
-from inputs.schema import Table, WalkerFile
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.library import suggestion
+from walkers.inputs.messages import quoted, validated
+from walkers.inputs.pile import PileCase
+from walkers.inputs.pile_file import PileFile, resolve_pile
+from walkers.inputs.resolving import UnusableKeyError, resolve
+from walkers.inputs.schema import Table, WalkerFile
 
 AnyCase = WalkerCase | PileCase
 _File = TypeVar("_File", bound=Table)

@@ -6,16 +6,16 @@ from dataclasses import replace
 from math import atan2
 from typing import Literal
 
-from inputs import library
-from inputs.case import Beads, Run, Start, WalkerCase
-from inputs.dimer import contact_loads, horizontal_distance, reach
-from inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector
-from inputs.library import suggestion
-from inputs.plane import Plane
-from inputs.schema import BeadsTable, ContactTable, DriveTable, HarmonicTable, LiquidTable, WalkerFile
-from physics.dimer import Dimer
-from physics.matter import Contact, Liquid
-from physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
+from walkers.inputs import library
+from walkers.inputs.case import Beads, Run, Start, WalkerCase
+from walkers.inputs.dimer import contact_loads, horizontal_distance, reach
+from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector
+from walkers.inputs.library import suggestion
+from walkers.inputs.plane import Plane
+from walkers.inputs.schema import BeadsTable, ContactTable, DriveTable, HarmonicTable, LiquidTable, WalkerFile
+from walkers.physics.dimer import Dimer
+from walkers.physics.matter import Contact, Liquid
+from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 
 MOST_STEPS = 2**31 - 1
 _MINIMUM_SEPARATION_RATIO = 0.01

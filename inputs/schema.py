@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
-from inputs.units import (
+from walkers.inputs.units import (
     Acceleration,
     Angle,
     Density,

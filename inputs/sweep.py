@@ -20,7 +20,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from inputs.axes import (
+from walkers.inputs.axes import (
     MOST_POINTS,
     Axis,
     UnusableAxisError,
@@ -36,12 +36,12 @@ from inputs.axes import (
     written,
     zipped,
 )
-from inputs.errors import InputError, Problem
-from inputs.messages import quoted, suggested_key, validated
-from inputs.pile_file import PileFile
-from inputs.reading import AnyCase, find_input, is_of_a_pile, read_toml, resolve_any, shipped_cases
-from inputs.schema import ALTERNATIVES, Table, WalkerFile, Whole
-from inputs.units import Speed
+from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.messages import quoted, suggested_key, validated
+from walkers.inputs.pile_file import PileFile
+from walkers.inputs.reading import AnyCase, find_input, is_of_a_pile, read_toml, resolve_any, shipped_cases
+from walkers.inputs.schema import ALTERNATIVES, Table, WalkerFile, Whole
+from walkers.inputs.units import Speed
 
 _SHIPPED = Path(__file__).parent / "sweeps"
 _PART = re.compile(r"(?P<name>[^.\[\]]+)(?:\[(?P<index>\d+)\])?")

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inputs.dimer import dimer_of
-from inputs.reading import load_case
-from paper import dimers, published
-from paper.sources import Sources
-from postprocess.drawing import new_figure, styled
-from theory.mathieu import Alignment, alignment, is_stable, turning
+from walkers.inputs.dimer import dimer_of
+from walkers.inputs.reading import load_case
+from walkers.paper import dimers, published
+from walkers.paper.sources import Sources
+from walkers.postprocess.drawing import new_figure, styled
+from walkers.theory.mathieu import Alignment, alignment, is_stable, turning
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from postprocess.trajectory import Trajectory
+    from walkers.postprocess.trajectory import Trajectory
 
 LARGEST_DRIVE = 10.0
 """Peak acceleration in g up to which the paper shakes."""

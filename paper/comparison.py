@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inputs.dimer import dimer_of
-from inputs.reading import load_case
-from paper import dimers, published
-from paper.alignment import paper_drives
-from paper.published import NUMBERS, Published
-from paper.sensitivity import misalignment
-from paper.sources import NothingFinishedError, Sources
-from postprocess.steady import steady_walkers
-from sweeps.table import thresholds
-from theory.mathieu import largest_stable_v
-from theory.prediction import motion_of, threshold
+from walkers.inputs.dimer import dimer_of
+from walkers.inputs.reading import load_case
+from walkers.paper import dimers, published
+from walkers.paper.alignment import paper_drives
+from walkers.paper.published import NUMBERS, Published
+from walkers.paper.sensitivity import misalignment
+from walkers.paper.sources import NothingFinishedError, Sources
+from walkers.postprocess.steady import steady_walkers
+from walkers.sweeps.table import thresholds
+from walkers.theory.mathieu import largest_stable_v
+from walkers.theory.prediction import motion_of, threshold
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from inputs.case import WalkerCase
+    from walkers.inputs.case import WalkerCase
 
 AGREES = 0.15
 """A number within this share of the published one agrees with it, where the paper gives no spread."""

@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from inputs.case import WalkerCase
-from inputs.dimer import dimer_of
-from inputs.drive import Drive, Harmonic
-from inputs.reading import load_case
-from paper.published import GRAVITY
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import dimer_of
+from walkers.inputs.drive import Drive, Harmonic
+from walkers.inputs.reading import load_case
+from walkers.paper.published import GRAVITY
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,15 +17,15 @@ from statistics import fmean
 import numpy as np
 import numpy.typing as npt
 
-from inputs.case import WalkerCase
-from inputs.reading import load_case
-from paper import dimers, published
-from physics.film import film_drag
-from runner.files import write_json, write_text
-from theory.friction import Friction
-from theory.motion import Walker, walk
-from theory.prediction import bridge_drag
-from theory.quasistatic import translation
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.reading import load_case
+from walkers.paper import dimers, published
+from walkers.physics.film import film_drag
+from walkers.runner.files import write_json, write_text
+from walkers.theory.friction import Friction
+from walkers.theory.motion import Walker, walk
+from walkers.theory.prediction import bridge_drag
+from walkers.theory.quasistatic import translation
 
 FloatArray = npt.NDArray[np.float64]
 _FREQUENCIES = (60.0, 90.0)
@@ -160,7 +160,7 @@ def walkers_of_the_paper() -> dict[str, WalkerCase]:
 
 def _bare(case: WalkerCase) -> WalkerCase:
     """With perfectly wetting bridges of 1 % liquid, of its own viscosity, and without a film."""
-    from inputs import library
+    from walkers.inputs import library
 
     known = library.liquid(case.liquid.name or "")
     liquid = replace(

@@ -8,18 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inputs.errors import InputError, Problem
-from paper.alignment import fig_alignment
-from paper.comparison import as_dict, as_markdown, compare, count
-from paper.modes import fig_modes
-from paper.rotation import fig4
-from paper.sensitivity import fig_sensitivity
-from paper.sources import NothingFinishedError, ProgressOf, Sources, make_sources
-from paper.strobe import fig1b
-from paper.velocity import fig2, fig3
-from postprocess.drawing import save_figure
-from runner.files import write_text
-from sweeps.conduct import Failure, Options
+from walkers.inputs.errors import InputError, Problem
+from walkers.paper.alignment import fig_alignment
+from walkers.paper.comparison import as_dict, as_markdown, compare, count
+from walkers.paper.modes import fig_modes
+from walkers.paper.rotation import fig4
+from walkers.paper.sensitivity import fig_sensitivity
+from walkers.paper.sources import NothingFinishedError, ProgressOf, Sources, make_sources
+from walkers.paper.strobe import fig1b
+from walkers.paper.velocity import fig2, fig3
+from walkers.postprocess.drawing import save_figure
+from walkers.runner.files import write_text
+from walkers.sweeps.conduct import Failure, Options
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

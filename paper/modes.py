@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from inputs.dimer import dimer_of
-from paper import dimers
-from paper.sources import Sources
-from postprocess.drawing import new_figure, styled
-from postprocess.gait import gait, settled_samples
-from theory.prediction import MOVING, motion_of
-from theory.quasistatic import detachment, translation
+from walkers.inputs.dimer import dimer_of
+from walkers.paper import dimers
+from walkers.paper.sources import Sources
+from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.gait import gait, settled_samples
+from walkers.theory.prediction import MOVING, motion_of
+from walkers.theory.quasistatic import detachment, translation
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from postprocess.trajectory import Trajectory
-    from theory.motion import Motion
+    from walkers.postprocess.trajectory import Trajectory
+    from walkers.theory.motion import Motion
 
 FloatArray = npt.NDArray[np.float64]
 REST = 2e-6

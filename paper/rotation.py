@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from paper import dimers, published
-from paper.sources import Sources
-from postprocess.drawing import new_figure, styled
-from postprocess.gait import gait
-from theory.prediction import motion_of
-from theory.quasistatic import translation
+from walkers.paper import dimers, published
+from walkers.paper.sources import Sources
+from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.gait import gait
+from walkers.theory.prediction import motion_of
+from walkers.theory.quasistatic import translation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from postprocess.trajectory import Trajectory
+    from walkers.postprocess.trajectory import Trajectory
 
 _CYCLES = 2
 _SERIES = (("walker", "s", "#c4473a"), ("large bead", "o", "#111111"), ("small bead", "^", "#1f5fa8"))

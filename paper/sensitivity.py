@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from paper import published
-from paper.sources import Sources
-from postprocess.drawing import new_figure, styled
-from postprocess.steady import on_axis, steady_walkers
-from postprocess.tables import read_table
+from walkers.paper import published
+from walkers.paper.sources import Sources
+from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.steady import on_axis, steady_walkers
+from walkers.postprocess.tables import read_table
 
 if TYPE_CHECKING:
     import pandas as pd

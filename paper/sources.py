@@ -8,12 +8,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inputs.errors import WalkersError
-from inputs.sweep import load_sweep
-from postprocess.trajectory import Trajectory, read_trajectory
-from sweeps.conduct import Failure, Options, Progress
-from sweeps.run import run_sweep
-from sweeps.table import load
+from walkers.inputs.errors import WalkersError
+from walkers.inputs.sweep import load_sweep
+from walkers.postprocess.trajectory import Trajectory, read_trajectory
+from walkers.sweeps.conduct import Failure, Options, Progress
+from walkers.sweeps.run import run_sweep
+from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
     import pandas as pd

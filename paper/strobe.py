@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from paper import dimers
-from paper.sources import Sources
-from postprocess.drawing import new_figure, styled
-from postprocess.rendering import top_view
+from walkers.paper import dimers
+from walkers.paper.sources import Sources
+from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.rendering import top_view
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inputs.dimer import dimer_of
-from paper import dimers, published
-from paper.sources import Sources
-from postprocess.drawing import new_figure, styled
-from sweeps.table import thresholds
-from theory.prediction import motion_of, threshold
-from theory.quasistatic import detachment, mean_velocity
+from walkers.inputs.dimer import dimer_of
+from walkers.paper import dimers, published
+from walkers.paper.sources import Sources
+from walkers.postprocess.drawing import new_figure, styled
+from walkers.sweeps.table import thresholds
+from walkers.theory.prediction import motion_of, threshold
+from walkers.theory.quasistatic import detachment, mean_velocity
 
 if TYPE_CHECKING:
     import pandas as pd

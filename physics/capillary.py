@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from math import cbrt, exp, log, pi, sqrt
 
-from physics.wall import WALL_COPIES
+from walkers.physics.wall import WALL_COPIES
 
 
 def bridge_volume_between_beads(radius_1: float, radius_2: float, volume_fraction: float) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import log, pi, sqrt
 
-from physics.wall import WALL_COPIES
+from walkers.physics.wall import WALL_COPIES
 
 
 def reduced_modulus(youngs_modulus: float, poissons_ratio: float) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import asin, cos, pi
 
-from physics.capillary import capillary_force_limit_at_wall
+from walkers.physics.capillary import capillary_force_limit_at_wall
 
 
 @dataclass(frozen=True)

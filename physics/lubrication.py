@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import log, pi
 
-from physics.wall import WALL_COPIES
+from walkers.physics.wall import WALL_COPIES
 
 
 def normal_drag(

@@ -17,11 +17,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil, inf, pi, sqrt
 
-from physics.contact import reduced_modulus
-from physics.dimer import Dimer
-from physics.film import film_drag
-from physics.lubrication import normal_drag, normal_drag_at_wall
-from physics.matter import Contact, Liquid
+from walkers.physics.contact import reduced_modulus
+from walkers.physics.dimer import Dimer
+from walkers.physics.film import film_drag
+from walkers.physics.lubrication import normal_drag, normal_drag_at_wall
+from walkers.physics.matter import Contact, Liquid
 
 AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
 """Share of each limit that ``"auto"`` stays under: at 0.2 of Rayleigh (2 µs at 50 MPa) the walker's speed, and at

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from inputs.pile import Container
-from physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
-from postprocess.pile import Bridges, PileMotion
+from walkers.inputs.pile import Container
+from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
+from walkers.postprocess.pile import Bridges, PileMotion
 
 FloatArray = npt.NDArray[np.float64]
 

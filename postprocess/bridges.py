@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from inputs.case import WalkerCase
-from postprocess.dump import FloatArray
-from postprocess.local_dump import read_local_dump
-from templates.layout import Layout
+from walkers.inputs.case import WalkerCase
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.local_dump import read_local_dump
+from walkers.templates.layout import Layout
 
 Columns = dict[str, npt.NDArray[Any]]
 

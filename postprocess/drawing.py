@@ -7,8 +7,8 @@ from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from inputs.errors import InputError, Problem
-from runner.files import beside
+from walkers.inputs.errors import InputError, Problem
+from walkers.runner.files import beside
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

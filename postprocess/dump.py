@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from inputs.errors import WalkersError
+from walkers.inputs.errors import WalkersError
 
 FloatArray = npt.NDArray[np.float64]
 

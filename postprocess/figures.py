@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inputs.case import WalkerCase
-from inputs.dimer import dimer_of
-from postprocess.drawing import new_figure, plain_text, save_figure, styled
-from postprocess.gait import distance_walked, fit_slopes, gait
-from postprocess.trajectory import Trajectory, read_trajectory
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import dimer_of
+from walkers.postprocess.drawing import new_figure, plain_text, save_figure, styled
+from walkers.postprocess.gait import distance_walked, fit_slopes, gait
+from walkers.postprocess.trajectory import Trajectory, read_trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

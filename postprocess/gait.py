@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from postprocess.dump import DumpError, FloatArray
-from postprocess.trajectory import Trajectory
+from walkers.postprocess.dump import DumpError, FloatArray
+from walkers.postprocess.trajectory import Trajectory
 
 STEADY_DIFFERENCE = 0.05
 """A walker is steady if the velocities of the two halves of the fitted cycles differ by less than this share …"""

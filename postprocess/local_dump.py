@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from postprocess.dump import DumpError, FloatArray
+from walkers.postprocess.dump import DumpError, FloatArray
 
 _HEADER_LINES = 9
 

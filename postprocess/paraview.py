@@ -15,11 +15,11 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from inputs.dimer import dimer_of
-from inputs.errors import InputError, Problem
-from postprocess.dump import FloatArray
-from postprocess.tables import read_table
-from postprocess.trajectory import Trajectory, read_trajectory
+from walkers.inputs.dimer import dimer_of
+from walkers.inputs.errors import InputError, Problem
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.tables import read_table
+from walkers.postprocess.trajectory import Trajectory, read_trajectory
 
 if TYPE_CHECKING:
     import pandas as pd

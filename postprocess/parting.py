@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from inputs.case import WalkerCase
-from inputs.dimer import dimer_of
-from postprocess.dump import BinaryDump, FloatArray
-from postprocess.result import NEAR, came_near
-from runner.failures import WalkersMet
-from runner.files import write_json
-from templates.deck import LAYOUT_NAME
-from templates.layout import Layout, PlacedWalker
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import dimer_of
+from walkers.postprocess.dump import BinaryDump, FloatArray
+from walkers.postprocess.result import NEAR, came_near
+from walkers.runner.failures import WalkersMet
+from walkers.runner.files import write_json
+from walkers.templates.deck import LAYOUT_NAME
+from walkers.templates.layout import Layout, PlacedWalker
 
 
 def part_output(directory: Path, layout: Layout, cases: Mapping[Path, WalkerCase]) -> None:

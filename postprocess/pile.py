@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from inputs.pile import PileCase
-from postprocess.dump import BinaryDump, DumpError, FloatArray
-from postprocess.local_dump import local_frames
-from runner.directory import CASE_NAME
-from runner.files import read_json
-from runner.parts import PART_NAME, part_directories
-from templates.deck import LAYOUT_NAME
-from templates.layout import Layout
+from walkers.inputs.pile import PileCase
+from walkers.postprocess.dump import BinaryDump, DumpError, FloatArray
+from walkers.postprocess.local_dump import local_frames
+from walkers.runner.directory import CASE_NAME
+from walkers.runner.files import read_json
+from walkers.runner.parts import PART_NAME, part_directories
+from walkers.templates.deck import LAYOUT_NAME
+from walkers.templates.layout import Layout
 
 IntArray = npt.NDArray[np.int64]
 FLOOR = 0

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postprocess.drawing import new_figure, plain_text, save_figure, styled
-from postprocess.pile_result import PileAnalysis, analyse
+from walkers.postprocess.drawing import new_figure, plain_text, save_figure, styled
+from walkers.postprocess.pile_result import PileAnalysis, analyse
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inputs.pile import Container
-from postprocess.clusters import components
-from postprocess.paraview import FOLDER_NAME, Frame, lines_between, write_series
-from postprocess.pile import Bridges, PileMotion, read_bridges
-from postprocess.pile_result import PileAnalysis, analyse
+from walkers.inputs.pile import Container
+from walkers.postprocess.clusters import components
+from walkers.postprocess.paraview import FOLDER_NAME, Frame, lines_between, write_series
+from walkers.postprocess.pile import Bridges, PileMotion, read_bridges
+from walkers.postprocess.pile_result import PileAnalysis, analyse
 
 if TYPE_CHECKING:
     import pyvista as pv

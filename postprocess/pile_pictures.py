@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from inputs.errors import InputError, Problem, WalkersError
-from inputs.pile import PileCase
-from inputs.units import DURATION, parse_quantity
-from postprocess.drawing import check_picture, new_figure, save_figure, styled
-from postprocess.pile_result import PileAnalysis, analyse
-from postprocess.rendering import SideView
-from runner.directory import CASE_NAME
-from runner.files import beside, read_json
+from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.pile import PileCase
+from walkers.inputs.units import DURATION, parse_quantity
+from walkers.postprocess.drawing import check_picture, new_figure, save_figure, styled
+from walkers.postprocess.pile_result import PileAnalysis, analyse
+from walkers.postprocess.rendering import SideView
+from walkers.runner.directory import CASE_NAME
+from walkers.runner.files import beside, read_json
 
 SERIES_NAME = "series.png"
 FILM_NAME = "pile.mp4"

@@ -10,14 +10,24 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from postprocess.bed import Bed, bed_of, liquid_of_beads, packing_profile
-from postprocess.bridges import Columns
-from postprocess.clusters import Climb, Cluster, Definition, Track, bulk_of, components, follow, held_clusters, judge
-from postprocess.events import Event, events_of
-from postprocess.pile import PileMotion, names_of_walls, read_bridges, read_pile
-from postprocess.result import RESULT_NAME, read_result
-from postprocess.tables import PILE_TABLES, intact, write_table
-from runner.files import write_json
+from walkers.postprocess.bed import Bed, bed_of, liquid_of_beads, packing_profile
+from walkers.postprocess.bridges import Columns
+from walkers.postprocess.clusters import (
+    Climb,
+    Cluster,
+    Definition,
+    Track,
+    bulk_of,
+    components,
+    follow,
+    held_clusters,
+    judge,
+)
+from walkers.postprocess.events import Event, events_of
+from walkers.postprocess.pile import PileMotion, names_of_walls, read_bridges, read_pile
+from walkers.postprocess.result import RESULT_NAME, read_result
+from walkers.postprocess.tables import PILE_TABLES, intact, write_table
+from walkers.runner.files import write_json
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from postprocess.drawing import check_picture
-from postprocess.dump import FloatArray
-from postprocess.pile import PileMotion
-from postprocess.trajectory import Trajectory, read_trajectory
-from runner.files import beside
+from walkers.postprocess.drawing import check_picture
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.pile import PileMotion
+from walkers.postprocess.trajectory import Trajectory, read_trajectory
+from walkers.runner.files import beside
 
 if TYPE_CHECKING:
     import pyvista as pv

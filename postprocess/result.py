@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from inputs.case import WalkerCase
-from inputs.dimer import contact_loads, dimer_of
-from postprocess.bridges import Columns, bridge_columns
-from postprocess.dump import FloatArray
-from postprocess.gait import Gait, Walk, gait, settled_samples, walk
-from postprocess.tables import intact, write_table
-from postprocess.trajectory import Trajectory, read_trajectory
-from runner.files import read_json, write_json
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import contact_loads, dimer_of
+from walkers.postprocess.bridges import Columns, bridge_columns
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.gait import Gait, Walk, gait, settled_samples, walk
+from walkers.postprocess.tables import intact, write_table
+from walkers.postprocess.trajectory import Trajectory, read_trajectory
+from walkers.runner.files import read_json, write_json
 
 RESULT_NAME = "result.json"
 NEAR = 1.5

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postprocess.result import read_result
-from postprocess.tables import read_table
+from walkers.postprocess.result import read_result
+from walkers.postprocess.tables import read_table
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from runner.files import beside
+from walkers.runner.files import beside
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from inputs.case import WalkerCase
-from inputs.dimer import dimer_of
-from inputs.drive import Drive
-from postprocess.dump import BinaryDump, DumpError, FloatArray
-from runner.directory import CASE_NAME
-from runner.files import read_json
-from templates.deck import LAYOUT_NAME
-from templates.layout import Layout
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import dimer_of
+from walkers.inputs.drive import Drive
+from walkers.postprocess.dump import BinaryDump, DumpError, FloatArray
+from walkers.runner.directory import CASE_NAME
+from walkers.runner.files import read_json
+from walkers.templates.deck import LAYOUT_NAME
+from walkers.templates.layout import Layout
 
 
 @dataclass(frozen=True)

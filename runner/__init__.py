@@ -3,10 +3,10 @@
 Knows cases and decks (`inputs`, `templates`); knows nothing of what the dumps mean.
 """
 
-from runner.binary import Engine, find_engine
-from runner.directory import FinishedRun, OpenRun, finished_run, open_run, run_name
-from runner.failures import EngineFailure
-from runner.launch import Progress, launch
+from walkers.runner.binary import Engine, find_engine
+from walkers.runner.directory import FinishedRun, OpenRun, finished_run, open_run, run_name
+from walkers.runner.failures import EngineFailure
+from walkers.runner.launch import Progress, launch
 
 __all__ = [
     "Engine",

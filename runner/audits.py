@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from runner.files import read_json, write_json
+from walkers.runner.files import read_json, write_json
 
 
 @dataclass(frozen=True)

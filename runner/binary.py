@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from runner.failures import EngineMissing
+from walkers.runner.failures import EngineMissing
 
 ENGINE_VARIABLE = "WALKERS_ENGINE"
 _BANNER = re.compile(rb"\(Version ([^,\n]+),")

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from inputs.case import WalkerCase
+from walkers.inputs.case import WalkerCase
 
 START_UP_SECONDS = 0.33
 _STEP_MICROSECONDS = 2.2

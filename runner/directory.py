@@ -20,17 +20,17 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from inputs.case import WalkerCase
-from inputs.errors import Stopped, WalkersError
-from inputs.pile import PileCase
-from runner.audits import read_audit
-from runner.binary import Engine
-from runner.failures import DiskFull, RunBusy
-from runner.files import read_json, settle, settle_entry, write_json
-from runner.launch import EngineReport
-from runner.locks import locked
-from templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck
-from templates.layout import Layout
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.errors import Stopped, WalkersError
+from walkers.inputs.pile import PileCase
+from walkers.runner.audits import read_audit
+from walkers.runner.binary import Engine
+from walkers.runner.failures import DiskFull, RunBusy
+from walkers.runner.files import read_json, settle, settle_entry, write_json
+from walkers.runner.launch import EngineReport
+from walkers.runner.locks import locked
+from walkers.templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck
+from walkers.templates.layout import Layout
 
 MANIFEST_NAME = "manifest.json"
 CASE_NAME = "case.json"

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from inputs.case import WalkerCase
-from runner.binary import Engine
-from runner.directory import (
+from walkers.inputs.case import WalkerCase
+from walkers.runner.binary import Engine
+from walkers.runner.directory import (
     CASE_NAME,
     MANIFEST_NAME,
     REPLACED,
@@ -30,10 +30,10 @@ from runner.directory import (
     unfinished,
     write_deck,
 )
-from runner.files import write_json
-from runner.launch import EngineReport, check_room
-from runner.locks import locked
-from templates.deck import Deck
+from walkers.runner.files import write_json
+from walkers.runner.launch import EngineReport, check_room
+from walkers.runner.locks import locked
+from walkers.templates.deck import Deck
 
 FOLDER = "ensembles"
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 
-from inputs.errors import WalkersError
+from walkers.inputs.errors import WalkersError
 
 INSTALL_COMMAND = "sudo apt-get install liggghts"
 

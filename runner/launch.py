@@ -16,8 +16,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from runner.binary import Engine, version_in
-from runner.failures import (
+from walkers.runner.binary import Engine, version_in
+from walkers.runner.failures import (
     BeadsLost,
     BlowUp,
     DiskFull,
@@ -28,8 +28,8 @@ from runner.failures import (
     MissingFrames,
     TimeLimitExceeded,
 )
-from templates.deck import DECK_NAME, OUTPUT_NAME, Deck
-from templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, RANKS, STEP_VARIABLES
+from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, Deck
+from walkers.templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, RANKS, STEP_VARIABLES
 
 _POLL_SECONDS = 0.05
 # See templates.engine: without this the message of an abort is lost.

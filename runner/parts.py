@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from inputs.errors import Stopped, WalkersError
-from inputs.pile import PileCase
-from runner.binary import Engine
-from runner.directory import (
+from walkers.inputs.errors import Stopped, WalkersError
+from walkers.inputs.pile import PileCase
+from walkers.runner.binary import Engine
+from walkers.runner.directory import (
     CASE_NAME,
     FAILURE_NAME,
     MANIFEST_NAME,
@@ -33,12 +33,12 @@ from runner.directory import (
     unfinished,
     write_deck,
 )
-from runner.failures import RunBusy
-from runner.files import read_json, settle, settle_entry, write_json
-from runner.launch import EngineReport, Progress, launch
-from runner.locks import locked
-from templates.deck import OUTPUT_NAME, Deck
-from templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Part, render_part, settling_steps
+from walkers.runner.failures import RunBusy
+from walkers.runner.files import read_json, settle, settle_entry, write_json
+from walkers.runner.launch import EngineReport, Progress, launch
+from walkers.runner.locks import locked
+from walkers.templates.deck import OUTPUT_NAME, Deck
+from walkers.templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Part, render_part, settling_steps
 
 PARTS = "parts"
 PART_NAME = "part.json"

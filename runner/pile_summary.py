@@ -5,12 +5,12 @@ from __future__ import annotations
 from math import pi
 from typing import Any
 
-from inputs.pile import PileCase
-from inputs.pile_file import limits_of
-from inputs.units import ACCELERATION_OF_ONE_G
-from runner.cost import START_UP_SECONDS
-from runner.summary import lines_of_limits, step_against, text_of_case
-from templates.pile import settling_steps
+from walkers.inputs.pile import PileCase
+from walkers.inputs.pile_file import limits_of
+from walkers.inputs.units import ACCELERATION_OF_ONE_G
+from walkers.runner.cost import START_UP_SECONDS
+from walkers.runner.summary import lines_of_limits, step_against, text_of_case
+from walkers.templates.pile import settling_steps
 
 _BEAD_STEPS_PER_SECOND = 2.6e6
 """On one core of a 2020s x86 server: 13,100 steps a second with 200 beads."""

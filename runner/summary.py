@@ -5,13 +5,13 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from inputs import library
-from inputs.case import WalkerCase
-from inputs.dimer import contact_loads, dimer_of
-from inputs.units import ACCELERATION_OF_ONE_G
-from physics.capillary import capillary_force_limit_at_wall
-from physics.time_step import AUTO_FRACTIONS, TimeStepLimits, time_step_limits
-from runner.cost import predicted_seconds
+from walkers.inputs import library
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import contact_loads, dimer_of
+from walkers.inputs.units import ACCELERATION_OF_ONE_G
+from walkers.physics.capillary import capillary_force_limit_at_wall
+from walkers.physics.time_step import AUTO_FRACTIONS, TimeStepLimits, time_step_limits
+from walkers.runner.cost import predicted_seconds
 
 _CONTACTS = ("bead 1 on substrate", "bead 2 on substrate", "bead on bead")
 

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from inputs.axes import flatten
-from inputs.errors import InputError, Problem
-from postprocess.clusters import Climb, Definition
-from postprocess.pile_result import analyse, judged
-from runner.directory import CASE_NAME, finished_run
-from runner.files import read_json
-from runner.parts import PARTS, is_pile
-from sweeps.record import RECORD_NAME, read_record, result_in, states
+from walkers.inputs.axes import flatten
+from walkers.inputs.errors import InputError, Problem
+from walkers.postprocess.clusters import Climb, Definition
+from walkers.postprocess.pile_result import analyse, judged
+from walkers.runner.directory import CASE_NAME, finished_run
+from walkers.runner.files import read_json
+from walkers.runner.parts import PARTS, is_pile
+from walkers.sweeps.record import RECORD_NAME, read_record, result_in, states
 
 _CONFIDENCE = 0.95
 _NO_CONDITION = ("name", "title", "seed")

@@ -14,16 +14,16 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from inputs.errors import InputError, Problem, WalkersError
-from inputs.reading import AnyCase
-from runner.binary import Engine
-from runner.ensemble import remove_remains
-from runner.locks import is_locked
-from sweeps.kinds import sharing_of
-from sweeps.packing import LONGEST_SECONDS, PlannedDeck, halves, pack, unfinished_parts
-from sweeps.record import PointState, SweepRecord, chains, states, velocity_of
-from sweeps.site import Site, pilots, threads
-from sweeps.worker import STOPS, Report, SweepStopped, Task, work
+from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.reading import AnyCase
+from walkers.runner.binary import Engine
+from walkers.runner.ensemble import remove_remains
+from walkers.runner.locks import is_locked
+from walkers.sweeps.kinds import sharing_of
+from walkers.sweeps.packing import LONGEST_SECONDS, PlannedDeck, halves, pack, unfinished_parts
+from walkers.sweeps.record import PointState, SweepRecord, chains, states, velocity_of
+from walkers.sweeps.site import Site, pilots, threads
+from walkers.sweeps.worker import STOPS, Report, SweepStopped, Task, work
 
 if TYPE_CHECKING:
     from concurrent.futures import Future

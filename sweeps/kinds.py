@@ -7,14 +7,14 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-from inputs.dimer import dimer_of
-from inputs.pile import PileCase
-from inputs.reading import AnyCase
-from postprocess.tables import WALKERS
-from runner.cost import predicted_seconds
-from runner.parts import is_pile
-from runner.pile_summary import predicted_pile_seconds
-from templates.sharing import sharing_key
+from walkers.inputs.dimer import dimer_of
+from walkers.inputs.pile import PileCase
+from walkers.inputs.reading import AnyCase
+from walkers.postprocess.tables import WALKERS
+from walkers.runner.cost import predicted_seconds
+from walkers.runner.parts import is_pile
+from walkers.runner.pile_summary import predicted_pile_seconds
+from walkers.templates.sharing import sharing_key
 
 _WALKER_DERIVED = {
     "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄)"),
@@ -116,8 +116,8 @@ def derived_of(case: AnyCase) -> list[float]:
 
 def current_result_of(directory: Path) -> dict[str, Any]:
     """The result of a finished run, tabulated anew if need be."""
-    from postprocess.pile_result import current_pile_result
-    from postprocess.result import current_result
+    from walkers.postprocess.pile_result import current_pile_result
+    from walkers.postprocess.result import current_result
 
     return (current_pile_result if is_pile(directory) else current_result)(directory)
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
 
-from inputs.reading import AnyCase
-from sweeps.kinds import replicates_of, seconds_of, sharing_of
+from walkers.inputs.reading import AnyCase
+from walkers.sweeps.kinds import replicates_of, seconds_of, sharing_of
 
 MOST_WALKERS = 96
 """In a deck; with 96 the share of the deck's own cost is down to 4 %."""

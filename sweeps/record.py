@@ -12,16 +12,16 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-from inputs.axes import plain
-from inputs.errors import InputError, Problem, WalkersError
-from inputs.reading import AnyCase
-from inputs.sweep import Descent, Sweep
-from runner.binary import Engine
-from runner.directory import FAILURE_NAME, run_place, unfinished
-from runner.ensemble import FOLDER, finished_places
-from runner.files import read_json, write_json
-from runner.locks import is_locked
-from sweeps.kinds import DERIVED, current_result_of, derived_of, kind_of, velocity_in
+from walkers.inputs.axes import plain
+from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.reading import AnyCase
+from walkers.inputs.sweep import Descent, Sweep
+from walkers.runner.binary import Engine
+from walkers.runner.directory import FAILURE_NAME, run_place, unfinished
+from walkers.runner.ensemble import FOLDER, finished_places
+from walkers.runner.files import read_json, write_json
+from walkers.runner.locks import is_locked
+from walkers.sweeps.kinds import DERIVED, current_result_of, derived_of, kind_of, velocity_in
 
 RECORD_NAME = "sweep.json"
 _FORMAT = 1

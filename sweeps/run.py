@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from inputs.reading import AnyCase
-from inputs.sweep import Sweep
-from runner.binary import Engine, find_engine
-from sweeps.conduct import Failure, Options, Progress, conduct, final_failures
-from sweeps.kinds import ranks_of, seconds_of
-from sweeps.packing import PlannedDeck, makespan, pack, unfinished_parts
-from sweeps.record import SweepRecord, describe_sweep, states, write_record
-from sweeps.site import check_path
-from sweeps.together import check_audit
+from walkers.inputs.reading import AnyCase
+from walkers.inputs.sweep import Sweep
+from walkers.runner.binary import Engine, find_engine
+from walkers.sweeps.conduct import Failure, Options, Progress, conduct, final_failures
+from walkers.sweeps.kinds import ranks_of, seconds_of
+from walkers.sweeps.packing import PlannedDeck, makespan, pack, unfinished_parts
+from walkers.sweeps.record import SweepRecord, describe_sweep, states, write_record
+from walkers.sweeps.site import check_path
+from walkers.sweeps.together import check_audit
 
 _SETTLED = ("finished", "not needed")
 

@@ -25,11 +25,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from inputs.errors import InputError, Problem
-from inputs.library import suggestion
-from inputs.messages import quoted, validated
-from inputs.reading import read_toml
-from inputs.schema import Whole
+from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.library import suggestion
+from walkers.inputs.messages import quoted, validated
+from walkers.inputs.reading import read_toml
+from walkers.inputs.schema import Whole
 
 if TYPE_CHECKING:
     from parsl.config import Config

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from inputs.errors import InputError, Problem
-from sweeps.record import RECORD_NAME, read_record, states
+from walkers.inputs.errors import InputError, Problem
+from walkers.sweeps.record import RECORD_NAME, read_record, states
 
 _MOST_FAILURES = 10
 _ORDER = ("finished", "running", "failed", "missing", "not needed")
@@ -48,7 +48,7 @@ def describe_status(directory: Path) -> str:
     if len(failed) > _MOST_FAILURES:
         lines.append(f"             and {len(failed) - _MOST_FAILURES} more")
     if record.descent is not None:
-        from sweeps.table import short_text, thresholds
+        from walkers.sweeps.table import short_text, thresholds
 
         lines += [f"  {line}" for line in short_text(thresholds(directory)).splitlines()]
     lines.append(f"  table      walkers table {directory}")

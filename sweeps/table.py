@@ -7,10 +7,10 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inputs.errors import InputError, Problem
-from runner.files import write_bytes
-from sweeps.kinds import DERIVED, RESULTS, columns_of
-from sweeps.record import (
+from walkers.inputs.errors import InputError, Problem
+from walkers.runner.files import write_bytes
+from walkers.sweeps.kinds import DERIVED, RESULTS, columns_of
+from walkers.sweeps.record import (
     DamagedRunError,
     PointState,
     SweepRecord,

@@ -7,18 +7,18 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from inputs.case import WalkerCase
-from inputs.pile import PileCase
-from inputs.reading import AnyCase
-from runner.audits import read_audit
-from runner.binary import Engine
-from runner.directory import FinishedRun, finished_run, make_run, recover, run_place
-from runner.ensemble import finished_place, make_ensemble
-from runner.failures import AuditFailed, RunBusy, UnauditedEngineWarning
-from runner.launch import Progress, launch
-from runner.locks import locked
-from runner.parts import run_pile
-from templates.deck import render_deck, render_shared_deck
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.pile import PileCase
+from walkers.inputs.reading import AnyCase
+from walkers.runner.audits import read_audit
+from walkers.runner.binary import Engine
+from walkers.runner.directory import FinishedRun, finished_run, make_run, recover, run_place
+from walkers.runner.ensemble import finished_place, make_ensemble
+from walkers.runner.failures import AuditFailed, RunBusy, UnauditedEngineWarning
+from walkers.runner.launch import Progress, launch
+from walkers.runner.locks import locked
+from walkers.runner.parts import run_pile
+from walkers.templates.deck import render_deck, render_shared_deck
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def make_any(
 def _make_pile(
     case: PileCase, out: Path, engine: Engine, on_progress: Callable[[object], None], time_limit: float | None
 ) -> Made:
-    from postprocess.pile_result import current_pile_result
+    from walkers.postprocess.pile_result import current_pile_result
 
     name = run_place(case, engine, out).name
     try:
@@ -151,7 +151,7 @@ def _make(
         report = launch(
             ensemble.deck, ensemble.directory, engine, on_progress=on_progress, time_limit=time_limit, keep_open=locks
         )
-        from postprocess.parting import part_output
+        from walkers.postprocess.parting import part_output
 
         directories = {ensemble.run_directory(name): case for name, case in named.items()}
         part_output(ensemble.directory, ensemble.deck.layout, directories)
@@ -160,7 +160,7 @@ def _make(
 
 
 def _tabulate(directories: Iterable[Path]) -> None:
-    from postprocess.result import tabulate
+    from walkers.postprocess.result import tabulate
 
     for directory in directories:
         tabulate(directory)

@@ -8,13 +8,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from inputs.errors import Stopped, WalkersError
-from inputs.reading import AnyCase
-from runner.binary import find_engine
-from runner.directory import run_place
-from runner.failures import DiskFull, EngineDiffers, EngineFailure, ProgramDiffers
-from sweeps.kinds import current_result_of, velocity_in
-from sweeps.together import make_any
+from walkers.inputs.errors import Stopped, WalkersError
+from walkers.inputs.reading import AnyCase
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import run_place
+from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, ProgramDiffers
+from walkers.sweeps.kinds import current_result_of, velocity_in
+from walkers.sweeps.together import make_any
 
 STOPS: dict[str, threading.Event] = {}
 """Of the sweeps that this process conducts, by `Task.sweep`: set to end their engines and to let none begin."""

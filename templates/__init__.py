@@ -4,6 +4,6 @@ Knows the cases (`inputs`); knows nothing of processes, files on disk or results
 engine, and every remedy for what it gets wrong, is in `templates.engine`.
 """
 
-from templates.deck import Deck, Layout, PlacedWalker, render_deck
+from walkers.templates.deck import Deck, Layout, PlacedWalker, render_deck
 
 __all__ = ["Deck", "Layout", "PlacedWalker", "render_deck"]

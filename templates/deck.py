@@ -8,16 +8,16 @@ from functools import cache
 from math import degrees, inf, sqrt
 from typing import TYPE_CHECKING
 
-from inputs.case import WalkerCase
-from inputs.dimer import contact_loads, dimer_of, hop_height, reach
-from inputs.pile import PileCase
-from physics.film import film_drag
-from physics.matter import Contact
-from templates.engine import ALL_REMEDIES, Remedies, contact_angle_setting, separation_cap, wall_mesh
-from templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
-from templates.placement import place_walkers
-from templates.scene import Point, Scene, without_riders
-from templates.sharing import check_sharing, surfaces_of
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import contact_loads, dimer_of, hop_height, reach
+from walkers.inputs.pile import PileCase
+from walkers.physics.film import film_drag
+from walkers.physics.matter import Contact
+from walkers.templates.engine import ALL_REMEDIES, Remedies, contact_angle_setting, separation_cap, wall_mesh
+from walkers.templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
+from walkers.templates.placement import place_walkers
+from walkers.templates.scene import Point, Scene, without_riders
+from walkers.templates.sharing import check_sharing, surfaces_of
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -328,7 +328,7 @@ def _environment() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("templates", "."),
+        loader=PackageLoader("walkers.templates", "."),
         undefined=StrictUndefined,
         keep_trailing_newline=True,
         trim_blocks=True,

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from math import degrees, sqrt
 
-from physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
-from physics.wall import WALL_COPIES
-from templates.scene import AXES, Face, turned
+from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
+from walkers.physics.wall import WALL_COPIES
+from walkers.templates.scene import AXES, Face, turned
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import cos, pi, sin, sqrt
 
-from inputs.pile import LOOSE, PileCase, lattice, lattice_pitch, turns_of_sides
-from physics.capillary import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
-from templates.deck import Checkpoint, Deck, Plan, Recording, compose
-from templates.scene import Bead, Face, Point, Scene
+from walkers.inputs.pile import LOOSE, PileCase, lattice, lattice_pitch, turns_of_sides
+from walkers.physics.capillary import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
+from walkers.templates.deck import Checkpoint, Deck, Plan, Recording, compose
+from walkers.templates.scene import Bead, Face, Point, Scene
 
 RESTART_NAME = "state.restart"
 PREVIOUS_RESTART_NAME = "previous.restart"

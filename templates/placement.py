@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from functools import lru_cache
 from math import atan2, ceil, cos, pi, sin, sqrt
 
-from inputs.case import WalkerCase
-from inputs.dimer import contact_loads, hop_height, horizontal_distance, reach
-from templates.layout import PlacedWalker
-from templates.scene import Bead, Face, Scene
-from templates.sharing import surfaces_of
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import contact_loads, hop_height, horizontal_distance, reach
+from walkers.templates.layout import PlacedWalker
+from walkers.templates.scene import Bead, Face, Scene
+from walkers.templates.sharing import surfaces_of
 
 _FIRST_BEAD = 2  # atom 1 is the rider of the substrate
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
-from inputs.case import WalkerCase
-from inputs.dimer import reach
-from physics.matter import Contact
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import reach
+from walkers.physics.matter import Contact
 
 
 def surfaces_of(cases: Sequence[WalkerCase]) -> tuple[Contact, ...]:

@@ -17,12 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from inputs import load_case
-from inputs.case import WalkerCase
-from theory.friction import Friction
-from theory.motion import Walker, walk
-from theory.prediction import friction_of
 from walkers import run_case
+from walkers.inputs import load_case
+from walkers.inputs.case import WalkerCase
+from walkers.theory.friction import Friction
+from walkers.theory.motion import Walker, walk
+from walkers.theory.prediction import friction_of
 
 _REPEATS = 3
 

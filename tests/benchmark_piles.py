@@ -16,14 +16,14 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from inputs import PileCase, resolve_pile_case, shipped_cases
-from postprocess.pile import read_pile
-from runner.binary import find_engine
-from runner.directory import write_deck
-from runner.files import read_json
-from runner.parts import PARTS, part_directories, run_pile
-from templates.deck import DECK_NAME, OUTPUT_NAME
-from templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Part, render_part
+from walkers.inputs import PileCase, resolve_pile_case, shipped_cases
+from walkers.postprocess.pile import read_pile
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import write_deck
+from walkers.runner.files import read_json
+from walkers.runner.parts import PARTS, part_directories, run_pile
+from walkers.templates.deck import DECK_NAME, OUTPUT_NAME
+from walkers.templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Part, render_part
 
 _REPEATS = 2
 
@@ -99,7 +99,7 @@ def measure_tables(out: Path) -> None:
 def main() -> None:
     """Print the tables."""
     if sys.argv[1:2] == ["tabulate"]:
-        from postprocess.pile_result import tabulate_pile
+        from walkers.postprocess.pile_result import tabulate_pile
 
         tabulate_pile(sys.argv[2])
         print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)

@@ -10,12 +10,12 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import repeat
 from pathlib import Path
 
-from runner.binary import Engine, find_engine
-from runner.directory import write_deck
-from runner.failures import EngineNeverStarted
-from runner.launch import launch
-from templates.deck import Deck, render_deck
 from tests.conftest import make_case
+from walkers.runner.binary import Engine, find_engine
+from walkers.runner.directory import write_deck
+from walkers.runner.failures import EngineNeverStarted
+from walkers.runner.launch import launch
+from walkers.templates.deck import Deck, render_deck
 
 AT_ONCE = 8
 

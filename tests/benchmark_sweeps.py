@@ -16,9 +16,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from inputs.sweep import load_sweep
-from runner.cost import START_UP_SECONDS
 from walkers import run_case
+from walkers.inputs.sweep import load_sweep
+from walkers.runner.cost import START_UP_SECONDS
 
 _PROGRAM = str(Path(sys.executable).with_name("walkers"))
 _WORKERS = 2

@@ -21,13 +21,13 @@ from typing import Any, TypeVar
 
 import pytest
 
-from inputs import resolve_case
-from inputs.case import WalkerCase
-from postprocess.gait import Walk, walk
-from postprocess.trajectory import Trajectory, read_trajectory
-from runner.failures import RunBusy
 from walkers import run_case
+from walkers.inputs import resolve_case
+from walkers.inputs.case import WalkerCase
 from walkers.main import main
+from walkers.postprocess.gait import Walk, walk
+from walkers.postprocess.trajectory import Trajectory, read_trajectory
+from walkers.runner.failures import RunBusy
 
 # The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, no rolling friction, one walker that starts on the
 # axis in equilibrium.

@@ -13,14 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from audit import AuditReport, Check, Line, Verdict, run_audit
-from audit.run import CHECKS, record, selected
-from audit.table import GROUPS, as_dict, as_markdown, as_text
-from inputs import InputError
-from runner.audits import AuditRecord, read_audit, write_audit
-from runner.binary import find_engine
-from runner.failures import AuditFailed, UnauditedEngineWarning
-from templates.engine import DEFECTS, Remedies
 from tests.conftest import (
     PATIENCE,
     PROGRAM,
@@ -33,6 +25,14 @@ from tests.conftest import (
     wait_for_engines,
 )
 from walkers import run_case
+from walkers.audit import AuditReport, Check, Line, Verdict, run_audit
+from walkers.audit.run import CHECKS, record, selected
+from walkers.audit.table import GROUPS, as_dict, as_markdown, as_text
+from walkers.inputs import InputError
+from walkers.runner.audits import AuditRecord, read_audit, write_audit
+from walkers.runner.binary import find_engine
+from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
+from walkers.templates.engine import DEFECTS, Remedies
 
 
 @pytest.fixture(scope="session")
@@ -104,8 +104,8 @@ def test_without_the_translation_exactly_the_angle_lines_fail(report: AuditRepor
 
 def test_glycerol_at_eight_microseconds_fails_at_the_pile_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Six cycles of the ten: by then the pile has lost beads."""
-    monkeypatch.setattr("audit.checks.timestep._CYCLES", 6)
-    monkeypatch.setattr("audit.checks.timestep._SETTLING", 3)
+    monkeypatch.setattr("walkers.audit.checks.timestep._CYCLES", 6)
+    monkeypatch.setattr("walkers.audit.checks.timestep._SETTLING", 3)
     broken = run_audit(selected(["step-pile"]), pile_time_step=8e-6)
     assert _failing(broken) == _standing_on(broken, "time step")
     assert len(_failing(broken)) == 1
@@ -233,7 +233,7 @@ def test_only_wins_over_quick() -> None:
 
 def test_an_audit_whose_outcome_cannot_be_kept_is_printed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", "/proc/nowhere")
-    monkeypatch.setattr("audit.run.CHECKS", selected(["hertz"]))  # as if it were all: a part is not to be kept
+    monkeypatch.setattr("walkers.audit.run.CHECKS", selected(["hertz"]))  # as if it were all: a part is not to be kept
     done = call("audit", "--quick", "--json", check=True)
     assert json.loads(done.stdout)["passed"]
     assert "cannot be kept" in done.stderr

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from inputs import InputError, resolve_case
 from tests.conftest import call, document, make_case, to_toml
+from walkers.inputs import InputError, resolve_case
 
 # name: (changed tables, key in the message, value in the message, expectation in the message)
 BAD: dict[str, tuple[dict[str, Any], str, str, str]] = {

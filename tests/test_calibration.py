@@ -15,16 +15,16 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from calibration.calibrate import FINAL, calibrate, first_wave, next_wave, ranking, sobol_indices
-from calibration.emulator import fit_emulators
-from calibration.posterior import log_likelihood, sample_posterior
-from calibration.report import emulator_checks, intervals, rows_of
-from calibration.space import Space, spread_out
-from calibration.waves import HOPELESS, run_wave, wave_sweep
-from inputs import InputError
-from inputs.calibration import Observation, Parameter, load_calibration, read_calibration, shipped_calibrations
-from sweeps.conduct import Options
 from tests.conftest import PROGRAM, call, to_toml
+from walkers.calibration.calibrate import FINAL, calibrate, first_wave, next_wave, ranking, sobol_indices
+from walkers.calibration.emulator import fit_emulators
+from walkers.calibration.posterior import log_likelihood, sample_posterior
+from walkers.calibration.report import emulator_checks, intervals, rows_of
+from walkers.calibration.space import Space, spread_out
+from walkers.calibration.waves import HOPELESS, run_wave, wave_sweep
+from walkers.inputs import InputError
+from walkers.inputs.calibration import Observation, Parameter, load_calibration, read_calibration, shipped_calibrations
+from walkers.sweeps.conduct import Options
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -5,15 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from inputs import InputError, load_case, resolve_case
-from inputs.case import WalkerCase
-from postprocess.report import describe_result
-from postprocess.result import read_result
-from runner.binary import find_engine
-from runner.directory import run_place
-from sweeps.together import make_together
 from tests.conftest import document
-from theory.prediction import motion_of, predict
+from walkers.inputs import InputError, load_case, resolve_case
+from walkers.inputs.case import WalkerCase
+from walkers.postprocess.report import describe_result
+from walkers.postprocess.result import read_result
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import run_place
+from walkers.sweeps.together import make_together
+from walkers.theory.prediction import motion_of, predict
 
 FRICTIONS = {0.1: -2.2e-3, 0.2: 1.8e-3, 0.3: 5.9e-3}
 """Climbing speeds in m/s, from a prototype deck of the same dimer."""

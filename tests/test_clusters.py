@@ -6,12 +6,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from inputs.pile import Container
-from physics.capillary import bridge_volume_between_beads
-from postprocess.bed import liquid_of_beads, packing_profile, segregation
-from postprocess.clusters import Climb, Definition, Track, bulk_of, components, follow, held_clusters, judge
-from postprocess.events import events_of
-from postprocess.pile import Bridges
+from walkers.inputs.pile import Container
+from walkers.physics.capillary import bridge_volume_between_beads
+from walkers.postprocess.bed import liquid_of_beads, packing_profile, segregation
+from walkers.postprocess.clusters import Climb, Definition, Track, bulk_of, components, follow, held_clusters, judge
+from walkers.postprocess.events import events_of
+from walkers.postprocess.pile import Bridges
 
 BULK = list(range(20))
 TIME = np.arange(0.0, 4.0, 0.02)

@@ -7,15 +7,15 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from inputs import load_case, shipped_cases
-from inputs.case import WalkerCase
-from inputs.reading import load_any
-from physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
-from templates import render_deck
-from templates.engine import contact_angle_setting, face_triangle, separation_cap
-from templates.placement import place_walkers
-from templates.scene import Face
 from tests.conftest import make_case
+from walkers.inputs import load_case, shipped_cases
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.reading import load_any
+from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
+from walkers.templates import render_deck
+from walkers.templates.engine import contact_angle_setting, face_triangle, separation_cap
+from walkers.templates.placement import place_walkers
+from walkers.templates.scene import Face
 
 
 @pytest.fixture(scope="module")

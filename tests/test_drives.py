@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from inputs import load_case, resolve_case
-from inputs.drive import Drive, Harmonic, common_frequency
-from inputs.plane import Plane
-from postprocess import read_result
 from tests.conftest import document, make_case
+from walkers.inputs import load_case, resolve_case
+from walkers.inputs.drive import Drive, Harmonic, common_frequency
+from walkers.inputs.plane import Plane
+from walkers.postprocess import read_result
 
 BRIEF = {"cycles": 20, "settling_cycles": 8, "samples_per_cycle": 10}
 ONE = {"frequency": "80 Hz", "peak_acceleration": "4 g"}

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inputs.dimer import contact_loads, dimer_of
-from physics.capillary import capillary_force, capillary_force_at_wall, rupture_distance
-from postprocess import read_table, tabulate
-from postprocess.dump import BinaryDump, DumpError
-from postprocess.local_dump import read_local_dump
-from runner import finished_run
-from templates.layout import BEAD_COLUMNS
 from tests.conftest import SHORT, make_case
 from walkers import run_case
+from walkers.inputs.dimer import contact_loads, dimer_of
+from walkers.physics.capillary import capillary_force, capillary_force_at_wall, rupture_distance
+from walkers.postprocess import read_table, tabulate
+from walkers.postprocess.dump import BinaryDump, DumpError
+from walkers.postprocess.local_dump import read_local_dump
+from walkers.runner import finished_run
+from walkers.templates.layout import BEAD_COLUMNS
 
 
 @pytest.fixture(scope="module")

@@ -17,22 +17,6 @@ from pathlib import Path
 
 import pytest
 
-from inputs.case import WalkerCase
-from runner import Engine, find_engine, launch, open_run
-from runner.failures import (
-    BeadsLost,
-    BlowUp,
-    DiskFull,
-    EngineError,
-    EngineFailure,
-    EngineKilled,
-    EngineMissing,
-    EngineVersionWarning,
-    MissingFrames,
-    TimeLimitExceeded,
-)
-from runner.launch import Progress, postponed_interrupts
-from templates import Deck, render_deck
 from tests.conftest import (
     PATIENCE,
     PROGRAM,
@@ -47,6 +31,22 @@ from tests.conftest import (
     wait_for_engines,
 )
 from walkers import run_case
+from walkers.inputs.case import WalkerCase
+from walkers.runner import Engine, find_engine, launch, open_run
+from walkers.runner.failures import (
+    BeadsLost,
+    BlowUp,
+    DiskFull,
+    EngineError,
+    EngineFailure,
+    EngineKilled,
+    EngineMissing,
+    EngineVersionWarning,
+    MissingFrames,
+    TimeLimitExceeded,
+)
+from walkers.runner.launch import Progress, postponed_interrupts
+from walkers.templates import Deck, render_deck
 
 LONG = {"cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
 

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inputs import load_case
-from inputs.case import WalkerCase
-from postprocess.gait import walk
-from postprocess.trajectory import Trajectory
-from runner import find_engine, launch
-from runner.directory import write_deck
-from templates import render_deck
 from walkers import run_case
+from walkers.inputs import load_case
+from walkers.inputs.case import WalkerCase
+from walkers.postprocess.gait import walk
+from walkers.postprocess.trajectory import Trajectory
+from walkers.runner import find_engine, launch
+from walkers.runner.directory import write_deck
+from walkers.templates import render_deck
 
 
 @pytest.fixture(scope="module")

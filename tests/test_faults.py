@@ -12,25 +12,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.calibrate import _determinants, _kept, calibrate
-from inputs import InputError, load_case
-from inputs.calibration import read_calibration
-from inputs.reading import read_toml
-from inputs.sweep import expand
-from postprocess import read_result, tabulate
-from postprocess.drawing import new_figure, save_figure, styled
-from postprocess.dump import DumpError
-from postprocess.local_dump import local_frames, read_local_dump
-from postprocess.report import describe_result
-from postprocess.result import current_result
-from runner.failures import EngineError, EngineFailure
-from runner.launch import launch
-from sweeps.conduct import Failure, Options, _mildness
-from sweeps.worker import Task, work
-from templates import render_deck
 from tests.conftest import PROGRAM, SHORT, call, document, make_case, to_toml
 from tests.test_calibration import reduced
 from walkers import run_case
+from walkers.calibration.calibrate import _determinants, _kept, calibrate
+from walkers.inputs import InputError, load_case
+from walkers.inputs.calibration import read_calibration
+from walkers.inputs.reading import read_toml
+from walkers.inputs.sweep import expand
+from walkers.postprocess import read_result, tabulate
+from walkers.postprocess.drawing import new_figure, save_figure, styled
+from walkers.postprocess.dump import DumpError
+from walkers.postprocess.local_dump import local_frames, read_local_dump
+from walkers.postprocess.report import describe_result
+from walkers.postprocess.result import current_result
+from walkers.runner.failures import EngineError, EngineFailure
+from walkers.runner.launch import launch
+from walkers.sweeps.conduct import Failure, Options, _mildness
+from walkers.sweeps.worker import Task, work
+from walkers.templates import render_deck
 
 # --- what the engine takes --------------------------------------------------------------------------------------------
 
@@ -258,8 +258,8 @@ def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(full_disk:
 
 
 def test_a_worker_tells_a_full_disk_by_its_name(full_disk: Path) -> None:
-    from runner import find_engine
-    from runner.directory import run_place
+    from walkers.runner import find_engine
+    from walkers.runner.directory import run_place
 
     case, engine = make_case(run=SHORT), find_engine()
     name = run_place(case, engine, full_disk).name
@@ -359,7 +359,7 @@ def test_a_result_says_what_the_walkers_do_that_kept_their_heading(run_directory
 
 
 def test_piles_are_run_from_python_as_walkers_are(tmp_path: Path) -> None:
-    from inputs import load_pile
+    from walkers.inputs import load_pile
 
     case = load_pile("pile-ci")
     brief = replace(case, run=replace(case.run, cycles=case.run.cycles_per_part, longest_settling=0.02))
@@ -374,8 +374,8 @@ def test_the_engines_log_is_not_kept_in_memory(tmp_path: Path) -> None:
     """A front that writes 100 MB of lines before the real engine: the launcher does not grow by that."""
     import resource
 
-    from runner import find_engine
-    from runner.directory import write_deck
+    from walkers.runner import find_engine
+    from walkers.runner.directory import write_deck
 
     front = tmp_path / "front"
     front.write_text('#!/bin/sh\nyes "a line that says nothing at all" | head -c 100000000\nexec liggghts "$@"\n')

@@ -5,9 +5,10 @@ from math import pi
 
 import pytest
 
-from inputs import load_case, resolve_case
-from inputs.dimer import contact_loads, dimer_of
-from physics.capillary import (
+from tests.conftest import document, make_case
+from walkers.inputs import load_case, resolve_case
+from walkers.inputs.dimer import contact_loads, dimer_of
+from walkers.physics.capillary import (
     bridge_volume_at_wall,
     bridge_volume_between_beads,
     capillary_force,
@@ -15,10 +16,9 @@ from physics.capillary import (
     capillary_force_limit_at_wall,
     rupture_distance,
 )
-from physics.contact import hertz_overlap, reduced_modulus
-from physics.dimer import Dimer
-from physics.time_step import AUTO_FRACTIONS, fit_into_cycle, time_step_limits
-from tests.conftest import document, make_case
+from walkers.physics.contact import hertz_overlap, reduced_modulus
+from walkers.physics.dimer import Dimer
+from walkers.physics.time_step import AUTO_FRACTIONS, fit_into_cycle, time_step_limits
 
 GAMMA = 0.0192
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from paper.ingredients import (
+from walkers.paper.ingredients import (
     ADDED,
     ALWAYS,
     KAPPA,
@@ -19,8 +19,8 @@ from paper.ingredients import (
     walkers_of_the_paper,
     write_ingredients,
 )
-from runner.files import read_json
-from theory.prediction import motion_of
+from walkers.runner.files import read_json
+from walkers.theory.prediction import motion_of
 
 KNOWN = {"friction_wall": 0.25, "friction_slide": 0.2, "friction_bead": 0.12, "log10_viscosity_ratio": 1.0}
 

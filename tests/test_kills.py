@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from inputs.case import WalkerCase
-from runner.directory import finished_run, open_run
-from runner.failures import RunBusy
-from runner.locks import OrphanLockWarning, is_locked, locked
-from templates import render_deck
 from tests.conftest import PROGRAM, document, engines_in, make_case, to_toml, wait_for
 from walkers import run_case
+from walkers.inputs.case import WalkerCase
+from walkers.runner.directory import finished_run, open_run
+from walkers.runner.failures import RunBusy
+from walkers.runner.locks import OrphanLockWarning, is_locked, locked
+from walkers.templates import render_deck
 
 BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cycle": 2}
 LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
@@ -105,7 +105,7 @@ def _front_that_lingers(folder: Path, seconds: int) -> str:
 
 
 def test_what_keeps_a_lock_for_long_is_refused_in_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("runner.locks._PATIENCE_SECONDS", 1.0)
+    monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 1.0)
     case = make_case(run=BRIEF)
     front = _front_that_lingers(tmp_path, seconds=600)
     child = _forked(lambda: run_case(case, tmp_path / "runs", engine=front))
@@ -166,13 +166,13 @@ def test_a_crash_between_renaming_and_removing_leaves_no_trace(tmp_path: Path) -
 
 
 def _engine() -> object:
-    from runner import find_engine
+    from walkers.runner import find_engine
 
     return find_engine()
 
 
 def test_what_a_replacement_left_is_no_run(tmp_path: Path) -> None:
-    from runner.ensemble import finished_places
+    from walkers.runner.ensemble import finished_places
 
     place, _ = _replaced(make_case(run=BRIEF), tmp_path)
     assert finished_places(tmp_path) == {place.name: place}

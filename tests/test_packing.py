@@ -4,13 +4,13 @@ import random
 
 import pytest
 
-from inputs.case import WalkerCase
-from inputs.sweep import load_sweep
-from sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, makespan, pack, unfinished_parts
-from templates import render_deck
-from templates.deck import render_shared_deck
-from templates.sharing import sharing_key
 from tests.conftest import make_case
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.sweep import load_sweep
+from walkers.sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, makespan, pack, unfinished_parts
+from walkers.templates import render_deck
+from walkers.templates.deck import render_shared_deck
+from walkers.templates.sharing import sharing_key
 
 STEP = {"time_step": "2 us"}
 

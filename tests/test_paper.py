@@ -12,29 +12,29 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from inputs import load_case
-from inputs.axes import flatten, is_axis
-from inputs.dimer import dimer_of
-from inputs.errors import InputError
-from inputs.reading import read_toml
-from inputs.sweep import expand, shipped_sweeps
-from paper import dimers, published
-from paper.alignment import climber, paper_drives
-from paper.comparison import as_markdown, compare, count
-from paper.make import FIGURES, make_figures
-from paper.modes import MODES, classify, sliding_share
-from paper.rotation import model
-from paper.sensitivity import OBSERVATIONS, PARAMETERS, sensitivities
-from paper.sources import NothingFinishedError, Sources
-from postprocess.drawing import save_figure
-from postprocess.gait import gait
-from postprocess.steady import steady_walkers
-from sweeps.conduct import Options
-from sweeps.run import run_sweep
 from tests.conftest import PROGRAM, call
-from theory.mathieu import alignment, turning
-from theory.prediction import motion_of
-from theory.quasistatic import mean_velocity
+from walkers.inputs import load_case
+from walkers.inputs.axes import flatten, is_axis
+from walkers.inputs.dimer import dimer_of
+from walkers.inputs.errors import InputError
+from walkers.inputs.reading import read_toml
+from walkers.inputs.sweep import expand, shipped_sweeps
+from walkers.paper import dimers, published
+from walkers.paper.alignment import climber, paper_drives
+from walkers.paper.comparison import as_markdown, compare, count
+from walkers.paper.make import FIGURES, make_figures
+from walkers.paper.modes import MODES, classify, sliding_share
+from walkers.paper.rotation import model
+from walkers.paper.sensitivity import OBSERVATIONS, PARAMETERS, sensitivities
+from walkers.paper.sources import NothingFinishedError, Sources
+from walkers.postprocess.drawing import save_figure
+from walkers.postprocess.gait import gait
+from walkers.postprocess.steady import steady_walkers
+from walkers.sweeps.conduct import Options
+from walkers.sweeps.run import run_sweep
+from walkers.theory.mathieu import alignment, turning
+from walkers.theory.prediction import motion_of
+from walkers.theory.quasistatic import mean_velocity
 
 SHORT = {"start.replicates": 2, "run.cycles": 8, "run.settling_cycles": 4, "run.time_step": "3 us"}
 FEWER = {
@@ -179,7 +179,7 @@ def test_the_style_is_readable_in_grey() -> None:
     from matplotlib import rcParams
     from matplotlib.colors import to_rgb
 
-    from postprocess.drawing import styled
+    from walkers.postprocess.drawing import styled
 
     colours = styled(lambda: rcParams["axes.prop_cycle"].by_key()["color"][:5])()
     lightness = [float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114))) for colour in colours]
@@ -272,7 +272,7 @@ def test_a_run_that_failed_is_left_out_and_told(tmp_path: Path) -> None:
 
 
 def test_the_comparison_is_written_for_programs_too(sources: Sources, tmp_path: Path) -> None:
-    from paper.comparison import as_dict
+    from walkers.paper.comparison import as_dict
 
     rows = compare(sources)
     contents = json.loads(json.dumps(as_dict(rows)))

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from inputs import InputError, load_case
-from inputs.sweep import load_sweep
-from sweeps.site import SiteFile, _worker_init, check_path
-from sweeps.table import load
 from tests.conftest import SHORT, call, document, to_toml
+from walkers.inputs import InputError, load_case
+from walkers.inputs.sweep import load_sweep
+from walkers.sweeps.site import SiteFile, _worker_init, check_path
+from walkers.sweeps.table import load
 
 ODD = {
     "a space": "sp ace",

@@ -7,11 +7,11 @@ from math import sin
 import numpy as np
 import pytest
 
-from inputs import load_case
-from inputs.dimer import dimer_of
-from postprocess.gait import Walk, gait, settled_samples, walk
-from postprocess.trajectory import Trajectory
 from tests.conftest import make_case
+from walkers.inputs import load_case
+from walkers.inputs.dimer import dimer_of
+from walkers.postprocess.gait import Walk, gait, settled_samples, walk
+from walkers.postprocess.trajectory import Trajectory
 
 Walked = Callable[..., Walk]
 Moved = Callable[..., Trajectory]

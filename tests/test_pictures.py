@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from inputs import InputError
-from postprocess import read_table, read_trajectory
-from postprocess.figures import plot_run
-from postprocess.paraview import write_vtk
-from postprocess.rendering import render_run
+from walkers.inputs import InputError
+from walkers.postprocess import read_table, read_trajectory
+from walkers.postprocess.figures import plot_run
+from walkers.postprocess.paraview import write_vtk
+from walkers.postprocess.rendering import render_run
 
 
 @pytest.fixture(scope="module")

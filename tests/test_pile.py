@@ -16,22 +16,22 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from inputs import InputError, PileCase, load_pile, resolve_pile_case, shipped_cases
-from inputs.sweep import expand
-from postprocess.pile import FLOOR, read_bridges, read_pile
-from postprocess.pile_result import current_pile_result, tabulate_pile
-from postprocess.tables import PILE_TABLES, TABLES, read_table
-from runner.binary import find_engine
-from runner.directory import run_place
-from runner.failures import EngineError, RunBusy
-from runner.parts import part_directories, run_pile
-from sweeps.climbing import describe_climbs, piles_in, summarise_climbs
-from sweeps.conduct import Options
-from sweeps.record import states
-from sweeps.run import plan_sweep, run_sweep
-from sweeps.site import Site, SiteFile
-from sweeps.table import load
 from tests.conftest import PROGRAM, call, engines_in, to_toml, wait_for
+from walkers.inputs import InputError, PileCase, load_pile, resolve_pile_case, shipped_cases
+from walkers.inputs.sweep import expand
+from walkers.postprocess.pile import FLOOR, read_bridges, read_pile
+from walkers.postprocess.pile_result import current_pile_result, tabulate_pile
+from walkers.postprocess.tables import PILE_TABLES, TABLES, read_table
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import run_place
+from walkers.runner.failures import EngineError, RunBusy
+from walkers.runner.parts import part_directories, run_pile
+from walkers.sweeps.climbing import describe_climbs, piles_in, summarise_climbs
+from walkers.sweeps.conduct import Options
+from walkers.sweeps.record import states
+from walkers.sweeps.run import plan_sweep, run_sweep
+from walkers.sweeps.site import Site, SiteFile
+from walkers.sweeps.table import load
 
 
 def document(**changes: dict[str, Any]) -> dict[str, Any]:
@@ -276,7 +276,7 @@ def test_looking_before_the_end_leaves_nothing_stale(halting: Callable[..., str]
 def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     case, engine = brief(), find_engine(None)
     place = run_place(case, engine, tmp_path)
-    from runner import parts
+    from walkers.runner import parts
 
     honest = parts.render_part
 

@@ -4,11 +4,13 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
 import pytest
 
+import walkers
 from tests.conftest import PROGRAM, SHORT, call, document, to_toml
 
 ROOT = Path(__file__).parent.parent
@@ -106,3 +108,17 @@ def test_without_root_and_engine_the_administrators_command_is_told() -> None:
     assert done.returncode != 0
     assert "apt-get install liggghts" in done.stderr
     assert "administrator" in done.stderr
+
+
+def test_installing_claims_one_name() -> None:
+    """Others may have a module called inputs or runner, and theirs is theirs."""
+    from importlib.metadata import packages_distributions
+
+    names = [name for name, owners in packages_distributions().items() if "granular-walkers" in owners]
+    assert [name for name in names if not name.startswith("__editable__")] == ["walkers"]
+    script = (
+        "import walkers.inputs, sys; print([name for name in sys.modules if name in ('inputs', 'runner', 'sweeps')])"
+    )
+    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd="/")
+    assert told.stdout.strip() == "[]"
+    assert dir(walkers) == sorted(walkers.__all__)

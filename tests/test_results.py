@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inputs import load_case
-from postprocess import read_result, read_table, read_trajectory
-from postprocess.gait import distance_walked, fit_slopes, gait, settled_samples, walk
-from postprocess.report import describe_result
-from postprocess.result import RESULT_NAME, current_result, walkers_met
-from postprocess.steady import steady_walkers
-from postprocess.tables import TABLES, WALKER_TABLES
-from postprocess.trajectory import Trajectory
-from runner.files import write_json
+from walkers.inputs import load_case
+from walkers.postprocess import read_result, read_table, read_trajectory
+from walkers.postprocess.gait import distance_walked, fit_slopes, gait, settled_samples, walk
+from walkers.postprocess.report import describe_result
+from walkers.postprocess.result import RESULT_NAME, current_result, walkers_met
+from walkers.postprocess.steady import steady_walkers
+from walkers.postprocess.tables import TABLES, WALKER_TABLES
+from walkers.postprocess.trajectory import Trajectory
+from walkers.runner.files import write_json
 
 
 @pytest.fixture(scope="module")

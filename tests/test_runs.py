@@ -12,10 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from inputs import InputError
-from runner import find_engine, finished_run, open_run, run_name
-from runner.failures import RunBusy
-from templates import render_deck
 from tests.conftest import (
     PROGRAM,
     SHORT,
@@ -28,6 +24,10 @@ from tests.conftest import (
     wait_for_engines,
 )
 from walkers import find_run, run_case
+from walkers.inputs import InputError
+from walkers.runner import find_engine, finished_run, open_run, run_name
+from walkers.runner.failures import RunBusy
+from walkers.templates import render_deck
 
 
 def _name(**changes: object) -> str:
@@ -152,7 +152,7 @@ def test_two_at_once_do_not_share_a_directory(tmp_path: Path) -> None:
 def test_an_engine_that_outlives_its_launcher_keeps_others_away(
     in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("runner.locks._PATIENCE_SECONDS", 1.0)  # of ten: this engine does not end by itself
+    monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 1.0)  # of ten: this engine does not end by itself
     long = {"cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
     (in_folder / "test.toml").write_text(to_toml(document(run=long)))
     # The kernel ends an engine whose launcher dies, but not the engine's own children.
@@ -209,7 +209,7 @@ def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, mo
     case = make_case(run=SHORT)
     stamp = run_case(case, tmp_path).run.manifest["finished"]
     answers = iter([None])
-    monkeypatch.setattr("runner.directory.finished_run", lambda place: next(answers, finished_run(place)))
+    monkeypatch.setattr("walkers.runner.directory.finished_run", lambda place: next(answers, finished_run(place)))
     outcome = run_case(case, tmp_path)
     assert outcome.found
     assert outcome.run.manifest["finished"] == stamp

@@ -9,11 +9,11 @@ from pathlib import Path
 import psutil
 import pytest
 
-from inputs import InputError
-from sweeps.site import load_site, pilots
-from sweeps.table import load
 from tests.conftest import PATIENCE, PROGRAM, document, engines_in, to_toml, wait_for, wait_for_engines
 from tests.test_sweeps import SLOW, TINY, contents_of
+from walkers.inputs import InputError
+from walkers.sweeps.site import load_site, pilots
+from walkers.sweeps.table import load
 
 SLURM = 'scheduler = "slurm"\ncores = 16\n'
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from sweeps.table import load
 from tests.cluster import slurm_cluster, why_not
 from tests.conftest import PATIENCE, PROGRAM, call, document, to_toml, wait_for
 from tests.test_sweeps import contents_of
+from walkers.sweeps.table import load
 
 SITE = """
 scheduler = "slurm"

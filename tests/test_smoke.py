@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from postprocess import read_result, read_table
-from runner import finished_run
 from tests.conftest import SHORT
+from walkers.postprocess import read_result, read_table
+from walkers.runner import finished_run
 
 pytestmark = pytest.mark.smoke
 

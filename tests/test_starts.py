@@ -8,11 +8,11 @@ from pathlib import Path
 import psutil
 import pytest
 
-from runner.failures import EngineNeverStarted
-from templates.engine import ALONE
 from tests.benchmark_starts import failed_starts
 from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml, wait_for
 from walkers import run_case
+from walkers.runner.failures import EngineNeverStarted
+from walkers.templates.engine import ALONE
 
 LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
 

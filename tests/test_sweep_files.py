@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from inputs import InputError
-from inputs.case import WalkerCase
-from inputs.dimer import dimer_of
-from inputs.sweep import Sweep, expand, load_sweep, shipped_sweeps
 from tests.conftest import call, document, to_toml
+from walkers.inputs import InputError
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import dimer_of
+from walkers.inputs.sweep import Sweep, expand, load_sweep, shipped_sweeps
 
 Make = Callable[..., Sweep]
 
@@ -215,7 +215,7 @@ def test_bad_sweeps_end_with_status_2_and_leave_nothing(tmp_path: Path) -> None:
 
 
 def test_a_case_by_mean_radius_and_asymmetry() -> None:
-    from inputs import resolve_case
+    from walkers.inputs import resolve_case
 
     tables = document()
     tables["beads"] = {"mean_radius": "0.25 mm", "sin_delta": 0.2, "material": "ruby"}

@@ -20,17 +20,6 @@ import pyarrow.parquet as pq
 import pytest
 
 import walkers
-from inputs.dimer import dimer_of
-from inputs.sweep import load_sweep
-from postprocess import read_table, read_trajectory
-from runner import find_engine, finished_run
-from runner.ensemble import finished_place
-from runner.failures import WalkersMet
-from sweeps.conduct import Options
-from sweeps.run import run_sweep
-from sweeps.table import load, thresholds
-from sweeps.together import make_together
-from sweeps.worker import Task, work
 from tests.conftest import (
     PATIENCE,
     PROGRAM,
@@ -43,6 +32,17 @@ from tests.conftest import (
     wait_for,
     wait_for_engines,
 )
+from walkers.inputs.dimer import dimer_of
+from walkers.inputs.sweep import load_sweep
+from walkers.postprocess import read_table, read_trajectory
+from walkers.runner import find_engine, finished_run
+from walkers.runner.ensemble import finished_place
+from walkers.runner.failures import WalkersMet
+from walkers.sweeps.conduct import Options
+from walkers.sweeps.run import run_sweep
+from walkers.sweeps.table import load, thresholds
+from walkers.sweeps.together import make_together
+from walkers.sweeps.worker import Task, work
 
 TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
 # Long enough for whoever is to be stopped meanwhile, however fast or busy the machine.
@@ -145,7 +145,7 @@ def test_a_run_of_a_shared_deck_is_an_ordinary_one(sweep_file: Callable[..., str
 
 def test_walkers_that_meet_are_taken_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """They have room for more than they walk; so what counts as near is made larger than all of it."""
-    monkeypatch.setattr("postprocess.parting.NEAR", 1e3)
+    monkeypatch.setattr("walkers.postprocess.parting.NEAR", 1e3)
     with pytest.raises(WalkersMet):
         make_together([make_case(run=TINY, start={"seed": seed}) for seed in (1, 2)], tmp_path, find_engine())
     assert not list(tmp_path.glob("ensembles/*"))

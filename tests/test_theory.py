@@ -12,19 +12,19 @@ import pytest
 import sympy
 from sympy.polys.fields import field
 
-from inputs import load_case
-from inputs.case import WalkerCase
-from physics.dimer import Dimer
-from postprocess.result import read_result
-from sweeps.conduct import Options
-from sweeps.run import run_sweep
-from sweeps.table import thresholds
 from tests.conftest import PROGRAM, call, document, make_case, to_toml
-from theory.friction import Friction
-from theory.mathieu import alignment, is_stable, largest_stable_v
-from theory.motion import Walker, walk
-from theory.prediction import motion_of, threshold
-from theory.quasistatic import detachment, mean_velocity, mean_velocity_closed_form
+from walkers.inputs import load_case
+from walkers.inputs.case import WalkerCase
+from walkers.physics.dimer import Dimer
+from walkers.postprocess.result import read_result
+from walkers.sweeps.conduct import Options
+from walkers.sweeps.run import run_sweep
+from walkers.sweeps.table import thresholds
+from walkers.theory.friction import Friction
+from walkers.theory.mathieu import alignment, is_stable, largest_stable_v
+from walkers.theory.motion import Walker, walk
+from walkers.theory.prediction import motion_of, threshold
+from walkers.theory.quasistatic import detachment, mean_velocity, mean_velocity_closed_form
 
 RUBY = Dimer((0.3e-3, 0.2e-3), 4000.0, 19.2e-3)
 
@@ -194,7 +194,7 @@ def test_the_threshold_of_coulomb_friction_does_not_depend_on_the_frequency(fric
 @pytest.mark.parametrize("friction", [0.05, 0.1, 0.3])
 def test_theory_and_engine_agree_on_the_threshold(tmp_path: Path, friction: float) -> None:
     """The engine's walkers are lowered in steps of a tenth of the predicted threshold."""
-    from inputs.sweep import expand
+    from walkers.inputs.sweep import expand
 
     tables = document(contact={"friction": {"bead_bead": friction, "bead_wall": friction}})
     tables["run"] = {"cycles": 20, "settling_cycles": 10}

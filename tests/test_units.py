@@ -2,8 +2,8 @@
 
 import pytest
 
-from inputs import library, units
-from inputs.units import parse_quantity
+from walkers.inputs import library, units
+from walkers.inputs.units import parse_quantity
 
 
 @pytest.mark.parametrize(

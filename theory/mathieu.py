@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import mathieu_a, mathieu_b
 
-from physics.dimer import Dimer
+from walkers.physics.dimer import Dimer
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -16,12 +16,12 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from inputs.case import WalkerCase
-from inputs.dimer import contact_loads, dimer_of
-from physics.dimer import Dimer
-from physics.film import film_drag
-from theory.friction import Friction
-from theory.quasistatic import forces_at_rest, inertia_matrix, normal_force_matrix, translation
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import contact_loads, dimer_of
+from walkers.physics.dimer import Dimer
+from walkers.physics.film import film_drag
+from walkers.theory.friction import Friction
+from walkers.theory.quasistatic import forces_at_rest, inertia_matrix, normal_force_matrix, translation
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -154,7 +154,7 @@ def walk(
     drive = np.stack(np.broadcast_arrays(*(np.asarray(one, np.float64).reshape(-1) for one in given))[:3], axis=-1)
     count = len(drive)
     walkers, law = _rows_of(walker, count), _law_of(friction, walker, count)
-    from theory.stepping import integrate
+    from walkers.theory.stepping import integrate
 
     mean, least, repeated, solved, series = integrate(walkers, law, drive, cycles, steps_per_cycle)
     velocity = translation(mean)

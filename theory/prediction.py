@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from inputs.case import WalkerCase
-from inputs.dimer import dimer_of
-from physics.lubrication import tangential_drag, tangential_drag_at_wall
-from theory.friction import Friction
-from theory.mathieu import alignment, largest_stable_v
-from theory.motion import FloatArray, Motion, Walker, walk
-from theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, detachment, mean_velocity
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import dimer_of
+from walkers.physics.lubrication import tangential_drag, tangential_drag_at_wall
+from walkers.theory.friction import Friction
+from walkers.theory.mathieu import alignment, largest_stable_v
+from walkers.theory.motion import FloatArray, Motion, Walker, walk
+from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, detachment, mean_velocity
 
 MOVING = 1e-6
 """A walker faster than this, m/s, moves."""

@@ -1,8 +1,9 @@
-"""Wet granular walkers, simulated with LIGGGHTS: the front door to the four rooms of the project.
+"""Wet granular walkers, simulated with LIGGGHTS: the one public name of the project.
 
-`run_case` takes a case from file to result as ``walkers run`` does, `load` gives the table of a sweep. The rooms are
-`inputs` (cases), `templates` (decks), `runner` (run directories) and `postprocess` (what runs mean), and `sweeps` (many
-cases at once) stands on them; each can be used by itself.
+`load_case` reads a case, `run_case` takes it to its result as ``walkers run`` does, `find_run` finds a finished run,
+`load` gives the table of a sweep. The folders of the project are packages below: `walkers.physics` (the laws),
+`walkers.inputs` (cases), `walkers.templates` (decks), `walkers.runner` (run directories), `walkers.postprocess` (what
+runs mean), and on them `walkers.sweeps`, `walkers.audit`, `walkers.theory`, `walkers.paper`, `walkers.calibration`.
 """
 
 from __future__ import annotations
@@ -15,11 +16,24 @@ from walkers.pipeline import Outcome, find_run, run_case
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Outcome", "find_run", "load", "run_case"]
+    from walkers.inputs.reading import AnyCase
+
+__all__ = ["Outcome", "find_run", "load", "load_case", "run_case"]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def load_case(case: str | Path) -> AnyCase:
+    """Read and resolve a case, of walkers or of a pile; see `walkers.inputs.reading.load_any`."""
+    from walkers.inputs.reading import load_any
+
+    return load_any(case)
 
 
 def load(directory: str | Path) -> pd.DataFrame:
-    """The table of a sweep, a row a point; see `sweeps.table.load`."""
-    from sweeps.table import load
+    """The table of a sweep, one row per point; see `walkers.sweeps.table.load`."""
+    from walkers.sweeps.table import load
 
     return load(directory)

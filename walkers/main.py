@@ -127,7 +127,7 @@ def _status(arguments: list[str] | None) -> int:
 
 def _told(stop: BaseException) -> int:
     """Tell why the program stopped; the exit status of that."""
-    from inputs.errors import InputError, WalkersError
+    from walkers.inputs.errors import InputError, WalkersError
 
     known = ((InputError, 2), (WalkersError, 1), (KeyboardInterrupt, INTERRUPTED), (typer.Abort, INTERRUPTED))
     status = stop.status if isinstance(stop, _Terminated) else next((s for k, s in known if isinstance(stop, k)), None)

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.errors import InputError, Problem, WalkersError
 
 if TYPE_CHECKING:
-    from inputs.case import WalkerCase
-    from inputs.pile import PileCase
-    from inputs.reading import AnyCase
-    from runner.binary import Engine
-    from runner.directory import FinishedRun
+    from walkers.inputs.case import WalkerCase
+    from walkers.inputs.pile import PileCase
+    from walkers.inputs.reading import AnyCase
+    from walkers.runner.binary import Engine
+    from walkers.runner.directory import FinishedRun
 
 DEFAULT_OUT = Path("runs")
 
@@ -69,8 +69,8 @@ def run_case(
     runner.EngineFailure
         If the engine fails in one of the known ways.
     """
-    from inputs.pile import PileCase
-    from runner.binary import find_engine
+    from walkers.inputs.pile import PileCase
+    from walkers.runner.binary import find_engine
 
     options = {"force": force, "on_progress": on_progress, "time_limit": time_limit}
     if isinstance(case, PileCase):
@@ -79,10 +79,10 @@ def run_case(
 
 
 def _run_walkers(case: WalkerCase, out: Path, engine: Engine, despite_audit: bool, options: dict[str, Any]) -> Outcome:
-    from runner.directory import finished_run, run_place, unfinished
-    from runner.ensemble import finished_place
-    from runner.failures import RunBusy
-    from sweeps.together import check_audit, make_together
+    from walkers.runner.directory import finished_run, run_place, unfinished
+    from walkers.runner.ensemble import finished_place
+    from walkers.runner.failures import RunBusy
+    from walkers.sweeps.together import check_audit, make_together
 
     place = run_place(case, engine, out)
     there = finished_place(out, place.name)
@@ -100,10 +100,10 @@ def _run_walkers(case: WalkerCase, out: Path, engine: Engine, despite_audit: boo
 
 
 def _run_pile(case: PileCase, out: Path, engine: Engine, despite_audit: bool, options: dict[str, Any]) -> Outcome:
-    from postprocess.pile_result import current_pile_result
-    from runner.directory import finished_run, run_place
-    from runner.parts import run_pile
-    from sweeps.together import check_audit
+    from walkers.postprocess.pile_result import current_pile_result
+    from walkers.runner.directory import finished_run, run_place
+    from walkers.runner.parts import run_pile
+    from walkers.sweeps.together import check_audit
 
     if options["force"] or finished_run(run_place(case, engine, out)) is None:
         check_audit(engine, despite_audit)
@@ -114,11 +114,11 @@ def _run_pile(case: PileCase, out: Path, engine: Engine, despite_audit: bool, op
 def _load_postprocess() -> None:
     import pyarrow.parquet  # noqa: F401
 
-    import postprocess.result  # noqa: F401
+    import walkers.postprocess.result  # noqa: F401
 
 
 def _result_of(run: FinishedRun) -> dict[str, Any]:
-    from postprocess.result import current_result
+    from walkers.postprocess.result import current_result
 
     return current_result(run.directory)
 
@@ -140,8 +140,8 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
     runner.EngineFailure
         If a case is given and there is no engine to look it up for.
     """
-    from runner.directory import finished_run
-    from runner.parts import is_pile
+    from walkers.runner.directory import finished_run
+    from walkers.runner.parts import is_pile
 
     path = Path(run)
     if path.is_dir():
@@ -159,10 +159,10 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
 
 
 def _place_of(case: Path, out: Path) -> Path | None:
-    from inputs.reading import load_any
-    from runner.binary import find_engine
-    from runner.directory import run_place
-    from runner.ensemble import finished_place
+    from walkers.inputs.reading import load_any
+    from walkers.runner.binary import find_engine
+    from walkers.runner.directory import run_place
+    from walkers.runner.ensemble import finished_place
 
     return finished_place(out, run_place(load_any(case), find_engine(), out).name)
 
@@ -170,17 +170,17 @@ def _place_of(case: Path, out: Path) -> Path | None:
 def described(directory: Path, result: dict[str, Any], *, found: bool = False) -> str:
     """A result as text, whatever it is of."""
     if result.get("kind") == "pile":
-        from postprocess.pile_result import describe_pile
+        from walkers.postprocess.pile_result import describe_pile
 
         return describe_pile(directory, result, found=found)
-    from postprocess.report import describe_result
+    from walkers.postprocess.report import describe_result
 
     return describe_result(directory, result, found=found)
 
 
 def _readable_pile(run: FinishedRun) -> FinishedRun:
     """A pile's run, if its description can be read; its tables are made anew if need be."""
-    from postprocess.pile_result import current_pile_result
+    from walkers.postprocess.pile_result import current_pile_result
 
     try:
         current_pile_result(run.directory)

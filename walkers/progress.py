@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from inputs.case import WalkerCase
-    from inputs.pile import PileCase
-    from inputs.reading import AnyCase
-    from runner.launch import Progress
-    from runner.parts import PileProgress
-    from sweeps.conduct import Progress as SweepProgress
+    from walkers.inputs.case import WalkerCase
+    from walkers.inputs.pile import PileCase
+    from walkers.inputs.reading import AnyCase
+    from walkers.runner.launch import Progress
+    from walkers.runner.parts import PileProgress
+    from walkers.sweeps.conduct import Progress as SweepProgress
 
 _FIRST_LINE_SECONDS = 1.0
 _LONGEST_SILENCE_SECONDS = 60.0
@@ -22,7 +22,7 @@ _LONGEST_SILENCE_SECONDS = 60.0
 @contextmanager
 def progress_of(case: AnyCase) -> Iterator[Callable[[Any], None]]:
     """Yield a function that shows how far a run of a case is."""
-    from inputs.pile import PileCase
+    from walkers.inputs.pile import PileCase
 
     if isinstance(case, PileCase):
         with _progress_of_pile(case) as advance:

@@ -7,21 +7,21 @@ from math import cos, degrees, pi, radians, sqrt
 
 import numpy as np
 
-from audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
-from audit.check import Check, Line
-from audit.laws import Partner, bridge_law, capillary_law, hertz_law, largest_error
-from inputs.case import WalkerCase
-from physics.capillary import (
+from walkers.audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
+from walkers.audit.check import Check, Line
+from walkers.audit.laws import Partner, bridge_law, capillary_law, hertz_law, largest_error
+from walkers.inputs.case import WalkerCase
+from walkers.physics.capillary import (
     bridge_volume_at_wall,
     bridge_volume_between_beads,
     capillary_force,
     capillary_force_at_wall,
     rupture_distance,
 )
-from postprocess.dump import FloatArray
-from templates.deck import Plan
-from templates.engine import Remedies
-from templates.scene import Bead
+from walkers.postprocess.dump import FloatArray
+from walkers.templates.deck import Plan
+from walkers.templates.engine import Remedies
+from walkers.templates.scene import Bead
 
 _SPEED = 0.02
 _OVERLAP = 2e-7

@@ -8,15 +8,15 @@ from math import exp, pi, sqrt
 
 import numpy as np
 
-from audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
-from audit.check import Check, Line
-from audit.laws import Partner, hertz_law, largest_error
-from inputs.case import WalkerCase
-from inputs.dimer import contact_loads
-from physics.contact import damping_ratio, reduced_shear_modulus
-from templates.deck import Plan
-from templates.engine import Remedies
-from templates.scene import Bead
+from walkers.audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
+from walkers.audit.check import Check, Line
+from walkers.audit.laws import Partner, hertz_law, largest_error
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import contact_loads
+from walkers.physics.contact import damping_ratio, reduced_shear_modulus
+from walkers.templates.deck import Plan
+from walkers.templates.engine import Remedies
+from walkers.templates.scene import Bead
 
 _WALL = frozenset({"walls"})
 _HERTZ = "4/3 E* √R* δ^(3/2)"

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from audit.bench import FIRST_BEAD, Bench, bench_case, changed_case
-from audit.check import Check, Line
-from inputs.case import WalkerCase
-from inputs.dimer import dimer_of
-from physics.film import film_drag
-from postprocess.gait import walk
-from postprocess.trajectory import prescribed_motion, read_trajectory
-from runner.directory import CASE_NAME
-from runner.files import write_json
-from templates.deck import walker_plan
+from walkers.audit.bench import FIRST_BEAD, Bench, bench_case, changed_case
+from walkers.audit.check import Check, Line
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import dimer_of
+from walkers.physics.film import film_drag
+from walkers.postprocess.gait import walk
+from walkers.postprocess.trajectory import prescribed_motion, read_trajectory
+from walkers.runner.directory import CASE_NAME
+from walkers.runner.files import write_json
+from walkers.templates.deck import walker_plan
 
 _SINE = "A sin ωt, A = a0/ω²"
 

@@ -15,16 +15,16 @@ from math import sqrt
 
 import numpy as np
 
-from audit.bench import Bench
-from audit.check import Check, Line
-from audit.checks.drive import reference_walker
-from audit.laws import Partner, lubrication_drags
-from inputs.case import WalkerCase
-from inputs.dimer import dimer_of
-from physics.contact import damping_ratio, reduced_modulus, reduced_shear_modulus
-from postprocess.dump import FloatArray
-from postprocess.trajectory import prescribed_motion
-from templates.deck import walker_plan
+from walkers.audit.bench import Bench
+from walkers.audit.check import Check, Line
+from walkers.audit.checks.drive import reference_walker
+from walkers.audit.laws import Partner, lubrication_drags
+from walkers.inputs.case import WalkerCase
+from walkers.inputs.dimer import dimer_of
+from walkers.physics.contact import damping_ratio, reduced_modulus, reduced_shear_modulus
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.trajectory import prescribed_motion
+from walkers.templates.deck import walker_plan
 
 _CYCLES = 14
 _LEAD = 2

@@ -9,13 +9,13 @@ from math import nan
 
 import numpy as np
 
-from audit.bench import FIRST_BEAD, Bench
-from audit.check import Check, Line, Verdict
-from audit.checks.drive import reference_walker
-from audit.checks.viscous import box_errors, box_lines, run_box, viscous_case
-from audit.laws import largest_error
-from inputs.case import WalkerCase
-from templates.deck import Checkpoint, walker_plan
+from walkers.audit.bench import FIRST_BEAD, Bench
+from walkers.audit.check import Check, Line, Verdict
+from walkers.audit.checks.drive import reference_walker
+from walkers.audit.checks.viscous import box_errors, box_lines, run_box, viscous_case
+from walkers.audit.laws import largest_error
+from walkers.inputs.case import WalkerCase
+from walkers.templates.deck import Checkpoint, walker_plan
 
 _RESTART_FILE = "half.restart"
 

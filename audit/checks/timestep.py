@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from audit.bench import Bench, bench_case, bench_recording
-from audit.check import Check, Line
-from audit.checks.drive import reference_walker, walking_speed
-from inputs.case import WalkerCase
-from templates.deck import Plan
-from templates.scene import Bead, Face, Scene
+from walkers.audit.bench import Bench, bench_case, bench_recording
+from walkers.audit.check import Check, Line
+from walkers.audit.checks.drive import reference_walker, walking_speed
+from walkers.inputs.case import WalkerCase
+from walkers.templates.deck import Plan
+from walkers.templates.scene import Bead, Face, Scene
 
 _SIDE = 5.3e-3
 _LARGE, _SMALL = 5.45e-4, 3.075e-4
@@ -73,7 +73,7 @@ def pile_scene() -> Scene:
 
 def agitation(bench: Bench, time_step: float) -> float:
     """Mean square velocity of the pile's beads over the last cycles, m²/s²; infinite if beads were lost."""
-    from inputs.errors import WalkersError
+    from walkers.inputs.errors import WalkersError
 
     case, scene = pile_case(time_step), pile_scene()
     period = 1.0 / case.drive.frequency

@@ -7,16 +7,16 @@ from itertools import product
 
 import numpy as np
 
-from audit.bench import Bench, Measured, bench_case, bench_recording, scene_on_floor
-from audit.check import Check, Line
-from audit.laws import Partner, bridge_law, frame_by_frame_error
-from inputs.case import WalkerCase
-from physics.capillary import bridge_volume_at_wall, rupture_distance
-from postprocess.dump import FloatArray
-from postprocess.trajectory import prescribed_motion
-from templates.deck import Plan
-from templates.engine import ALL_REMEDIES, Remedies
-from templates.scene import AXES, Bead, Face, Point, Scene, vector_along
+from walkers.audit.bench import Bench, Measured, bench_case, bench_recording, scene_on_floor
+from walkers.audit.check import Check, Line
+from walkers.audit.laws import Partner, bridge_law, frame_by_frame_error
+from walkers.inputs.case import WalkerCase
+from walkers.physics.capillary import bridge_volume_at_wall, rupture_distance
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.trajectory import prescribed_motion
+from walkers.templates.deck import Plan
+from walkers.templates.engine import ALL_REMEDIES, Remedies
+from walkers.templates.scene import AXES, Bead, Face, Point, Scene, vector_along
 
 HALF = 3e-3
 """Half of the box's inner side, m."""

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from inputs.reading import load_any, shipped_cases
 from walkers import run_case
+from walkers.inputs.reading import load_any, shipped_cases
 
 LEFT_OUT = ("pile-small", "pile-fig1a")  # minutes
 OUT = Path("runs/compare")

@@ -17,7 +17,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON, SI units.")]
 
 def refuse(option: str, wrong: bool, told: str) -> None:
     """Refuse an option if something is wrong with it, and tell what."""
-    from inputs.errors import InputError, Problem
+    from walkers.inputs.errors import InputError, Problem
 
     if wrong:
         raise InputError(option, [Problem("", None, told)])

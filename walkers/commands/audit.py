@@ -26,12 +26,12 @@ def command(
     engine: EngineName = None,
 ) -> int:
     """Measure the engine's forces and our remedies against published formulas; exit status 1 if a line fails."""
-    from audit.run import CheckedLines, record, run_audit, selected
-    from audit.table import as_dict, as_markdown, as_text
-    from inputs.errors import InputError, Problem
-    from runner.binary import find_engine
-    from runner.failures import EngineMissing
-    from runner.files import write_text
+    from walkers.audit.run import CheckedLines, record, run_audit, selected
+    from walkers.audit.table import as_dict, as_markdown, as_text
+    from walkers.inputs.errors import InputError, Problem
+    from walkers.runner.binary import find_engine
+    from walkers.runner.failures import EngineMissing
+    from walkers.runner.files import write_text
 
     def tell(checked: CheckedLines) -> None:
         print(f"walkers: {checked.check.name} ({checked.seconds:.1f} s)", file=sys.stderr, flush=True)

@@ -27,13 +27,13 @@ def command(
     despite_audit: DespiteAudit = False,
 ) -> int:
     """Calibrate, or go on with it: waves of runs, emulators, posterior, predictions by the engine."""
-    from calibration.calibrate import calibrate
-    from calibration.figures import draw
-    from calibration.report import rows_of, write_tables
-    from inputs.calibration import load_calibration
-    from sweeps.conduct import Options
-    from sweeps.site import cores_here
+    from walkers.calibration.calibrate import calibrate
+    from walkers.calibration.figures import draw
+    from walkers.calibration.report import rows_of, write_tables
+    from walkers.inputs.calibration import load_calibration
     from walkers.progress import progress_of_sweep
+    from walkers.sweeps.conduct import Options
+    from walkers.sweeps.site import cores_here
 
     read = load_calibration(calibration)
     check_out(out)

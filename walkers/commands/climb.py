@@ -21,7 +21,7 @@ def command(
     directory: Directory, within: Within = None, thresholds: Sensitivity = False, as_json: Json = False
 ) -> None:
     """Print how often piles climbed, how soon, how fast, and led by whom."""
-    from sweeps.climbing import describe_climbs, describe_sensitivity, piles_in, sensitivity, summarise_climbs
+    from walkers.sweeps.climbing import describe_climbs, describe_sensitivity, piles_in, sensitivity, summarise_climbs
 
     groups = piles_in(directory)
     if thresholds:

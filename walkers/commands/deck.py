@@ -16,18 +16,18 @@ Folder = Annotated[
 
 def command(case: Case, to: Folder = None) -> None:
     """Print the LIGGGHTS deck of a case (of a pile, that in which it settles), or write it with its files."""
-    from inputs.errors import InputError, Problem
-    from inputs.pile import PileCase
-    from inputs.reading import load_any
-    from templates.deck import DECK_NAME, render_deck
-    from templates.pile import render_first_part
+    from walkers.inputs.errors import InputError, Problem
+    from walkers.inputs.pile import PileCase
+    from walkers.inputs.reading import load_any
+    from walkers.templates.deck import DECK_NAME, render_deck
+    from walkers.templates.pile import render_first_part
 
     loaded = load_any(case)
     deck = render_first_part(loaded) if isinstance(loaded, PileCase) else render_deck(loaded)
     if to is None:
         print(deck.text, end="")
         return
-    from runner.directory import write_deck
+    from walkers.runner.directory import write_deck
 
     try:
         to.mkdir(parents=True)

@@ -25,10 +25,10 @@ def command(
     despite_audit: DespiteAudit = False,
 ) -> int:
     """Draw the paper's figures with engine, theory and published values; runs that are missing are made first."""
-    from paper.make import make_figures
-    from sweeps.conduct import Options
-    from sweeps.site import cores_here
+    from walkers.paper.make import make_figures
     from walkers.progress import progress_of_sweep
+    from walkers.sweeps.conduct import Options
+    from walkers.sweeps.site import cores_here
 
     made = make_figures(
         out,

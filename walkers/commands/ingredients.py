@@ -15,7 +15,7 @@ Generations = Annotated[int, typer.Option("--generations", min=1, help="Of each 
 
 def command(to: To = Path("figures"), generations: Generations = 120) -> int:
     """Fit the theory to the published numbers with one ingredient after the other; no engine is needed."""
-    from paper.ingredients import try_ingredients, write_ingredients
+    from walkers.paper.ingredients import try_ingredients, write_ingredients
 
     check_folder("--to", to)
     fits = try_ingredients(generations=generations)

@@ -36,10 +36,10 @@ def command(
     slower: Slower = None,
 ) -> None:
     """Render a walker or a pile at several times, or film a pile (off-screen, no X server)."""
-    from postprocess.pile_pictures import render_film, render_series, seconds_apart
-    from postprocess.rendering import render_run
-    from runner.parts import is_pile
     from walkers.pipeline import find_run
+    from walkers.postprocess.pile_pictures import render_film, render_series, seconds_apart
+    from walkers.postprocess.rendering import render_run
+    from walkers.runner.parts import is_pile
 
     found = find_run(run, out)
     pile = is_pile(found.directory)

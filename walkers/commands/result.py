@@ -10,8 +10,8 @@ from walkers.pipeline import DEFAULT_OUT
 
 def command(run: Run, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
     """Print the result of a finished run."""
-    from postprocess.result import read_result
     from walkers.pipeline import described, find_run
+    from walkers.postprocess.result import read_result
 
     directory = find_run(run, out).directory
     result = read_result(directory)

@@ -28,10 +28,10 @@ def command(
     despite_audit: DespiteAudit = False,
 ) -> int:
     """Run cases, unless they have been run, and print their results (with --json an object a line)."""
-    from inputs.reading import load_any
-    from runner.failures import EngineFailure
+    from walkers.inputs.reading import load_any
     from walkers.pipeline import described, run_case
     from walkers.progress import progress_of
+    from walkers.runner.failures import EngineFailure
 
     loaded = [load_any(case) for case in cases]  # a mistake in the last file shows before the first run starts
     check_out(out)

@@ -9,10 +9,10 @@ from walkers.commands.arguments import Case, Json
 
 def command(case: Case, as_json: Json = False) -> None:
     """Show a case in SI units with its forces, its time step and its cost."""
-    from inputs.pile import PileCase
-    from inputs.reading import load_any
-    from runner.pile_summary import describe_pile_case, summarise_pile
-    from runner.summary import describe, summarise
+    from walkers.inputs.pile import PileCase
+    from walkers.inputs.reading import load_any
+    from walkers.runner.pile_summary import describe_pile_case, summarise_pile
+    from walkers.runner.summary import describe, summarise
 
     loaded = load_any(case)
     if isinstance(loaded, PileCase):

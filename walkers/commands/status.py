@@ -12,6 +12,6 @@ Directory = Annotated[Path, typer.Argument(metavar="DIR", help="A sweep's direct
 
 def command(directory: Directory) -> None:
     """Say how many points of a sweep are finished, failed, running and missing, and why they failed."""
-    from sweeps.summary import describe_status, sweeps_in
+    from walkers.sweeps.summary import describe_status, sweeps_in
 
     print("\n".join(describe_status(one) for one in sweeps_in(directory)))

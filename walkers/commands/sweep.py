@@ -32,12 +32,12 @@ def command(
     despite_audit: DespiteAudit = False,
 ) -> int:
     """Run the points of a sweep that are missing, on all cores or on a cluster; exit status 1 if any failed."""
-    from inputs.sweep import load_sweep
-    from sweeps.conduct import Options
-    from sweeps.run import plan_sweep, run_sweep
-    from sweeps.site import cores_here, load_site
-    from sweeps.summary import describe_status
+    from walkers.inputs.sweep import load_sweep
     from walkers.progress import progress_of_sweep
+    from walkers.sweeps.conduct import Options
+    from walkers.sweeps.run import plan_sweep, run_sweep
+    from walkers.sweeps.site import cores_here, load_site
+    from walkers.sweeps.summary import describe_status
 
     loaded = load_sweep(sweep)
     check_out(out)

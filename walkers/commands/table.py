@@ -27,8 +27,8 @@ def command(
     thresholds: Thresholds = False,
 ) -> None:
     """Print the table of a sweep, a row a point: what varied, what follows, what came out, where the run is."""
-    from sweeps.table import encoded, load, short_text, write_table_file
-    from sweeps.table import thresholds as thresholds_of
+    from walkers.sweeps.table import encoded, load, short_text, write_table_file
+    from walkers.sweeps.table import thresholds as thresholds_of
 
     frame = thresholds_of(directory) if thresholds else load(directory)
     forms = [name for name, wanted in (("csv", csv), ("parquet", parquet), ("json", json)) if wanted]

@@ -12,12 +12,12 @@ from walkers.pipeline import DEFAULT_OUT
 
 def command(case: Case, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
     """Print what the paper's model and its extensions predict, beside the engine's result if the case was run."""
-    from inputs.errors import InputError, Problem
-    from inputs.reading import load_case
-    from postprocess.result import current_result
-    from runner.failures import EngineMissing
-    from theory.prediction import describe, predict
+    from walkers.inputs.errors import InputError, Problem
+    from walkers.inputs.reading import load_case
     from walkers.pipeline import find_run
+    from walkers.postprocess.result import current_result
+    from walkers.runner.failures import EngineMissing
+    from walkers.theory.prediction import describe, predict
 
     try:
         prediction = predict(load_case(case))

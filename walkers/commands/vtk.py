@@ -29,10 +29,10 @@ def command(
     every: Every = 1,
 ) -> None:
     """Write beads, bridges and substrate as .vtp with a .pvd in seconds."""
-    from postprocess.paraview import write_vtk
-    from postprocess.pile_paraview import write_pile_vtk
-    from runner.parts import is_pile
     from walkers.pipeline import find_run
+    from walkers.postprocess.paraview import write_vtk
+    from walkers.postprocess.pile_paraview import write_pile_vtk
+    from walkers.runner.parts import is_pile
 
     directory = find_run(run, out).directory
     pile = is_pile(directory)
