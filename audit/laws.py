@@ -42,7 +42,7 @@ class Partner:
 
 
 def capillary_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
-    """Attraction at each gap, N (`physics.capillary`); zero past rupture."""
+    """Attraction at each gap, N (`walkers.physics.capillary`); zero past rupture."""
     liquid = case.liquid
     tension, angle = liquid.surface_tension, liquid.contact_angle
     if partner.wall:
@@ -55,7 +55,7 @@ def capillary_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatA
 
 
 def hertz_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
-    """Repulsion, N (`physics.contact`)."""
+    """Repulsion, N (`walkers.physics.contact`)."""
     modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     if partner.wall:
         return np.array([hertz_repulsion_at_wall(-float(h), radius, modulus) for h in gap])
@@ -63,7 +63,7 @@ def hertz_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray
 
 
 def lubrication_drags(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
-    """Coefficients of the normal and the tangential viscous force (`physics.lubrication`), N s/m, shape (2, F)."""
+    """Normal and tangential coefficients of the viscous force (`walkers.physics.lubrication`), N s/m, (2, F)."""
     size = partner.reduced_radius(radius)
     laws = (normal_drag_at_wall, tangential_drag_at_wall) if partner.wall else (normal_drag, tangential_drag)
     viscosity, nearest = case.liquid.dynamic_viscosity, case.contact.minimum_separation_ratio

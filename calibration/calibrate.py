@@ -134,14 +134,14 @@ def calibrate(
     Parameters
     ----------
     calibration
-        From `inputs.calibration.load_calibration`.
+        From `walkers.inputs.calibration.load_calibration`.
     out
         Folder of the run directories; each wave is a sweep there, and the designs are kept in a folder of the
         calibration's name.
     options, engine, despite_audit
-        As for `sweeps.run.run_sweep`.
+        As for `walkers.sweeps.run.run_sweep`.
     progress_of
-        As for `paper.sources.make_sources`.
+        As for `walkers.paper.sources.make_sources`.
 
     Returns
     -------

@@ -68,7 +68,7 @@ def log_likelihood(mean: FloatArray, deviation: FloatArray, variance: FloatArray
     Parameters
     ----------
     mean, deviation
-        Of the transformed residual (`calibration.emulator.transformed`).
+        Of the transformed residual (`walkers.calibration.emulator.transformed`).
     variance
         Of the residual: 1, and the square of the discrepancy.
     """

@@ -96,15 +96,15 @@ def wave_sweep(
 def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
     """What a wave's table says of each observation, shape (P, K).
 
-    Speeds are means over the walkers that are some until the end (`postprocess.steady.steady_walkers`). Where there is
-    none, or the run failed, nothing was observed: NaN.
+    Speeds are means over the walkers that are some until the end (`walkers.postprocess.steady.steady_walkers`). Where
+    there is none, or the run failed, nothing was observed: NaN.
 
     Parameters
     ----------
     calibration
         What is calibrated.
     table
-        Of a wave's sweep (`sweeps.table.load`).
+        Of a wave's sweep (`walkers.sweeps.table.load`).
     """
     labels = list(calibration.experiments)
     seen = seen_in(calibration, table, {observation.quantity for observation in calibration.observations})
@@ -168,7 +168,7 @@ def run_wave(  # noqa: PLR0913
     name
         Of the sweep.
     out, options, engine, despite_audit, on_progress
-        As for `sweeps.run.run_sweep`.
+        As for `walkers.sweeps.run.run_sweep`.
     """
     space = Space(calibration.parameters)
     sweep = wave_sweep(calibration, space.values(unit), name, extra)

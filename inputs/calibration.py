@@ -251,7 +251,7 @@ def load_calibration(calibration: str | Path) -> Calibration:
 
 
 def read_calibration(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Calibration:
-    """A calibration given as nested tables; parameters and errors as for `inputs.sweep.expand`."""
+    """A calibration given as nested tables; parameters and errors as for `walkers.inputs.sweep.expand`."""
     file = validated(CalibrationFile, document, source, "a calibration")
     problems = _problems(file)
     if problems:

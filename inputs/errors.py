@@ -1,7 +1,7 @@
 """The project's errors, all under one root.
 
 `InputError` is what a user can mend in a file or on the command line (exit status 2); everything that goes wrong while
-an engine runs derives from `WalkersError` too and is listed in `runner.failures` (exit status 1).
+an engine runs derives from `WalkersError` too and is listed in `walkers.runner.failures` (exit status 1).
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ _WAYS: dict[str, Literal["both", "right", "left"]] = {
 
 
 class UnusableKeyError(Exception):
-    """A problem found between keys; `inputs.reading` adds the file and the value."""
+    """A problem found between keys; `walkers.inputs.reading` adds the file and the value."""
 
     def __init__(self, key: str, expected: str) -> None:
         self.key = key

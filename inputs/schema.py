@@ -1,7 +1,7 @@
 """What a case file may say: keys, types, defaults and bounds, as pydantic models.
 
 A quantity is written as a string with its unit and held here as a number in SI units. Keys that the library of
-materials and liquids can supply are optional; `inputs.reading` fills them in.
+materials and liquids can supply are optional; `walkers.inputs.reading` fills them in.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class LiquidTable(Table):
 
     ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag;
     ``film_drag_ratio`` a drag on the beads' translation over that of Stokes in the liquid, 6π η R v. The last four,
-    left out, are the library's for the surfaces, else as in `inputs.resolving`.
+    left out, are the library's for the surfaces, else as in `walkers.inputs.resolving`.
     """
 
     name: str | None = None

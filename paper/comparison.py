@@ -35,7 +35,7 @@ class Value:
     """One of our numbers, in the unit of the published one: engine with its range, and theory; NaN where there is none.
 
     The range is over walkers, or over the frequencies where a number is a mean over these. ``left_out`` of all walkers
-    are none until the end (`postprocess.steady`).
+    are none until the end (`walkers.postprocess.steady`).
     """
 
     engine: float
@@ -57,7 +57,7 @@ class Row:
     Attributes
     ----------
     key, what, unit, published, measured
-        See `paper.published.Published`.
+        See `walkers.paper.published.Published`.
     engine, low, high, theory, left_out
         See `Value`; theory is Coulomb friction with the drag of bridges and film, nothing fitted.
     ratio

@@ -91,11 +91,11 @@ def make_figures(
     to
         Folder of the figures.
     options, engine, despite_audit
-        As for `sweeps.run.run_sweep`.
+        As for `walkers.sweeps.run.run_sweep`.
     only
         Names of `FIGURES`, or ``comparison``; all if empty.
     progress_of
-        As for `paper.sources.make_sources`.
+        As for `walkers.paper.sources.make_sources`.
 
     Returns
     -------

@@ -62,7 +62,7 @@ def _speed(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
 
 
 def steady_speed(run: str | Path) -> float:
-    """Mean velocity of a run's `postprocess.steady.steady_walkers`, m/s; NaN if there is none."""
+    """Mean velocity of a run's `walkers.postprocess.steady.steady_walkers`, m/s; NaN if there is none."""
     kept = steady_walkers(run)
     return float(kept["velocity"].mean()) if len(kept) else np.nan
 

@@ -40,7 +40,7 @@ class Sources:
         self.trajectory = lru_cache(maxsize=32)(self._trajectory)
 
     def _table(self, sweep: str) -> pd.DataFrame:
-        """The table of a sweep, see `sweeps.table.load`, its run directories from where the process is."""
+        """The table of a sweep, see `walkers.sweeps.table.load`, its run directories from where the process is."""
         return load(self.out / sweep)
 
     def _trajectory(self, run: str) -> Trajectory:
@@ -82,7 +82,7 @@ def make_sources(
     names
         Of the sweeps.
     out, options, engine, despite_audit
-        As for `sweeps.run.run_sweep`.
+        As for `walkers.sweeps.run.run_sweep`.
     progress_of
         Gives, for the name of a sweep, a context whose value is told of its progress.
 

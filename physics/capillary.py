@@ -1,7 +1,7 @@
 """Capillary bridges: their liquid, their rupture, and F = πγ√(R1R2) (exp(A h/R2 + B) + C).
 
 The force is that of Soulié et al. (2006), Eqs. 13 and 14, R2 the larger radius and h the gap. At a wall
-(`physics.wall`) it is that between two equal spheres, taken twice.
+(`walkers.physics.wall`) it is that between two equal spheres, taken twice.
 
 References
 ----------
@@ -71,7 +71,7 @@ def capillary_force(
 def capillary_force_at_wall(
     surface_tension: float, radius: float, volume: float, contact_angle: float, gap: float = 0.0
 ) -> float:
-    """Attraction by the bridge between a bead and a wall (`physics.wall`), N."""
+    """Attraction by the bridge between a bead and a wall (`walkers.physics.wall`), N."""
     return WALL_COPIES * capillary_force(surface_tension, radius, radius, volume, contact_angle, gap)
 
 

@@ -35,7 +35,7 @@ def hertz_repulsion(overlap: float, reduced_radius: float, reduced_modulus: floa
 
 
 def hertz_repulsion_at_wall(overlap: float, radius: float, reduced_modulus: float) -> float:
-    """Repulsion of a bead of ``radius`` (m) by a wall (`physics.wall`), N."""
+    """Repulsion of a bead of ``radius`` (m) by a wall (`walkers.physics.wall`), N."""
     return WALL_COPIES * hertz_repulsion(overlap, radius, reduced_modulus)
 
 
@@ -53,7 +53,7 @@ def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -
 
 
 def hertz_overlap_at_wall(force: float, radius: float, reduced_modulus: float) -> float:
-    """Overlap at which the repulsion by a wall (`physics.wall`) carries a load (N), m; of a bead of ``radius`` (m)."""
+    """Overlap at which a wall (`walkers.physics.wall`) carries a load (N), m; of a bead of ``radius`` (m)."""
     return hertz_overlap(force / WALL_COPIES, radius, reduced_modulus)
 
 

@@ -44,12 +44,12 @@ def tangential_drag(
 def normal_drag_at_wall(
     dynamic_viscosity: float, radius: float, minimum_separation_ratio: float, gap: float = 0.0
 ) -> float:
-    """Coefficient of the normal viscous force at a wall (`physics.wall`), N s/m; of a bead of ``radius`` (m)."""
+    """Coefficient of the normal force at a wall (`walkers.physics.wall`), N s/m; of a bead of ``radius`` (m)."""
     return WALL_COPIES * normal_drag(dynamic_viscosity, radius / 2.0, minimum_separation_ratio, gap)
 
 
 def tangential_drag_at_wall(
     dynamic_viscosity: float, radius: float, minimum_separation_ratio: float, gap: float = 0.0
 ) -> float:
-    """Coefficient of the tangential viscous force at a wall (`physics.wall`), N s/m; of a bead of ``radius`` (m)."""
+    """Coefficient of the tangential force at a wall (`walkers.physics.wall`), N s/m; of a bead of ``radius`` (m)."""
     return WALL_COPIES * tangential_drag(dynamic_viscosity, radius / 2.0, minimum_separation_ratio, gap)

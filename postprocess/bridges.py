@@ -1,7 +1,7 @@
 """The capillary bridges that the engine reports: which bead holds on to what, across which gap, with what force.
 
 Only the normal part of the reported forces is kept: the engine's tangential part is wrong for sliding contacts (see
-`templates.engine`).
+`walkers.templates.engine`).
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ def events_of(
     Parameters
     ----------
     tracks
-        From `postprocess.clusters.follow`.
+        From `walkers.postprocess.clusters.follow`.
     time : ndarray, shape (F,)
         s.
     bulk

@@ -23,7 +23,7 @@ IntArray = npt.NDArray[np.int64]
 FLOOR = 0
 """Number of the floor among the walls; the others are the side walls."""
 _WALLS = {"box": ("floor", "-x", "+x", "-y", "+y"), "cylinder": ("floor", "side")}
-"""Names of the walls of a container, in the order of their numbers (`templates.pile.faces_of`)."""
+"""Names of the walls of a container, in the order of their numbers (`walkers.templates.pile.faces_of`)."""
 
 
 @dataclass(frozen=True)

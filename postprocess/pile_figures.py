@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 CLIMB_NAME = "climb.png"
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "let go": "x"}
-"""How events are marked (`postprocess.events`)."""
+"""How events are marked (`walkers.postprocess.events`)."""
 
 
 def plot_pile(directory: Path, destination: Path | None = None) -> list[Path]:

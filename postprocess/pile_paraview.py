@@ -66,7 +66,8 @@ def beads_of(found: PileAnalysis, frame: int, bridges: Bridges) -> pv.PolyData:
     """Beads of a frame as points, relative to the container, SI units.
 
     Point data: ``bead`` (number, from 0), ``radius``, ``large``, ``velocity``, ``speed``, ``component`` (connected by
-    bridges), ``liquid`` (in its bridges, m³), ``track`` (of `postprocess.clusters`; -1 for none) and ``is_climber``.
+    bridges), ``liquid`` (in its bridges, m³), ``track`` (of `walkers.postprocess.clusters`; -1 for none) and
+    ``is_climber``.
     """
     import pyvista as pv
 

@@ -17,7 +17,7 @@ def describe_result(directory: Path, result: dict[str, Any], *, found: bool = Fa
     directory
         The run directory.
     result
-        As `postprocess.result.tabulate` returns it.
+        As `walkers.postprocess.result.tabulate` returns it.
     found
         Whether the run was there before.
     """

@@ -17,7 +17,7 @@ class AuditRecord:
     Attributes
     ----------
     engine
-        Hash of the binary (`runner.binary.Engine.sha256`).
+        Hash of the binary (`walkers.runner.binary.Engine.sha256`).
     version
         What its banner says.
     scope

@@ -2,7 +2,7 @@
 
 A run is made in ``<name>-<hash>.part`` and renamed to ``<name>-<hash>`` when its manifest has been written, last: a
 directory without a manifest is not a run, and a run that is made anew replaces the old one only when it has finished.
-While it is made, the file ``<name>-<hash>.lock`` is locked, also by the engine itself (see `runner.locks`).
+While it is made, the file ``<name>-<hash>.lock`` is locked, also by the engine itself (see `walkers.runner.locks`).
 """
 
 from __future__ import annotations

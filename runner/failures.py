@@ -1,7 +1,7 @@
 """Every way in which a run is known to fail: what it is called, how it is seen, what the user is told.
 
 The engine's own signs are unreliable (an ERROR line without an exit status, an exit status without a line, silence), so
-each failure is recognised by what it leaves behind. `runner.launch` raises them.
+each failure is recognised by what it leaves behind. `walkers.runner.launch` raises them.
 """
 
 from __future__ import annotations

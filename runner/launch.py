@@ -100,7 +100,7 @@ def launch(
     Raises
     ------
     EngineFailure
-        One of the failures of `runner.failures`; the engine and its children have ended by then.
+        One of the failures of `walkers.runner.failures`; the engine and its children have ended by then.
     """
     check_room(directory, deck.layout.bead_dump_bytes)
     for left in reversed(range(starts)):

@@ -120,7 +120,7 @@ VARIATIONS = {
     "brush": (0.03, 0.1, 0.2),
     "same": (0.3, 0.5, 0.7),
 }
-"""Other thresholds of `postprocess.clusters.Definition`, tried one at a time."""
+"""Other thresholds of `walkers.postprocess.clusters.Definition`, tried one at a time."""
 
 
 def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:

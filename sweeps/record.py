@@ -42,7 +42,7 @@ class SweepRecord:
     values
         Of each point, one a key.
     derived
-        Of each point, one a column of `sweeps.kinds.DERIVED`.
+        Of each point, one a column of `walkers.sweeps.kinds.DERIVED`.
     runs
         Name of each point's run.
     descent

@@ -34,7 +34,7 @@ class SweepPlan:
     decks
         Those that are missing. Of a sweep with a descent all down to its bottom, one a point: it may end earlier.
     statuses
-        Of the points, see `sweeps.record.PointState`.
+        Of the points, see `walkers.sweeps.record.PointState`.
     workers
         How many decks run at once.
     final
@@ -89,13 +89,13 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     Parameters
     ----------
     sweep
-        From `inputs.sweep.load_sweep`.
+        From `walkers.inputs.sweep.load_sweep`.
     out
         Folder of the run directories.
     options
         How it is to be conducted.
     engine
-        Name or path of the binary; see `runner.find_engine`.
+        Name or path of the binary; see `walkers.runner.find_engine`.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def run_sweep(
     Returns
     -------
     record
-        The sweep; `sweeps.table.load` reads the table from ``record.directory``.
+        The sweep; `walkers.sweeps.table.load` reads the table from ``record.directory``.
     failures
         The points that failed.
 

@@ -53,8 +53,8 @@ def load(directory: str | Path) -> pd.DataFrame:
     -------
     DataFrame
         A row a point, in the order of the sweep; a descent's points below its end are left out. Columns are ``point``,
-        the keys that vary (in the unit of the sweep file), and (SI units) `sweeps.kinds.DERIVED`,
-        `sweeps.kinds.RESULTS` and `STATE`.
+        the keys that vary (in the unit of the sweep file), and (SI units) `walkers.sweeps.kinds.DERIVED`,
+        `walkers.sweeps.kinds.RESULTS` and `STATE`.
         ``attrs["units"]`` maps columns to units, ``attrs["meanings"]`` to what they are. Numbers of points that are
         not finished are NaN.
 

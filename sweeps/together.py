@@ -57,7 +57,7 @@ def make_together(
     Parameters
     ----------
     cases
-        Cases that may share a deck (`templates.sharing`).
+        Cases that may share a deck (`walkers.templates.sharing`).
     out
         Folder of the run directories; made if need be.
     engine

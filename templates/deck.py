@@ -106,7 +106,7 @@ class Plan:
     checkpoint
         Restart file to write or to go on from.
     surfaces
-        How the beads' surfaces touch, by `templates.scene.Bead.surface`; the case's own contact if left out.
+        How the beads' surfaces touch, by `walkers.templates.scene.Bead.surface`; the case's own contact if left out.
     fastest
         A speed that no bead can reach, m/s; computed from the case if left out.
     drive_from
@@ -170,7 +170,7 @@ def render_shared_deck(cases: Sequence[WalkerCase]) -> Deck:
     Raises
     ------
     ValueError
-        If they cannot share a deck (see `templates.sharing.sharing_key`).
+        If they cannot share a deck (see `walkers.templates.sharing.sharing_key`).
     """
     return compose(walker_plan(*cases))
 

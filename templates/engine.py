@@ -123,7 +123,7 @@ DEFECTS = (
         "Too large a time step is no error",
         "The lubrication force is stiff: past its limit beads heat up, and at several times the limit are lost, "
         "in silence.",
-        "The time step respects a viscous limit beside Rayleigh's and Hertz's (`physics.time_step`).",
+        "The time step respects a viscous limit beside Rayleigh's and Hertz's (`walkers.physics.time_step`).",
         (
             "step-walker",
             "step-pile",

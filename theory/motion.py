@@ -2,10 +2,10 @@
 
     M dv/dt = -M a(t) (1, 1, 0) - G F∥,    F = F0 + D F∥,    F∥ = law(v, F)
 
-(symbols as in `theory.quasistatic`); a film on the substrate may drag the beads' centres besides. Coulomb's law is
-set-valued: a contact that sticks is held by whatever force keeps it at rest. Each step is implicit (`theory.stepping`),
-its friction forces found by a semi-smooth Newton method: sticking needs no regularisation, and steps are short only
-where a contact begins to stick or to slip.
+(symbols as in `walkers.theory.quasistatic`); a film on the substrate may drag the beads' centres besides. Coulomb's law
+is set-valued: a contact that sticks is held by whatever force keeps it at rest. Each step is implicit
+(`walkers.theory.stepping`), its friction forces found by a semi-smooth Newton method: sticking needs no regularisation,
+and steps are short only where a contact begins to stick or to slip.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ def walk(
 
 
 def _rows_of(walker: Walker, count: int) -> FloatArray:
-    """The table of `theory.stepping.integrate`, shape (N, 9, 3).
+    """The table of `walkers.theory.stepping.integrate`, shape (N, 9, 3).
 
     A force on a bead's centre acts on the normal forces as one at its contact with the substrate does.
     """
@@ -188,7 +188,7 @@ def _rows_of(walker: Walker, count: int) -> FloatArray:
 
 
 def _law_of(friction: Friction, walker: Walker, count: int) -> FloatArray:
-    """The table of `theory.stepping.integrate`, shape (N, 5, 3)."""
+    """The table of `walkers.theory.stepping.integrate`, shape (N, 5, 3)."""
     values = (
         friction.kinetic,
         friction.kinetic if friction.static is None else friction.static,

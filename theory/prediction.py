@@ -24,7 +24,7 @@ _ROUNDS = 3
 def bridge_drag(case: WalkerCase) -> FloatArray:
     """Coefficient of the tangential viscous force at each contact as in the engine, N s/m, shape (3,).
 
-    Lubrication of touching bridges (`physics.lubrication`).
+    Lubrication of touching bridges (`walkers.physics.lubrication`).
     """
     viscosity, nearest = case.liquid.dynamic_viscosity, case.contact.minimum_separation_ratio
     on_walls = [tangential_drag_at_wall(viscosity, radius, nearest) for radius in case.beads.radii]

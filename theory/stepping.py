@@ -1,4 +1,4 @@
-"""The implicit steps of `theory.motion`, compiled (numba): one walker after the other, each for as long as it needs."""
+"""The implicit steps of `walkers.theory.motion`, compiled (numba): one walker after the other, each while it needs."""
 
 from __future__ import annotations
 

@@ -45,16 +45,16 @@ def run_case(
     Parameters
     ----------
     case
-        A resolved case: of walkers (`inputs.load_case`) or of a pile (`inputs.load_pile`).
+        A resolved case: of walkers (`walkers.inputs.load_case`) or of a pile (`walkers.inputs.load_pile`).
     out
         Folder of the run directories.
     engine
-        Name or path of the binary; see `runner.find_engine`.
+        Name or path of the binary; see `walkers.runner.find_engine`.
     force
         Run again; the old run is replaced only by a finished one.
     on_progress
-        Called a few times a second while the engine runs, with a `runner.launch.Progress`, of a pile with a
-        `runner.parts.PileProgress`.
+        Called a few times a second while the engine runs, with a `walkers.runner.launch.Progress`, of a pile with a
+        `walkers.runner.parts.PileProgress`.
     time_limit
         Wall time in s that the engine may take, of a pile for each part.
     despite_audit
