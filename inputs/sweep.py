@@ -280,7 +280,7 @@ def changed(document: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[s
     UnusableAxisError
         If there is no such place in a list.
 
-    What a new value stands for in other words (`walkers.inputs.schema.ALTERNATIVES`) is left out, unless it changes too.
+    What a new value stands for in other words (`walkers.inputs.schema.ALTERNATIVES`) goes, unless it changes too.
     """
     changed_document = copy.deepcopy(dict(document))
     for key in changes:
