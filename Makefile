@@ -54,7 +54,11 @@ test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test fir
 	.venv/bin/mypy
 	.venv/bin/pytest -q -m smoke
 	.venv/bin/walkers audit --quick
-	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke"
+	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"
+
+.PHONY: test-slow
+test-slow: setup ## Run what `make test` leaves out: what only figures of a release hang on
+	.venv/bin/pytest -q -n 2 -m slow
 
 .PHONY: audit
 audit: setup ## Prove what the installed engine does, against published formulas

@@ -58,6 +58,7 @@ def test_the_papers_law_alone_gives_its_figures_and_with_inertia_less_at_the_lar
     assert values["Fig. 2, plateau"] is None
 
 
+@pytest.mark.slow
 def test_what_the_theory_made_is_found_again_and_what_it_lacks_is_missed(tmp_path: Path) -> None:
     made = {**KNOWN, "static_ratio": 1.8, "log10_stribeck_velocity": -3.0}
     wanted = targets()[:7]

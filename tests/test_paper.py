@@ -163,6 +163,7 @@ def test_figures_say_what_they_were_made_from(sources: Sources, tmp_path: Path, 
     assert not list(tmp_path.glob("*.new"))
 
 
+@pytest.mark.slow
 def test_the_sensitivity_study_covers_each_parameter_both_ways(sensitivity: Sources) -> None:
     found = sensitivities(sensitivity)
     assert list(found["parameter"]).count("shipped") == 1
