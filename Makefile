@@ -43,9 +43,9 @@ figures: setup ## The paper's figures and published numbers beside ours, in figu
 calibrate: setup ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
 	@$(WALKERS) calibrate $(CALIBRATION) --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
-.PHONY: ingredients
-ingredients: setup ## Which physics is missing: the theory fitted to the published numbers with each ingredient
-	@$(WALKERS) ingredients
+.PHONY: model-terms
+model-terms: setup ## Which physics is missing: the theory fitted to the published numbers with each further term
+	@$(WALKERS) model-terms
 
 .PHONY: test
 test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test first)
@@ -57,7 +57,7 @@ test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test fir
 	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"
 
 .PHONY: test-slow
-test-slow: setup ## Run what `make test` leaves out: what only figures of a release hang on
+test-slow: setup ## Run what `make test` leaves out: what only figures of a release depend on
 	.venv/bin/pytest -q -n 2 -m slow
 
 .PHONY: audit

@@ -22,13 +22,13 @@ from walkers.runner.binary import Engine
 from walkers.runner.directory import write_deck
 from walkers.runner.launch import Progress, launch
 from walkers.templates.deck import Deck, Plan, Recording, compose
-from walkers.templates.engine import ALL_REMEDIES, Remedies
+from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds
 from walkers.templates.layout import BEAD_COLUMNS, Layout
 from walkers.templates.scene import Bead, Face, Point, Scene
 
 TORQUE_COLUMNS = ("tqx", "tqy", "tqz")
 FIRST_BEAD = 2
-"""Id of the first bead of a scene with one rider."""
+"""Id of the first bead of a scene with one carrier."""
 FLOOR = Face("z", 1, (0.0, 0.0, 0.0))
 
 
@@ -64,7 +64,7 @@ class Measured:
     directory, layout
         Of the run.
     missing
-        How many riders of the scene the deck was run without.
+        How many carriers of the scene the deck was run without.
     """
 
     steps: npt.NDArray[np.int64]
@@ -102,7 +102,7 @@ class Bench:
         The binary on trial.
     folder
         Where decks are run.
-    remedies
+    workarounds
         Those of the decks on trial; tests take some away to see the audit fail.
     pile_time_step
         Step in s at which the small pile is tried instead of the one that ``auto`` takes; tests set it too large.
@@ -112,7 +112,7 @@ class Bench:
 
     engine: Engine
     folder: Path
-    remedies: Remedies = ALL_REMEDIES
+    workarounds: Workarounds = ALL_WORKAROUNDS
     pile_time_step: float | None = None
     stop: threading.Event = field(default_factory=threading.Event)
     version: str = "unknown"
@@ -148,7 +148,7 @@ class Bench:
         if carry is not None:
             shutil.copy(carry, directory)
         self.version = launch(deck, directory, self.engine, on_progress=self._look).version
-        missing = 0 if plan.remedies.riders else len(plan.scene.riders)
+        missing = 0 if plan.workarounds.carriers else len(plan.scene.carriers)
         return replace(read_series(deck, directory), missing=missing)
 
 
@@ -179,8 +179,8 @@ def bench_recording(steps: int, sample_every: int) -> Recording:
 
 
 def scene_on_floor(beads: list[Bead], half_width: float = 0.02, height: float = 0.02) -> Scene:
-    """Beads over the floor z = 0 with its rider in the corner; ids are given here, from 2 (`FIRST_BEAD`)."""
+    """Beads over the floor z = 0 with its carrier in the corner; ids are given here, from 2 (`FIRST_BEAD`)."""
     numbered = tuple(replace(bead, id=FIRST_BEAD + number) for number, bead in enumerate(beads))
     edge = half_width + 2e-3
-    rider: Point = (half_width + 1e-3, half_width + 1e-3, height + 1e-3)
-    return Scene(numbered, (FLOOR,), (rider,), (-edge, -edge, -2e-3), (edge, edge, height + 2e-3))
+    carrier: Point = (half_width + 1e-3, half_width + 1e-3, height + 1e-3)
+    return Scene(numbered, (FLOOR,), (carrier,), (-edge, -edge, -2e-3), (edge, edge, height + 2e-3))

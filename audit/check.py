@@ -44,9 +44,9 @@ class Line:
     error
         Relative error where it is not that of the two numbers: the largest over a series.
     needs
-        Remedies that this line stands on (``riders``, ``walls``, ``angle``, ``time step``): without one it fails.
+        Workarounds that this line stands on (``carriers``, ``walls``, ``angle``, ``time step``): without one it fails.
     defect
-        The line measures a defect of the raw engine, expected as it was when the remedies were made.
+        The line measures a defect of the raw engine, expected as it was when the workarounds were made.
     unmeasured
         Why nothing was measured, as a verdict: ``ERROR`` or ``SKIPPED``.
     """

@@ -18,7 +18,7 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.runner.audits import AuditRecord, write_audit
 from walkers.runner.binary import Engine, find_engine
-from walkers.templates.engine import ALL_REMEDIES, Remedies
+from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds
 
 CHECKS: tuple[Check, ...] = (
     *capillary.CHECKS,
@@ -85,7 +85,7 @@ def run_audit(
     checks: Sequence[Check] = CHECKS,
     *,
     engine: Engine | None = None,
-    remedies: Remedies = ALL_REMEDIES,
+    workarounds: Workarounds = ALL_WORKAROUNDS,
     on_done: Callable[[CheckedLines], None] | None = None,
     **bench_options: Any,
 ) -> AuditReport:
@@ -97,7 +97,7 @@ def run_audit(
         Which ones.
     engine
         The binary; the installed one if None.
-    remedies
+    workarounds
         Those of the decks on trial.
     on_done
         Called with each check as it is done.
@@ -106,7 +106,7 @@ def run_audit(
     """
     binary = engine or find_engine()
     with tempfile.TemporaryDirectory(prefix="walkers-audit-") as folder:
-        bench = Bench(binary, Path(folder), remedies, **bench_options)
+        bench = Bench(binary, Path(folder), workarounds, **bench_options)
 
         def measure(check: Check) -> CheckedLines:
             begin = time.perf_counter()

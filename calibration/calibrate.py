@@ -23,7 +23,7 @@ from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.paper.sources import ProgressOf
 from walkers.runner.failures import BeadsLost, BlowUp
 from walkers.runner.files import read_json, write_json
-from walkers.sweeps.conduct import Failure, Options
+from walkers.sweeps.scheduler import Failure, Options
 
 FloatArray = npt.NDArray[np.float64]
 _STEPS_BETWEEN_WAVES = 800
@@ -115,7 +115,7 @@ class _Engine:
             self.failures[sweep] = failed
         undone = [failure for failure in failed if failure.reason not in FINAL]
         if undone or not wave.table["status"].isin(("finished", "failed")).all():
-            told = undone[0].message if undone else "others are at it"
+            told = undone[0].message if undone else "another process is running them"
             raise CalibrationStopped(f"{sweep}: points are missing ({told}); call again to go on")
         return wave
 
@@ -126,7 +126,7 @@ def calibrate(
     options: Options,
     *,
     engine: str | None = None,
-    despite_audit: bool = False,
+    allow_failed_audit: bool = False,
     progress_of: ProgressOf | None = None,
 ) -> Outcome:
     """Calibrate, or go on with it: what is finished is not run again.
@@ -138,7 +138,7 @@ def calibrate(
     out
         Folder of the run directories; each wave is a sweep there, and the designs are kept in a folder of the
         calibration's name.
-    options, engine, despite_audit
+    options, engine, allow_failed_audit
         As for `walkers.sweeps.run.run_sweep`.
     progress_of
         As for `walkers.paper.sources.make_sources`.
@@ -160,7 +160,7 @@ def calibrate(
     check_ranges(calibration)
     folder = out / calibration.name
     folder.mkdir(parents=True, exist_ok=True)
-    arguments = {"engine": engine, "despite_audit": despite_audit}
+    arguments = {"engine": engine, "allow_failed_audit": allow_failed_audit}
     runner = _Engine(calibration, out, replace(options, final=FINAL), arguments, progress_of, {})
     unit, outcome = np.zeros((0, space.dimensions)), np.zeros((0, len(calibration.observations)))
     filling = 0
@@ -319,7 +319,7 @@ def _promising(
     for emulator in emulators:
         if not emulator.observation.derived:
             mean, deviation = emulator.predict(tried)
-            residuals = np.sinh(mean[:, None] + emulator.stretch * deviation[:, None] * _QUANTILES)
+            residuals = np.sinh(mean[:, None] + emulator.error_inflation * deviation[:, None] * _QUANTILES)
             expected += np.log1p(residuals**2).mean(axis=1)
     return spread_out(tried[np.argsort(expected)[: 4 * points]], points, taken)
 
@@ -363,7 +363,7 @@ def _finer_and_longer(calibration: Calibration, values: FloatArray) -> dict[str,
 
 
 def sobol_indices(emulators: list[Emulator], space: Space, seed: int, points: int = 512) -> FloatArray:
-    """How much of each observation's variance over the whole range hangs on each parameter (Saltelli et al. 2010).
+    """How much of each observation's variance over the whole range depends on each parameter (Saltelli et al. 2010).
 
     Returns
     -------

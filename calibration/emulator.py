@@ -39,7 +39,7 @@ class Emulator:
         scikit-learn's regressor.
     inverse : ndarray, shape (P, P)
         Of its covariance matrix.
-    stretch
+    error_inflation
         By how much its standard deviations are too small, from cross-validation in the later waves; at least 1.
     error
         Root mean square of the cross-validated error, in the transformed residual.
@@ -50,7 +50,7 @@ class Emulator:
     observation: Observation
     process: Any
     inverse: FloatArray
-    stretch: float
+    error_inflation: float
     error: float
     explained: float
 
@@ -75,7 +75,7 @@ class Emulator:
             Standard normal numbers, one a point.
         """
         mean, deviation = self.predict(unit)
-        residual = np.sinh(np.clip(mean + deviation * self.stretch * normal, -LARGEST, LARGEST))
+        residual = np.sinh(np.clip(mean + deviation * self.error_inflation * normal, -LARGEST, LARGEST))
         return np.asarray(self.observation.value + self.observation.deviation * residual)
 
     def value(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -128,7 +128,7 @@ def _fitted(unit: FloatArray, outcome: FloatArray, observation: Observation, see
         observation,
         process,
         inverse=cho_solve((process.L_, True), np.eye(len(unit))),
-        stretch=max(1.0, float(np.sqrt(np.mean((miss / deviation)[judged] ** 2)))),
+        error_inflation=max(1.0, float(np.sqrt(np.mean((miss / deviation)[judged] ** 2)))),
         error=float(np.sqrt(np.mean(miss**2))),
         explained=1.0 - float(np.mean(miss**2)) / spread if spread > 0.0 else 1.0,
     )

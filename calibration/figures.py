@@ -1,4 +1,4 @@
-"""Figures of a calibration: the posterior's corners, predictions beside observations, what hangs on what."""
+"""Figures of a calibration: the posterior's corners, predictions beside observations, what depends on what."""
 
 from __future__ import annotations
 

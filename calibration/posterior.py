@@ -16,7 +16,7 @@ _WALKERS_PER_DIMENSION = 8
 _BURN = 0.4
 _KEPT = 4000
 _DISCREPANCY = 0.5
-"""Scale of the half-Cauchy belief about a group's discrepancy, in standard deviations of its observations: most groups
+"""Scale of the half-Cauchy prior about a group's discrepancy, in standard deviations of its observations: most groups
 have little, but one may have much without bending all parameters toward it."""
 _LOG_DISCREPANCY = (-5.0, 5.0)
 _NODES, _WEIGHTS = np.polynomial.hermite.hermgauss(21)
@@ -85,12 +85,12 @@ class _Density:
     def __init__(self, emulators: Sequence[Emulator], space: Space, groups: tuple[str, ...]) -> None:
         self.emulators, self.space = emulators, space
         self.group = np.array([groups.index(one.observation.group) for one in emulators])
-        self.stretch = np.array([one.stretch for one in emulators])
+        self.error_inflation = np.array([one.error_inflation for one in emulators])
         self.dimensions = space.dimensions
 
     def __call__(self, points: FloatArray) -> FloatArray:
         unit, logs = points[:, : self.dimensions], points[:, self.dimensions :]
-        total = self.space.log_belief(unit)
+        total = self.space.log_prior(unit)
         low, high = _LOG_DISCREPANCY
         total = np.where(np.all((logs >= low) & (logs <= high), axis=1), total, -np.inf)
         inside = np.isfinite(total)
@@ -99,10 +99,10 @@ class _Density:
         logs = logs[inside]
         variance = 1.0 + np.exp(2.0 * logs)[:, self.group]
         mean, deviation = np.stack([one.predict(unit[inside]) for one in self.emulators], axis=2)
-        likelihood = log_likelihood(mean, deviation * self.stretch, variance).sum(axis=1)
+        likelihood = log_likelihood(mean, deviation * self.error_inflation, variance).sum(axis=1)
         # Half-Cauchy, with the Jacobian of the logarithm.
-        belief = (logs - np.log1p((np.exp(logs) / _DISCREPANCY) ** 2)).sum(axis=1)
-        total[inside] += likelihood + belief
+        prior = (logs - np.log1p((np.exp(logs) / _DISCREPANCY) ** 2)).sum(axis=1)
+        total[inside] += likelihood + prior
         return total
 
 

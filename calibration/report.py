@@ -129,7 +129,7 @@ def emulator_checks(found: Outcome) -> FloatArray:
     for place, emulator in enumerate(found.emulators):
         mean, deviation = emulator.predict(found.predictive.unit)
         seen = transformed(found.predictive.outcome[:, place], emulator.observation)
-        columns.append((seen - mean) / (deviation * emulator.stretch))
+        columns.append((seen - mean) / (deviation * emulator.error_inflation))
     return np.stack(columns, axis=1)
 
 
@@ -179,7 +179,11 @@ def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
             "acceptance": posterior.acceptance,
         },
         "emulators": {
-            one.observation.name: {"explained": one.explained, "error": one.error, "stretch": one.stretch}
+            one.observation.name: {
+                "explained": one.explained,
+                "error": one.error,
+                "error_inflation": one.error_inflation,
+            }
             for one in found.emulators
         },
         "emulators_within_two_errors": float(np.mean(np.abs(checks) <= _SIGMAS)),

@@ -1,4 +1,4 @@
-"""The space of the free parameters, as a unit cube: designs in it, beliefs about it."""
+"""The space of the free parameters, as a unit cube: designs in it, priors about it."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ class Space:
         scaled = np.where(log, np.log(np.where(log, values, 1.0)), values)
         return np.asarray((scaled - low) / (high - low), dtype=np.float64)
 
-    def log_belief(self, unit: FloatArray) -> FloatArray:
-        """Logarithm of the density that is believed beforehand, but for a constant, shape (...); -inf outside."""
+    def log_prior(self, unit: FloatArray) -> FloatArray:
+        """Logarithm of the density that is assumed beforehand, but for a constant, shape (...); -inf outside."""
         unit = np.asarray(unit)
         low, high = self.bounds
         scaled = low + unit * (high - low)

@@ -16,10 +16,10 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.reading import is_of_a_pile
 from walkers.inputs.sweep import Sweep, expand
 from walkers.paper.sensitivity import misalignment
-from walkers.postprocess.steady import steady_walkers, together
+from walkers.postprocess.steady_state import steady_walkers, together
 from walkers.postprocess.tables import read_table
-from walkers.sweeps.conduct import Failure, Options, Progress
 from walkers.sweeps.run import run_sweep
+from walkers.sweeps.scheduler import Failure, Options, Progress
 from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 _DIGITS = 9
-HOPELESS = 30.0
+FAILED_RESIDUAL = 30.0
 """Deviations by which an observation is off that could not be made."""
 
 
@@ -42,7 +42,7 @@ class Wave:
     seen : ndarray, shape (P, K)
         Each observation, SI units and degrees; NaN where there is none.
     outcome : ndarray, shape (P, K)
-        The same, but `HOPELESS` deviations off where there is none.
+        The same, but `FAILED_RESIDUAL` deviations off where there is none.
     table
         The sweep's, P times the number of experiments long.
     """
@@ -96,8 +96,8 @@ def wave_sweep(
 def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
     """What a wave's table says of each observation, shape (P, K).
 
-    Speeds are means over the walkers that are some until the end (`walkers.postprocess.steady.steady_walkers`). Where
-    there is none, or the run failed, nothing was observed: NaN.
+    Speeds are means over the walkers that are some until the end (`walkers.postprocess.steady_state.steady_walkers`).
+    Where there is none, or the run failed, nothing was observed: NaN.
 
     Parameters
     ----------
@@ -123,9 +123,9 @@ def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-def _hopeless(calibration: Calibration) -> FloatArray:
+def _failed_outcome(calibration: Calibration) -> FloatArray:
     """What counts where nothing was observed, shape (K,): an emulator has to know that it is bad there."""
-    return np.array([one.value + HOPELESS * one.deviation for one in calibration.observations])
+    return np.array([one.value + FAILED_RESIDUAL * one.deviation for one in calibration.observations])
 
 
 _LEAST_SPEED = 5e-5
@@ -154,7 +154,7 @@ def run_wave(  # noqa: PLR0913
     *,
     extra: Mapping[str, Mapping[str, Any]] | None = None,
     engine: str | None = None,
-    despite_audit: bool = False,
+    allow_failed_audit: bool = False,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> tuple[Wave, list[Failure]]:
     """Run what is missing of a wave.
@@ -167,14 +167,14 @@ def run_wave(  # noqa: PLR0913
         The parameter sets, in the unit cube.
     name
         Of the sweep.
-    out, options, engine, despite_audit, on_progress
+    out, options, engine, allow_failed_audit, on_progress
         As for `walkers.sweeps.run.run_sweep`.
     """
     space = Space(calibration.parameters)
     sweep = wave_sweep(calibration, space.values(unit), name, extra)
     record, failures = run_sweep(
-        sweep, out, options, engine=engine, despite_audit=despite_audit, on_progress=on_progress
+        sweep, out, options, engine=engine, allow_failed_audit=allow_failed_audit, on_progress=on_progress
     )
     table = load(record.directory)
     seen = observed(calibration, table)
-    return Wave(unit, seen, np.where(np.isnan(seen), _hopeless(calibration), seen), table), failures
+    return Wave(unit, seen, np.where(np.isnan(seen), _failed_outcome(calibration), seen), table), failures

@@ -51,7 +51,7 @@ class _Table(BaseModel):
 
 
 class ParameterTable(_Table):
-    """``[parameters.NAME]``: keys of the case that take its value, its range, and what is believed beforehand.
+    """``[parameters.NAME]``: keys of the case that take its value, its range, and what is assumed beforehand.
 
     Numbers are in its ``unit``, if it has one.
     """
@@ -128,11 +128,11 @@ class Parameter:
     low, high, unit
         Its range, in its unit.
     log
-        Whether designs and beliefs are even in its logarithm.
+        Whether designs and priors are even in its logarithm.
     experiments
         Those that it belongs to.
     normal
-        Mean and standard deviation of a normal belief; where ``log``, the median and the deviation of the natural
+        Mean and standard deviation of a normal prior; where ``log``, the median and the deviation of the natural
         logarithm. None: even in the range.
     """
 
@@ -377,7 +377,7 @@ def _problems_of_parameters(file: CalibrationFile) -> list[Problem]:
             expected = "expected a smaller and a larger number" + (", both above zero" if table.log else "")
             found.append(Problem(f"{place}.range", f"[{low:g}, {high:g}]", expected))
         if table.normal is not None and table.log and table.normal[0] <= 0.0:
-            expected = "expected a median above zero: the belief is one of the logarithm"
+            expected = "expected a median above zero: the prior is one of the logarithm"
             found.append(Problem(f"{place}.normal", f"[{table.normal[0]:g}, {table.normal[1]:g}]", expected))
         if table.experiments is not None and not table.experiments:
             found.append(Problem(f"{place}.experiments", "[]", "expected at least one experiment"))

@@ -123,7 +123,7 @@ def lattice(beads: PileBeads, container: Container) -> tuple[list[tuple[float, f
 
 @dataclass(frozen=True)
 class PileRun:
-    """How long, how fine and in which parts.
+    """How long, how fine and in which segments.
 
     Attributes
     ----------
@@ -133,8 +133,8 @@ class PileRun:
         Of the drive.
     cycles
         Driven, after the settling.
-    cycles_per_part
-        The run is made in parts of so many cycles, each with a restart file at its end.
+    cycles_per_segment
+        The run is made in segments of so many cycles, each with a restart file at its end.
     frames_per_cycle, cycles_per_frame
         Beads and bridges are recorded this often a cycle, or once in so many cycles; one of them is 1.
     settled_below
@@ -148,7 +148,7 @@ class PileRun:
     time_step: float
     steps_per_cycle: int
     cycles: int
-    cycles_per_part: int
+    cycles_per_segment: int
     frames_per_cycle: int
     cycles_per_frame: int
     settled_below: float

@@ -69,7 +69,7 @@ class PileRunTable(Table):
     time_step: Annotated[Time | None, AUTO] = None
     allow_unstable: bool = False
     duration: Duration
-    part: Duration = 0.5
+    segment: Duration = 0.5
     frames_per_second: Annotated[Number, Field(gt=0, le=1e6)] = 60.0
     settled_below: Speed = 5e-3
     longest_settling: Duration = 0.5
@@ -221,9 +221,9 @@ def _run(table: PileRunTable, beads: PileBeads, contact: Contact, liquid: Liquid
     wanted = drive.frequency / table.frames_per_second
     per_cycle, cycles_per_frame = (round(1.0 / wanted), 1) if wanted < 1.0 else (1, round(wanted))
     time_step, steps = fit_into_cycle(largest, drive.frequency, per_cycle)
-    # Parts end with a frame, so that each begins where the last one ended.
-    frames_per_part = max(1, round(table.part * drive.frequency / cycles_per_frame))
-    per_part = frames_per_part * cycles_per_frame
+    # Segments end with a frame, so that each begins where the last one ended.
+    frames_per_segment = max(1, round(table.segment * drive.frequency / cycles_per_frame))
+    per_segment = frames_per_segment * cycles_per_frame
     cycles = ceil(table.duration * drive.frequency / cycles_per_frame * (1.0 - 1e-12)) * cycles_per_frame
     if steps * (cycles + ceil((table.longest_settling + 1.0) * drive.frequency)) > MOST_STEPS:
         raise UnusableKeyError("run.duration", "too long: the engine counts steps up to 2^31")
@@ -231,7 +231,7 @@ def _run(table: PileRunTable, beads: PileBeads, contact: Contact, liquid: Liquid
         time_step,
         steps,
         cycles,
-        min(per_part, cycles),
+        min(per_segment, cycles),
         per_cycle,
         cycles_per_frame,
         table.settled_below,

@@ -174,7 +174,7 @@ def _resolved(
     try:
         return resolver(file, name)
     except ArithmeticError as error:
-        raise InputError(source, [Problem("", None, f"the numbers do not go together ({error})")]) from error
+        raise InputError(source, [Problem("", None, f"inconsistent values: {error}")]) from error
     except UnusableKeyError as unusable:
         parts = re.findall(r"[^.\[\]]+", unusable.key)
         value = quoted(document, [int(part) if part.isdigit() else part for part in parts])

@@ -267,7 +267,9 @@ def _descending(table: DescendTable) -> list[Value]:
     start, to, step = (number_of(name, value)[0] for name, value in given.items())
     unit = unit_of(table.key, list(given.values()))
     if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
-        raise UnusableAxisError("descend", f"{table.start} to {table.to}", "expected a way down in steps above zero")
+        raise UnusableAxisError(
+            "descend", f"{table.start} to {table.to}", "`from` must not be below `to`, and `step` must be positive"
+        )
     number = int((start - to) / step + 1e-9) + 1
     return [written(start - step * count, unit) for count in range(number)]
 

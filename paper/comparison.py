@@ -14,7 +14,7 @@ from walkers.paper.alignment import paper_drives
 from walkers.paper.published import NUMBERS, Published
 from walkers.paper.sensitivity import misalignment
 from walkers.paper.sources import NothingFinishedError, Sources
-from walkers.postprocess.steady import steady_walkers
+from walkers.postprocess.steady_state import steady_walkers
 from walkers.sweeps.table import thresholds
 from walkers.theory.mathieu import largest_stable_v
 from walkers.theory.prediction import motion_of, threshold
@@ -35,7 +35,7 @@ class Value:
     """One of our numbers, in the unit of the published one: engine with its range, and theory; NaN where there is none.
 
     The range is over walkers, or over the frequencies where a number is a mean over these. ``left_out`` of all walkers
-    are none until the end (`walkers.postprocess.steady`).
+    are none until the end (`walkers.postprocess.steady_state`).
     """
 
     engine: float
@@ -70,7 +70,7 @@ class Row:
     agrees
         Whether it lies within the bounds or, where there are none, within `AGREES` of the published value.
     why
-        What the disagreement hangs on; empty where it agrees.
+        What the disagreement depends on; empty where it agrees.
     """
 
     key: str
@@ -126,7 +126,7 @@ def _row(number: Published, value: Value) -> Row:
 
 def _why(number: Published, value: Value, ours: float) -> str:
     if np.isfinite(ours):
-        return number.hangs_on
+        return number.depends_on
     if value.left_out:
         return "Of a run that it needs no walker is steady, stays on the axis and keeps its beads together."
     return "A run that it needs is missing or failed."

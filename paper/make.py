@@ -15,11 +15,11 @@ from walkers.paper.modes import fig_modes
 from walkers.paper.rotation import fig4
 from walkers.paper.sensitivity import fig_sensitivity
 from walkers.paper.sources import NothingFinishedError, ProgressOf, Sources, make_sources
-from walkers.paper.strobe import fig1b
+from walkers.paper.stroboscopic import fig1b
 from walkers.paper.velocity import fig2, fig3
 from walkers.postprocess.drawing import save_figure
 from walkers.runner.files import write_text
-from walkers.sweeps.conduct import Failure, Options
+from walkers.sweeps.scheduler import Failure, Options
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,7 +43,7 @@ FIGURES = {
     "fig4": Drawing(fig4, ("fig4",), "Fig. 4: rotation of the beads through two cycles"),
     "alignment": Drawing(fig_alignment, ("alignment",), "Alignment with the shaking axis and across it"),
     "modes": Drawing(fig_modes, ("modes",), "Modes of motion"),
-    "sensitivity": Drawing(fig_sensitivity, ("sensitivity",), "What the disagreements hang on"),
+    "sensitivity": Drawing(fig_sensitivity, ("sensitivity",), "What the disagreements depend on"),
 }
 COMPARISON = "comparison"
 _COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
@@ -79,7 +79,7 @@ def make_figures(
     *,
     only: Sequence[str] = (),
     engine: str | None = None,
-    despite_audit: bool = False,
+    allow_failed_audit: bool = False,
     progress_of: ProgressOf | None = None,
 ) -> Made:
     """Run what is missing, draw the figures and write the comparison.
@@ -90,7 +90,7 @@ def make_figures(
         Folder of the run directories.
     to
         Folder of the figures.
-    options, engine, despite_audit
+    options, engine, allow_failed_audit
         As for `walkers.sweeps.run.run_sweep`.
     only
         Names of `FIGURES`, or ``comparison``; all if empty.
@@ -118,7 +118,7 @@ def make_figures(
     needed = {name: FIGURES[name].sweeps if name in FIGURES else _COMPARED for name in chosen}
     sweeps = dict.fromkeys(sweep for names in needed.values() for sweep in names)
     sources, failures = make_sources(
-        sweeps, out, options, engine=engine, despite_audit=despite_audit, progress_of=progress_of
+        sweeps, out, options, engine=engine, allow_failed_audit=allow_failed_audit, progress_of=progress_of
     )
     files: list[Path] = []
     left_out: dict[str, str] = {}

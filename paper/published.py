@@ -44,8 +44,8 @@ class Published:
         Shown with it.
     bounds
         Between which a value is what the paper says, if it says so: the rounding of its digits is none.
-    hangs_on
-        A sentence: what a disagreement of the engine hangs on, as the sensitivity study and docs/physics.md find.
+    depends_on
+        A sentence: what a disagreement of the engine depends on, as the sensitivity study and docs/physics.md find.
     measured
         Whether it tests the engine: Γ0 and Mathieu's V follow from beads and drive alone.
     """
@@ -55,7 +55,7 @@ class Published:
     value: float | None
     unit: str = "mm/s"
     bounds: tuple[float, float] | None = None
-    hangs_on: str = ""
+    depends_on: str = ""
     measured: bool = True
 
 
@@ -65,7 +65,7 @@ def _in_mm(speed: float) -> float:
 
 
 _SPEED = (
-    "Speeds hang on friction and on the tangential drag of the bridges, which are calibrated to all of these numbers "
+    "Speeds depend on friction and on the tangential drag of the bridges, which are calibrated to all of these numbers "
     "at once."
 )
 _ASYMMETRY = (
@@ -74,16 +74,16 @@ _ASYMMETRY = (
     "4.88."
 )
 _FIG4A = (
-    "It hangs on the frictions of the slide and between the beads: with less of the latter the walker is slower, and "
+    "It depends on the frictions of the slide and between the beads: with less of the latter the walker is slower, and "
     "with less of the former the large bead slides."
 )
 _FIG4B = (
-    "Its beads part in every cycle and come together again; whether they do hangs on the liquid, on its drag and on a "
-    "film's, and without them walkers turn, are not steady or come apart."
+    "Its beads part in every cycle and come together again; whether they do depends on the liquid, on its drag and on "
+    "a film's, and without them walkers turn, are not steady or come apart."
 )
-_THRESHOLD = "The threshold hangs on friction alone: it is 0.7 to 0.85 times the coefficient."
+_THRESHOLD = "The threshold depends on friction alone: it is 0.7 to 0.85 times the coefficient."
 _TURNED = (
-    "Dimers turn into or across the axis within two seconds or three; whether they do hangs on friction, rolling "
+    "Dimers turn into or across the axis within two seconds or three; whether they do depends on friction, rolling "
     "friction and viscosity."
 )
 
@@ -91,7 +91,7 @@ _TURNED = (
 # are ours.
 NUMBERS = (
     *(
-        Published(f"fig2_{g:g}g", f"Fig. 2, fit at {g:g} g, 60 to 90 Hz", _in_mm(v), hangs_on=_SPEED)
+        Published(f"fig2_{g:g}g", f"Fig. 2, fit at {g:g} g, 60 to 90 Hz", _in_mm(v), depends_on=_SPEED)
         for g, v in FIT.items()
     ),
     *(
@@ -105,7 +105,7 @@ NUMBERS = (
         "Fig. 2, v(90 Hz)/v(60 Hz) at 6 g: no significant dependence",
         1.0,
         "",
-        hangs_on="Where friction alone limits sliding, speeds go as 1/f; in theory a tangential drag ten times the "
+        depends_on="Where friction alone limits sliding, speeds go as 1/f; in theory a tangential drag ten times the "
         "bridges' nominal one removes eight tenths of that.",
     ),
     Published(
@@ -113,42 +113,42 @@ NUMBERS = (
         "Fig. 2, v(10 g)/v(6 g): a plateau from Γ0 ≈ 0.6 on",
         1.0,
         "",
-        hangs_on="Of all sets that the calibration ran none levels off. In theory friction that is larger at rest than "
-        "in motion gives the plateau (docs/calibration.md); the engine knows one coefficient.",
+        depends_on="Of all sets that the calibration ran none levels off. In theory friction that is larger at rest "
+        "than in motion gives the plateau (docs/calibration.md); the engine knows one coefficient.",
     ),
     Published(
         "fig2_threshold",
         "Fig. 2, inset: Γc, in words: a threshold that does not depend on the frequency",
         None,
         "",
-        hangs_on=_THRESHOLD,
+        depends_on=_THRESHOLD,
     ),
     Published(
         "fig2_threshold_frequency",
         "Fig. 2, inset: Γc(90 Hz)/Γc(60 Hz): independent within its uncertainties",
         1.0,
         "",
-        hangs_on=_THRESHOLD,
+        depends_on=_THRESHOLD,
     ),
     *(
-        Published(f"fig3_{r1:g}_{r2:g}", f"Fig. 3, fit for R = {r1:g}/{r2:g} mm", _in_mm(v), hangs_on=_ASYMMETRY)
+        Published(f"fig3_{r1:g}_{r2:g}", f"Fig. 3, fit for R = {r1:g}/{r2:g} mm", _in_mm(v), depends_on=_ASYMMETRY)
         for (r1, r2), v in FIG3_FIT.items()
     ),
-    Published("fig3_symmetric", "Fig. 3, a symmetric dimer does not walk", 0.0, hangs_on=_TURNED),
+    Published("fig3_symmetric", "Fig. 3, a symmetric dimer does not walk", 0.0, depends_on=_TURNED),
     Published("fig4a_gamma", "Fig. 4a, Γ0", 0.74, "", (0.7345, 0.745), measured=False),
     Published(
         "fig4a_velocity",
         "Fig. 4a, velocity",
         _in_mm(FIG4_VELOCITY[0]),
-        hangs_on=_FIG4A,
+        depends_on=_FIG4A,
     ),
-    Published("fig4a_sliding", "Fig. 4a, large bead's mean sliding: hardly any", 0.0, hangs_on=_FIG4A),
+    Published("fig4a_sliding", "Fig. 4a, large bead's mean sliding: hardly any", 0.0, depends_on=_FIG4A),
     Published("fig4b_gamma", "Fig. 4b, Γ0", 3.5, "", (3.45, 3.55), measured=False),
-    Published("fig4b_velocity", "Fig. 4b, velocity", _in_mm(FIG4_VELOCITY[1]), hangs_on=_FIG4B),
+    Published("fig4b_velocity", "Fig. 4b, velocity", _in_mm(FIG4_VELOCITY[1]), depends_on=_FIG4B),
     Published(
-        "fig4b_rotation", "Fig. 4b, large bead's mean rotation velocity", _in_mm(FIG4B_ROTATION), hangs_on=_FIG4B
+        "fig4b_rotation", "Fig. 4b, large bead's mean rotation velocity", _in_mm(FIG4B_ROTATION), depends_on=_FIG4B
     ),
-    Published("fig4b_sliding", "Fig. 4b, large bead's mean sliding velocity", _in_mm(FIG4B_SLIDING), hangs_on=_FIG4B),
+    Published("fig4b_sliding", "Fig. 4b, large bead's mean sliding velocity", _in_mm(FIG4B_SLIDING), depends_on=_FIG4B),
     Published(
         "alignment_asymmetric",
         "Asymmetric dimers align with the shaking axis: largest angle to it at the end",

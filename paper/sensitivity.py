@@ -1,4 +1,4 @@
-"""What the disagreements with the paper hang on: the shipped sweep ``sensitivity``, one parameter at a time."""
+"""What the disagreements with the paper depend on: the shipped sweep ``sensitivity``, one parameter at a time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from walkers.paper import published
 from walkers.paper.sources import Sources
 from walkers.postprocess.drawing import new_figure, styled
-from walkers.postprocess.steady import on_axis, steady_walkers
+from walkers.postprocess.steady_state import on_axis, steady_walkers
 from walkers.postprocess.tables import read_table
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def _speed(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
 
 
 def steady_speed(run: str | Path) -> float:
-    """Mean velocity of a run's `walkers.postprocess.steady.steady_walkers`, m/s; NaN if there is none."""
+    """Mean velocity of a run's `walkers.postprocess.steady_state.steady_walkers`, m/s; NaN if there is none."""
     kept = steady_walkers(run)
     return float(kept["velocity"].mean()) if len(kept) else np.nan
 

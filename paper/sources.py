@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from walkers.inputs.errors import WalkersError
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.trajectory import Trajectory, read_trajectory
-from walkers.sweeps.conduct import Failure, Options, Progress
 from walkers.sweeps.run import run_sweep
+from walkers.sweeps.scheduler import Failure, Options, Progress
 from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def make_sources(
     options: Options,
     *,
     engine: str | None = None,
-    despite_audit: bool = False,
+    allow_failed_audit: bool = False,
     progress_of: ProgressOf | None = None,
 ) -> tuple[Sources, dict[str, list[Failure]]]:
     """Run what is missing of shipped sweeps.
@@ -81,7 +81,7 @@ def make_sources(
     ----------
     names
         Of the sweeps.
-    out, options, engine, despite_audit
+    out, options, engine, allow_failed_audit
         As for `walkers.sweeps.run.run_sweep`.
     progress_of
         Gives, for the name of a sweep, a context whose value is told of its progress.
@@ -103,6 +103,6 @@ def make_sources(
         sweep = load_sweep(name)
         with progress_of(name) if progress_of else nullcontext() as advance:
             _, failures[name] = run_sweep(
-                sweep, out, options, engine=engine, despite_audit=despite_audit, on_progress=advance
+                sweep, out, options, engine=engine, allow_failed_audit=allow_failed_audit, on_progress=advance
             )
     return Sources(out), failures

@@ -4,9 +4,9 @@ A *cluster* is a connected component of the beads' bridges (touching or open) of
 of the pile's bulk: the component of most beads, and all that is bridged to the floor. It is *held* if a bridge joins
 one of its beads to a side wall. A *track* is a cluster followed by its beads: from frame to frame it is the one that
 shares most of them. What is no cluster for a moment only, because its tail brushes the pile or it lets go of the wall,
-for no longer than `Definition.brush`, stays the same track.
+for no longer than `ClimbCriteria.max_gap`, stays the same track.
 
-A *climb* is height gained while free and held: a track whose beads rose by at least `Definition.least_gain` between
+A *climb* is height gained while free and held: a track whose beads rose by at least `ClimbCriteria.min_rise` between
 frames that follow each other and in both of which the cluster was free and held. From frame to frame the rise is that
 of the mean height of the beads that it has in both, so that beads that it takes up or leaves behind count for nothing.
 A column that detaches high and sinks gains none; a bead thrown into the air is not held, nor is what flies for a
@@ -37,22 +37,22 @@ _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
 
 
 @dataclass(frozen=True)
-class Definition:
+class ClimbCriteria:
     """Thresholds of what a climb is.
 
     Attributes
     ----------
-    least_gain
+    min_rise
         Height, m, that a cluster must gain: about two diameters of the paper's large beads.
-    brush
+    max_gap
         Seconds for which a cluster may touch the pile or lose the wall and still be the same.
-    same
+    min_overlap
         Share of the smaller one's beads that two clusters must have in common to be one.
     """
 
-    least_gain: float = 2e-3
-    brush: float = 0.1
-    same: float = 0.5
+    min_rise: float = 2e-3
+    max_gap: float = 0.1
+    min_overlap: float = 0.5
 
 
 @dataclass
@@ -117,7 +117,7 @@ def held_clusters(labels: IntArray, bridges: Bridges, bulk: npt.NDArray[np.bool_
         yield frozenset(members.tolist()), frozenset(holding.tolist())
 
 
-def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: Definition) -> list[Track]:
+def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: ClimbCriteria) -> list[Track]:
     """Follow clusters from frame to frame.
 
     Parameters
@@ -137,14 +137,14 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: 
     tracks: list[Track] = []
     alive: list[int] = []
     for frame, found in enumerate(clusters):
-        alive = [number for number in alive if time[frame] - time[tracks[number].frames[-1]] <= definition.brush]
+        alive = [number for number in alive if time[frame] - time[tracks[number].frames[-1]] <= definition.max_gap]
         # The larger overlap first: of two tracks that meet, the one that gives more beads goes on.
         shared = sorted(
             (
                 (len(tracks[number].members[-1] & members), -number, place)
                 for number in alive
                 for place, (members, _) in enumerate(found)
-                if _same(tracks[number].members[-1], members, definition.same)
+                if _same(tracks[number].members[-1], members, definition.min_overlap)
             ),
             reverse=True,
         )
@@ -216,12 +216,12 @@ class Climb:
     climbed: bool
 
 
-def judge(
+def classify(
     track: Track,
     time: FloatArray,
     height: FloatArray,
     large: npt.NDArray[np.bool_],
-    definition: Definition,
+    definition: ClimbCriteria,
 ) -> Climb:
     """What a track did, and whether it is a climb.
 
@@ -258,7 +258,7 @@ def judge(
         size=len(members),
         large=int(large[list(members)].sum()),
         walls=tuple(sorted(track.walls[end])),
-        climbed=bool(risen[end] >= definition.least_gain and len(span) >= _FEWEST_FRAMES),
+        climbed=bool(risen[end] >= definition.min_rise and len(span) >= _FEWEST_FRAMES),
     )
 
 

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from walkers.postprocess.clusters import Definition, Track
+from walkers.postprocess.clusters import ClimbCriteria, Track
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -26,7 +26,7 @@ class Event:
         s.
     kind
         ``freed`` (came free of the pile, or reached a wall), ``split`` (parted from another track), ``merged`` (into
-        another track), ``rejoined`` (the pile), ``let go`` (of the walls, or its beads parted).
+        another track), ``rejoined`` (the pile), ``detached`` (of the walls, or its beads parted).
     track
         Number of the track.
     other
@@ -34,13 +34,13 @@ class Event:
     """
 
     time: float
-    kind: Literal["freed", "split", "merged", "rejoined", "let go"]
+    kind: Literal["freed", "split", "merged", "rejoined", "detached"]
     track: int
     other: int | None = None
 
 
 def events_of(
-    tracks: Sequence[Track], time: FloatArray, bulk: Sequence[BoolArray], definition: Definition, first: int = 0
+    tracks: Sequence[Track], time: FloatArray, bulk: Sequence[BoolArray], definition: ClimbCriteria, first: int = 0
 ) -> list[Event]:
     """The events of all tracks in the order of time.
 
@@ -69,27 +69,29 @@ def events_of(
             events.append(Event(float(time[born]), "freed", number))
         if track.merged_at is not None:
             events.append(Event(float(time[track.merged_at]), "merged", number, track.merged_into))
-        elif time[-1] - time[track.frames[-1]] > definition.brush:
+        elif time[-1] - time[track.frames[-1]] > definition.max_gap:
             events.append(_end(number, track, time, bulk, definition))
     return sorted(events, key=lambda event: (event.time, event.track))
 
 
-def _end(number: int, track: Track, time: FloatArray, bulk: Sequence[BoolArray], definition: Definition) -> Event:
+def _end(number: int, track: Track, time: FloatArray, bulk: Sequence[BoolArray], definition: ClimbCriteria) -> Event:
     """How a track ended: on the pile, if most of its beads were there when it could no longer be the same."""
     after = track.frames[-1] + 1
-    until = int(np.searchsorted(time, time[track.frames[-1]] + definition.brush, side="right"))
+    until = int(np.searchsorted(time, time[track.frames[-1]] + definition.max_gap, side="right"))
     members = list(track.members[-1])
-    back = any(bulk[frame][members].mean() >= definition.same for frame in range(after, min(until, len(time) - 1) + 1))
-    return Event(float(time[after]), "rejoined" if back else "let go", number)
+    back = any(
+        bulk[frame][members].mean() >= definition.min_overlap for frame in range(after, min(until, len(time) - 1) + 1)
+    )
+    return Event(float(time[after]), "rejoined" if back else "detached", number)
 
 
-def _parent(tracks: Sequence[Track], number: int, time: FloatArray, definition: Definition) -> int | None:
+def _parent(tracks: Sequence[Track], number: int, time: FloatArray, definition: ClimbCriteria) -> int | None:
     """The track that held most of another one's beads shortly before it began."""
     first, members = tracks[number].frames[0], tracks[number].members[0]
-    best, most = None, definition.same * len(members)
+    best, most = None, definition.min_overlap * len(members)
     for other, track in enumerate(tracks):
         before = bisect_left(track.frames, first) - 1
-        if other == number or before < 0 or time[first] - time[track.frames[before]] > definition.brush:
+        if other == number or before < 0 or time[first] - time[track.frames[before]] > definition.max_gap:
             continue
         shared = len(track.members[before] & members)
         if shared >= most:

@@ -1,4 +1,4 @@
-"""The motion of a pile and its bridges, frame by frame, over all parts of a run."""
+"""The motion of a pile and its bridges, frame by frame, over all segments of a run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from walkers.postprocess.dump import BinaryDump, DumpError, FloatArray
 from walkers.postprocess.local_dump import local_frames
 from walkers.runner.directory import CASE_NAME
 from walkers.runner.files import read_json
-from walkers.runner.parts import PART_NAME, part_directories
+from walkers.runner.segments import SEGMENT_NAME, segment_directories
 from walkers.templates.deck import LAYOUT_NAME
 from walkers.templates.layout import Layout
 
@@ -43,7 +43,7 @@ class PileMotion:
     first_id
         The engine's id of the first bead.
     frames : list of (Path, int)
-        Part and number of each frame within it, for the bridges.
+        Segment and number of each frame within it, for the bridges.
     """
 
     case: PileCase
@@ -95,49 +95,49 @@ def read_pile(directory: str | Path) -> PileMotion:
     Parameters
     ----------
     directory
-        A run directory with its parts.
+        A run directory with its segments.
 
     Raises
     ------
     DumpError
-        If there is no part, or one cannot be read.
+        If there is no segment, or one cannot be read.
     FileNotFoundError
         If it is no such directory.
     """
     directory = Path(directory)
     case = PileCase.from_dict(read_json(directory / CASE_NAME))
-    parts = part_directories(directory)
-    if not parts:
-        raise DumpError(f"{directory}: no part of the run is finished yet")
-    told = [_part(part) for part in parts]
+    segments = segment_directories(directory)
+    if not segments:
+        raise DumpError(f"{directory}: no segment of the run is finished yet")
+    told = [_segment(segment) for segment in segments]
     start = next((one["drive_from"] for one in told if one["drive_from"] is not None), None)
     steps: list[int] = []
     rows: list[FloatArray] = []
-    riders: list[FloatArray] = []
+    carriers: list[FloatArray] = []
     frames: list[tuple[Path, int]] = []
-    for part, one in zip(parts, told, strict=True):
+    for segment, one in zip(segments, told, strict=True):
         if one["begin"] != (steps[-1] if steps else 0):
-            raise DumpError(f"{part}: the part before it is missing")
-        layout, dump = _dump_of(part)
+            raise DumpError(f"{segment}: the segment before it is missing")
+        layout, dump = _dump_of(segment)
         if dump.truncated or not len(dump.steps) or dump.steps[-1] != one["end"]:
-            raise DumpError(f"{part}: its dump is incomplete")
+            raise DumpError(f"{segment}: its dump is incomplete")
         for number, step in enumerate(dump.steps):
             if steps and step <= steps[-1]:
-                continue  # the last frame of the part before
+                continue  # the last frame of the segment before
             frame = dump.frame(number)
-            if len(frame) != layout.riders + sum(case.beads.counts):
-                raise DumpError(f"{part}: {len(frame)} rows, expected riders and {sum(case.beads.counts)} beads")
+            if len(frame) != layout.carriers + sum(case.beads.counts):
+                raise DumpError(f"{segment}: {len(frame)} rows, expected carriers and {sum(case.beads.counts)} beads")
             steps.append(int(step))
-            riders.append(frame[0])  # ids are dumped in their order, the riders first
-            rows.append(frame[layout.riders :])
-            frames.append((part, number))
-    data, walls = np.stack(rows), np.stack(riders)
+            carriers.append(frame[0])  # ids are dumped in their order, the carriers first
+            rows.append(frame[layout.carriers :])
+            frames.append((segment, number))
+    data, walls = np.stack(rows), np.stack(carriers)
     x, vx = dump.column("x"), dump.column("vx")
     radius = data[0, :, dump.column("radius")]
     # Before the drive has begun it is as if it would with the next frame.
     begin = start if start is not None else steps[-1] + case.run.steps_per_frame
     time = (np.array(steps, dtype=np.float64) - begin) * case.run.time_step
-    # In the laboratory frame the riders move with the walls, in the container's they rest.
+    # In the laboratory frame the carriers move with the walls, in the container's they rest.
     shift, speed = walls[:, None, x : x + 3] - walls[0, x : x + 3], walls[:, None, vx : vx + 3]
     return PileMotion(
         case,
@@ -151,20 +151,20 @@ def read_pile(directory: str | Path) -> PileMotion:
     )
 
 
-def _part(directory: Path) -> dict[str, Any]:
+def _segment(directory: Path) -> dict[str, Any]:
     try:
-        said = read_json(directory / PART_NAME)
+        said = read_json(directory / SEGMENT_NAME)
         return {name: said[name] for name in ("begin", "end", "drive_from")}
     except (OSError, ValueError, KeyError) as error:
-        raise DumpError(f"{directory / PART_NAME}: cannot be read ({error})") from error
+        raise DumpError(f"{directory / SEGMENT_NAME}: cannot be read ({error})") from error
 
 
-def _dump_of(part: Path) -> tuple[Layout, BinaryDump]:
+def _dump_of(segment: Path) -> tuple[Layout, BinaryDump]:
     try:
-        layout = Layout.from_dict(read_json(part / LAYOUT_NAME))
-        return layout, BinaryDump(part / layout.bead_dump, layout.bead_columns)
+        layout = Layout.from_dict(read_json(segment / LAYOUT_NAME))
+        return layout, BinaryDump(segment / layout.bead_dump, layout.bead_columns)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DumpError(f"{part}: cannot be read ({error})") from error
+        raise DumpError(f"{segment}: cannot be read ({error})") from error
 
 
 def read_bridges(motion: PileMotion) -> Iterator[Bridges]:
@@ -176,11 +176,11 @@ def read_bridges(motion: PileMotion) -> Iterator[Bridges]:
         If a dump cannot be read.
     """
     frame = -1
-    for part in dict.fromkeys(part for part, _ in motion.frames):
-        wanted = [number for place, number in motion.frames if place == part]
-        layout = Layout.from_dict(read_json(part / LAYOUT_NAME))
-        pairs = local_frames(part / layout.pair_bridge_dump, layout.pair_bridge_columns)
-        walls = local_frames(part / layout.wall_bridge_dump, layout.wall_bridge_columns)
+    for segment in dict.fromkeys(segment for segment, _ in motion.frames):
+        wanted = [number for place, number in motion.frames if place == segment]
+        layout = Layout.from_dict(read_json(segment / LAYOUT_NAME))
+        pairs = local_frames(segment / layout.pair_bridge_dump, layout.pair_bridge_columns)
+        walls = local_frames(segment / layout.wall_bridge_dump, layout.wall_bridge_columns)
         pair, wall = layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
         for number, ((_, between), (_, against)) in enumerate(zip(pairs, walls, strict=False)):
             if number not in wanted:

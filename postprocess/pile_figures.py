@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CLIMB_NAME = "climb.png"
-_MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "let go": "x"}
+_MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """How events are marked (`walkers.postprocess.events`)."""
 
 

@@ -77,7 +77,7 @@ def render_series(
     return save_figure(figure, path, [directory.name])
 
 
-def render_film(directory: Path, destination: Path | None = None, *, slower: float = 1.0) -> Path:
+def render_film(directory: Path, destination: Path | None = None, *, slowdown: float = 1.0) -> Path:
     """Film the box from the side, climbers coloured, with the time and a scale of heights in the picture.
 
     Parameters
@@ -86,8 +86,8 @@ def render_film(directory: Path, destination: Path | None = None, *, slower: flo
         A run directory.
     destination
         The MP4 to write (H.264); ``pile.mp4`` in the run directory if None.
-    slower
-        How many times slower than in reality: every frame of the drive is shown, one after the other.
+    slowdown
+        How many times slowdown than in reality: every frame of the drive is shown, one after the other.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def render_film(directory: Path, destination: Path | None = None, *, slower: flo
     path.parent.mkdir(parents=True, exist_ok=True)
     pictures = _film(found, shown)
     first = next(pictures)
-    rate = 1.0 / (float(np.median(np.diff(time[shown.start :]))) * slower) if len(shown) > 1 else 1.0
+    rate = 1.0 / (float(np.median(np.diff(time[shown.start :]))) * slowdown) if len(shown) > 1 else 1.0
     size = (first.shape[1], first.shape[0])
     with closing(pictures), beside(path) as new:
         writer = write_frames(new, size, fps=rate, codec="libx264", quality=7, macro_block_size=2)
@@ -211,7 +211,7 @@ def seconds_apart(text: str, directory: Path) -> float:
             return seconds
     except (ValueError, ZeroDivisionError):
         pass
-    raise InputError("--apart", [Problem("", None, f'{text!r}: expected a time such as "2 s", or "T/4" of a cycle')])
+    raise InputError("--interval", [Problem("", None, f'{text!r}: expected a time such as "2 s", or "T/4" of a cycle')])
 
 
 def _climbers(found: PileAnalysis, frame: int) -> set[int]:

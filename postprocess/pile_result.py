@@ -14,14 +14,14 @@ from walkers.postprocess.bed import Bed, bed_of, liquid_of_beads, packing_profil
 from walkers.postprocess.bridges import Columns
 from walkers.postprocess.clusters import (
     Climb,
+    ClimbCriteria,
     Cluster,
-    Definition,
     Track,
     bulk_of,
+    classify,
     components,
     follow,
     held_clusters,
-    judge,
 )
 from walkers.postprocess.events import Event, events_of
 from walkers.postprocess.pile import PileMotion, names_of_walls, read_bridges, read_pile
@@ -67,16 +67,16 @@ class PileAnalysis:
     tracks: list[Track]
     climbs: list[Climb]
     events: list[Event]
-    definition: Definition
+    definition: ClimbCriteria
 
 
-def analyse(directory: str | Path, definition: Definition | None = None) -> PileAnalysis:
+def analyse(directory: str | Path, definition: ClimbCriteria | None = None) -> PileAnalysis:
     """Measure a pile, finished or not.
 
     Parameters
     ----------
     directory
-        A run directory with its parts.
+        A run directory with its segments.
     definition
         What counts as a climb.
 
@@ -85,7 +85,7 @@ def analyse(directory: str | Path, definition: Definition | None = None) -> Pile
     postprocess.dump.DumpError
         If a dump cannot be read.
     """
-    rule = definition or Definition()
+    rule = definition or ClimbCriteria()
     motion = read_pile(directory)
     case = motion.case
     beds: list[Bed] = []
@@ -98,19 +98,19 @@ def analyse(directory: str | Path, definition: Definition | None = None) -> Pile
         # While the pile falls and settles, most of it is free of the rest.
         driven = motion.time[frame] >= 0.0
         held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
-    return judged(PileAnalysis(motion, beds, np.stack(liquid), bulks, held, [], [], [], rule), rule)
+    return classified(PileAnalysis(motion, beds, np.stack(liquid), bulks, held, [], [], [], rule), rule)
 
 
-def judged(found: PileAnalysis, definition: Definition) -> PileAnalysis:
+def classified(found: PileAnalysis, definition: ClimbCriteria) -> PileAnalysis:
     """The same pile with another definition of a climb."""
     motion = found.motion
     tracks = follow(motion.time, found.held, definition)
-    climbs = [judge(track, motion.time, motion.position[:, :, 2], motion.large, definition) for track in tracks]
+    climbs = [classify(track, motion.time, motion.position[:, :, 2], motion.large, definition) for track in tracks]
     events = events_of(tracks, motion.time, found.bulks, definition, motion.first_driven)
     return replace(found, tracks=tracks, climbs=climbs, events=events, definition=definition)
 
 
-def tabulate_pile(directory: str | Path, definition: Definition | None = None) -> dict[str, Any]:
+def tabulate_pile(directory: str | Path, definition: ClimbCriteria | None = None) -> dict[str, Any]:
     """Write the tables and ``result.json`` of a pile.
 
     Parameters
@@ -139,7 +139,7 @@ def current_pile_result(directory: str | Path) -> dict[str, Any]:
     directory = Path(directory)
     try:
         result = read_result(directory)
-        usual = result.get("definition") == vars(Definition()) and result.get("method") == METHOD
+        usual = result.get("definition") == vars(ClimbCriteria()) and result.get("method") == METHOD
         if usual and result.keys() >= {"climbs", "surface"} and intact(directory, PILE_TABLES):
             return result
     except (OSError, ValueError):
@@ -245,12 +245,12 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
     }
 
 
-def describe_pile(directory: Path, result: dict[str, Any], *, found: bool = False) -> str:
+def describe_pile(directory: Path, result: dict[str, Any], *, cached: bool = False) -> str:
     """The result of a pile in a few lines: did it climb, when, how fast, who led; mm and mm/s."""
     surface, nuts = result["surface"], result["brazil_nut"]
     lines = [
         f"{result['case']}: {result['beads']} beads ({result['large']} large), {result['frequency']:g} Hz, "
-        f"a0 = {result['peak_acceleration']:.4g} m/s²" + (" (already run)" if found else ""),
+        f"a0 = {result['peak_acceleration']:.4g} m/s²" + (" (already run)" if cached else ""),
         f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling",
         f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
         f"  segregation (z of large - z of small)/sum: {nuts['start']:.3f} at the start, {nuts['end']:.3f} at the end",

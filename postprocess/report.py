@@ -9,7 +9,7 @@ from typing import Any
 _CONTACTS = {"contact_1": "bead 1", "contact_2": "bead 2", "contact_3": "bead on bead"}
 
 
-def describe_result(directory: Path, result: dict[str, Any], *, found: bool = False) -> str:
+def describe_result(directory: Path, result: dict[str, Any], *, cached: bool = False) -> str:
     """The result of a run in a few lines.
 
     Parameters
@@ -18,13 +18,13 @@ def describe_result(directory: Path, result: dict[str, Any], *, found: bool = Fa
         The run directory.
     result
         As `walkers.postprocess.result.tabulate` returns it.
-    found
+    cached
         Whether the run was there before.
     """
     rotation, end = result["rotation"], result["orientation_end"]
     drive = (
         f"{result['frequency']:g} Hz, a0 = {result['peak_acceleration']:.4g} m/s², "
-        f"Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}" + (" (already run)" if found else "")
+        f"Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}" + (" (already run)" if cached else "")
     )
     sliding = ", ".join(f"{name} {_speed(result['sliding'][contact])}" for contact, name in _CONTACTS.items())
     lines = [

@@ -66,7 +66,9 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     directory = Path(directory)
     try:
         result = read_result(directory)
-        if result.keys() >= {"velocity", "walkers", "gamma0", "parted", "kept_heading", "tilt"} and intact(directory):
+        if result.keys() >= {"velocity", "walkers", "gamma0", "separated_fraction", "kept_heading", "tilt"} and intact(
+            directory
+        ):
             return result
     except (OSError, ValueError):
         pass
@@ -117,7 +119,7 @@ def _walker_columns(trajectory: Trajectory, motion: Gait, walked: Walk) -> Colum
         **{f"rotation_{bead + 1}": rotation[:, bead] for bead in range(2)},
         **{f"sliding_{contact + 1}": sliding[:, contact] for contact in range(3)},
         **{f"open_{contact + 1}": opened[:, contact] for contact in range(3)},
-        "parted": (motion.gap[samples, :, 2] > contact_loads(trajectory.case).rupture[2]).mean(axis=0),
+        "separated_fraction": (motion.gap[samples, :, 2] > contact_loads(trajectory.case).rupture[2]).mean(axis=0),
     }
 
 
@@ -157,7 +159,7 @@ def _result(trajectory: Trajectory, walkers: Columns) -> dict[str, Any]:
         "rotation": {f"bead_{bead}": _mean(walkers[f"rotation_{bead}"]) for bead in (1, 2)},
         "sliding": {f"contact_{contact}": _mean(walkers[f"sliding_{contact}"]) for contact in (1, 2, 3)},
         "open": {f"contact_{contact}": _mean(walkers[f"open_{contact}"]) for contact in (1, 2, 3)},
-        "parted": _mean(walkers["parted"]),
+        "separated_fraction": _mean(walkers["separated_fraction"]),
         "orientation_end": _spread(walkers["orientation_end"]),
         "steady": int(np.sum(walkers["steady"])),
         "turned_round": int(np.sum(turned)),

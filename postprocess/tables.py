@@ -60,7 +60,10 @@ WALKERS = {
     "open_1": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
     "open_2": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
     "open_3": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
-    "parted": ("", "share of the samples in which the beads are farther apart than a bridge between them reaches"),
+    "separated_fraction": (
+        "",
+        "share of the samples in which the beads are farther apart than a bridge between them reaches",
+    ),
 }
 """``walkers.parquet``: a row a walker; means are over the cycles after the settling ones."""
 
@@ -93,7 +96,7 @@ BED = {
     "clusters": ("", "clusters that are free of the bulk and held to a side wall"),
     "highest": ("m", "height of the topmost bead of these; the surface where there is none"),
 }
-"""``bed.parquet``: a row a frame of a pile."""
+"""``bed.parquet``: one row per frame of a pile."""
 
 CLUSTERS = {
     "track": ("", "number of the cluster, followed through time"),
@@ -126,11 +129,11 @@ PROFILE = {
 
 EVENTS = {
     "time": ("s", "from the begin of the drive"),
-    "event": ("", "freed, split, merged, rejoined or let go (postprocess.events)"),
+    "event": ("", "freed, split, merged, rejoined or detached (postprocess.events)"),
     "track": ("", "number of the cluster to which it happened"),
     "other": ("", "that from which it split or into which it merged, -1 for none"),
 }
-"""``events.parquet``: a row an event in the lives of a pile's clusters."""
+"""``events.parquet``: one row per event in the lives of a pile's clusters."""
 
 WALKER_TABLES = ("trajectory", "walkers", "bridges")
 PILE_TABLES = ("bed", "clusters", "events", "profile")

@@ -149,9 +149,9 @@ def read_trajectory(directory: str | Path) -> Trajectory:
 def _substrate(
     case: WalkerCase, layout: Layout, time: FloatArray, position: FloatArray, velocity: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Displacement and velocity of the substrate: those of its rider, or the prescribed ones where it has none."""
-    if layout.rider:
-        row = layout.rider - 1
+    """Displacement and velocity of the substrate: those of its carrier, or the prescribed ones where it has none."""
+    if layout.carrier:
+        row = layout.carrier - 1
         return position[:, row] - position[:1, row], velocity[:, row]
     return prescribed_motion(case.drive, time)
 

@@ -1,7 +1,7 @@
 """Run directories: one a run, named by the case and by the hash of all that determines the run.
 
-A run is made in ``<name>-<hash>.part`` and renamed to ``<name>-<hash>`` when its manifest has been written, last: a
-directory without a manifest is not a run, and a run that is made anew replaces the old one only when it has finished.
+A run is made in ``<name>-<hash>.incomplete`` and renamed to ``<name>-<hash>`` when its manifest has been written, last:
+a directory without a manifest is not a run, and a run that is made anew replaces the old one only when it has finished.
 While it is made, the file ``<name>-<hash>.lock`` is locked, also by the engine itself (see `walkers.runner.locks`).
 """
 
@@ -26,7 +26,7 @@ from walkers.inputs.pile import PileCase
 from walkers.runner.audits import read_audit
 from walkers.runner.binary import Engine
 from walkers.runner.failures import DiskFull, RunBusy
-from walkers.runner.files import read_json, settle, settle_entry, write_json
+from walkers.runner.files import fsync_path, read_json, settle, write_json
 from walkers.runner.launch import EngineReport
 from walkers.runner.locks import locked
 from walkers.templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck
@@ -35,7 +35,7 @@ from walkers.templates.layout import Layout
 MANIFEST_NAME = "manifest.json"
 CASE_NAME = "case.json"
 FAILURE_NAME = "failure.json"
-UNFINISHED = ".part"
+UNFINISHED = ".incomplete"
 REPLACED = ".replaced"
 _FORMAT = 1
 _LONGEST_NAME = 80
@@ -119,7 +119,7 @@ def move_into_place(made: Path, place: Path) -> None:
     if place.exists():
         place.rename(replaced)
     made.rename(place)
-    settle_entry(place.parent)
+    fsync_path(place.parent)
     shutil.rmtree(replaced, ignore_errors=True)
 
 
@@ -141,7 +141,7 @@ def open_run(case: WalkerCase, deck: Deck, engine: Engine, out: Path) -> Iterato
     Yields
     ------
     OpenRun
-        Call its `OpenRun.finish` at the end. Left without that, the directory stays as ``….part``, with a
+        Call its `OpenRun.finish` at the end. Left without that, the directory stays as ``….incomplete``, with a
         ``failure.json`` if something failed.
 
     Raises
@@ -168,18 +168,18 @@ def unfinished(place: Path) -> Path:
 @contextmanager
 def make_run(case: WalkerCase, deck: Deck, engine: Engine, place: Path, locks: Sequence[int]) -> Iterator[OpenRun]:
     """`open_run` for somebody who has locked the place already."""
-    part = unfinished(place)
+    incomplete = unfinished(place)
     recover(place)
-    shutil.rmtree(part, ignore_errors=True)
-    run = OpenRun(case, deck, engine, part, place, locks, time.time())
+    shutil.rmtree(incomplete, ignore_errors=True)
+    run = OpenRun(case, deck, engine, incomplete, place, locks, time.time())
     try:
-        with room_on_disk(part, deck):
+        with room_on_disk(incomplete, deck):
             _write_deck(run)
             yield run
     except Stopped:
         raise
     except (WalkersError, OSError) as failure:
-        record_failure(part, failure)
+        record_failure(incomplete, failure)
         raise
 
 
@@ -195,7 +195,7 @@ def recover(place: Path) -> None:
 
 
 @contextmanager
-def room_on_disk(part: Path, deck: Deck) -> Iterator[None]:
+def room_on_disk(incomplete: Path, deck: Deck) -> Iterator[None]:
     """Turn the system's word for a full disk into a `DiskFull`."""
     import errno
 
@@ -204,7 +204,7 @@ def room_on_disk(part: Path, deck: Deck) -> Iterator[None]:
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
-        raise DiskFull(deck.layout.bead_dump_bytes, shutil.disk_usage(part.parent).free, part) from error
+        raise DiskFull(deck.layout.bead_dump_bytes, shutil.disk_usage(incomplete.parent).free, incomplete) from error
 
 
 def _write_deck(run: OpenRun) -> None:
@@ -220,11 +220,11 @@ def write_deck(deck: Deck, directory: Path) -> None:
     write_json(directory / LAYOUT_NAME, deck.layout.as_dict())
 
 
-def record_failure(part: Path, failure: Exception) -> None:
+def record_failure(incomplete: Path, failure: Exception) -> None:
     """Leave word of a failure in the directory of an unfinished run."""
     said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
     with suppress(OSError):  # a full disk: the message reaches the user all the same
-        write_json(part / FAILURE_NAME, said)
+        write_json(incomplete / FAILURE_NAME, said)
 
 
 def manifest(

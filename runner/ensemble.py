@@ -1,6 +1,6 @@
 """Ensembles: the runs of several cases made by one deck, each a run directory of its own within the ensemble's.
 
-An ensemble is made in ``ensembles/<name>-<hash>.part`` and renamed at the end, which finishes all of its runs at once.
+An ensemble is made in ``ensembles/<name>-<hash>.incomplete`` and renamed at the end, which finishes all of its runs.
 """
 
 from __future__ import annotations
@@ -94,22 +94,22 @@ def make_ensemble(
     """
     digest = hashlib.sha256("\n".join(cases).encode()).hexdigest()[:12]
     place = out / FOLDER / f"{next(iter(cases)).rpartition('-')[0]}-{digest}"
-    part = unfinished(place)
+    incomplete = unfinished(place)
     recover(place)
-    shutil.rmtree(part, ignore_errors=True)
-    ensemble = OpenEnsemble(cases, deck, engine, part, place, locks, time.time())
+    shutil.rmtree(incomplete, ignore_errors=True)
+    ensemble = OpenEnsemble(cases, deck, engine, incomplete, place, locks, time.time())
     try:
-        with room_on_disk(part, deck):
+        with room_on_disk(incomplete, deck):
             place.parent.mkdir(exist_ok=True)
             check_room(place.parent, 2 * deck.layout.bead_dump_bytes)  # the whole and its parts, side by side
-            part.mkdir()
-            write_deck(deck, part)
+            incomplete.mkdir()
+            write_deck(deck, incomplete)
             for name, case in cases.items():
                 ensemble.run_directory(name).mkdir()
                 write_json(ensemble.run_directory(name) / CASE_NAME, case.as_dict())
             yield ensemble
     finally:
-        shutil.rmtree(part, ignore_errors=True)
+        shutil.rmtree(incomplete, ignore_errors=True)
 
 
 def finished_places(out: Path) -> dict[str, Path]:
@@ -152,9 +152,9 @@ def _folders(out: Path) -> list[Path]:
 
 def remove_remains(out: Path) -> None:
     """Remove ensembles that were being made when their makers were killed, unless engines still write into them."""
-    for part in (out / FOLDER).glob(f"*{UNFINISHED}"):
-        places = [out / path.name for path in _folders(part)]
+    for incomplete in (out / FOLDER).glob(f"*{UNFINISHED}"):
+        places = [out / path.name for path in _folders(incomplete)]
         with locked(places) as ours:
             # Whoever makes an ensemble has its runs locked before its directory is there.
             if places and len(ours) == len(places):
-                shutil.rmtree(part, ignore_errors=True)
+                shutil.rmtree(incomplete, ignore_errors=True)

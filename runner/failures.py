@@ -152,7 +152,7 @@ class AuditFailed(EngineFailure):
     def __init__(self, failures: Sequence[str]) -> None:
         super().__init__(
             f"this engine failed its audit in {len(failures)} line(s), first: {failures[0]}; "
-            "see it with: walkers audit (--despite-audit runs all the same)"
+            "see it with: walkers audit (--allow-failed-audit runs all the same)"
         )
 
 
@@ -161,4 +161,4 @@ class UnauditedEngineWarning(UserWarning):
 
 
 class EngineVersionWarning(UserWarning):
-    """The engine is another version than the one that the decks' remedies were measured on."""
+    """The engine is another version than the one that the decks' workarounds were measured on."""

@@ -33,10 +33,10 @@ def settle(directory: Path) -> None:
     """Put a directory and all that is in it on the disk, so that its new name outlives a loss of power."""
     for folder, _, names in os.walk(directory):
         for entry in [Path(folder) / name for name in names] + [Path(folder)]:
-            settle_entry(entry)
+            fsync_path(entry)
 
 
-def settle_entry(path: Path) -> None:
+def fsync_path(path: Path) -> None:
     """Put a file, or the names in a directory, on the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:

@@ -22,8 +22,8 @@ def predicted_pile_seconds(case: PileCase) -> float:
     run = case.run
     steps = run.cycles * run.steps_per_cycle + 3 * settling_steps(case)
     speed = _BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1))
-    parts = 3 + -(-run.cycles // run.cycles_per_part)
-    return START_UP_SECONDS * parts + steps * sum(case.beads.counts) / speed
+    segments = 3 + -(-run.cycles // run.cycles_per_segment)
+    return START_UP_SECONDS * segments + steps * sum(case.beads.counts) / speed
 
 
 def summarise_pile(case: PileCase) -> dict[str, Any]:
@@ -47,7 +47,7 @@ def summarise_pile(case: PileCase) -> dict[str, Any]:
             "steps": steps,
             "simulated_seconds": steps * run.time_step,
             "frames": run.cycles * run.frames_per_cycle // run.cycles_per_frame,
-            "parts": -(-run.cycles // run.cycles_per_part),
+            "segments": -(-run.cycles // run.cycles_per_segment),
             "predicted_seconds": predicted_pile_seconds(case),
         },
     }
@@ -63,7 +63,7 @@ def describe_pile_case(summary: dict[str, Any]) -> str:
         f"drive      a0 = {summary['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g",
         f"time step  {step['step'] * 1e6:.5g} µs",
         *lines_of_limits(step),
-        f"run        {run['steps']} steps after the settling, {run['simulated_seconds']:.4g} s, in {run['parts']} "
-        f"parts with {run['frames']} frames, about {run['predicted_seconds'] / 60.0:.1f} min",
+        f"run        {run['steps']} steps after the settling, {run['simulated_seconds']:.4g} s, in {run['segments']} "
+        f"segments with {run['frames']} frames, about {run['predicted_seconds'] / 60.0:.1f} min",
     ]
     return "\n".join(lines)

@@ -93,7 +93,7 @@ def describe(summary: dict[str, Any]) -> str:
 
 
 def text_of_case(case: dict[str, Any]) -> str:
-    """A resolved case, a line a table."""
+    """A resolved case, one line per table."""
     lines = [f"{case['name']}: {case['title']}".rstrip(": ")]
     for table, values in case.items():
         if isinstance(values, dict):
@@ -153,7 +153,7 @@ def _text_of_step(summary: dict[str, Any]) -> str:
 
 
 def lines_of_limits(step: dict[str, Any]) -> list[str]:
-    """What `step_against` says, a line a limit."""
+    """What `step_against` says, one line per limit."""
     lines = []
     for name, limit in step["limits"].items():
         shown = f"{limit * 1e6:.4g} µs" if limit is not None else "none"

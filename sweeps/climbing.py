@@ -12,11 +12,11 @@ import numpy.typing as npt
 
 from walkers.inputs.axes import flatten
 from walkers.inputs.errors import InputError, Problem
-from walkers.postprocess.clusters import Climb, Definition
-from walkers.postprocess.pile_result import analyse, judged
+from walkers.postprocess.clusters import Climb, ClimbCriteria
+from walkers.postprocess.pile_result import analyse, classified
 from walkers.runner.directory import CASE_NAME, finished_run
 from walkers.runner.files import read_json
-from walkers.runner.parts import PARTS, is_pile
+from walkers.runner.segments import SEGMENTS, is_pile
 from walkers.sweeps.record import RECORD_NAME, read_record, result_in, states
 
 _CONFIDENCE = 0.95
@@ -42,7 +42,7 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
     elif is_pile(directory):
         found = [directory]
     else:
-        found = sorted(path.parent for path in directory.glob(f"*/{PARTS}"))
+        found = sorted(path.parent for path in directory.glob(f"*/{SEGMENTS}"))
     finished = {
         path.name.rpartition("-")[2]: path for path in found if finished_run(path) is not None and is_pile(path)
     }
@@ -116,11 +116,11 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
 
 
 VARIATIONS = {
-    "least_gain": (1e-3, 2e-3, 3e-3, 5e-3),
-    "brush": (0.03, 0.1, 0.2),
+    "min_rise": (1e-3, 2e-3, 3e-3, 5e-3),
+    "max_gap": (0.03, 0.1, 0.2),
     "same": (0.3, 0.5, 0.7),
 }
-"""Other thresholds of `walkers.postprocess.clusters.Definition`, tried one at a time."""
+"""Other thresholds of `walkers.postprocess.clusters.ClimbCriteria`, tried one at a time."""
 
 
 def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
@@ -137,8 +137,8 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
         A row a definition, the usual one first: ``threshold`` and ``value`` (empty and None for the usual one),
         ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s).
     """
-    usual = Definition()
-    tried: list[tuple[str, float | None, Definition]] = [("", None, usual)]
+    usual = ClimbCriteria()
+    tried: list[tuple[str, float | None, ClimbCriteria]] = [("", None, usual)]
     for name, values in VARIATIONS.items():
         tried += [(name, value, replace(usual, **{name: value})) for value in values if value != getattr(usual, name)]
     counted: list[list[list[Climb]]] = [[] for _ in tried]
@@ -147,7 +147,7 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
         found = analyse(run)
         larges.append(found.motion.large)
         for climbs, (_, _, definition) in zip(counted, tried, strict=True):
-            climbs.append([climb for climb in judged(found, definition).climbs if climb.climbed])
+            climbs.append([climb for climb in classified(found, definition).climbs if climb.climbed])
     rows = []
     for climbs, (name, value, _) in zip(counted, tried, strict=True):
         speeds = [climb.speed for one in climbs for climb in one]

@@ -12,8 +12,8 @@ from walkers.inputs.pile import PileCase
 from walkers.inputs.reading import AnyCase
 from walkers.postprocess.tables import WALKERS
 from walkers.runner.cost import predicted_seconds
-from walkers.runner.parts import is_pile
 from walkers.runner.pile_summary import predicted_pile_seconds
+from walkers.runner.segments import is_pile
 from walkers.templates.sharing import sharing_key
 
 _WALKER_DERIVED = {
@@ -44,7 +44,11 @@ _WALKER_RESULTS = {
     "right_facing": ("m/s", "mean velocity of the walkers that started facing right"),
     "left_facing": ("m/s", "mean velocity of the walkers that started facing left"),
     # Means over the walkers of what the table of a run says of each.
-    **{name: WALKERS[name] for name in WALKERS if name.startswith(("rotation_", "sliding_", "open_", "parted"))},
+    **{
+        name: WALKERS[name]
+        for name in WALKERS
+        if name.startswith(("rotation_", "sliding_", "open_", "separated_fraction"))
+    },
     "orientation_end": ("rad", "mean orientation at the end"),
     "walkers": ("", "replicates"),
     "steady": ("", "how many of them are steady"),
@@ -138,7 +142,7 @@ def columns_of(result: dict[str, Any]) -> dict[str, Any]:
         **{name: result[name]["mean"] for name in ("right_facing", "left_facing", "orientation_end")},
         **{f"rotation_{bead}": result["rotation"][f"bead_{bead}"] for bead in (1, 2)},
         **{f"{what}_{at}": result[what][f"contact_{at}"] for what in ("sliding", "open") for at in (1, 2, 3)},
-        **{name: result[name] for name in ("parted", "walkers", "steady", "turned_round", "walkers_met")},
+        **{name: result[name] for name in ("separated_fraction", "walkers", "steady", "turned_round", "walkers_met")},
     }
 
 

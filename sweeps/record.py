@@ -191,10 +191,12 @@ def _state(place: Path, finished: Path | None) -> PointState:
         return PointState("finished", finished)
     if is_locked(place):
         return PointState("running")
-    part = unfinished(place)
+    incomplete = unfinished(place)
     try:
-        failure = read_json(part / FAILURE_NAME)
-        return PointState("failed", part, str(failure["reason"]), str(failure["message"]), int(failure.get("lost", 0)))
+        failure = read_json(incomplete / FAILURE_NAME)
+        return PointState(
+            "failed", incomplete, str(failure["reason"]), str(failure["message"]), int(failure.get("lost", 0))
+        )
     except (OSError, ValueError, KeyError, TypeError):
         return PointState("missing")
 

@@ -9,12 +9,12 @@ from pathlib import Path
 from walkers.inputs.reading import AnyCase
 from walkers.inputs.sweep import Sweep
 from walkers.runner.binary import Engine, find_engine
-from walkers.sweeps.conduct import Failure, Options, Progress, conduct, final_failures
 from walkers.sweeps.kinds import ranks_of, seconds_of
 from walkers.sweeps.packing import PlannedDeck, makespan, pack, unfinished_parts
 from walkers.sweeps.record import SweepRecord, describe_sweep, states, write_record
+from walkers.sweeps.scheduler import Failure, Options, Progress, final_failures, schedule
+from walkers.sweeps.shared_deck import check_audit
 from walkers.sweeps.site import check_path
-from walkers.sweeps.together import check_audit
 
 _SETTLED = ("finished", "not needed")
 
@@ -133,7 +133,7 @@ def run_sweep(
     options: Options,
     *,
     engine: str | None = None,
-    despite_audit: bool = False,
+    allow_failed_audit: bool = False,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> tuple[SweepRecord, list[Failure]]:
     """Make all runs of a sweep that are missing.
@@ -142,7 +142,7 @@ def run_sweep(
     ----------
     sweep, out, options, engine
         As for `plan_sweep`.
-    despite_audit
+    allow_failed_audit
         Run on an engine that failed its audit.
     on_progress
         Called a few times a second.
@@ -160,14 +160,14 @@ def run_sweep(
         If a point cannot be used.
     runner.EngineFailure
         If there is no engine, or its audit failed.
-    sweeps.conduct.ClusterFailed
+    sweeps.scheduler.ClusterFailed
         If the cluster's jobs end without having worked.
     """
     plan = plan_sweep(sweep, out, options, engine)
     if plan.decks:
-        check_audit(plan.engine, despite_audit)
+        check_audit(plan.engine, allow_failed_audit)
     write_record(plan.record)
     if not plan.decks:
         return plan.record, plan.final
     options = options.for_ranks(max(map(ranks_of, plan.cases)))
-    return plan.record, conduct(plan.record, plan.cases, plan.engine, options, on_progress)
+    return plan.record, schedule(plan.record, plan.cases, plan.engine, options, on_progress)

@@ -1,4 +1,4 @@
-"""The table of a sweep: a row a point, what was varied, what follows from it, and what came out."""
+"""The table of a sweep: one row per point, what was varied, what follows from it, and what came out."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _INPUTS = {name for columns in DERIVED.values() for name in columns}
 _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
     *("standard_error", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2", "open_3"),
-    *("parted", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
+    *("separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
 }
 """Columns that a table to look at leaves out."""
 

@@ -14,7 +14,7 @@ from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, ProgramDiffers
 from walkers.sweeps.kinds import current_result_of, velocity_in
-from walkers.sweeps.together import make_any
+from walkers.sweeps.shared_deck import make_any
 
 STOPS: dict[str, threading.Event] = {}
 """Of the sweeps that this process conducts, by `Task.sweep`: set to end their engines and to let none begin."""
@@ -31,9 +31,9 @@ class Task:
     Attributes
     ----------
     sweep
-        Which conductor it is from.
+        Which scheduler it is from.
     runs
-        Names of the runs, as the conductor calls them.
+        Names of the runs, as the scheduler calls them.
     cases
         Of the runs; may share a deck.
     out

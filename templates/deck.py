@@ -13,10 +13,10 @@ from walkers.inputs.dimer import contact_loads, dimer_of, hop_height, reach
 from walkers.inputs.pile import PileCase
 from walkers.physics.film import film_drag
 from walkers.physics.matter import Contact
-from walkers.templates.engine import ALL_REMEDIES, Remedies, contact_angle_setting, separation_cap, wall_mesh
+from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds, contact_angle_setting, separation_cap, wall_mesh
 from walkers.templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
 from walkers.templates.placement import place_walkers
-from walkers.templates.scene import Point, Scene, without_riders
+from walkers.templates.scene import Point, Scene, without_carriers
 from walkers.templates.sharing import check_sharing, surfaces_of
 
 if TYPE_CHECKING:
@@ -97,12 +97,12 @@ class Plan:
         Length and sampling.
     walkers
         Which beads are whose.
-    remedies
-        Which remedies the deck carries; without riders those of the scene are left out.
+    workarounds
+        Which workarounds the deck carries; without carriers those of the scene are left out.
     prescribed
         Beads keep their velocities instead of following the forces.
     ranks
-        Number of MPI processes; the scene must have riders for each.
+        Number of MPI processes; the scene must have carriers for each.
     checkpoint
         Restart file to write or to go on from.
     surfaces
@@ -116,7 +116,7 @@ class Plan:
         suits few beads far apart.
     title
         What the deck is of, for those who read it.
-    tells_agitation
+    print_rms_velocity
         Whether the root mean square velocity of the beads is printed at the end.
     """
 
@@ -124,7 +124,7 @@ class Plan:
     scene: Scene
     recording: Recording
     walkers: tuple[PlacedWalker, ...] = ()
-    remedies: Remedies = ALL_REMEDIES
+    workarounds: Workarounds = ALL_WORKAROUNDS
     prescribed: bool = False
     ranks: int = 1
     checkpoint: Checkpoint = NO_CHECKPOINT
@@ -133,7 +133,7 @@ class Plan:
     drive_from: int | None = 0
     skin: float | None = None
     title: str = "Wet dimers on a shaken substrate"
-    tells_agitation: bool = False
+    print_rms_velocity: bool = False
 
     @property
     def shaken(self) -> bool:
@@ -146,22 +146,22 @@ class Plan:
         return self.drive_from == self.recording.begin
 
 
-def render_deck(case: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Deck:
+def render_deck(case: WalkerCase, workarounds: Workarounds = ALL_WORKAROUNDS) -> Deck:
     """Render a walker case.
 
     Parameters
     ----------
     case
         A resolved case.
-    remedies
-        Which remedies for the engine's defects the deck carries.
+    workarounds
+        Which workarounds for the engine's defects the deck carries.
 
     Returns
     -------
     Deck
         Numbers in full precision (the shortest text that reads back as the same double).
     """
-    return compose(walker_plan(case, remedies=remedies))
+    return compose(walker_plan(case, workarounds=workarounds))
 
 
 def render_shared_deck(cases: Sequence[WalkerCase]) -> Deck:
@@ -175,7 +175,7 @@ def render_shared_deck(cases: Sequence[WalkerCase]) -> Deck:
     return compose(walker_plan(*cases))
 
 
-def walker_plan(*cases: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Plan:
+def walker_plan(*cases: WalkerCase, workarounds: Workarounds = ALL_WORKAROUNDS) -> Plan:
     """The plan of walker cases that share a deck: their replicates on one substrate, recorded as the cases say."""
     check_sharing(cases)
     case = cases[0]
@@ -188,16 +188,16 @@ def walker_plan(*cases: WalkerCase, remedies: Remedies = ALL_REMEDIES) -> Plan:
         status_every=-(-run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
     )
     fastest = max(fastest_of(one) for one in cases)
-    return Plan(case, scene, recording, walkers, remedies, surfaces=surfaces_of(cases), fastest=fastest)
+    return Plan(case, scene, recording, walkers, workarounds, surfaces=surfaces_of(cases), fastest=fastest)
 
 
 def compose(plan: Plan) -> Deck:
     """Put a deck together from its blocks."""
-    case, remedies = plan.case, plan.remedies
+    case, workarounds = plan.case, plan.workarounds
     scene, walkers = plan.scene, plan.walkers
-    if not remedies.riders:
-        gone = len(scene.riders)
-        scene = without_riders(scene)
+    if not workarounds.carriers:
+        gone = len(scene.carriers)
+        scene = without_carriers(scene)
         walkers = tuple(replace(one, beads=(one.beads[0] - gone, one.beads[1] - gone)) for one in walkers)
     first = case.drive.harmonics[0]
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
@@ -212,13 +212,13 @@ def compose(plan: Plan) -> Deck:
         output_name=OUTPUT_NAME,
         layout_name=LAYOUT_NAME,
         wall_file=WALL_NAME,
-        copies=[f"walls_{number}" for number in range(1, remedies.wall_copies + 1)],
+        copies=[f"walls_{number}" for number in range(1, workarounds.wall_copies + 1)],
         contact_model=_contact_model(case),
         types=len(surfaces) + 1,
         friction=_pairs([(surface.friction_bead_bead, surface.friction_bead_wall) for surface in surfaces]),
         rolling_friction=_pairs([(surface.rolling_friction,) * 2 for surface in surfaces]),
         restitution=_pairs([(surface.restitution,) * 2 for surface in surfaces]),
-        contact_angle_setting=contact_angle_setting(angle) if remedies.contact_angle else degrees(angle),
+        contact_angle_setting=contact_angle_setting(angle) if workarounds.contact_angle else degrees(angle),
         separation_cap=separation_cap((bead.radius for bead in scene.beads), case.liquid.volume_fraction, angle),
         bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
         down=[component / case.gravity for component in case.gravity_vector] if case.gravity else [],
@@ -314,11 +314,11 @@ def _layout(
         wall_bridge_columns=recording.wall_bridge_columns,
         bridge_every=recording.bridge_every,
         bridge_frames=(recording.steps - recording.begin) // recording.bridge_every + 1,
-        atoms=len(scene.riders) + len(scene.beads),
+        atoms=len(scene.carriers) + len(scene.beads),
         steps=recording.steps,
         time_step=case.run.time_step,
-        rider=1 if scene.riders else 0,
-        riders=len(scene.riders),
+        carrier=1 if scene.carriers else 0,
+        carriers=len(scene.carriers),
         walkers=walkers,
     )
 

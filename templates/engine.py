@@ -1,7 +1,7 @@
 """What LIGGGHTS-PUBLIC 3.8.0 (as Debian packages it) does wrong or unlike its manual, and what the decks do about it.
 
 This is the only place that knows; docs/engine.md is generated from `DEFECTS` and from an audit. The functions below are
-the remedies that need arithmetic, the rest stands in the deck's blocks (``templates/blocks``).
+the workarounds that need arithmetic, the rest stands in the deck's blocks (``templates/blocks``).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Defect:
         What it is.
     shows
         How it shows.
-    remedy
+    workaround
         What is done about it.
     watched_by
         Names of the audit's checks that would notice a change.
@@ -34,7 +34,7 @@ class Defect:
 
     name: str
     shows: str
-    remedy: str
+    workaround: str
     watched_by: tuple[str, ...] = ()
 
 
@@ -59,11 +59,11 @@ DEFECTS = (
         "is that of the wall's triangle: it vanishes for bead 0 and is 80-90 % off for others. With a primitive "
         "wall it reads in front of the array, and crashes or not.",
         "Walls are meshes with one large triangle a face, and the first atoms of every deck, one a triangle and "
-        "MPI rank, are riders that move with the walls and touch nothing, so that the velocity read is the wall's"
+        "MPI rank, are carriers that move with the walls and touch nothing, so that the velocity read is the wall's"
         " own. Spatial sorting is off, for it would renumber them.",
         (
             "viscous-walls",
-            "viscous-riders",
+            "viscous-carriers",
             "ranks",
         ),
     ),
@@ -203,12 +203,12 @@ _SIGHT = 1.1
 
 
 @dataclass(frozen=True)
-class Remedies:
-    """Which of the remedies a deck carries: all of them, but for decks that show what happens without one.
+class Workarounds:
+    """Which of the workarounds a deck carries: all of them, but for decks that show what happens without one.
 
     Attributes
     ----------
-    riders
+    carriers
         Atoms that carry the walls' velocity, created first.
     wall_copies
         How often every wall stands in the deck.
@@ -216,12 +216,12 @@ class Remedies:
         Whether the contact angle is translated.
     """
 
-    riders: bool = True
+    carriers: bool = True
     wall_copies: int = WALL_COPIES
     contact_angle: bool = True
 
 
-ALL_REMEDIES = Remedies()
+ALL_WORKAROUNDS = Workarounds()
 
 
 def contact_angle_setting(effective_angle: float) -> float:

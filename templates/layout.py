@@ -38,8 +38,8 @@ class PlacedWalker:
 class Layout:
     """Dumps of a deck (file names, columns, steps between frames, frames expected) and its walkers.
 
-    ``rider`` is the id of the atom that moves with the substrate, 0 in a deck without one; ``riders`` is how many there
-    are.
+    ``carrier`` is the id of the atom that moves with the substrate, 0 in a deck without one; ``carriers`` is how many
+    there are.
     """
 
     bead_dump: str
@@ -55,10 +55,10 @@ class Layout:
     atoms: int
     steps: int
     time_step: float
-    rider: int
+    carrier: int
     walkers: tuple[PlacedWalker, ...]
     ranks: int = 1
-    riders: int = 1
+    carriers: int = 1
 
     @property
     def bead_dump_bytes(self) -> int:

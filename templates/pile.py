@@ -1,4 +1,4 @@
-"""Decks of piles: the beads' places at the start, the container, and the parts that a run is made in."""
+"""Decks of piles: the beads' places at the start, the container, and the segments that a run is made in."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _SKIN = 2e-4
 """m; between 0.1 and 0.3 mm it makes no difference of more than some per cent to the time of a step."""
 _STATUS_LINES_PER_CYCLE = 2
 SETTLING_SECONDS = 0.05
-"""Length of the parts in which a pile settles; at the end of each it is looked whether it has."""
+"""Length of the segments in which a pile settles; at the end of each we check whether it has."""
 
 
 @dataclass(frozen=True)
-class Part:
-    """A part of a run: from a step to a step, from a restart file (unless it is the first) to the next.
+class Segment:
+    """A segment of a run: from a step to a step, from a restart file (unless it is the first) to the next.
 
     ``drive_from`` is the step at which the drive begins; None while the pile settles.
     """
@@ -55,16 +55,16 @@ def faces_of(case: PileCase) -> tuple[Face, ...]:
     )
 
 
-def render_part(case: PileCase, part: Part) -> Deck:
-    """Render the deck of a part."""
+def render_segment(case: PileCase, segment: Segment) -> Deck:
+    """Render the deck of a segment."""
     run = case.run
     recording = Recording(
-        steps=part.end,
+        steps=segment.end,
         sample_every=run.steps_per_frame,
         bridge_every=run.steps_per_frame,
         status_every=-(-run.steps_per_cycle // _STATUS_LINES_PER_CYCLE),
         bead_columns=BEAD_COLUMNS,
-        begin=part.begin,
+        begin=segment.begin,
         pair_bridge_columns=PAIR_COLUMNS,
         wall_bridge_columns=WALL_COLUMNS,
     )
@@ -74,12 +74,12 @@ def render_part(case: PileCase, part: Part) -> Deck:
             place_pile(case),
             recording,
             ranks=run.ranks,
-            checkpoint=Checkpoint(write=RESTART_NAME, read=PREVIOUS_RESTART_NAME if part.begin else None),
+            checkpoint=Checkpoint(write=RESTART_NAME, read=PREVIOUS_RESTART_NAME if segment.begin else None),
             fastest=_fastest(case),
-            drive_from=part.drive_from,
+            drive_from=segment.drive_from,
             skin=_SKIN,
             title="A wet bidisperse pile in a shaken container",
-            tells_agitation=True,
+            print_rms_velocity=True,
         )
     )
 
@@ -96,21 +96,21 @@ def _fastest(case: PileCase) -> float:
 
 
 def settling_steps(case: PileCase) -> int:
-    """Steps of a part in which the pile settles."""
+    """Steps of a segment in which the pile settles."""
     frame = case.run.steps_per_frame
     return max(1, round(SETTLING_SECONDS / case.run.time_step / frame)) * frame
 
 
-def render_first_part(case: PileCase) -> Deck:
+def render_first_segment(case: PileCase) -> Deck:
     """The deck that a run begins with: the beads fall and settle."""
-    return render_part(case, Part(0, settling_steps(case), None))
+    return render_segment(case, Segment(0, settling_steps(case), None))
 
 
 @lru_cache(maxsize=4)
 def place_pile(case: PileCase) -> Scene:
     """Beads on a loose lattice, the sizes shuffled and the places jittered by the case's seed, to fall and settle.
 
-    Riders come first: for each MPI rank one a face, under the floor of its part of the box.
+    Carriers come first: for each MPI rank one a face, under the floor of its part of the box.
     """
     faces, ranks = faces_of(case), case.run.ranks
     half = case.container.width / 2.0
@@ -120,14 +120,14 @@ def place_pile(case: PileCase) -> Scene:
     # Climbers may rise above the rim: the walls go on, and no bead is lost there before it has fallen off for long.
     upper: Point = (edge, edge, 2.0 * case.container.height)
     width = (upper[0] - lower[0]) / ranks
-    riders = tuple(
+    carriers = tuple(
         (lower[0] + (rank + 0.5) * width, 0.0, -(number + 1.5) * below)
         for rank in range(ranks)
         for number in range(len(faces))
     )
     places = _places(case, largest)
-    beads = tuple(Bead(len(riders) + 1 + number, place, radius) for number, (place, radius) in enumerate(places))
-    return Scene(beads, faces, riders, lower, upper)
+    beads = tuple(Bead(len(carriers) + 1 + number, place, radius) for number, (place, radius) in enumerate(places))
+    return Scene(beads, faces, carriers, lower, upper)
 
 
 def _places(case: PileCase, largest: float) -> list[tuple[Point, float]]:

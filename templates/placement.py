@@ -12,7 +12,7 @@ from walkers.templates.layout import PlacedWalker
 from walkers.templates.scene import Bead, Face, Scene
 from walkers.templates.sharing import surfaces_of
 
-_FIRST_BEAD = 2  # atom 1 is the rider of the substrate
+_FIRST_BEAD = 2  # atom 1 is the carrier of the substrate
 
 
 def place_walkers(cases: Sequence[WalkerCase]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
@@ -46,7 +46,7 @@ def place_walkers(cases: Sequence[WalkerCase]) -> tuple[Scene, tuple[PlacedWalke
         beads=tuple(beads),
         faces=(Face("z", 1, (0.0, 0.0, 0.0)),),
         # In the corner, beyond the walkers' reach and above it.
-        riders=((half_x + margin, half_y + margin, height + margin),),
+        carriers=((half_x + margin, half_y + margin, height + margin),),
         lower=(-half_x - 2.0 * margin, -half_y - 2.0 * margin, -margin),
         upper=(half_x + 2.0 * margin, half_y + 2.0 * margin, height + 2.0 * margin),
     )

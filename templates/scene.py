@@ -1,4 +1,4 @@
-"""What stands in the simulation box: beads, the faces of walls, and the riders that move with them."""
+"""What stands in the simulation box: beads, the faces of walls, and the carriers that move with them."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ class Face:
 
 @dataclass(frozen=True)
 class Scene:
-    """Beads, faces, the riders' places (one a face, in the order of the faces) and the box's corners, all in m."""
+    """Beads, faces, the carriers' places (one a face, in the order of the faces) and the box's corners, all in m."""
 
     beads: tuple[Bead, ...]
     faces: tuple[Face, ...]
-    riders: tuple[Point, ...]
+    carriers: tuple[Point, ...]
     lower: Point
     upper: Point
 
@@ -60,10 +60,10 @@ def turned(vector: Point, angle: float) -> Point:
     return (x * cos(angle) - y * sin(angle), x * sin(angle) + y * cos(angle), z)
 
 
-def without_riders(scene: Scene) -> Scene:
-    """The scene with its riders left out, the beads numbered from 1."""
-    gone = len(scene.riders)
-    return replace(scene, riders=(), beads=tuple(replace(bead, id=bead.id - gone) for bead in scene.beads))
+def without_carriers(scene: Scene) -> Scene:
+    """The scene with its carriers left out, the beads numbered from 1."""
+    gone = len(scene.carriers)
+    return replace(scene, carriers=(), beads=tuple(replace(bead, id=bead.id - gone) for bead in scene.beads))
 
 
 def vector_along(axis: Axis, length: float = 1.0) -> Point:

@@ -21,9 +21,9 @@ from walkers.postprocess.pile import read_pile
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import write_deck
 from walkers.runner.files import read_json
-from walkers.runner.parts import PARTS, part_directories, run_pile
+from walkers.runner.segments import SEGMENTS, run_pile, segment_directories
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME
-from walkers.templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Part, render_part
+from walkers.templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Segment, render_segment
 
 _REPEATS = 2
 
@@ -37,32 +37,32 @@ def _case(name: str, **run: Any) -> PileCase:
 def measure_loop(out: Path) -> None:
     """Share of the engine's loop in the wall time of a run, and bead-steps a second against the deck run by hand."""
     print("| | ratio |\n|---|---|")
-    case = _case("pile-small", duration="0.5 s", part="0.25 s")
+    case = _case("pile-small", duration="0.5 s", segment="0.25 s")
     begin = time.perf_counter()
     run, _ = run_pile(case, find_engine(None), out, force=True)
     wall = time.perf_counter() - begin
     loop = run.manifest["seconds"]["engine_loop"]
-    print(f"| engine's loop over wall time, small pile, parts of 0.25 s | {loop / wall:.3f} |")
+    print(f"| engine's loop over wall time, small pile, segments of 0.25 s | {loop / wall:.3f} |")
     ours, theirs = [], []
-    last = part_directories(run.directory)[-1]
+    last = segment_directories(run.directory)[-1]
     for number in range(_REPEATS):
-        again = _case("pile-small", duration="0.5 s", part="0.25 s")
+        again = _case("pile-small", duration="0.5 s", segment="0.25 s")
         redone, _ = run_pile(again, find_engine(None), out / f"again-{number}", force=True)
-        ours.append(read_json(part_directories(redone.directory)[-1] / "part.json")["loop_seconds"])
+        ours.append(read_json(segment_directories(redone.directory)[-1] / "segment.json")["loop_seconds"])
         theirs.append(_by_hand(case, last, out / "by-hand"))
-    steps = read_json(last / "part.json")
+    steps = read_json(last / "segment.json")
     speed = sum(case.beads.counts) * (steps["end"] - steps["begin"])
-    print(f"| its last part: bead-steps a second by `walkers run` over those by hand | {min(theirs) / min(ours):.3f} |")
+    print(f"| its last segment: bead-steps a second, `walkers run` over by hand | {min(theirs) / min(ours):.3f} |")
     print(f"\n{speed / min(ours) / 1e6:.2f} million bead-steps a second on one core")
 
 
-def _by_hand(case: PileCase, part: Path, folder: Path) -> float:
-    """Loop time of a part's deck when ``liggghts`` is called on it in a folder, s."""
+def _by_hand(case: PileCase, segment: Path, folder: Path) -> float:
+    """Loop time of a segment's deck when ``liggghts`` is called on it in a folder, s."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    said = read_json(part / "part.json")
-    write_deck(render_part(case, Part(said["begin"], said["end"], said["drive_from"])), folder)
-    before = part.with_name(f"{int(part.name) - 1:04d}") / RESTART_NAME
+    said = read_json(segment / "segment.json")
+    write_deck(render_segment(case, Segment(said["begin"], said["end"], said["drive_from"])), folder)
+    before = segment.with_name(f"{int(segment.name) - 1:04d}") / RESTART_NAME
     shutil.copyfile(before, folder / PREVIOUS_RESTART_NAME)
     command = ["liggghts", "-in", DECK_NAME]
     with (folder / OUTPUT_NAME).open("wb") as output:
@@ -75,23 +75,23 @@ def measure_ranks(out: Path) -> None:
     """The shaken full pile on one rank and on two."""
     print("\n| full pile | bead-steps a second |\n|---|---|")
     for ranks in (1, 2):
-        case = _case("pile-fig1a", duration="0.1 s", part="0.1 s", ranks=ranks, longest_settling="0.05 s")
+        case = _case("pile-fig1a", duration="0.1 s", segment="0.1 s", ranks=ranks, longest_settling="0.05 s")
         run, _ = run_pile(case, find_engine(None), out, force=True)
-        part = read_json(part_directories(run.directory)[-1] / "part.json")
-        speed = (part["end"] - part["begin"]) * sum(case.beads.counts) / part["loop_seconds"] / 1e6
+        segment = read_json(segment_directories(run.directory)[-1] / "segment.json")
+        speed = (segment["end"] - segment["begin"]) * sum(case.beads.counts) / segment["loop_seconds"] / 1e6
         print(f"| {ranks} rank{'s' * (ranks > 1)} | {speed:.2f} million |")
 
 
 def measure_tables(out: Path) -> None:
     """Time and memory of the tables of the full pile with 2,000 frames and their bridges."""
-    case = _case("pile-fig1a", duration="0.37 s", frames_per_second=5440.0, part="0.1 s", longest_settling="0.05 s")
+    case = _case("pile-fig1a", duration="0.37 s", frames_per_second=5440.0, segment="0.1 s", longest_settling="0.05 s")
     run, _ = run_pile(case, find_engine(None), out)
     frames = len(read_pile(run.directory).time)
     begin = time.perf_counter()
     command = [sys.executable, __file__, "tabulate", str(run.directory)]
     told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     seconds = time.perf_counter() - begin
-    size = sum(path.stat().st_size for path in (run.directory / PARTS).rglob("*")) / 1e6
+    size = sum(path.stat().st_size for path in (run.directory / SEGMENTS).rglob("*")) / 1e6
     print("\n| full pile | seconds | MB of memory | MB read |\n|---|---|---|---|")
     print(f"| tables of {frames} frames with bridges | {seconds:.1f} | {float(told):.0f} | {size:.0f} |")
 

@@ -1,4 +1,4 @@
-"""The audit: passes on the installed engine, fails at exactly the lines whose remedy is missing."""
+"""The audit: passes on the installed engine, fails at exactly the lines whose workaround is missing."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from walkers.inputs import InputError
 from walkers.runner.audits import AuditRecord, read_audit, write_audit
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
-from walkers.templates.engine import DEFECTS, Remedies
+from walkers.templates.engine import DEFECTS, Workarounds
 
 
 @pytest.fixture(scope="session")
@@ -56,8 +56,8 @@ def _failing(report: AuditReport) -> set[str]:
     return {line.what for line in report.failures}
 
 
-def _standing_on(report: AuditReport, remedy: str) -> set[str]:
-    return {line.what for line in report.lines if remedy in line.needs}
+def _standing_on(report: AuditReport, workaround: str) -> set[str]:
+    return {line.what for line in report.lines if workaround in line.needs}
 
 
 def test_the_installed_engine_passes(report: AuditReport) -> None:
@@ -81,24 +81,24 @@ def test_the_surprises_are_there_in_the_raw_engine(report: AuditReport) -> None:
 
 
 def _quick_but(*longest: str) -> tuple[Check, ...]:
-    """The quick checks without some that take long and have no line that stands on the remedy in question."""
+    """The quick checks without some that take long and have no line that stands on the workaround in question."""
     return tuple(check for check in selected(quick=True) if check.name not in longest)
 
 
 def test_without_riders_exactly_the_viscous_wall_lines_fail(report: AuditReport) -> None:
     checks = _quick_but("known-speed", "independence", "restart", "energy", "restitution", "contact-angle")
-    broken = run_audit(checks, remedies=Remedies(riders=False))
-    assert _failing(broken) == _standing_on(report, "riders")
+    broken = run_audit(checks, workarounds=Workarounds(carriers=False))
+    assert _failing(broken) == _standing_on(report, "carriers")
     assert len(_failing(broken)) >= 9
 
 
 def test_with_a_single_wall_exactly_the_wall_lines_fail(report: AuditReport) -> None:
-    broken = run_audit(_quick_but("independence", "restart", "wall-motion"), remedies=Remedies(wall_copies=1))
+    broken = run_audit(_quick_but("independence", "restart", "wall-motion"), workarounds=Workarounds(wall_copies=1))
     assert _failing(broken) == _standing_on(report, "walls")
 
 
 def test_without_the_translation_exactly_the_angle_lines_fail(report: AuditReport) -> None:
-    broken = run_audit(selected(["contact-angle"]), remedies=Remedies(contact_angle=False))
+    broken = run_audit(selected(["contact-angle"]), workarounds=Workarounds(contact_angle=False))
     assert _failing(broken) == _standing_on(report, "angle")
 
 
@@ -156,7 +156,7 @@ def test_docs_engine_is_what_the_audit_writes(report: AuditReport) -> None:
     """docs/engine.md is generated: all defects and all lines of the quick audit are in it, by their names."""
     written = (Path(__file__).parent.parent / "docs" / "engine.md").read_text("utf-8")
     for defect in DEFECTS:
-        assert f"### {defect.name}\n\n{defect.shows}\n\n*Remedy.* {defect.remedy}\n" in written
+        assert f"### {defect.name}\n\n{defect.shows}\n\n*Workaround.* {defect.workaround}\n" in written
     for checked in report.checked:
         for line in checked.lines:
             assert f"| `{checked.check.name}` | {line.what} |" in written
@@ -184,7 +184,7 @@ def test_a_binary_that_failed_is_refused_unless_told_otherwise(own_cache: Path) 
     with pytest.raises(AuditFailed, match="Hertz force"):
         run_case(case, own_cache / "runs")
     assert not (own_cache / "runs").exists()
-    assert not run_case(case, own_cache / "runs", despite_audit=True).run.manifest["engine"]["audit"]["passed"]
+    assert not run_case(case, own_cache / "runs", allow_failed_audit=True).run.manifest["engine"]["audit"]["passed"]
 
 
 def test_a_quick_audit_does_not_displace_a_full_one(own_cache: Path) -> None:

@@ -21,10 +21,10 @@ from walkers.calibration.emulator import fit_emulators
 from walkers.calibration.posterior import log_likelihood, sample_posterior
 from walkers.calibration.report import emulator_checks, intervals, rows_of
 from walkers.calibration.space import Space, spread_out
-from walkers.calibration.waves import HOPELESS, run_wave, wave_sweep
+from walkers.calibration.waves import FAILED_RESIDUAL, run_wave, wave_sweep
 from walkers.inputs import InputError
 from walkers.inputs.calibration import Observation, Parameter, load_calibration, read_calibration, shipped_calibrations
-from walkers.sweeps.conduct import Options
+from walkers.sweeps.scheduler import Options
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -46,8 +46,8 @@ def test_the_cube_and_the_parameters_are_one() -> None:
     assert 0.1 <= values[:, 0].min() < values[:, 0].max() <= 10.0
     np.testing.assert_allclose(SPACE.unit(values), unit)
     np.testing.assert_allclose(SPACE.values(np.array([0.5, 0.5])), [1.0, 1.0])
-    believed = Space((parameter("a", 0.1, 10.0, log=True, normal=(1.0, 0.5)),))
-    densities = believed.log_belief(np.array([[0.5], [0.9], [1.1]]))
+    narrowed = Space((parameter("a", 0.1, 10.0, log=True, normal=(1.0, 0.5)),))
+    densities = narrowed.log_prior(np.array([[0.5], [0.9], [1.1]]))
     expected = -0.5 * (np.log(SPACE.values(np.array([0.9, 0.0]))[0]) / 0.5) ** 2
     assert densities[1] - densities[0] == pytest.approx(expected)
     assert densities[2] == -np.inf
@@ -99,11 +99,11 @@ def test_errors_are_judged_by_the_later_sets() -> None:
     kink = np.sign(unit.sum(axis=1) - 1.0) * (np.abs(unit - 0.5).max(axis=1) < 0.12)
     outcome = (unit[:, 0] + 0.3 * kink)[:, None]
     everywhere, there, few = (
-        fit_emulators(unit[:count], outcome[:count], [observation("p", 0.5, 0.05)], 1, judged)[0].stretch
+        fit_emulators(unit[:count], outcome[:count], [observation("p", 0.5, 0.05)], 1, judged)[0].error_inflation
         for judged, count in ((0, None), (64, None), (64, 70))
     )
     assert there > 1.2 * everywhere
-    assert few == fit_emulators(unit[:70], outcome[:70], [observation("p", 0.5, 0.05)], 1)[0].stretch
+    assert few == fit_emulators(unit[:70], outcome[:70], [observation("p", 0.5, 0.05)], 1)[0].error_inflation
 
 
 def test_later_waves_look_around_the_best_sets(tmp_path: Path) -> None:
@@ -150,7 +150,9 @@ def test_the_best_set_gives_most_observations_and_then_the_least_misfit(tmp_path
     document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
     found = read_calibration(document, source="best", name="best", folder=tmp_path)
     deviation = np.array([one.deviation for one in found.observations])
-    residuals = np.array([[0.0, 0.0, 5.0, 5.0], [0.9, 0.9, 0.9, 3.0], [0.9, 0.2, 0.2, 2.0], [0.2, 0.2, 0.2, HOPELESS]])
+    residuals = np.array(
+        [[0.0, 0.0, 5.0, 5.0], [0.9, 0.9, 0.9, 3.0], [0.9, 0.2, 0.2, 2.0], [0.2, 0.2, 0.2, FAILED_RESIDUAL]]
+    )
     outcome = np.array([one.value for one in found.observations]) + residuals * deviation
     assert ranking(found, outcome).tolist() == [2, 1, 3, 0]
 
@@ -313,10 +315,10 @@ def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
     found = read_calibration(document, source="apart", name="apart", folder=tmp_path)
     unit = Space(found.parameters).unit(np.array([[0.1, 0.5], [0.2, 9.9]]))
     wave, _ = run_wave(found, unit, "apart", tmp_path / "runs", Options(2))
-    assert wave.table["parted"].tolist() == pytest.approx([0.0, 1.0], abs=0.1)
+    assert wave.table["separated_fraction"].tolist() == pytest.approx([0.0, 1.0], abs=0.1)
     observed = found.observations[0]
     assert wave.outcome[0, 0] == pytest.approx(wave.table["velocity"][0])
-    assert wave.outcome[1, 0] == pytest.approx(observed.value + HOPELESS * observed.deviation)
+    assert wave.outcome[1, 0] == pytest.approx(observed.value + FAILED_RESIDUAL * observed.deviation)
 
 
 def test_values_have_their_units_and_guesses_lead_the_first_wave(tmp_path: Path) -> None:
@@ -349,7 +351,7 @@ def test_a_set_that_loses_its_beads_is_told_and_not_run_again(tmp_path: Path) ->
     wave, failures = run_wave(found, unit, "lost", tmp_path / "runs", Options(2))
     assert {failure.reason for failure in failures} <= FINAL
     assert len(failures) == 3
-    expected = [one.value + HOPELESS * one.deviation for one in found.observations]
+    expected = [one.value + FAILED_RESIDUAL * one.deviation for one in found.observations]
     np.testing.assert_allclose(wave.outcome[0], expected)
     remains = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("failure.json")}
     assert len(remains) == 3
@@ -367,7 +369,7 @@ def test_the_example_of_the_docs_can_be_read(tmp_path: Path) -> None:
     assert read_calibration(document, source="docs", name="docs", folder=tmp_path).groups == ("fig2", "fig4a")
 
 
-@pytest.mark.parametrize("command", ["calibrate ruby --out", "calibrate ruby --to", "ingredients --to"])
+@pytest.mark.parametrize("command", ["calibrate ruby --out", "calibrate ruby --to", "model-terms --to"])
 def test_a_file_is_no_folder_to_write_into(command: str, tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.touch()

@@ -12,7 +12,7 @@ from walkers.postprocess.report import describe_result
 from walkers.postprocess.result import read_result
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
-from walkers.sweeps.together import make_together
+from walkers.sweeps.shared_deck import make_together
 from walkers.theory.prediction import motion_of, predict
 
 FRICTIONS = {0.1: -2.2e-3, 0.2: 1.8e-3, 0.3: 5.9e-3}

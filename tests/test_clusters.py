@@ -9,7 +9,16 @@ import pytest
 from walkers.inputs.pile import Container
 from walkers.physics.capillary import bridge_volume_between_beads
 from walkers.postprocess.bed import liquid_of_beads, packing_profile, segregation
-from walkers.postprocess.clusters import Climb, Definition, Track, bulk_of, components, follow, held_clusters, judge
+from walkers.postprocess.clusters import (
+    Climb,
+    ClimbCriteria,
+    Track,
+    bulk_of,
+    classify,
+    components,
+    follow,
+    held_clusters,
+)
 from walkers.postprocess.events import events_of
 from walkers.postprocess.pile import Bridges
 
@@ -45,8 +54,8 @@ class Scene:
         self.walls: list[dict[int, int]] = [{20: SIDE, 0: SIDE, 1: 0} for _ in TIME]
         self.bulks: list[npt.NDArray[np.bool_]] = []
 
-    def climbs(self, definition: Definition | None = None) -> tuple[list[Track], list[Climb]]:
-        rule = definition or Definition()
+    def climbs(self, definition: ClimbCriteria | None = None) -> tuple[list[Track], list[Climb]]:
+        rule = definition or ClimbCriteria()
         clusters = []
         for pairs, walls in zip(self.pairs, self.walls, strict=True):
             bridges = frame(pairs, walls)
@@ -55,7 +64,7 @@ class Scene:
             clusters.append(list(held_clusters(labels, bridges, self.bulks[-1])))
         tracks = follow(TIME, clusters, rule)
         self.events = [(event.kind, event.track, event.other) for event in events_of(tracks, TIME, self.bulks, rule)]
-        return tracks, [judge(track, TIME, self.height, self.large, rule) for track in tracks]
+        return tracks, [classify(track, TIME, self.height, self.large, rule) for track in tracks]
 
 
 def test_a_rising_cluster_climbs() -> None:
@@ -80,7 +89,7 @@ def test_the_error_of_a_speed_is_its_scatter() -> None:
     for _ in range(200):
         height = scene.height.copy()
         height[:, 20:22] += np.cumsum(draw.normal(5e-3, 20e-3, FRAMES) * 0.02)[:, None]
-        climb = judge(track, TIME, height, scene.large, Definition())
+        climb = classify(track, TIME, height, scene.large, ClimbCriteria())
         speeds.append(climb.speed)
         errors.append(climb.standard_error)
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(speeds), rel=0.25)
@@ -185,7 +194,7 @@ def test_one_that_parts_is_followed_by_its_beads() -> None:
     assert {tracks[0].members[-1], tracks[1].members[-1]} == {frozenset({20, 21}), frozenset({22, 23})}
 
 
-@pytest.mark.parametrize("event", ["rejoined", "let go"])
+@pytest.mark.parametrize("event", ["rejoined", "detached"])
 def test_how_a_cluster_ends(event: str) -> None:
     scene = Scene()
     for number in range(FRAMES // 2, FRAMES):

@@ -1,4 +1,4 @@
-"""The deck: readable, exact, and with every remedy for what the engine gets wrong."""
+"""The deck: readable, exact, and with every workaround for what the engine gets wrong."""
 
 import re
 from math import radians
@@ -30,8 +30,8 @@ def _lines(deck: str, start: str) -> list[list[str]]:
 def test_the_rider_is_created_first_and_atoms_are_not_sorted(deck: str) -> None:
     case = load_case("fig1b")
     first = _lines(deck, "create_atoms")[0]
-    assert tuple(map(float, first[3:6])) == place_walkers([case])[0].riders[0]
-    assert _lines(deck, "group           rider") == [["group", "rider", "id", "<=", "1"]]
+    assert tuple(map(float, first[3:6])) == place_walkers([case])[0].carriers[0]
+    assert _lines(deck, "group           carrier") == [["group", "carrier", "id", "<=", "1"]]
     assert ["atom_modify", "map", "array", "sort", "0", "0"] in _lines(deck, "atom_modify")
 
 
@@ -58,9 +58,9 @@ def test_beads_start_with_the_substrate_in_the_laboratory_frame(deck: str) -> No
     case = load_case("fig1b")
     velocities = _lines(deck, "velocity")
     assert {velocity[1]: float(velocity[3]) for velocity in velocities} == dict.fromkeys(
-        ("beads", "rider"), case.drive.peak_velocity
+        ("beads", "carrier"), case.drive.peak_velocity
     )
-    assert len([line for line in _lines(deck, "fix") if "wiggle" in line]) == 3  # two meshes and the rider
+    assert len([line for line in _lines(deck, "fix") if "wiggle" in line]) == 3  # two meshes and the carrier
 
 
 def test_the_container_frame_has_a_signed_gravity_and_walls_at_rest() -> None:

@@ -63,7 +63,7 @@ def _launch_deck(case: WalkerCase, deck: Deck, out: Path, **options: object) -> 
 
 def _remains(out: Path) -> dict[str, str]:
     """What a failed run leaves: one unfinished directory that says why."""
-    (part,) = out.glob("*.part")
+    (part,) = out.glob("*.incomplete")
     assert not list(out.glob("*/manifest.json"))
     failure: dict[str, str] = json.loads((part / "failure.json").read_text())
     return failure
@@ -115,7 +115,7 @@ def test_crash_of_the_engine(tmp_path: Path) -> None:
 
 def test_engine_killed(tmp_path: Path) -> None:
     def kill_soon() -> None:
-        wait_for(lambda: list(tmp_path.glob("*.part/beads.bin")))
+        wait_for(lambda: list(tmp_path.glob("*.incomplete/beads.bin")))
         for engine in engines_in(tmp_path):
             os.kill(engine, signal.SIGKILL)
 
@@ -226,7 +226,7 @@ def test_a_disk_that_fills_up_during_the_run(small_disk: Path) -> None:
     case = make_case(run={"cycles": 180, "settling_cycles": 2, "samples_per_cycle": 20})
 
     def fill() -> None:
-        wait_for(lambda: list(small_disk.glob("runs/*.part/beads.bin")))
+        wait_for(lambda: list(small_disk.glob("runs/*.incomplete/beads.bin")))
         with suppress(OSError), (small_disk / "ballast").open("wb", buffering=0) as file:
             while file.write(b"\0" * 4096):
                 pass

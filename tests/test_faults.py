@@ -28,7 +28,7 @@ from walkers.postprocess.report import describe_result
 from walkers.postprocess.result import current_result
 from walkers.runner.failures import EngineError, EngineFailure
 from walkers.runner.launch import launch
-from walkers.sweeps.conduct import Failure, Options, _mildness
+from walkers.sweeps.scheduler import Failure, Options, _severity
 from walkers.sweeps.worker import Task, work
 from walkers.templates import render_deck
 
@@ -49,7 +49,7 @@ def test_bounds_of_a_case_are_the_engines(
     run = {"time_step": "0.4 us", "cycles": 2, "settling_cycles": 0, "samples_per_cycle": 1, "allow_unstable": True}
     drive = {"frequency": "2 kHz"}
     case = make_case(contact=contact, run=run, drive=drive)
-    assert not run_case(case, tmp_path).found
+    assert not run_case(case, tmp_path).cached
     (key,) = beyond
     with pytest.raises(InputError, match=rf"contact\.{key} = .*: expected .*(more than 0\.05|at most 1e\+09)"):
         make_case(contact=beyond)
@@ -84,7 +84,7 @@ def test_a_number_that_is_none_at_the_end_of_a_dump_is_a_failure(unnumbered: str
     with pytest.raises((DumpError, EngineFailure), match="no number"):
         run_case(make_case(run=run), tmp_path / "runs", engine=unnumbered)
     assert not list(tmp_path.glob("runs/*/manifest.json"))
-    assert list(tmp_path.glob("runs/*.part/failure.json"))
+    assert list(tmp_path.glob("runs/*.incomplete/failure.json"))
 
 
 def test_a_dump_that_holds_no_number_is_not_tabulated(run_directory: Callable[..., Path], tmp_path: Path) -> None:
@@ -314,7 +314,7 @@ def test_an_observation_over_itself_is_refused(tmp_path: Path) -> None:
 def test_failures_that_threaten_all_points_come_first() -> None:
     reasons = ["WalkersMet", "BeadsLost", "SomethingNew", "EngineKilled", "RunBusy", "DiskFull", "EngineNeverStarted"]
     failures = [Failure(number, "run", reason, "", None) for number, reason in enumerate(reasons)]
-    order = [failure.reason for failure in sorted(failures, key=_mildness)]
+    order = [failure.reason for failure in sorted(failures, key=_severity)]
     expected = ["DiskFull", "EngineNeverStarted", "EngineKilled", "SomethingNew", "BeadsLost", "WalkersMet", "RunBusy"]
     assert order == expected
 
@@ -362,12 +362,12 @@ def test_piles_are_run_from_python_as_walkers_are(tmp_path: Path) -> None:
     from walkers.inputs import load_pile
 
     case = load_pile("pile-ci")
-    brief = replace(case, run=replace(case.run, cycles=case.run.cycles_per_part, longest_settling=0.02))
+    brief = replace(case, run=replace(case.run, cycles=case.run.cycles_per_segment, longest_settling=0.02))
     seen: list[object] = []
     outcome = run_case(brief, tmp_path, on_progress=seen.append)
-    assert (outcome.found, outcome.result["beads"]) == (False, sum(case.beads.counts))
+    assert (outcome.cached, outcome.result["beads"]) == (False, sum(case.beads.counts))
     assert seen
-    assert run_case(brief, tmp_path).found
+    assert run_case(brief, tmp_path).cached
 
 
 def test_the_engines_log_is_not_kept_in_memory(tmp_path: Path) -> None:

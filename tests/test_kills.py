@@ -50,7 +50,7 @@ def test_after_each_of_fifty_kills_the_next_call_runs(tmp_path: Path) -> None:
         assert not is_locked(outcome.run.directory)
     assert begun["running"] > 5  # the moments are spread, and some have an engine
     wait_for(lambda: not engines_in(tmp_path))
-    assert not list(tmp_path.glob("*.part"))
+    assert not list(tmp_path.glob("*.incomplete"))
     assert not list(tmp_path.glob("*.lock"))
 
 
@@ -60,7 +60,7 @@ def test_no_engine_is_orphaned_by_a_kill_at_its_birth(tmp_path: Path) -> None:
     for kill in range(40):
         folder = tmp_path / str(kill)
         child = _forked(lambda folder=folder: run_case(case, folder))  # type: ignore[misc]
-        wait_for(lambda folder=folder: list(folder.glob("*.part/engine.log")))  # type: ignore[misc]
+        wait_for(lambda folder=folder: list(folder.glob("*.incomplete/engine.log")))  # type: ignore[misc]
         time.sleep(draw.uniform(0.0, 0.02))  # the fork, setpriv, sh and the engine follow within that time
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
@@ -90,7 +90,7 @@ def test_a_dying_engine_is_waited_for_with_a_line(tmp_path: Path) -> None:
     os.waitpid(child, 0)
     with pytest.warns(OrphanLockWarning, match="waiting for what is left of a run that was killed"):
         outcome = run_case(case, tmp_path / "runs", engine=front)
-    assert not outcome.found
+    assert not outcome.cached
 
 
 def _front_that_lingers(folder: Path, seconds: int) -> str:
@@ -160,7 +160,7 @@ def test_a_crash_between_renaming_and_removing_leaves_no_trace(tmp_path: Path) -
     assert run_case(case, tmp_path, force=True).run.directory == place
     assert not left.exists()
     place, left = _replaced(case, tmp_path)
-    assert run_case(case, tmp_path).found
+    assert run_case(case, tmp_path).cached
     with open_run(case, render_deck(case), _engine(), tmp_path):
         assert not left.exists()
 

@@ -29,9 +29,9 @@ from walkers.paper.sensitivity import OBSERVATIONS, PARAMETERS, sensitivities
 from walkers.paper.sources import NothingFinishedError, Sources
 from walkers.postprocess.drawing import save_figure
 from walkers.postprocess.gait import gait
-from walkers.postprocess.steady import steady_walkers
-from walkers.sweeps.conduct import Options
+from walkers.postprocess.steady_state import steady_walkers
 from walkers.sweeps.run import run_sweep
+from walkers.sweeps.scheduler import Options
 from walkers.theory.mathieu import alignment, turning
 from walkers.theory.prediction import motion_of
 from walkers.theory.quasistatic import mean_velocity
@@ -108,7 +108,7 @@ def test_all_drives_of_the_paper_are_stable() -> None:
 def test_every_published_number_is_compared(sources: Sources) -> None:
     rows = compare(sources)
     assert [row.key for row in rows] == [number.key for number in published.NUMBERS]
-    assert all(number.hangs_on for number in published.NUMBERS if number.measured)
+    assert all(number.depends_on for number in published.NUMBERS if number.measured)
     for row in rows:
         assert (row.engine is not None) or not row.measured or row.left_out
         assert bool(row.why) != row.agrees

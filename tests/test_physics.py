@@ -113,7 +113,7 @@ def test_a_cycle_is_a_whole_multiple_of_the_sampling_interval(frequency: str, st
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_substrate_moves_as_prescribed(trajectory: Moved, axis: str) -> None:
-    """The rider carries the substrate's motion: A sin ωt along the axis, zero across."""
+    """The carrier carries the substrate's motion: A sin ωt along the axis, zero across."""
     moved = trajectory(drive={"axis": axis}, run={"cycles": 4, "settling_cycles": 1})
     drive = moved.case.drive
     along = "xyz".index(axis)

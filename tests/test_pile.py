@@ -25,11 +25,11 @@ from walkers.postprocess.tables import PILE_TABLES, TABLES, read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runner.failures import EngineError, RunBusy
-from walkers.runner.parts import part_directories, run_pile
+from walkers.runner.segments import run_pile, segment_directories
 from walkers.sweeps.climbing import describe_climbs, piles_in, summarise_climbs
-from walkers.sweeps.conduct import Options
 from walkers.sweeps.record import states
 from walkers.sweeps.run import plan_sweep, run_sweep
+from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import Site, SiteFile
 from walkers.sweeps.table import load
 
@@ -58,22 +58,22 @@ def run(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     return directory
 
 
-# Three parts of the drive, each as short as it can be and still have frames.
-BRIEF = {"duration": "0.045 s", "part": "0.015 s"}
+# Three segments of the drive, each as short as it can be and still have frames.
+BRIEF = {"duration": "0.045 s", "segment": "0.015 s"}
 
 
 @pytest.fixture
 def halting(tmp_path: Path) -> Callable[..., str]:
-    """An engine that stops in the midst of some parts when it makes them for the first time."""
+    """An engine that stops in the midst of some segments when it makes them for the first time."""
 
-    def engine(*parts: int) -> str:
+    def engine(*segments: int) -> str:
         front = tmp_path / "front"
-        halts = "|".join(f"{part:04d}.new" for part in parts)
+        halts = "|".join(f"{segment:04d}.new" for segment in segments)
         front.write_text(
             f"""#!/bin/sh
-            part=$(basename "$PWD")
-            mark={tmp_path}/halted-${{part%.new}}
-            case $part in {halts})
+            segment=$(basename "$PWD")
+            mark={tmp_path}/halted-${{segment%.new}}
+            case $segment in {halts})
                 [ -e $mark ] || (while ! [ -e beads.bin ]; do sleep 0.02; done; kill -STOP $$; touch $mark) &
             esac
             exec liggghts "$@"
@@ -154,18 +154,18 @@ def test_tables_of_a_pile(run: Path) -> None:
 
 
 def test_an_interrupted_pile_goes_on_bit_for_bit(halting: Callable[..., str], tmp_path: Path) -> None:
-    """Killed while it makes its second part, and the engine alone while it makes the third."""
+    """Killed while it makes its second segment, and the engine alone while it makes the third."""
     uninterrupted, _ = run_pile(brief(), find_engine(None), tmp_path)
     run = uninterrupted.directory
     tabulate_pile(run)
     engine = halting(1, 2)
     place = run_place(brief(), find_engine(engine), tmp_path / "out")
-    unfinished = place.with_name(place.name + ".part")
-    for part in (1, 2):
+    unfinished = place.with_name(place.name + ".incomplete")
+    for segment in (1, 2):
         program = start_brief(tmp_path, engine)
-        wait_for((tmp_path / f"halted-{part:04d}").exists)
-        assert len(part_directories(unfinished)) == part
-        if part == 1:
+        wait_for((tmp_path / f"halted-{segment:04d}").exists)
+        assert len(segment_directories(unfinished)) == segment
+        if segment == 1:
             program.kill()
         else:
             for process in engines_in(unfinished):
@@ -174,9 +174,9 @@ def test_an_interrupted_pile_goes_on_bit_for_bit(halting: Callable[..., str], tm
         wait_for(lambda: not engines_in(unfinished))
     assert not place.exists()
     assert start_brief(tmp_path, engine).wait() == 0
-    assert len(part_directories(run)) == 4
-    assert [path.name for path in part_directories(place)] == [path.name for path in part_directories(run)]
-    for here, there in zip(part_directories(place), part_directories(run), strict=True):
+    assert len(segment_directories(run)) == 4
+    assert [path.name for path in segment_directories(place)] == [path.name for path in segment_directories(run)]
+    for here, there in zip(segment_directories(place), segment_directories(run), strict=True):
         for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"):
             assert (here / name).read_bytes() == (there / name).read_bytes()
     for name in PILE_TABLES:
@@ -184,8 +184,8 @@ def test_an_interrupted_pile_goes_on_bit_for_bit(halting: Callable[..., str], tm
 
 
 def test_restart_files_are_kept_for_the_last_two_parts_only(run: Path) -> None:
-    kept = [path.name for path in part_directories(run) if (path / "state.restart").exists()]
-    assert kept == [path.name for path in part_directories(run)][-2:]
+    kept = [path.name for path in segment_directories(run) if (path / "state.restart").exists()]
+    assert kept == [path.name for path in segment_directories(run)][-2:]
 
 
 def test_a_pile_is_run_once_at_a_time(halting: Callable[..., str], tmp_path: Path) -> None:
@@ -209,7 +209,7 @@ def test_two_ranks_make_the_same_kind_of_pile(run: Path, tmp_path: Path) -> None
 
 
 def test_both_frames_shake_alike(run: Path, tmp_path: Path) -> None:
-    """Chaotic trajectories part, their agitation does not."""
+    """Chaotic trajectories segment, their agitation does not."""
     case = small(drive={"frame": "lab"})
     finished, _ = run_pile(case, find_engine(None), tmp_path)
 
@@ -245,11 +245,11 @@ def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
         return place
 
     gap, cut, said, lines = (broken(name) for name in ("gap", "cut", "said", "lines"))
-    shutil.rmtree(part_directories(gap)[1])
-    dump = part_directories(cut)[1] / "beads.bin"
+    shutil.rmtree(segment_directories(gap)[1])
+    dump = segment_directories(cut)[1] / "beads.bin"
     dump.write_bytes(dump.read_bytes()[:-100])
-    (part_directories(said)[1] / "part.json").write_text("{")
-    text = part_directories(lines)[1] / "bridges.walls.txt"
+    (segment_directories(said)[1] / "segment.json").write_text("{")
+    text = segment_directories(lines)[1] / "bridges.walls.txt"
     text.write_text(text.read_text()[:-200])
     for place in (gap, cut, said, lines):
         for command in ("plot", "vtk"):
@@ -261,7 +261,7 @@ def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
 def test_looking_before_the_end_leaves_nothing_stale(halting: Callable[..., str], tmp_path: Path) -> None:
     case, engine = brief(), find_engine(halting(1))
     place = run_place(case, engine, tmp_path / "out")
-    unfinished = place.with_name(place.name + ".part")
+    unfinished = place.with_name(place.name + ".incomplete")
     program = start_brief(tmp_path, str(engine.path))
     wait_for((tmp_path / "halted-0001").exists)
     program.kill()
@@ -276,24 +276,26 @@ def test_looking_before_the_end_leaves_nothing_stale(halting: Callable[..., str]
 def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     case, engine = brief(), find_engine(None)
     place = run_place(case, engine, tmp_path)
-    from walkers.runner import parts
+    from walkers.runner import segments
 
-    honest = parts.render_part
+    honest = segments.render_segment
 
-    def broken(case: PileCase, part: parts.Part) -> Any:
-        deck = honest(case, part)
-        return deck if part.drive_from is None else replace(deck, text=deck.text.replace("nve/sphere", "nve/cube"))
+    def broken(case: PileCase, segment: segments.Segment) -> Any:
+        deck = honest(case, segment)
+        return deck if segment.drive_from is None else replace(deck, text=deck.text.replace("nve/sphere", "nve/cube"))
 
-    monkeypatch.setattr(parts, "render_part", broken)
+    monkeypatch.setattr(segments, "render_segment", broken)
     with pytest.raises(EngineError, match="nve/cube"):
         run_pile(case, engine, tmp_path)
     monkeypatch.undo()
-    unfinished = place.with_name(place.name + ".part")
+    unfinished = place.with_name(place.name + ".incomplete")
     assert json.loads((unfinished / "failure.json").read_text())["reason"] == "EngineError"
-    kept = {path: path.stat().st_mtime_ns for path in part_directories(unfinished)}
+    kept = {path: path.stat().st_mtime_ns for path in segment_directories(unfinished)}
     assert kept
     finished, _ = run_pile(case, engine, tmp_path)
-    assert {finished.directory / "parts" / path.name for path in kept} <= set(part_directories(finished.directory))
+    assert {finished.directory / "segments" / path.name for path in kept} <= set(
+        segment_directories(finished.directory)
+    )
 
 
 BAD: dict[str, tuple[dict[str, dict[str, Any]], str]] = {
@@ -345,7 +347,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     assert "climbs  " in told("result", str(run))
     assert told("plot", str(run), "--to", "here").strip() == "here/climb.png"
     assert told("render", str(run), "--to", "here/box.png", "--images", "2").strip() == "here/box.png"
-    assert told("render", str(run), "--to", "here/row.png", "--apart", "0.05 s").strip() == "here/row.png"
+    assert told("render", str(run), "--to", "here/row.png", "--interval", "0.05 s").strip() == "here/row.png"
     film = in_folder / told("render", str(run), "--film", "--to", "here/box.mp4").strip()
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(film))
     assert frames == (read_pile(run).time >= 0.0).sum()
@@ -371,11 +373,11 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     assert f"{small().beads.counts[0]} small and {small().beads.counts[1]} large beads" in told("show", "pile-ci")
     assert "Not yet" in told("deck", "pile-ci")
     refusals = [
-        ["render", "--apart", "3 s"],
-        ["render", "--apart", "soon"],
-        ["render", "--apart", "T/4"],  # frames are whole cycles apart
+        ["render", "--interval", "3 s"],
+        ["render", "--interval", "soon"],
+        ["render", "--interval", "T/4"],  # frames are whole cycles apart
         ["render", "--walker", "1"],
-        ["render", "--slower", "2"],
+        ["render", "--slowdown", "2"],
         ["render", "--film", "--images", "3"],
         ["render", "--film", "--to", "box.png"],
         ["render", "--to", "box.jpg"],

@@ -13,7 +13,7 @@ from walkers.postprocess import read_result, read_table, read_trajectory
 from walkers.postprocess.gait import distance_walked, fit_slopes, gait, settled_samples, walk
 from walkers.postprocess.report import describe_result
 from walkers.postprocess.result import RESULT_NAME, current_result, walkers_met
-from walkers.postprocess.steady import steady_walkers
+from walkers.postprocess.steady_state import steady_walkers
 from walkers.postprocess.tables import TABLES, WALKER_TABLES
 from walkers.postprocess.trajectory import Trajectory
 from walkers.runner.files import write_json
@@ -46,7 +46,7 @@ def test_a_result_of_before_is_made_anew(directory: Path, tmp_path: Path) -> Non
     copy = tmp_path / directory.name
     shutil.copytree(directory, copy)
     known = read_result(copy)
-    write_json(copy / RESULT_NAME, {key: value for key, value in known.items() if key != "parted"})
+    write_json(copy / RESULT_NAME, {key: value for key, value in known.items() if key != "separated_fraction"})
     assert current_result(copy) == known
     assert read_result(copy) == known
 

@@ -39,7 +39,7 @@ def test_a_finished_run_is_not_run_again(tmp_path: Path) -> None:
     first = run_case(case, tmp_path)
     stamp = (first.run.directory / "manifest.json").stat().st_mtime_ns
     again = run_case(case, tmp_path)
-    assert (first.found, again.found) == (False, True)
+    assert (first.cached, again.cached) == (False, True)
     assert again.result == first.result
     assert (first.run.directory / "manifest.json").stat().st_mtime_ns == stamp
 
@@ -50,7 +50,7 @@ def test_force_runs_again(tmp_path: Path) -> None:
     node = (first.directory / "beads.bin").stat().st_ino
     with (first.directory / "beads.bin").open("rb"):  # as long as it is open no other file gets its number
         again = run_case(case, tmp_path, force=True)
-    assert not again.found
+    assert not again.cached
     assert (again.run.directory / "beads.bin").stat().st_ino != node
     assert [path.name for path in tmp_path.iterdir()] == [again.run.directory.name]
 
@@ -61,7 +61,7 @@ def test_a_forced_run_that_fails_leaves_the_old_one(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         run_case(case, tmp_path, force=True, on_progress=_interrupt)
     assert finished_run(old.directory) is not None
-    assert run_case(case, tmp_path).found
+    assert run_case(case, tmp_path).cached
 
 
 def _interrupt(_: object) -> None:
@@ -72,10 +72,10 @@ def test_an_unfinished_run_is_redone(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
     with pytest.raises(KeyboardInterrupt):
         run_case(case, tmp_path, on_progress=_interrupt)
-    (part,) = tmp_path.glob("*.part")
+    (part,) = tmp_path.glob("*.incomplete")
     (part / "leftover").touch()
     outcome = run_case(case, tmp_path)
-    assert not outcome.found
+    assert not outcome.cached
     assert not part.exists()
     assert not (outcome.run.directory / "leftover").exists()
 
@@ -160,7 +160,7 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(
     front.write_text('#!/bin/sh\nliggghts "$@"\nexit 0\n')
     front.chmod(0o755)
     program = subprocess.Popen([PROGRAM, "run", "test.toml", "--engine", str(front)], stderr=subprocess.DEVNULL)
-    wait_for(lambda: program.poll() is not None or list(in_folder.glob("runs/*.part/beads.bin")))
+    wait_for(lambda: program.poll() is not None or list(in_folder.glob("runs/*.incomplete/beads.bin")))
     assert program.poll() is None
     program.kill()
     program.wait()
@@ -199,7 +199,7 @@ def test_a_run_is_found_by_its_directory_or_its_case(tmp_path: Path) -> None:
 def test_json_result_of_the_program(in_folder: Path) -> None:
     _toml(in_folder)
     first, second = (json.loads(call("run", "test.toml", "--json", check=True).stdout) for _ in range(2))
-    assert (first["found"], second["found"]) == (False, True)
+    assert (first["cached"], second["cached"]) == (False, True)
     assert first["velocity"] == second["velocity"]
     shown = subprocess.run([PROGRAM, "result", first["run"]], capture_output=True, text=True, check=True).stdout
     assert f"{first['velocity']['mean'] * 1e3:.3f}" in shown
@@ -211,9 +211,9 @@ def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, mo
     answers = iter([None])
     monkeypatch.setattr("walkers.runner.directory.finished_run", lambda place: next(answers, finished_run(place)))
     outcome = run_case(case, tmp_path)
-    assert outcome.found
+    assert outcome.cached
     assert outcome.run.manifest["finished"] == stamp
-    assert not list(tmp_path.glob("*.part"))
+    assert not list(tmp_path.glob("*.incomplete"))
 
 
 @pytest.mark.parametrize("damage", ["result.json", "walkers.parquet", "bridges.parquet", "trajectory.parquet"])

@@ -49,14 +49,14 @@ def test_an_engine_that_never_starts_is_told_by_its_name(stillborn: Callable[[in
     with pytest.raises(EngineNeverStarted, match="never started: exit status"):
         run_case(make_case(run=SHORT), tmp_path / "runs", engine=stillborn(99))
     assert (tmp_path / "births").read_text().count("born") == 3
-    assert "EngineNeverStarted" in next((tmp_path / "runs").glob("*.part/failure.json")).read_text()
+    assert "EngineNeverStarted" in next((tmp_path / "runs").glob("*.incomplete/failure.json")).read_text()
 
 
 def test_an_engine_starts_where_nothing_temporary_can_be_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("TMPDIR", "/proc")
-    assert not run_case(make_case(run=SHORT), tmp_path).found
+    assert not run_case(make_case(run=SHORT), tmp_path).cached
 
 
 def _below(process: psutil.Process) -> list[psutil.Process]:

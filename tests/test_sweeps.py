@@ -38,10 +38,10 @@ from walkers.postprocess import read_table, read_trajectory
 from walkers.runner import find_engine, finished_run
 from walkers.runner.ensemble import finished_place
 from walkers.runner.failures import WalkersMet
-from walkers.sweeps.conduct import Options
 from walkers.sweeps.run import run_sweep
+from walkers.sweeps.scheduler import Options
+from walkers.sweeps.shared_deck import make_together
 from walkers.sweeps.table import load, thresholds
-from walkers.sweeps.together import make_together
 from walkers.sweeps.worker import Task, work
 
 TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
@@ -75,7 +75,7 @@ def _start(*arguments: str) -> subprocess.Popen[str]:
 def contents_of(out: Path) -> dict[str, dict[str, bytes]]:
     """What each finished run computed: tables, result and dumps, by the names of runs and files."""
     manifests = [*out.glob("*/manifest.json"), *out.glob("ensembles/*/*/manifest.json")]
-    manifests = [path for path in manifests if not any(folder.suffix == ".part" for folder in path.parents)]
+    manifests = [path for path in manifests if not any(folder.suffix == ".incomplete" for folder in path.parents)]
     kept = (
         "beads.bin",
         "bridges.pairs.txt",
@@ -135,7 +135,7 @@ def test_a_run_of_a_shared_deck_is_an_ordinary_one(sweep_file: Callable[..., str
     directory = in_folder / load(in_folder / "runs" / "test")["run"][0]
     assert directory.parent.parent.name == "ensembles"
     found = call("run", "base.toml", "--json", check=True)
-    assert json.loads(found.stdout)["found"] is True
+    assert json.loads(found.stdout)["cached"] is True
     for command in ("result", "plot", "vtk", "render"):
         call(command, str(directory), check=True)
     (directory / "walkers.parquet").unlink()
@@ -145,7 +145,7 @@ def test_a_run_of_a_shared_deck_is_an_ordinary_one(sweep_file: Callable[..., str
 
 def test_walkers_that_meet_are_taken_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """They have room for more than they walk; so what counts as near is made larger than all of it."""
-    monkeypatch.setattr("walkers.postprocess.parting.NEAR", 1e3)
+    monkeypatch.setattr("walkers.postprocess.splitting.NEAR", 1e3)
     with pytest.raises(WalkersMet):
         make_together([make_case(run=TINY, start={"seed": seed}) for seed in (1, 2)], tmp_path, find_engine())
     assert not list(tmp_path.glob("ensembles/*"))
@@ -250,7 +250,7 @@ def test_a_failing_point_does_not_stop_the_others(
     assert _sweep(name, "--engine", engine, "--retries", "2").returncode == 1
     again = launches()[before:]
     assert len(again) == 3
-    assert {Path(place).name.removesuffix(".part") for place in again} == {
+    assert {Path(place).name.removesuffix(".incomplete") for place in again} == {
         json.loads((in_folder / "runs" / "test" / "sweep.json").read_text())["points"][2]["run"]
     }
 
@@ -343,7 +343,7 @@ def test_an_engine_that_outlives_a_killed_sweep_is_waited_for(sweep_file: Callab
     program = _start(name, "--engine", str(front))
     wait_for(stopped.exists)
     orphan = int(stopped.read_text())
-    (dump,) = in_folder.glob("runs/*.part/beads.bin")
+    (dump,) = in_folder.glob("runs/*.incomplete/beads.bin")
     program.kill()
     program.communicate()
     node = dump.stat().st_ino
@@ -536,9 +536,9 @@ def test_a_sweep_that_is_killed_eight_times(
     assert len(frame) == frame["run"].nunique() == 24
     assert contents_of(in_folder / "runs") == contents_of(in_folder / "undisturbed")
     # The last call made no finished point again: each of its decks holds points that were missing before.
-    again = {Path(place).name.removesuffix(".part") for place in launches()[before:]}
+    again = {Path(place).name.removesuffix(".incomplete") for place in launches()[before:]}
     assert not again & finished
-    assert not list(in_folder.glob("runs/**/*.part"))
+    assert not list(in_folder.glob("runs/**/*.incomplete"))
     assert not list(in_folder.glob("runs/**/*.lock"))
 
 

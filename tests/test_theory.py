@@ -17,8 +17,8 @@ from walkers.inputs import load_case
 from walkers.inputs.case import WalkerCase
 from walkers.physics.dimer import Dimer
 from walkers.postprocess.result import read_result
-from walkers.sweeps.conduct import Options
 from walkers.sweeps.run import run_sweep
+from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import thresholds
 from walkers.theory.friction import Friction
 from walkers.theory.mathieu import alignment, is_stable, largest_stable_v

@@ -18,7 +18,7 @@ from walkers.commands import (
     climb,
     deck,
     figures,
-    ingredients,
+    model_terms,
     plot,
     render,
     result,
@@ -52,11 +52,11 @@ for command in (
     table,
     climb,
     figures,
-    ingredients,
+    model_terms,
     calibrate,
     audit,
 ):
-    app.command(name=command.__name__.rsplit(".", 1)[-1])(command.command)
+    app.command(name=command.__name__.rsplit(".", 1)[-1].replace("_", "-"))(command.command)
 
 
 INTERRUPTED = 130

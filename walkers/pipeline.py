@@ -27,7 +27,7 @@ class Outcome:
 
     run: FinishedRun
     result: dict[str, Any]
-    found: bool
+    cached: bool
 
 
 def run_case(
@@ -38,7 +38,7 @@ def run_case(
     force: bool = False,
     on_progress: Callable[[Any], None] | None = None,
     time_limit: float | None = None,
-    despite_audit: bool = False,
+    allow_failed_audit: bool = False,
 ) -> Outcome:
     """Run a case, unless its run is there already, and tabulate it; an interrupted pile goes on.
 
@@ -54,10 +54,10 @@ def run_case(
         Run again; the old run is replaced only by a finished one.
     on_progress
         Called a few times a second while the engine runs, with a `walkers.runner.launch.Progress`, of a pile with a
-        `walkers.runner.parts.PileProgress`.
+        `walkers.runner.segments.PileProgress`.
     time_limit
-        Wall time in s that the engine may take, of a pile for each part.
-    despite_audit
+        Wall time in s that the engine may take, of a pile for each segment.
+    allow_failed_audit
         Run on an engine that failed its audit.
 
     Returns
@@ -74,39 +74,41 @@ def run_case(
 
     options = {"force": force, "on_progress": on_progress, "time_limit": time_limit}
     if isinstance(case, PileCase):
-        return _run_pile(case, out, find_engine(engine), despite_audit, options)
-    return _run_walkers(case, out, find_engine(engine), despite_audit, options)
+        return _run_pile(case, out, find_engine(engine), allow_failed_audit, options)
+    return _run_walkers(case, out, find_engine(engine), allow_failed_audit, options)
 
 
-def _run_walkers(case: WalkerCase, out: Path, engine: Engine, despite_audit: bool, options: dict[str, Any]) -> Outcome:
+def _run_walkers(
+    case: WalkerCase, out: Path, engine: Engine, allow_failed_audit: bool, options: dict[str, Any]
+) -> Outcome:
     from walkers.runner.directory import finished_run, run_place, unfinished
     from walkers.runner.ensemble import finished_place
     from walkers.runner.failures import RunBusy
-    from walkers.sweeps.together import check_audit, make_together
+    from walkers.sweeps.shared_deck import check_audit, make_together
 
     place = run_place(case, engine, out)
     there = finished_place(out, place.name)
     old = finished_run(there) if there and not options["force"] else None
     if old is not None:
-        return Outcome(old, _result_of(old), found=True)
-    check_audit(engine, despite_audit)
+        return Outcome(old, _result_of(old), cached=True)
+    check_audit(engine, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
     threading.Thread(target=_load_postprocess, daemon=True).start()
     made = make_together([case], out, engine, **options)
     if made.busy:
         raise RunBusy(unfinished(place))
     run = made.runs[place.name]
-    return Outcome(run, _result_of(run), found=place.name in made.found)
+    return Outcome(run, _result_of(run), cached=place.name in made.found)
 
 
-def _run_pile(case: PileCase, out: Path, engine: Engine, despite_audit: bool, options: dict[str, Any]) -> Outcome:
+def _run_pile(case: PileCase, out: Path, engine: Engine, allow_failed_audit: bool, options: dict[str, Any]) -> Outcome:
     from walkers.postprocess.pile_result import current_pile_result
     from walkers.runner.directory import finished_run, run_place
-    from walkers.runner.parts import run_pile
-    from walkers.sweeps.together import check_audit
+    from walkers.runner.segments import run_pile
+    from walkers.sweeps.shared_deck import check_audit
 
     if options["force"] or finished_run(run_place(case, engine, out)) is None:
-        check_audit(engine, despite_audit)
+        check_audit(engine, allow_failed_audit)
     run, found = run_pile(case, engine, out, **options)
     return Outcome(run, current_pile_result(run.directory), found)
 
@@ -141,7 +143,7 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
         If a case is given and there is no engine to look it up for.
     """
     from walkers.runner.directory import finished_run
-    from walkers.runner.parts import is_pile
+    from walkers.runner.segments import is_pile
 
     path = Path(run)
     if path.is_dir():
@@ -167,15 +169,15 @@ def _place_of(case: Path, out: Path) -> Path | None:
     return finished_place(out, run_place(load_any(case), find_engine(), out).name)
 
 
-def described(directory: Path, result: dict[str, Any], *, found: bool = False) -> str:
+def described(directory: Path, result: dict[str, Any], *, cached: bool = False) -> str:
     """A result as text, whatever it is of."""
     if result.get("kind") == "pile":
         from walkers.postprocess.pile_result import describe_pile
 
-        return describe_pile(directory, result, found=found)
+        return describe_pile(directory, result, cached=cached)
     from walkers.postprocess.report import describe_result
 
-    return describe_result(directory, result, found=found)
+    return describe_result(directory, result, cached=cached)
 
 
 def _readable_pile(run: FinishedRun) -> FinishedRun:

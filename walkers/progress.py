@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from walkers.inputs.pile import PileCase
     from walkers.inputs.reading import AnyCase
     from walkers.runner.launch import Progress
-    from walkers.runner.parts import PileProgress
-    from walkers.sweeps.conduct import Progress as SweepProgress
+    from walkers.runner.segments import PileProgress
+    from walkers.sweeps.scheduler import Progress as SweepProgress
 
 _FIRST_LINE_SECONDS = 1.0
 _LONGEST_SILENCE_SECONDS = 60.0
@@ -149,17 +149,17 @@ def _sweep_lines(name: str) -> Callable[[SweepProgress], None]:
 def _told(progress: SweepProgress) -> str:
     """How far a sweep is, on a line."""
     rate = (progress.done - progress.found) / progress.elapsed if progress.elapsed else 0.0
-    parts = [
+    segments = [
         f"{progress.done} of {progress.points} points done",
         f"{progress.running} running",
         f"{progress.failed} failed",
         f"{rate:.2g} points/s",
     ]
     if progress.left is not None:
-        parts.append(f"{progress.left:.0f} s left")
+        segments.append(f"{progress.left:.0f} s left")
     if progress.worst_failure is not None:
-        parts.append(f"worst failure: point {progress.worst_failure.point}, {progress.worst_failure.reason}")
-    return ", ".join(parts)
+        segments.append(f"worst failure: point {progress.worst_failure.point}, {progress.worst_failure.reason}")
+    return ", ".join(segments)
 
 
 def _rate(progress: Progress) -> float:

@@ -20,7 +20,7 @@ from walkers.physics.capillary import (
 )
 from walkers.postprocess.dump import FloatArray
 from walkers.templates.deck import Plan
-from walkers.templates.engine import Remedies
+from walkers.templates.engine import Workarounds
 from walkers.templates.scene import Bead
 
 _SPEED = 0.02
@@ -67,7 +67,9 @@ def bead_on_bead(bench: Bench) -> Iterator[Line]:
         volumes = [bridge_volume_between_beads(ratio * _SMALL, _SMALL, fraction) for ratio in _RATIOS]
         ruptures = [rupture_distance(volume, 0.0) for volume in volumes]
         steps, every = _steps_to(1.1 * max(ruptures), case)
-        series = bench.run(Plan(case, scene, bench_recording(steps, every), remedies=bench.remedies, prescribed=True))
+        series = bench.run(
+            Plan(case, scene, bench_recording(steps, every), workarounds=bench.workarounds, prescribed=True)
+        )
         for number, ratio in enumerate(_RATIOS):
             upper, large = 3 + 2 * number, ratio * _SMALL
             gap = _gap(series, upper, upper - 1, large + _SMALL)
@@ -104,7 +106,7 @@ def before_contact(bench: Bench) -> Iterator[Line]:
         Bead(0, (6e-3, 0.0, _SMALL + 2e-6), _SMALL, velocity=(0.0, 0.0, -_SPEED)),
     ]
     recording = bench_recording(90, 10)
-    series = bench.run(Plan(case, scene_on_floor(beads), recording, remedies=bench.remedies, prescribed=True))
+    series = bench.run(Plan(case, scene_on_floor(beads), recording, workarounds=bench.workarounds, prescribed=True))
     for what, bead in (("bead", 3), ("wall", 4)):
         largest = float(np.abs(series.force[:, series.row(bead)]).max())
         yield Line(
@@ -117,12 +119,12 @@ def before_contact(bench: Bench) -> Iterator[Line]:
         )
 
 
-def _retract_from_wall(bench: Bench, case: WalkerCase, remedies: Remedies) -> tuple[FloatArray, FloatArray]:
+def _retract_from_wall(bench: Bench, case: WalkerCase, workarounds: Workarounds) -> tuple[FloatArray, FloatArray]:
     radius = case.beads.radii[0]
     bead = Bead(0, (0.0, 0.0, radius - _OVERLAP), radius, velocity=(0.0, 0.0, _SPEED))
     volume = bridge_volume_at_wall(radius, case.liquid.volume_fraction)
     steps, every = _steps_to(1.1 * rupture_distance(volume, case.liquid.contact_angle), case)
-    plan = Plan(case, scene_on_floor([bead]), bench_recording(steps, every), remedies=remedies, prescribed=True)
+    plan = Plan(case, scene_on_floor([bead]), bench_recording(steps, every), workarounds=workarounds, prescribed=True)
     series = bench.run(plan)
     row = series.row(FIRST_BEAD)
     return series.position[:, row, 2] - radius, -series.force[:, row, 2]
@@ -133,7 +135,7 @@ def at_wall(bench: Bench) -> Iterator[Line]:
     case = bench_case()
     radius, tension = case.beads.radii[0], case.liquid.surface_tension
     scale = pi * tension * radius
-    gap, pull = _retract_from_wall(bench, case, bench.remedies)
+    gap, pull = _retract_from_wall(bench, case, bench.workarounds)
     still = np.zeros((len(gap), 3))
     normal = still + np.array([0.0, 0.0, 1.0])
     law = -bridge_law(case, radius, Partner(radius, wall=True), normal, gap, still, still).force[:, 2]
@@ -149,7 +151,7 @@ def at_wall(bench: Bench) -> Iterator[Line]:
     yield Line(
         "rupture distance at a wall", "(1 + θ/2) V^(1/3), Lian et al. 1993", rupture, float(measured), "m", resolution
     )
-    raw_gap, raw_pull = _retract_from_wall(bench, case, Remedies(wall_copies=1))
+    raw_gap, raw_pull = _retract_from_wall(bench, case, Workarounds(wall_copies=1))
     first_open = int(np.argmax(raw_gap > 0))
     raw = capillary_force(tension, radius, radius, volume, 0.0, float(raw_gap[first_open])) / scale
     yield Line(
@@ -174,14 +176,14 @@ def contact_angle(bench: Bench) -> Iterator[Line]:
     for angle in (0.0, 10.0, 30.0, 60.0):
         case = bench_case(liquid={"contact_angle": f"{angle} deg"})
         needs = frozenset({"angle"}) if angle else frozenset[str]()
-        gap, pull = _retract_from_wall(bench, case, bench.remedies)
+        gap, pull = _retract_from_wall(bench, case, bench.workarounds)
         law = _pull_law(case, case.beads.radii[0], Partner(case.beads.radii[0], wall=True), gap)
         yield _angle_line(f"contact angle {angle:g}°, bead on wall", gap, pull, law, needs | _WALL)
         gap, pull = _part_beads(bench, case)
         law = _pull_law(case, _SMALL, Partner(_SMALL), gap)
         yield _angle_line(f"contact angle {angle:g}°, bead on bead", gap, pull, law, needs)
     case = bench_case(liquid={"contact_angle": "30 deg"})
-    gap, pull = _retract_from_wall(bench, case, Remedies(contact_angle=False))
+    gap, pull = _retract_from_wall(bench, case, Workarounds(contact_angle=False))
     # The raw engine takes ½ θi θj: solve its force at the first open gap for the angle that it used.
     number = int(np.argmax(gap > 0))
     radius, tension = case.beads.radii[0], case.liquid.surface_tension
@@ -214,7 +216,7 @@ def _part_beads(bench: Bench, case: WalkerCase) -> tuple[FloatArray, FloatArray]
     volume = bridge_volume_between_beads(_SMALL, _SMALL, case.liquid.volume_fraction)
     steps, every = _steps_to(1.1 * rupture_distance(volume, case.liquid.contact_angle), case)
     scene = scene_on_floor(_pairs((1.0,), -_OVERLAP, _SPEED))
-    series = bench.run(Plan(case, scene, bench_recording(steps, every), remedies=bench.remedies, prescribed=True))
+    series = bench.run(Plan(case, scene, bench_recording(steps, every), workarounds=bench.workarounds, prescribed=True))
     return _gap(series, 3, 2, 2.0 * _SMALL), -series.force[:, series.row(3), 2]
 
 

@@ -15,7 +15,7 @@ from walkers.inputs.case import WalkerCase
 from walkers.inputs.dimer import contact_loads
 from walkers.physics.contact import damping_ratio, reduced_shear_modulus
 from walkers.templates.deck import Plan
-from walkers.templates.engine import Remedies
+from walkers.templates.engine import Workarounds
 from walkers.templates.scene import Bead
 
 _WALL = frozenset({"walls"})
@@ -36,7 +36,7 @@ def friction(bench: Bench) -> Iterator[Line]:
     bead, load = _pressed_bead(case)
     bead = replace(bead, velocity=(speed, 0.0, 0.0))
     recording = bench_recording(1500, 10)
-    series = bench.run(Plan(case, scene_on_floor([bead]), recording, remedies=bench.remedies, prescribed=True))
+    series = bench.run(Plan(case, scene_on_floor([bead]), recording, workarounds=bench.workarounds, prescribed=True))
     drag = -series.force[:, series.row(FIRST_BEAD), 0]
     yield Line(
         "sliding friction under the capillary load",
@@ -67,7 +67,7 @@ def rolling(bench: Bench) -> Iterator[Line]:
     bead, load = _pressed_bead(case)
     bead = replace(bead, spin=(0.0, 20.0, 0.0))
     series = bench.run(
-        Plan(case, scene_on_floor([bead]), bench_recording(20, 10), remedies=bench.remedies, prescribed=True)
+        Plan(case, scene_on_floor([bead]), bench_recording(20, 10), workarounds=bench.workarounds, prescribed=True)
     )
     torque = series.torque[-1, series.row(FIRST_BEAD), 1]
     yield Line(
@@ -97,7 +97,11 @@ def between_beads(bench: Bench) -> Iterator[Line]:
     (lower, upper), load = _pressed_pair(case)
     moving = replace(upper, velocity=(1e-4, 0.0, 0.0))
     plan = Plan(
-        case, scene_on_floor([lower, moving]), bench_recording(1500, 100), remedies=bench.remedies, prescribed=True
+        case,
+        scene_on_floor([lower, moving]),
+        bench_recording(1500, 100),
+        workarounds=bench.workarounds,
+        prescribed=True,
     )
     series = bench.run(plan)
     drag = -series.force[-1, series.row(FIRST_BEAD + 1), 0]
@@ -107,7 +111,7 @@ def between_beads(bench: Bench) -> Iterator[Line]:
     )
     spinning = replace(upper, spin=(0.0, 20.0, 0.0))
     plan = Plan(
-        case, scene_on_floor([lower, spinning]), bench_recording(20, 10), remedies=bench.remedies, prescribed=True
+        case, scene_on_floor([lower, spinning]), bench_recording(20, 10), workarounds=bench.workarounds, prescribed=True
     )
     series = bench.run(plan)
     torque = -series.torque[-1, series.row(FIRST_BEAD + 1), 1]
@@ -121,7 +125,9 @@ def reported_forces(bench: Bench) -> Iterator[Line]:
     case = bench_case(contact={"friction": {"bead_bead": 0.3, "bead_wall": 0.3}, "restitution": 0.3})
     bead, _ = _pressed_bead(case)
     sliding = replace(bead, velocity=(0.05, 0.0, 0.0))
-    plan = Plan(case, scene_on_floor([sliding]), bench_recording(200, 200), remedies=bench.remedies, prescribed=True)
+    plan = Plan(
+        case, scene_on_floor([sliding]), bench_recording(200, 200), workarounds=bench.workarounds, prescribed=True
+    )
     series = bench.run(plan)
     steps, drag = series.wall_bridges("fx")
     reported = drag[steps == series.steps[-1]].sum()
@@ -141,7 +147,7 @@ def hertz(bench: Bench) -> Iterator[Line]:
         Bead(0, (6e-3, 0.0, 5e-3 + radius + small), small, velocity=(0.0, 0.0, sink)),
     ]
     series = bench.run(
-        Plan(case, scene_on_floor(beads), bench_recording(500, 25), remedies=bench.remedies, prescribed=True)
+        Plan(case, scene_on_floor(beads), bench_recording(500, 25), workarounds=bench.workarounds, prescribed=True)
     )
     row = series.row(FIRST_BEAD)
     at_wall = series.position[:, row, 2] - radius
@@ -181,10 +187,10 @@ def restitution(bench: Bench) -> Iterator[Line]:
             Bead(0, (6e-3, 0.0, 5e-3 + 2.0 * radius + 1e-7), radius, velocity=(0.0, 0.0, -speed)),
         ]
         recording = bench_recording(2000, 2000)
-        walls = {"single": Remedies(wall_copies=1), "doubled": bench.remedies}
+        walls = {"single": Workarounds(wall_copies=1), "doubled": bench.workarounds}
         found = {
-            name: bench.run(Plan(case, scene_on_floor(beads), recording, remedies=remedies))
-            for name, remedies in walls.items()
+            name: bench.run(Plan(case, scene_on_floor(beads), recording, workarounds=workarounds))
+            for name, workarounds in walls.items()
         }
         yield Line(
             f"restitution {coefficient:g} on a single wall",

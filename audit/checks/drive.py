@@ -48,13 +48,13 @@ def reference_walker(**changes: dict[str, Any]) -> WalkerCase:
 
 def walking_speed(bench: Bench, case: WalkerCase) -> float:
     """Velocity of the first walker of a case, m/s."""
-    series = bench.run(walker_plan(case, remedies=bench.remedies))
+    series = bench.run(walker_plan(case, workarounds=bench.workarounds))
     write_json(series.directory / CASE_NAME, case.as_dict())
     return float(walk(read_trajectory(series.directory)).velocity[0])
 
 
 def wall_motion(bench: Bench) -> Iterator[Line]:
-    """Rider and wall in the laboratory frame, shaken vertically; a bead held to the wall by its bridge."""
+    """Carrier and wall in the laboratory frame, shaken vertically; a bead held to the wall by its bridge."""
     case = bench_case(
         drive={"axis": "z", "frame": "lab", "peak_acceleration": "1 g"},
         contact={"restitution": 0.3, "friction": {"bead_bead": 0.1, "bead_wall": 0.1}},
@@ -68,16 +68,16 @@ def wall_motion(bench: Bench) -> Iterator[Line]:
         },
         environment={"gravity": "9.81 m/s^2"},
     )
-    series = bench.run(walker_plan(case, remedies=bench.remedies))
+    series = bench.run(walker_plan(case, workarounds=bench.workarounds))
     drive, time = case.drive, series.steps * case.run.time_step
     expected, speed = (motion[:, 2] for motion in prescribed_motion(drive, time))
-    if bench.remedies.riders:
+    if bench.workarounds.carriers:
         displacement = series.position[:, 0, 2] - series.position[0, 0, 2]
         error = float(np.abs(displacement - expected).max() / drive.amplitude)
-        yield Line("position of the rider", _SINE, drive.amplitude, float(displacement.max()), "m", 1e-3, error)
+        yield Line("position of the carrier", _SINE, drive.amplitude, float(displacement.max()), "m", 1e-3, error)
         error = float(np.abs(series.velocity[:, 0, 2] - speed).max() / drive.peak_velocity)
         yield Line(
-            "velocity of the rider",
+            "velocity of the carrier",
             "Aω cos ωt",
             drive.peak_velocity,
             float(series.velocity[:, 0, 2].max()),
@@ -121,7 +121,7 @@ def film(bench: Bench) -> Iterator[Line]:
             drive={"peak_acceleration": "1 g", "frame": frame},
             run={"cycles": 20, "settling_cycles": 10},
         )
-        series = bench.run(walker_plan(case, remedies=bench.remedies))
+        series = bench.run(walker_plan(case, workarounds=bench.workarounds))
         drive, dimer = case.drive, dimer_of(case)
         last = slice(case.run.settling_cycles * case.run.samples_per_cycle, -1)
         own = series.velocity[last, series.row(FIRST_BEAD), 0]
@@ -152,7 +152,7 @@ def known_speed(bench: Bench) -> Iterator[Line]:
 
 
 CHECKS = (
-    Check("wall-motion", 6, "motion of rider and wall, acceleration of a bead on it", True, wall_motion),
+    Check("wall-motion", 6, "motion of carrier and wall, acceleration of a bead on it", True, wall_motion),
     Check("known-speed", 6, "speed of the reference walker", True, known_speed),
     Check("film", 6, "a frictionless dimer dragged along by a film", False, film),
     Check("frames", 6, "laboratory against container frame", False, frames),

@@ -111,7 +111,7 @@ def balance(bench: Bench) -> Iterator[Line]:
     """The reference walker, recorded every step, its last cycle balanced."""
     case = reference_walker(run={"cycles": _CYCLES, "settling_cycles": 2, "time_step": "auto"})
     cycle = case.run.steps_per_cycle
-    plan = walker_plan(case, remedies=bench.remedies)
+    plan = walker_plan(case, workarounds=bench.workarounds)
     every_step = replace(plan.recording, sample_every=1, bridge_every=cycle, status_every=cycle)
     series = bench.run(replace(plan, recording=every_step))
     kept = slice((_CYCLES - 1 - _LEAD) * cycle, _CYCLES * cycle)

@@ -30,7 +30,9 @@ def _ensemble(replicates: int, frame: str = "lab") -> WalkerCase:
 
 def independence(bench: Bench) -> Iterator[Line]:
     """A walker among four against the same one alone; a rerun against the run."""
-    together, alone, again = (bench.run(walker_plan(_ensemble(count), remedies=bench.remedies)) for count in (4, 1, 4))
+    together, alone, again = (
+        bench.run(walker_plan(_ensemble(count), workarounds=bench.workarounds)) for count in (4, 1, 4)
+    )
     tracks = [series.position[:, series.row(FIRST_BEAD)] for series in (together, alone)]
     ways = [track - track[0] for track in tracks]
     error = float(np.abs(ways[0] - ways[1]).max() / np.abs(ways[1]).max())
@@ -44,7 +46,7 @@ def independence(bench: Bench) -> Iterator[Line]:
 def restart(bench: Bench) -> Iterator[Line]:
     """Ten cycles at a stretch against five, a restart file, and five more (container frame)."""
     case = _ensemble(2, "container")
-    run, plan = case.run, walker_plan(case, remedies=bench.remedies)
+    run, plan = case.run, walker_plan(case, workarounds=bench.workarounds)
     whole = bench.run(plan)
     half = replace(plan.recording, steps=run.steps // 2)
     first = bench.run(replace(plan, recording=half, checkpoint=Checkpoint(write=_RESTART_FILE)))
@@ -78,12 +80,12 @@ def restart(bench: Bench) -> Iterator[Line]:
 
 
 def ranks(bench: Bench) -> Iterator[Line]:
-    """The box of beads on two MPI ranks, each with its own riders, against the law and against one rank."""
+    """The box of beads on two MPI ranks, each with its own carriers, against the law and against one rank."""
     if shutil.which("mpirun") is None:
         yield Line("two MPI ranks: no mpirun on this machine", "", nan, nan, unmeasured=Verdict.SKIPPED)
         return
-    case, needs = viscous_case(), frozenset({"riders", "walls"})
-    (scene, one), (split, two) = (run_box(bench, case, bench.remedies, ranks=count) for count in (1, 2))
+    case, needs = viscous_case(), frozenset({"carriers", "walls"})
+    (scene, one), (split, two) = (run_box(bench, case, bench.workarounds, ranks=count) for count in (1, 2))
     yield from box_lines("two MPI ranks", box_errors(case, split, two), needs)
     pairs = [
         (one.force[:, one.row(a.id)], two.force[:, two.row(b.id)])
@@ -91,7 +93,7 @@ def ranks(bench: Bench) -> Iterator[Line]:
     ]
     error = max(largest_error(force, single) for single, force in pairs)
     yield Line(
-        "forces on two MPI ranks against one", "the same", 0.0, error, "rel.", 1e-6, error, frozenset({"riders"})
+        "forces on two MPI ranks against one", "the same", 0.0, error, "rel.", 1e-6, error, frozenset({"carriers"})
     )
 
 

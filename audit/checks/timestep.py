@@ -52,7 +52,7 @@ def pile_scene() -> Scene:
         Face("x", 1, (-half, 0.0, 0.01)), Face("x", -1, (half, 0.0, 0.01)),
         Face("y", 1, (1e-4, -half, 0.01)), Face("y", -1, (1e-4, half, 0.01)),
     )  # fmt: skip
-    riders = tuple((x, 0.0, -1.5e-3) for x in (-2e-3, -1e-3, 0.0, 1e-3, 2e-3))
+    carriers = tuple((x, 0.0, -1.5e-3) for x in (-2e-3, -1e-3, 0.0, 1e-3, 2e-3))
     jitter = np.random.default_rng(7)
     beads: list[Bead] = []
     height = 0.0
@@ -65,10 +65,10 @@ def pile_scene() -> Scene:
             z = height + (1.02 + 2.04 * layer) * radius
             shift = jitter.uniform(-1.0, 1.0, 2) * 0.4 * (pitch - 2.0 * radius)
             x, y = ((index + 0.5) * pitch - half for index in (row, column))
-            beads.append(Bead(len(riders) + len(beads) + 1, (x + shift[0], y + shift[1], z), radius))
+            beads.append(Bead(len(carriers) + len(beads) + 1, (x + shift[0], y + shift[1], z), radius))
         height += (2.04 * (1 + (count - 1) // (across * across)) + 0.02) * radius
     edge = half + 3e-4
-    return Scene(tuple(beads), faces, riders, (-edge, -edge, -2.5e-3), (edge, edge, 0.02))
+    return Scene(tuple(beads), faces, carriers, (-edge, -edge, -2.5e-3), (edge, edge, 0.02))
 
 
 def agitation(bench: Bench, time_step: float) -> float:
@@ -80,7 +80,7 @@ def agitation(bench: Bench, time_step: float) -> float:
     every = max(1, round(period / 20.0 / time_step))
     steps = every * 20 * _CYCLES
     try:
-        series = bench.run(Plan(case, scene, bench_recording(steps, every), remedies=bench.remedies))
+        series = bench.run(Plan(case, scene, bench_recording(steps, every), workarounds=bench.workarounds))
     except WalkersError:
         return float("inf")
     first = series.row(scene.beads[0].id)

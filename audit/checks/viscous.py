@@ -1,4 +1,4 @@
-"""Group 4: viscous forces, between beads and at the six faces of a box at rest and moving, with and without riders."""
+"""Group 4: viscous forces, between beads and at six faces of a box at rest and moving, with and without carriers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from walkers.physics.capillary import bridge_volume_at_wall, rupture_distance
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.trajectory import prescribed_motion
 from walkers.templates.deck import Plan
-from walkers.templates.engine import ALL_REMEDIES, Remedies
+from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds
 from walkers.templates.scene import AXES, Bead, Face, Point, Scene, vector_along
 
 HALF = 3e-3
@@ -26,7 +26,7 @@ _RETREAT = 0.02
 _ALONG: Point = (0.03, -0.02, 0.025)
 _SPIN: Point = (60.0, -80.0, 40.0)
 _NASE = "6πηR* v_n/max(ε, h/R*), Nase et al. in Shi, McCarthy 2008, Eqs. 40, 41"
-_NEEDS = frozenset({"riders", "walls"})
+_NEEDS = frozenset({"carriers", "walls"})
 
 
 def viscous_case(frame: str = "container", acceleration: str = "0 g", axis: str = "x") -> WalkerCase:
@@ -38,20 +38,20 @@ def viscous_case(frame: str = "container", acceleration: str = "0 g", axis: str 
 
 
 def box_scene(radius: float, ranks: int = 1) -> Scene:
-    """26 beads at the faces, edges and corners of a cube, six riders outside it for every rank (split along x)."""
+    """26 beads at the faces, edges and corners of a cube, six carriers outside it for every rank (split along x)."""
     faces = [Face(axis, side, vector_along(axis, -side * HALF)) for axis in AXES for side in (1, -1)]
     far = HALF + _OUTSIDE
-    riders: list[Point] = []
+    carriers: list[Point] = []
     for rank in range(ranks):
         x = far if ranks == 1 else (rank - (ranks - 1) / 2.0) * 2.0 * far / ranks
-        riders += [(x, y, z) for y in (-far, far) for z in (-1e-3, 0.0, 1e-3)]
+        carriers += [(x, y, z) for y in (-far, far) for z in (-1e-3, 0.0, 1e-3)]
     beads = []
     for number, place in enumerate(p for p in product((-1, 0, 1), repeat=3) if any(p)):
         centre = [side * (HALF - radius + _OVERLAP) if side else 3e-4 for side in place]
         velocity = [-side * _RETREAT if side else along for side, along in zip(place, _ALONG, strict=True)]
         beads.append(
             Bead(
-                len(riders) + 1 + number,
+                len(carriers) + 1 + number,
                 (centre[0], centre[1], centre[2]),
                 radius,
                 (velocity[0], velocity[1], velocity[2]),
@@ -59,7 +59,7 @@ def box_scene(radius: float, ranks: int = 1) -> Scene:
             )
         )
     edge = HALF + 2.0 * _OUTSIDE
-    return Scene(tuple(beads), tuple(faces), tuple(riders), (-edge,) * 3, (edge,) * 3)
+    return Scene(tuple(beads), tuple(faces), tuple(carriers), (-edge,) * 3, (edge,) * 3)
 
 
 def box_errors(case: WalkerCase, scene: Scene, series: Measured) -> dict[int, FloatArray]:
@@ -95,13 +95,13 @@ def box_errors(case: WalkerCase, scene: Scene, series: Measured) -> dict[int, Fl
     return errors
 
 
-def run_box(bench: Bench, case: WalkerCase, remedies: Remedies, ranks: int = 1) -> tuple[Scene, Measured]:
+def run_box(bench: Bench, case: WalkerCase, workarounds: Workarounds, ranks: int = 1) -> tuple[Scene, Measured]:
     """Retract the 26 beads from their walls, from touching to past rupture."""
     radius = case.beads.radii[0]
     scene = box_scene(radius, ranks)
     rupture = rupture_distance(bridge_volume_at_wall(radius, case.liquid.volume_fraction), 0.0)
     steps = int(1.4 * rupture / (_RETREAT * case.run.time_step) / 100) * 100
-    plan = Plan(case, scene, bench_recording(steps, 5), remedies=remedies, prescribed=True, ranks=ranks)
+    plan = Plan(case, scene, bench_recording(steps, 5), workarounds=workarounds, prescribed=True, ranks=ranks)
     return scene, bench.run(plan)
 
 
@@ -121,7 +121,7 @@ def between_beads(bench: Bench) -> Iterator[Line]:
         x = 6e-3 * (number - 1)
         beads.append(Bead(0, (x, 0.0, 5e-3), large, spin=(-30.0, 50.0, 20.0)))
         beads.append(Bead(0, (x, 0.0, 5e-3 + large + small - _OVERLAP), small, (0.015, -0.01, _RETREAT), _SPIN))
-    plan = Plan(case, scene_on_floor(beads), bench_recording(3000, 10), remedies=bench.remedies, prescribed=True)
+    plan = Plan(case, scene_on_floor(beads), bench_recording(3000, 10), workarounds=bench.workarounds, prescribed=True)
     series = bench.run(plan)
     for number, (large, small) in enumerate(pairs):
         low, high = series.row(2 + 2 * number), series.row(3 + 2 * number)
@@ -147,24 +147,26 @@ def between_beads(bench: Bench) -> Iterator[Line]:
 def at_walls(bench: Bench) -> Iterator[Line]:
     """Six faces at rest and moving along each axis; faces, edges and corners; touching and open."""
     case = viscous_case()
-    yield from box_lines("walls at rest", box_errors(case, *run_box(bench, case, bench.remedies)), _NEEDS)
+    yield from box_lines("walls at rest", box_errors(case, *run_box(bench, case, bench.workarounds)), _NEEDS)
     for axis in AXES:
         moving = viscous_case("lab", "0.25 g", axis)
-        errors = box_errors(moving, *run_box(bench, moving, bench.remedies))
+        errors = box_errors(moving, *run_box(bench, moving, bench.workarounds))
         yield from box_lines(f"walls moving along {axis}", errors, _NEEDS)
 
 
-def without_riders(bench: Bench) -> Iterator[Line]:
+def without_carriers(bench: Bench) -> Iterator[Line]:
     """The raw engine's forces of open wall bridges."""
     case = viscous_case()
-    errors = box_errors(case, *run_box(bench, case, Remedies(riders=False, wall_copies=ALL_REMEDIES.wall_copies)))
+    errors = box_errors(
+        case, *run_box(bench, case, Workarounds(carriers=False, wall_copies=ALL_WORKAROUNDS.wall_copies))
+    )
     off = float(max(error[0] for error in errors.values()) > 0.1)
-    what = "without riders open wall bridges read a stranger's velocity"
+    what = "without carriers open wall bridges read a stranger's velocity"
     yield Line(what, "viscous force off by more than 10 %: 1", 1.0, off, defect=True)
 
 
 CHECKS = (
     Check("viscous-beads", 4, "viscous force between beads", True, between_beads),
     Check("viscous-walls", 4, "viscous force at faces, edges and corners, at rest and moving", True, at_walls),
-    Check("viscous-riders", 4, "the same without riders", True, without_riders),
+    Check("viscous-carriers", 4, "the same without carriers", True, without_carriers),
 )

@@ -11,7 +11,7 @@ Case = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the n
 Run = Annotated[str, typer.Argument(metavar="RUN", help="A run directory, or a case whose run is looked up in --out.")]
 Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
 EngineName = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
-DespiteAudit = Annotated[bool, typer.Option("--despite-audit", help="Run on an engine that failed its audit.")]
+AllowFailedAudit = Annotated[bool, typer.Option("--allow-failed-audit", help="Run on an engine that failed its audit.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, SI units.")]
 
 

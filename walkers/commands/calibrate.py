@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import DespiteAudit, EngineName, Out, check_folder, check_out
+from walkers.commands.arguments import AllowFailedAudit, EngineName, Out, check_folder, check_out
 from walkers.pipeline import DEFAULT_OUT
 
 File = Annotated[
@@ -24,7 +24,7 @@ def command(
     to: To = None,
     jobs: Jobs = None,
     engine: EngineName = None,
-    despite_audit: DespiteAudit = False,
+    allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Calibrate, or go on with it: waves of runs, emulators, posterior, predictions by the engine."""
     from walkers.calibration.calibrate import calibrate
@@ -32,7 +32,7 @@ def command(
     from walkers.calibration.report import rows_of, write_tables
     from walkers.inputs.calibration import load_calibration
     from walkers.progress import progress_of_sweep
-    from walkers.sweeps.conduct import Options
+    from walkers.sweeps.scheduler import Options
     from walkers.sweeps.site import cores_here
 
     read = load_calibration(calibration)
@@ -44,7 +44,7 @@ def command(
         out,
         Options(jobs or cores_here()),
         engine=engine,
-        despite_audit=despite_audit,
+        allow_failed_audit=allow_failed_audit,
         progress_of=progress_of_sweep,
     )
     for sweep, failures in found.failures.items():

@@ -20,10 +20,10 @@ def command(case: Case, to: Folder = None) -> None:
     from walkers.inputs.pile import PileCase
     from walkers.inputs.reading import load_any
     from walkers.templates.deck import DECK_NAME, render_deck
-    from walkers.templates.pile import render_first_part
+    from walkers.templates.pile import render_first_segment
 
     loaded = load_any(case)
-    deck = render_first_part(loaded) if isinstance(loaded, PileCase) else render_deck(loaded)
+    deck = render_first_segment(loaded) if isinstance(loaded, PileCase) else render_deck(loaded)
     if to is None:
         print(deck.text, end="")
         return

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import DespiteAudit, EngineName, Out
+from walkers.commands.arguments import AllowFailedAudit, EngineName, Out
 from walkers.pipeline import DEFAULT_OUT
 
 To = Annotated[Path, typer.Option("--to", help="Folder of the figures.")]
@@ -22,12 +22,12 @@ def command(
     only: Only = None,
     jobs: Jobs = None,
     engine: EngineName = None,
-    despite_audit: DespiteAudit = False,
+    allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Draw the paper's figures with engine, theory and published values; runs that are missing are made first."""
     from walkers.paper.make import make_figures
     from walkers.progress import progress_of_sweep
-    from walkers.sweeps.conduct import Options
+    from walkers.sweeps.scheduler import Options
     from walkers.sweeps.site import cores_here
 
     made = make_figures(
@@ -36,7 +36,7 @@ def command(
         Options(jobs or cores_here()),
         only=only or (),
         engine=engine,
-        despite_audit=despite_audit,
+        allow_failed_audit=allow_failed_audit,
         progress_of=progress_of_sweep,
     )
     for sweep, failures in made.failures.items():

@@ -18,7 +18,7 @@ def command(run: Run, out: Out = DEFAULT_OUT, to: Folder = None) -> None:
     from walkers.pipeline import find_run
     from walkers.postprocess.figures import plot_run
     from walkers.postprocess.pile_figures import plot_pile
-    from walkers.runner.parts import is_pile
+    from walkers.runner.segments import is_pile
 
     directory = find_run(run, out).directory
     for path in (plot_pile if is_pile(directory) else plot_run)(directory, to):

@@ -15,13 +15,13 @@ Picture = Annotated[
 ]
 Walker = Annotated[int, typer.Option("--walker", min=0, help="Number of the walker.")]
 Images = Annotated[int | None, typer.Option("--images", min=1, max=20, help="How many times to show; 6 if left out.")]
-Apart = Annotated[
-    str | None, typer.Option("--apart", help="Of a pile: time between the pictures, as '2 s' or 'T/4' (of a cycle).")
+Interval = Annotated[
+    str | None, typer.Option("--interval", help="Of a pile: time between the pictures, as '2 s' or 'T/4' (of a cycle).")
 ]
 Film = Annotated[bool, typer.Option("--film", help="Of a pile: an MP4 of all frames instead.")]
-Slower = Annotated[
+Slowdown = Annotated[
     float | None,
-    typer.Option("--slower", min=0.05, max=1000.0, help="Of a film: so many times slower than in reality."),
+    typer.Option("--slowdown", min=0.05, max=1000.0, help="Of a film: so many times slower than in reality."),
 ]
 
 
@@ -31,28 +31,28 @@ def command(
     to: Picture = None,
     walker: Walker = 0,
     images: Images = None,
-    apart: Apart = None,
+    interval: Interval = None,
     film: Film = False,
-    slower: Slower = None,
+    slowdown: Slowdown = None,
 ) -> None:
     """Render a walker or a pile at several times, or film a pile (off-screen, no X server)."""
     from walkers.pipeline import find_run
     from walkers.postprocess.pile_pictures import render_film, render_series, seconds_apart
     from walkers.postprocess.rendering import render_run
-    from walkers.runner.parts import is_pile
+    from walkers.runner.segments import is_pile
 
     found = find_run(run, out)
     pile = is_pile(found.directory)
     refuse("--walker", bool(walker) and pile, "a pile has none")
-    for option, given in (("--film", film), ("--apart", apart is not None), ("--slower", slower is not None)):
+    for option, given in (("--film", film), ("--interval", interval is not None), ("--slowdown", slowdown is not None)):
         refuse(option, given and not pile, "is for piles")
-    for option, given in (("--apart", apart is not None), ("--images", images is not None)):
+    for option, given in (("--interval", interval is not None), ("--images", images is not None)):
         refuse(option, given and film, "has no meaning for a film")
-    refuse("--slower", slower is not None and not film, "is for films (--film)")
+    refuse("--slowdown", slowdown is not None and not film, "is for films (--film)")
     if film:
-        print(render_film(found.directory, to, slower=slower or 1.0))
+        print(render_film(found.directory, to, slowdown=slowdown or 1.0))
     elif pile:
-        seconds = None if apart is None else seconds_apart(apart, found.directory)
+        seconds = None if interval is None else seconds_apart(interval, found.directory)
         for path in render_series(found.directory, to, images=images or 6, apart=seconds):
             print(path)
     else:

@@ -8,13 +8,13 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import DespiteAudit, EngineName, Json, Out, check_out
+from walkers.commands.arguments import AllowFailedAudit, EngineName, Json, Out, check_out
 from walkers.pipeline import DEFAULT_OUT
 
 Cases = Annotated[list[str], typer.Argument(metavar="CASE...", help="Case files, or names of shipped cases.")]
 Force = Annotated[bool, typer.Option("--force", help="Run again even if the run is there.")]
 Limit = Annotated[
-    float | None, typer.Option("--limit", min=0.0, help="Stop a run (of a pile: a part) after this many seconds.")
+    float | None, typer.Option("--limit", min=0.0, help="Stop a run (of a pile: a segment) after this many seconds.")
 ]
 
 
@@ -25,7 +25,7 @@ def command(
     as_json: Json = False,
     limit: Limit = None,
     engine: EngineName = None,
-    despite_audit: DespiteAudit = False,
+    allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Run cases, unless they have been run, and print their results (with --json an object a line)."""
     from walkers.inputs.reading import load_any
@@ -46,14 +46,14 @@ def command(
                     force=force,
                     on_progress=advance,
                     time_limit=limit,
-                    despite_audit=despite_audit,
+                    allow_failed_audit=allow_failed_audit,
                 )
         except EngineFailure as failure:
             print(f"walkers: {case.name}: {failure}", file=sys.stderr)
             failed += 1
             continue
         if as_json:
-            print(json.dumps({**outcome.result, "run": str(outcome.run.directory), "found": outcome.found}))
+            print(json.dumps({**outcome.result, "run": str(outcome.run.directory), "cached": outcome.cached}))
         else:
-            print(described(outcome.run.directory, outcome.result, found=outcome.found))
+            print(described(outcome.run.directory, outcome.result, cached=outcome.cached))
     return 1 if failed else 0

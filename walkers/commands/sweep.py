@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import DespiteAudit, EngineName, Out, check_out, refuse
+from walkers.commands.arguments import AllowFailedAudit, EngineName, Out, check_out, refuse
 from walkers.pipeline import DEFAULT_OUT
 
 SweepFile = Annotated[str, typer.Argument(metavar="SWEEP", help="A sweep file, or a shipped sweep such as fig2.")]
@@ -29,13 +29,13 @@ def command(
     retries: Retries = 0,
     limit: Limit = None,
     engine: EngineName = None,
-    despite_audit: DespiteAudit = False,
+    allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Run the points of a sweep that are missing, on all cores or on a cluster; exit status 1 if any failed."""
     from walkers.inputs.sweep import load_sweep
     from walkers.progress import progress_of_sweep
-    from walkers.sweeps.conduct import Options
     from walkers.sweeps.run import plan_sweep, run_sweep
+    from walkers.sweeps.scheduler import Options
     from walkers.sweeps.site import cores_here, load_site
     from walkers.sweeps.summary import describe_status
 
@@ -54,7 +54,7 @@ def command(
             out.resolve() if site else out,
             options,
             engine=engine,
-            despite_audit=despite_audit,
+            allow_failed_audit=allow_failed_audit,
             on_progress=advance,
         )
     for failure in failures:

@@ -26,7 +26,7 @@ def command(
     to: Target = None,
     thresholds: Thresholds = False,
 ) -> None:
-    """Print the table of a sweep, a row a point: what varied, what follows, what came out, where the run is."""
+    """Print the table of a sweep, one row per point: what varied, what follows, what came out, where the run is."""
     from walkers.sweeps.table import encoded, load, short_text, write_table_file
     from walkers.sweeps.table import thresholds as thresholds_of
 

@@ -32,7 +32,7 @@ def command(
     from walkers.pipeline import find_run
     from walkers.postprocess.paraview import write_vtk
     from walkers.postprocess.pile_paraview import write_pile_vtk
-    from walkers.runner.parts import is_pile
+    from walkers.runner.segments import is_pile
 
     directory = find_run(run, out).directory
     pile = is_pile(directory)

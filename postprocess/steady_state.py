@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 ASTRAY = np.pi / 4.0
 """rad; a walker that ends farther from where it was to face has left the axis."""
-PARTED = 0.1
+SEPARATED = 0.1
 """Share of the time beyond which beads that no bridge can hold together are no walker."""
 
 
@@ -26,7 +26,7 @@ def on_axis(walkers: pd.DataFrame) -> pd.Series[bool]:
 
 def together(walkers: pd.DataFrame) -> pd.Series[bool]:
     """Whether the beads of walkers of a table ``walkers`` stay where a bridge can hold them."""
-    return walkers["parted"] < PARTED
+    return walkers["separated_fraction"] < SEPARATED
 
 
 def steady_walkers(run: str | Path) -> pd.DataFrame:

@@ -17,7 +17,7 @@ from walkers.runner.ensemble import finished_place, make_ensemble
 from walkers.runner.failures import AuditFailed, RunBusy, UnauditedEngineWarning
 from walkers.runner.launch import Progress, launch
 from walkers.runner.locks import locked
-from walkers.runner.parts import run_pile
+from walkers.runner.segments import run_pile
 from walkers.templates.deck import render_deck, render_shared_deck
 
 
@@ -151,10 +151,10 @@ def _make(
         report = launch(
             ensemble.deck, ensemble.directory, engine, on_progress=on_progress, time_limit=time_limit, keep_open=locks
         )
-        from walkers.postprocess.parting import part_output
+        from walkers.postprocess.splitting import split_output
 
         directories = {ensemble.run_directory(name): case for name, case in named.items()}
-        part_output(ensemble.directory, ensemble.deck.layout, directories)
+        split_output(ensemble.directory, ensemble.deck.layout, directories)
         _tabulate(directories)
         return ensemble.finish(report)
 
@@ -166,7 +166,7 @@ def _tabulate(directories: Iterable[Path]) -> None:
         tabulate(directory)
 
 
-def check_audit(engine: Engine, despite_audit: bool) -> None:
+def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
     """Refuse an engine whose audit failed, unless told otherwise; warn of one that never had one.
 
     Raises
@@ -178,5 +178,5 @@ def check_audit(engine: Engine, despite_audit: bool) -> None:
     if audit is None:
         message = "this engine was never audited; prove what it computes with: walkers audit"
         warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
-    elif not audit.passed and not despite_audit:
+    elif not audit.passed and not allow_failed_audit:
         raise AuditFailed(audit.failures)

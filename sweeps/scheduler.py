@@ -115,12 +115,12 @@ _WORST_FIRST = (
 )
 
 
-def _mildness(failure: Failure) -> int:
+def _severity(failure: Failure) -> int:
     return _WORST_FIRST.index(failure.reason if failure.reason in _WORST_FIRST else "")
 
 
 @dataclass(eq=False)
-class _Course:
+class _Chain:
     """Batches of points of which each waits for the one before."""
 
     batches: Generator[list[int], None, None]
@@ -132,12 +132,12 @@ class _Job:
     """A deck on its way: how often it failed and how often its worker was lost."""
 
     deck: PlannedDeck
-    course: _Course
+    chain: _Chain
     failures: int = 0
     losses: int = 0
 
 
-def conduct(
+def schedule(
     record: SweepRecord,
     cases: Sequence[AnyCase],
     engine: Engine,
@@ -174,7 +174,7 @@ def conduct(
     out.mkdir(parents=True, exist_ok=True)
     remove_remains(out)
     with _workers(options, record) as workers:
-        return _Conductor(record, cases, engine, options, workers, on_progress).run()
+        return _Scheduler(record, cases, engine, options, workers, on_progress).run()
 
 
 def _raise_file_limit() -> None:
@@ -264,7 +264,7 @@ def final_failures(record: SweepRecord, found: Sequence[PointState], options: Op
     ]
 
 
-class _Conductor:
+class _Scheduler:
     """Hands out decks and takes in reports."""
 
     def __init__(
@@ -298,7 +298,7 @@ class _Conductor:
 
     def run(self) -> list[Failure]:
         for batch in batches(self.record, list(self.cases.values()), self._stopped):
-            self._advance(_Course(batch))
+            self._advance(_Chain(batch))
         while self.out_there or self.later:
             now = time.perf_counter()
             for due, job in [entry for entry in self.later if entry[0] <= now]:
@@ -320,21 +320,21 @@ class _Conductor:
         run = self.record.runs[point]
         return run in self.finished or run in self.given_up
 
-    def _advance(self, course: _Course) -> None:
+    def _advance(self, chain: _Chain) -> None:
         """Hand out the next batch of which anything is missing."""
-        while not course.unsettled:
-            batch = next(course.batches, None)
+        while not chain.unsettled:
+            batch = next(chain.batches, None)
             if batch is None:
                 return
-            course.unsettled = {point for point in batch if not self._is_settled(point)}
-            if course.unsettled:
+            chain.unsettled = {point for point in batch if not self._is_settled(point)}
+            if chain.unsettled:
                 for deck in pack(
                     {point: self.cases[point] for point in batch},
                     self.options.decks_at_once,
                     self.options.longest_seconds,
                 ):
                     for part in unfinished_parts(deck.points, self.cases, self._is_settled):
-                        self._hand_out(_Job(part, course))
+                        self._hand_out(_Job(part, chain))
 
     def _hand_out(self, job: _Job) -> None:
         task = Task(
@@ -365,8 +365,8 @@ class _Conductor:
         elif left:
             self.later.append((time.perf_counter() + _BUSY_SECONDS, replace(job, deck=self._deck_of(left, job))))
         self.done += len(settled)
-        job.course.unsettled -= set(settled)
-        self._advance(job.course)
+        job.chain.unsettled -= set(settled)
+        self._advance(job.chain)
 
     def _deck_of(self, points: Sequence[int], job: _Job) -> PlannedDeck:
         return PlannedDeck(tuple(points), job.deck.seconds * len(points) / len(job.deck.points))
@@ -386,8 +386,8 @@ class _Conductor:
             failure = Failure(point, run, report.failure or "", report.message, report.directory)
             self.failures.append(failure)
             self.seconds_done += job.deck.seconds
-            job.course.unsettled -= {point}
-            self._advance(job.course)
+            job.chain.unsettled -= {point}
+            self._advance(job.chain)
 
     def _lost(self, job: _Job, error: BaseException) -> Report | None:
         """An exception out of a worker: lost with its job or node, or something that nobody foresaw."""
@@ -423,5 +423,5 @@ class _Conductor:
             running=running,
             elapsed=elapsed,
             left=waiting / self.seconds_done * elapsed if self.seconds_done else None,
-            worst_failure=min(self.failures, key=_mildness, default=None),
+            worst_failure=min(self.failures, key=_severity, default=None),
         )

@@ -18,7 +18,7 @@ from walkers.templates.deck import LAYOUT_NAME
 from walkers.templates.layout import Layout, PlacedWalker
 
 
-def part_output(directory: Path, layout: Layout, cases: Mapping[Path, WalkerCase]) -> None:
+def split_output(directory: Path, layout: Layout, cases: Mapping[Path, WalkerCase]) -> None:
     """Write the dumps and the layout of each case into its directory, and remove those of the shared deck.
 
     Beads and walkers are numbered anew in each; they stay where they were in the shared deck.
@@ -50,7 +50,7 @@ def part_output(directory: Path, layout: Layout, cases: Mapping[Path, WalkerCase
     owners: dict[str, tuple[int, str]] = {}
     for number, (place, case) in enumerate(cases.items()):
         own = [next(walkers) for _ in range(case.start.replicates)]
-        old = [layout.rider, *(bead for walker in own for bead in walker.beads)]
+        old = [layout.carrier, *(bead for walker in own for bead in walker.beads)]
         new = np.arange(1, len(old) + 1)
         owners |= {str(one): (number, str(other)) for one, other in zip(old, new, strict=True)}
         own_frames = frames[:, np.array(old) - 1]
@@ -59,18 +59,18 @@ def part_output(directory: Path, layout: Layout, cases: Mapping[Path, WalkerCase
         dump.write_like(own_frames, place / layout.bead_dump)
         write_json(place / LAYOUT_NAME, _own_layout(layout, own).as_dict())
     for name, columns in texts.items():
-        _part_local_dump(directory / name, columns, owners, [place / name for place in cases])
+        _split_local_dump(directory / name, columns, owners, [place / name for place in cases])
     for name in (layout.bead_dump, *texts, LAYOUT_NAME):
         (directory / name).unlink()
 
 
 def _own_layout(layout: Layout, walkers: list[PlacedWalker]) -> Layout:
-    first = layout.rider + 1
+    first = layout.carrier + 1
     renumbered = tuple(
         replace(walker, walker=number, beads=(first + 2 * number, first + 2 * number + 1))
         for number, walker in enumerate(walkers)
     )
-    return replace(layout, atoms=layout.rider + 2 * len(walkers), walkers=renumbered, ranks=1)
+    return replace(layout, atoms=layout.carrier + 2 * len(walkers), walkers=renumbered, ranks=1)
 
 
 def _check_apart(frames: FloatArray, layout: Layout, cases: Mapping[Path, WalkerCase], directory: Path) -> None:
@@ -81,7 +81,7 @@ def _check_apart(frames: FloatArray, layout: Layout, cases: Mapping[Path, Walker
         raise WalkersMet(directory)
 
 
-def _part_local_dump(path: Path, columns: list[int], owners: dict[str, tuple[int, str]], places: list[Path]) -> None:
+def _split_local_dump(path: Path, columns: list[int], owners: dict[str, tuple[int, str]], places: list[Path]) -> None:
     """Give each row of a local dump to the owner of its bead; ``columns`` hold ids, ``owners`` their new ones."""
     lines = path.read_text("ascii").split("\n")
     parts: list[list[str]] = [[] for _ in places]

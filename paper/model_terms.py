@@ -1,7 +1,7 @@
-"""Which physics is missing: published numbers from the theory, with one ingredient after the other, each fitted anew.
+"""Which physics is missing: published numbers from the theory, with one term after the other, each fitted anew.
 
 The engine knows Coulomb's friction, the bridges' drag and a film's. The theory integrates under any law of friction,
-thousands of walkers a second, so that for every ingredient all parameters can be searched for what they give at best.
+thousands of walkers a second, so that for every term all parameters can be searched for what they give at best.
 It is a theory of walkers whose contacts stay closed, aligned with the drive: of hopping and turning it knows nothing.
 """
 
@@ -36,7 +36,7 @@ _HOPELESS = 30.0
 
 
 @dataclass(frozen=True)
-class Ingredient:
+class Term:
     """Something that the theory may have: parameters and their ranges.
 
     Attributes
@@ -51,7 +51,7 @@ class Ingredient:
     ranges: Mapping[str, tuple[float, float]]
 
 
-ALWAYS = Ingredient(
+ALWAYS = Term(
     "Coulomb friction and the bridges' drag",
     {
         "friction_wall": (0.02, 0.6),
@@ -61,18 +61,18 @@ ALWAYS = Ingredient(
     },
 )
 """What the engine has: three frictions, and the bridges' viscosity over the liquid's."""
-KAPPA = Ingredient("drag in proportion to the load, the paper's κ (s/m)", {"log10_kappa": (-1.0, 2.0)})
+KAPPA = Term("drag in proportion to the load, the paper's κ (s/m)", {"log10_kappa": (-1.0, 2.0)})
 ADDED = (
-    Ingredient("drag of a film on the beads' translation", {"log10_film_drag_ratio": (-2.0, 2.0)}),
-    Ingredient("weaker or stronger bridges to the substrate", {"wall_bridge_factor": (0.5, 1.3)}),
-    Ingredient("weaker or stronger bridges between the beads", {"bead_bridge_factor": (0.5, 1.3)}),
+    Term("drag of a film on the beads' translation", {"log10_film_drag_ratio": (-2.0, 2.0)}),
+    Term("weaker or stronger bridges to the substrate", {"wall_bridge_factor": (0.5, 1.3)}),
+    Term("weaker or stronger bridges between the beads", {"bead_bridge_factor": (0.5, 1.3)}),
     KAPPA,
-    Ingredient(
+    Term(
         "static friction above the kinetic",
         {"static_ratio": (1.0, 2.5), "log10_stribeck_velocity": (-4.0, -1.5)},
     ),
 )
-"""Ingredients to be tried, one at a time and all together."""
+"""Terms to be tried, one at a time and all together."""
 
 _NEUTRAL = {
     "log10_film_drag_ratio": -2.0,
@@ -115,12 +115,12 @@ class Target:
 
 @dataclass(frozen=True)
 class Fit:
-    """What an ingredient gives at best.
+    """What an term gives at best.
 
     Attributes
     ----------
     name
-        Of the ingredient.
+        Of the term.
     parameters
         The best ones.
     values
@@ -270,7 +270,7 @@ def _residuals(values: Mapping[str, float], wanted: Sequence[Target]) -> FloatAr
 
 
 def fit(
-    ingredients: Sequence[Ingredient],
+    terms: Sequence[Term],
     wanted: Sequence[Target],
     *,
     fixed: Mapping[str, float] | None = None,
@@ -282,21 +282,21 @@ def fit(
 
     Parameters
     ----------
-    ingredients
+    terms
         Beside `ALWAYS`.
     wanted
         What is to come out.
     fixed
         Parameters that are not searched for.
     begin
-        Parameters to begin with; those of an ingredient that are not among them begin where it does nothing.
+        Parameters to begin with; those of an term that are not among them begin where it does nothing.
     seed, generations
         Of the search.
     """
     from scipy.optimize import differential_evolution
 
     fixed = fixed or {}
-    every = {**ALWAYS.ranges, **{key: ends for one in ingredients for key, ends in one.ranges.items()}}
+    every = {**ALWAYS.ranges, **{key: ends for one in terms for key, ends in one.ranges.items()}}
     ranges = {key: ends for key, ends in every.items() if key not in fixed}
 
     def misfit(point: FloatArray) -> float:
@@ -318,7 +318,7 @@ def fit(
     residuals = np.abs(_residuals(values, wanted))
     worst = [place for place in np.argsort(residuals)[::-1] if residuals[place] > 1.0]
     return Fit(
-        name=" + ".join(one.name for one in ingredients) or ALWAYS.name,
+        name=" + ".join(one.name for one in terms) or ALWAYS.name,
         parameters=parameters,
         values={name: value if isfinite(value) else None for name, value in values.items()},
         met=len(wanted) - len(worst),
@@ -327,8 +327,8 @@ def fit(
     )
 
 
-def try_ingredients(*, seed: int = 1, generations: int = 80) -> list[Fit]:
-    """The fit without any, with each ingredient, with all of them, and of the paper's law alone."""
+def try_model_terms(*, seed: int = 1, generations: int = 80) -> list[Fit]:
+    """The fit without any, with each term, with all of them, and of the paper's law alone."""
     bare = fit((), targets(), seed=seed, generations=generations)
     # From where the others end: what has more parameters must not come out worse for want of generations.
     added = [fit((one,), targets(), begin=bare.parameters, seed=seed, generations=generations) for one in ADDED]
@@ -339,14 +339,14 @@ def try_ingredients(*, seed: int = 1, generations: int = 80) -> list[Fit]:
     return [bare, *added, *named]
 
 
-def write_ingredients(fits: Sequence[Fit], to: Path) -> list[Path]:
-    """Write ``ingredients.json`` and ``ingredients.md``."""
+def write_model_terms(fits: Sequence[Fit], to: Path) -> list[Path]:
+    """Write ``model_terms.json`` and ``model_terms.md``."""
     to.mkdir(parents=True, exist_ok=True)
     write_json(
-        to / "ingredients.json", {"targets": [asdict(one) for one in targets()], "fits": [asdict(one) for one in fits]}
+        to / "model_terms.json", {"targets": [asdict(one) for one in targets()], "fits": [asdict(one) for one in fits]}
     )
-    write_text(to / "ingredients.md", as_markdown(fits))
-    return [to / "ingredients.json", to / "ingredients.md"]
+    write_text(to / "model_terms.md", as_markdown(fits))
+    return [to / "model_terms.json", to / "model_terms.md"]
 
 
 def as_markdown(fits: Sequence[Fit]) -> str:
@@ -356,7 +356,7 @@ def as_markdown(fits: Sequence[Fit]) -> str:
         "# Which physics is missing",
         "",
         f"The theory (contacts stay closed, walkers on the axis) fitted to {len(wanted)} published numbers: without "
-        "any ingredient, with each by itself and with all of them. Misfit is Σ ln(1 + r²), r the residual in "
+        "any term, with each by itself and with all of them. Misfit is Σ ln(1 + r²), r the residual in "
         "deviations, which are 15 % of speeds. Factors of bridges are over those that wet perfectly, of 1 % liquid; "
         "their drag is that at a minimum separation of 0.01.",
         "",

@@ -1,4 +1,4 @@
-"""Fits of the theory with further ingredients: what is put in comes out, and what is lacking is missed."""
+"""Fits of the theory with further terms: what is put in comes out, and what is lacking is missed."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkers.paper.ingredients import (
+from walkers.paper.model_terms import (
     ADDED,
     ALWAYS,
     KAPPA,
@@ -17,7 +17,7 @@ from walkers.paper.ingredients import (
     targets,
     values_of,
     walkers_of_the_paper,
-    write_ingredients,
+    write_model_terms,
 )
 from walkers.runner.files import read_json
 from walkers.theory.prediction import motion_of
@@ -74,7 +74,7 @@ def test_what_the_theory_made_is_found_again_and_what_it_lacks_is_missed(tmp_pat
     assert static.misfit < 0.5 * without.misfit
     assert set(static.parameters) == set(ALWAYS.ranges) | set(ADDED[-1].ranges)
     full = [replace(one, values=dict(values_of(one.parameters, targets()))) for one in (without, static)]
-    paths = write_ingredients(full, tmp_path)
-    assert [path.name for path in paths] == ["ingredients.json", "ingredients.md"]
+    paths = write_model_terms(full, tmp_path)
+    assert [path.name for path in paths] == ["model_terms.json", "model_terms.md"]
     assert len(read_json(paths[0])["fits"]) == 2
     assert as_markdown(full).count("\n| Fig.") == len(targets())
