@@ -1,8 +1,8 @@
 """Runs made in segments: the pile's, which take long, each segment from a restart file to the next.
 
 A run is made in ``NAME-HASH.incomplete``, its segments in ``segments/0000``, ``segments/0001``, … there. A segment that
-is being made is called ``0003.new`` and gets its name when it is whole; an interrupted run goes on after the last whole
-one. Since the segments are the same whether the run was interrupted or not, so is all that comes out of it, bit for bit.
+is being made is called ``0003.new`` and gets its name when it is whole; an interrupted run goes on after the last one.
+Since the segments are the same whether the run was interrupted or not, so is all that comes out of it, bit for bit.
 """
 
 from __future__ import annotations
