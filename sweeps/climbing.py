@@ -118,7 +118,7 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
 VARIATIONS = {
     "min_rise": (1e-3, 2e-3, 3e-3, 5e-3),
     "max_gap": (0.03, 0.1, 0.2),
-    "same": (0.3, 0.5, 0.7),
+    "min_overlap": (0.3, 0.5, 0.7),
 }
 """Other thresholds of `walkers.postprocess.clusters.ClimbCriteria`, tried one at a time."""
 
