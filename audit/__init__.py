@@ -1,6 +1,6 @@
 """Proof of what the engine does: small decks, made of the blocks of the real ones, against published formulas.
 
-Knows all rooms before it. A check is an entry in one of the modules of ``audit/checks``.
+Stands on all packages before it. A check is an entry in one of the modules of ``audit/checks``.
 """
 
 from walkers.audit.check import Check, Line, Verdict

@@ -1,6 +1,6 @@
 """Cases: what is shaken, in physical units, read from TOML and validated.
 
-The first room of the project: it knows nothing of the engine's language.
+It stands on the laws alone (`walkers.physics`) and knows nothing of the engine's language.
 """
 
 from walkers.inputs.case import WalkerCase

@@ -93,7 +93,7 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     out
         Folder of the run directories.
     options
-        How it is to be conducted.
+        How it is to be run.
     engine
         Name or path of the binary; see `walkers.runner.find_engine`.
 

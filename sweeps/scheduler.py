@@ -1,4 +1,4 @@
-"""Conduct a sweep: decks handed to Parsl's workers, what they report taken in, until every point is settled."""
+"""Schedule a sweep: decks handed to Parsl's workers, what they report taken in, until every point is settled."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ClusterFailed(WalkersError):
 
 @dataclass(frozen=True)
 class Options:
-    """How a sweep is conducted.
+    """How a sweep is run.
 
     Attributes
     ----------

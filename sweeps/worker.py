@@ -17,7 +17,7 @@ from walkers.sweeps.kinds import current_result_of, velocity_in
 from walkers.sweeps.shared_deck import make_any
 
 STOPS: dict[str, threading.Event] = {}
-"""Of the sweeps that this process conducts, by `Task.sweep`: set to end their engines and to let none begin."""
+"""Of the sweeps that this process runs, by `Task.sweep`: set to end their engines and to let none begin."""
 
 
 class SweepStopped(Stopped):
