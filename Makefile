@@ -57,7 +57,7 @@ test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test fir
 	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"
 
 .PHONY: test-slow
-test-slow: setup ## Run what `make test` leaves out: what only figures of a release depend on
+test-slow: setup ## Run what `make test` leaves out: what only a release needs
 	.venv/bin/pytest -q -n 2 -m slow
 
 .PHONY: audit

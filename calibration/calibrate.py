@@ -255,7 +255,9 @@ def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArra
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InputError(str(path), [Problem("", None, f"cannot be read ({error}); delete it")]) from error
         for key, now in determinants.items():
-            if kept.get(key) != now:
+            if key not in kept:
+                raise InputError(str(path), [Problem(key, None, "missing: of an earlier version; delete the file")])
+            if kept[key] != now:
                 told = (
                     f"was drawn with other {key} than the file has now; delete it and the waves after it to have them "
                     "drawn again (runs that fit are kept), take the change back, or give another --out"

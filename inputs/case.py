@@ -6,7 +6,7 @@ This is what the deck is rendered from, what a run directory stores as ``case.js
 from __future__ import annotations
 
 from dataclasses import dataclass, is_dataclass, replace
-from math import hypot
+from math import cos, hypot, sin
 from typing import Any, Literal
 
 from walkers.inputs.drive import AXES, Drive, Vector
@@ -84,6 +84,13 @@ class WalkerCase:
         x, y, _ = self.drive.direction
         length = hypot(x, y)
         return (x / length, y / length, 0.0) if length else AXES["x"]
+
+    @property
+    def goes_uphill(self) -> bool:
+        """Whether the drive axis is the steepest way up a tilted plane: right is up then, and left down."""
+        x, y, _ = self.drive_axis
+        uphill = (cos(self.boundary.uphill), sin(self.boundary.uphill))
+        return bool(self.boundary.tilt) and x * uphill[0] + y * uphill[1] > 1.0 - 1e-9
 
     @property
     def gravity_vector(self) -> Vector:

@@ -69,7 +69,7 @@ def reach(case: WalkerCase) -> float:
 
 def hop_height(case: WalkerCase) -> float:
     """Height that a bead thrown up at twice the substrate's peak velocity reaches, m (its reach without gravity)."""
-    if case.pressing_gravity == 0.0:
+    if case.pressing_gravity <= 0.0:
         return reach(case)
     return min((2.0 * case.drive.peak_velocity) ** 2 / (2.0 * case.pressing_gravity), reach(case))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import gcd, isclose, lcm, pi, sqrt
+from math import degrees, gcd, hypot, isclose, lcm, pi
 from typing import Any, Literal
 
 Vector = tuple[float, float, float]
@@ -16,6 +16,8 @@ Frame = Literal["lab", "container"]
 AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 LARGEST_RATIO = 24
 """Of the frequencies of two harmonics, as a fraction: 24/1 and 23/24 are taken, 25/1 is not."""
+MOST_PERIODS = 1000
+"""Of the fastest harmonic in a cycle."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,14 @@ class Drive:
             harmonics=tuple(replace(one, peak_acceleration=share * one.peak_acceleration) for one in self.harmonics),
         )
 
+    def described(self) -> str:
+        """The harmonics in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""
+        return " + ".join(
+            f"{one.frequency:g} Hz, a0 = {one.peak_acceleration:.4g} m/s²"
+            + (f", {degrees(one.phase):g}°" if one.phase else "")
+            for one in self.harmonics
+        )
+
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types."""
         harmonics = [{**vars(one), "direction": list(one.direction)} for one in self.harmonics]
@@ -129,7 +139,7 @@ def common_frequency(frequencies: list[float]) -> float:
     Raises
     ------
     ValueError
-        If two of them are not in a ratio of whole numbers up to `LARGEST_RATIO`.
+        If one is in no ratio of whole numbers up to `LARGEST_RATIO` to the first, or a cycle is too long.
     """
     first = frequencies[0]
     ratios = [Fraction(one / first).limit_denominator(LARGEST_RATIO) for one in frequencies]
@@ -137,7 +147,11 @@ def common_frequency(frequencies: list[float]) -> float:
         if not isclose(float(ratio) * first, one, rel_tol=1e-9) or ratio.numerator > LARGEST_RATIO:
             raise ValueError(f"{one:g} Hz and {first:g} Hz are in no ratio of whole numbers up to {LARGEST_RATIO}")
     below = lcm(*(ratio.denominator for ratio in ratios))
-    return first * gcd(*(int(ratio * below) for ratio in ratios)) / below
+    numerators = [int(ratio * below) for ratio in ratios]
+    common = gcd(*numerators)
+    if max(numerators) > MOST_PERIODS * common:
+        raise ValueError(f"their common period is more than {MOST_PERIODS} of the shortest one")
+    return first * common / below
 
 
 def unit_vector(vector: Vector) -> Vector:
@@ -148,8 +162,8 @@ def unit_vector(vector: Vector) -> Vector:
     ValueError
         If the vector is zero.
     """
-    length = sqrt(sum(component**2 for component in vector))
-    if length == 0.0:
-        raise ValueError("expected a direction, not zero")
+    length = hypot(*vector)
+    if not 1e-100 < length < 1e100:
+        raise ValueError("expected a direction such as [1, 0, 1]")
     x, y, z = (component / length for component in vector)
     return (x, y, z)

@@ -236,7 +236,9 @@ def resolve_drive(table: DriveTable, axis: str, dimer: Dimer | None) -> Drive:
     """
     besides = sorted(table.model_fields_set - {"harmonics", "frame"})
     if table.harmonics and besides:
-        raise UnusableKeyError(f"drive.{besides[0]}", "expected none beside drive.harmonics")
+        raise UnusableKeyError(
+            f"drive.{besides[0]}", f"expected none beside drive.harmonics: write drive.harmonics[0].{besides[0]}"
+        )
     if table.harmonics:
         harmonics = tuple(
             _harmonic(one, f"drive.harmonics[{number}]", axis, dimer) for number, one in enumerate(table.harmonics)

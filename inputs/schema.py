@@ -112,7 +112,7 @@ class PlaneTable(Table):
 
     shape: Literal["plane"] = "plane"
     material: str
-    tilt: Annotated[NonNegativeAngle, Field(le=3.1416)] = 0.0
+    tilt: Annotated[NonNegativeAngle, Field(le=1.5708)] = 0.0
     uphill: Angle = 0.0
 
 

@@ -1,4 +1,4 @@
-"""What happens to the clusters of a pile: they come free, part, merge, return to the pile or let go of the wall."""
+"""What happens to the clusters of a pile: they come free, split, merge, return to the pile or detach from the wall."""
 
 from __future__ import annotations
 

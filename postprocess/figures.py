@@ -54,8 +54,8 @@ def _title(case: WalkerCase) -> str:
     gamma0 = dimer_of(case).gamma0(case.drive.peak_acceleration)
     first, second = (f"{radius * 1e3:g}" for radius in case.beads.radii)
     return (
-        f"{plain_text(case.title or case.name)}\nR = {first}/{second} mm, {case.drive.frequency:g} Hz, "
-        f"$a_0$ = {case.drive.peak_acceleration:.3g} m/s² ($\\Gamma_0$ = {gamma0:.3g})"
+        f"{plain_text(case.title or case.name)}\nR = {first}/{second} mm, {case.drive.described()} "
+        f"($\\Gamma_0$ = {gamma0:.3g})"
     )
 
 

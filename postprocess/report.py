@@ -22,9 +22,8 @@ def describe_result(directory: Path, result: dict[str, Any], *, cached: bool = F
         Whether the run was there before.
     """
     rotation, end = result["rotation"], result["orientation_end"]
-    drive = (
-        f"{result['frequency']:g} Hz, a0 = {result['peak_acceleration']:.4g} m/s², "
-        f"Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}" + (" (already run)" if cached else "")
+    drive = f"{result['drive']}, Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}" + (
+        " (already run)" if cached else ""
     )
     sliding = ", ".join(f"{name} {_speed(result['sliding'][contact])}" for contact, name in _CONTACTS.items())
     lines = [
@@ -48,7 +47,7 @@ def _of_walkers(result: dict[str, Any], drive: str) -> list[str]:
     of_what = f"over {count} walkers" if count > 1 else "of the fit"
     doubt = f" (standard error {_speed(error)} {of_what})" if error is not None else ""
     toward = "toward the large bead" if result["sin_delta"] else "toward bead 1"
-    ways = ("up", "down") if result["tilt"] else ("right", "left")
+    ways = ("up", "down") if result["goes_uphill"] else ("right", "left")
     return [
         f"{result['case']}: {drive}",
         f"  velocity   {_speed(velocity['mean'])} mm/s, positive {toward}{doubt}",
@@ -60,7 +59,7 @@ def _of_walkers(result: dict[str, Any], drive: str) -> list[str]:
 def _of_turned(result: dict[str, Any], drive: str) -> list[str]:
     """What became of walkers of which some turned by more than 90°: a velocity along their heading says nothing."""
     axial, kept = result["axial_velocity"], result["kept_heading"]
-    tilted = bool(result["tilt"])
+    tilted = result["goes_uphill"]
     what, (first, second) = ("over", ("up", "down")) if tilted else ("round", ("right", "left"))
     return [
         f"{result['case']}: {result['turned_round']} of {result['walkers']} turned {what}, "
@@ -68,7 +67,7 @@ def _of_turned(result: dict[str, Any], drive: str) -> list[str]:
         f"  drive      {drive}",
         f"  axial velocity, positive {'up' if tilted else 'to the right'}: started facing {first} "
         f"{_speed(axial['right_facing'])}, {second} {_speed(axial['left_facing'])} mm/s; {_steady(result)}",
-        f"  velocity   of the {kept['n']} others {_speed(kept['mean'])} mm/s, along their heading"
+        f"  velocity   {_speed(kept['mean'])} mm/s along the heading, of the {kept['n']} that kept it"
         if kept["n"]
         else "  velocity   none: no walker kept its heading",
     ]

@@ -22,6 +22,8 @@ from walkers.postprocess.trajectory import Trajectory, read_trajectory
 from walkers.runner.files import read_json, write_json
 
 RESULT_NAME = "result.json"
+_NEWEST_KEYS = {"separated_fraction", "kept_heading", "goes_uphill", "drive"}
+"""Of a result; one that lacks any is of an earlier version."""
 NEAR = 1.5
 """Walkers whose mass centres come within this many lengths of a dimer have met."""
 
@@ -66,9 +68,7 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     directory = Path(directory)
     try:
         result = read_result(directory)
-        if result.keys() >= {"velocity", "walkers", "gamma0", "separated_fraction", "kept_heading", "tilt"} and intact(
-            directory
-        ):
+        if result.keys() >= _NEWEST_KEYS and intact(directory):
             return result
     except (OSError, ValueError):
         pass
@@ -145,7 +145,7 @@ def _result(trajectory: Trajectory, walkers: Columns) -> dict[str, Any]:
     return {
         "case": case.name,
         "kind": "walker",
-        "tilt": case.boundary.tilt,
+        "goes_uphill": case.goes_uphill,
         "units": "SI: m/s, rad, s",
         "velocity": _spread(velocity, float(walkers["standard_error"][0])),
         "right_facing": _spread(velocity[facing > 0]),
@@ -179,6 +179,7 @@ def _drive(case: WalkerCase) -> dict[str, Any]:
     return {
         "frequency": case.drive.frequency,
         "peak_acceleration": case.drive.peak_acceleration,
+        "drive": case.drive.described(),
         "gamma0": dimer.gamma0(case.drive.peak_acceleration),
         "sin_delta": dimer.sin_delta,
     }

@@ -50,7 +50,7 @@ class EngineDiffers(EngineFailure):
 
 
 class ProgramDiffers(EngineFailure):
-    """A worker of a sweep makes other decks of the same cases than the program that the sweep was started with."""
+    """A worker of a sweep names runs otherwise than where it was started: resolved cases or decks differ."""
 
     def __init__(self) -> None:
         import platform
@@ -133,7 +133,7 @@ class TimeLimitExceeded(EngineFailure):
 
 
 class WalkersMet(EngineFailure):
-    """Walkers of different cases that shared a deck came close to each other. Seen when the deck's output is parted."""
+    """Walkers of different cases that shared a deck came close to each other. Seen when the deck's output is split."""
 
     def __init__(self, directory: Path) -> None:
         super().__init__("walkers of different cases came close to each other in a shared deck", directory)

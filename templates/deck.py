@@ -110,7 +110,7 @@ class Plan:
     fastest
         A speed that no bead can reach, m/s; computed from the case if left out.
     drive_from
-        Step at which the drive begins; None for a part before it.
+        Step at which the drive begins; None for a segment before it.
     skin
         How far beyond contact neighbours are looked for, m; if left out, the smallest radius, and wide bins, which
         suits few beads far apart.

@@ -127,14 +127,14 @@ BAD: dict[str, tuple[dict[str, Any], str, str, str]] = {
     "substrate of old": ({"substrate": {"material": "glass"}}, "substrate", '"glass"', "is now [boundary]"),
     "container of old": ({"container": {"width": "5 mm"}}, "container", '"5 mm"', "is now [boundary]"),
     "tilt of a number": ({"boundary": {"tilt": 30}}, "boundary.tilt", "30", "angle with its unit"),
-    "tilt too far": ({"boundary": {"tilt": "200 deg"}}, "boundary.tilt", '"200 deg"', "at most"),
+    "tilt too far": ({"boundary": {"tilt": "100 deg"}}, "boundary.tilt", '"100 deg"', "at most"),
     "direction of nothing": ({"drive": {"axis": [0, 0, 0]}}, "drive.axis", "[0, 0, 0]", "[1, 0, 1]"),
     "direction of two": ({"drive": {"axis": [1, 0]}}, "drive.axis", "[1, 0]", "[1, 0, 1]"),
     "harmonics and a frequency": (
         {"drive": {"harmonics": [{"frequency": "80 Hz", "peak_acceleration": "1 g"}]}},
         "drive.frequency",
         '"80 Hz"',
-        "none beside drive.harmonics",
+        "write drive.harmonics[0].frequency",
     ),
     "a phase in the laboratory": (
         {"drive": {"phase": "10 deg", "frame": "lab"}},

@@ -1,6 +1,7 @@
 """The deck: readable, exact, and with every workaround for what the engine gets wrong."""
 
 import re
+from dataclasses import replace
 from hashlib import sha256
 from math import radians
 from typing import Literal
@@ -14,7 +15,7 @@ from walkers.inputs.case import WalkerCase
 from walkers.inputs.reading import load_any
 from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
 from walkers.templates import render_deck
-from walkers.templates.deck import CONTENT_VERSION, Deck
+from walkers.templates.deck import CONTENT_VERSION, Deck, render_shared_deck
 from walkers.templates.engine import contact_angle_setting, face_triangle, separation_cap
 from walkers.templates.pile import Segment, render_segment, settling_steps
 from walkers.templates.placement import place_walkers
@@ -135,7 +136,7 @@ def test_there_is_one_run_and_one_thermo_style(deck: str) -> None:
     assert len(_lines(deck, "thermo_style")) == 1
 
 
-CONTENT = {1: "a76b989847cd693f"}
+CONTENT = {1: "7dc0566616dc45cc"}
 """Digest of all that the engine reads of some cases, by the version of the decks' content."""
 
 
@@ -155,9 +156,13 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
     several = document(contact={"rolling_friction": 0.01}, boundary={"tilt": "20 deg"})
     several["drive"] = {"harmonics": [*harmonics, {"frequency": "120 Hz", "peak_acceleration": "1 g"}]}
     film = make_case(liquid={"film_drag_ratio": 0.5}, start={"replicates": 3, "angle": "10 deg"})
-    decks = [render_deck(case) for case in (make_case(), film, resolve_case(several))]
-    for name in ("pile-ci", "cluster"):
-        case = load_pile(name)
+    decks = [render_deck(case) for case in (make_case(), film, resolve_case(several), make_case(drive={"axis": "y"}))]
+    decks += [render_shared_deck([make_case(), make_case(contact={"restitution": 0.6}, start={"seed": 2})])]
+    decks += [render_deck(make_case(liquid={"film_drag_ratio": 0.5}, drive={"frame": "container"}))]
+    piles = [load_pile("pile-ci"), load_pile("cluster")]
+    round_one = replace(piles[0].container, shape="cylinder")
+    piles += [replace(piles[0], run=replace(piles[0].run, ranks=2)), replace(piles[0], container=round_one)]
+    for case in piles:
         settled = settling_steps(case)
         end = settled + case.run.cycles_per_segment * case.run.steps_per_cycle
         decks += [render_segment(case, Segment(0, settled, None)), render_segment(case, Segment(settled, end, settled))]

@@ -35,6 +35,18 @@ def test_a_cycle_is_the_common_period(frequencies: list[float], common: float) -
     assert common_frequency(frequencies) == pytest.approx(common, rel=1e-12)
 
 
+def test_a_cycle_that_would_be_too_long_is_refused() -> None:
+    with pytest.raises(ValueError, match="common period"):
+        common_frequency([1.0, 23 / 24, 22 / 23, 21 / 22, 19 / 20, 17 / 18])
+
+
+def test_right_is_up_only_where_the_drive_goes_uphill() -> None:
+    def uphill(tilt: float, way: float) -> bool:
+        return bool(shipped(boundary=Plane("glass", radians(tilt), radians(way))).goes_uphill)
+
+    assert [uphill(5.0, 0.0), uphill(5.0, 180.0), uphill(5.0, 90.0), uphill(0.0, 0.0)] == [True, False, False, False]
+
+
 @pytest.mark.parametrize("other", [80.0 * 25, 80.0 * 2**0.5, 81.3])
 def test_frequencies_without_one_are_refused(other: float) -> None:
     with pytest.raises(ValueError, match="no ratio of whole numbers"):

@@ -171,6 +171,16 @@ def test_a_reader_who_has_had_enough_is_no_failure(short_case: Path) -> None:
         assert (done.stdout.strip(), "Traceback" in done.stderr, "BrokenPipe" in done.stderr) == ("0", False, False)
 
 
+def test_progress_that_nobody_reads_stops_nothing(in_folder: Path) -> None:
+    """Half a second of walkers, so that a line of progress comes when the reader has gone."""
+    (in_folder / "base.toml").write_text(to_toml(document(run={"cycles": 120, "samples_per_cycle": 10})))
+    (in_folder / "sweep.toml").write_text('case = "base.toml"\n[axes]\nstart.angle = ["0 deg", "10 deg"]\n')
+    script = f'{PROGRAM} sweep sweep.toml -j 1 2>&1 | true; echo "${{PIPESTATUS[0]}}"'
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "0"
+    assert "2 finished" in call("status", "runs/sweep").stdout
+
+
 def test_a_dollar_in_a_title_is_a_dollar(short_case: Path) -> None:
     call("run", "short.toml", check=True)
     done = call("plot", "short.toml")
@@ -355,7 +365,7 @@ def test_a_result_says_what_the_walkers_do_that_kept_their_heading(run_directory
     result |= {"turned_round": 2, "kept_heading": {**result["kept_heading"], "n": 1, "mean": 1.5e-3}}
     lines = describe_result(directory, result).splitlines()
     assert lines[0].startswith("test: 2 of 3 turned round, axial velocity ")
-    assert "  velocity   of the 1 others 1.500 mm/s, along their heading" in lines
+    assert "  velocity   1.500 mm/s along the heading, of the 1 that kept it" in lines
 
 
 def test_piles_are_run_from_python_as_walkers_are(tmp_path: Path) -> None:

@@ -34,11 +34,12 @@ def _forked(work: Callable[[], object]) -> int:
     os._exit(0)
 
 
-def test_after_each_of_fifty_kills_the_next_call_runs(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kills", [12, pytest.param(50, marks=pytest.mark.slow)])
+def test_after_each_kill_the_next_call_runs(tmp_path: Path, kills: int) -> None:
     """The launcher is killed before, at and after the birth of its engine; whoever calls then gets the run."""
     draw = random.Random(14)
     begun = {"waiting": 0, "running": 0}
-    for kill in range(50):
+    for kill in range(kills):
         case = make_case(run=BRIEF, start={"seed": kill})
         child = _forked(lambda case=case: run_case(case, tmp_path, force=True))  # type: ignore[misc]
         time.sleep(draw.uniform(0.0, 0.12))
@@ -48,7 +49,7 @@ def test_after_each_of_fifty_kills_the_next_call_runs(tmp_path: Path) -> None:
         os.waitpid(child, 0)
         assert finished_run(outcome.run.directory) is not None
         assert not is_locked(outcome.run.directory)
-    assert begun["running"] > 5  # the moments are spread, and some have an engine
+    assert begun["running"]  # the moments are spread, and some have an engine
     wait_for(lambda: not engines_in(tmp_path))
     assert not list(tmp_path.glob("*.incomplete"))
     assert not list(tmp_path.glob("*.lock"))
@@ -57,7 +58,7 @@ def test_after_each_of_fifty_kills_the_next_call_runs(tmp_path: Path) -> None:
 def test_no_engine_is_orphaned_by_a_kill_at_its_birth(tmp_path: Path) -> None:
     """Decks that would run for minutes: an engine that its launcher's death did not reach would still be there."""
     case, draw = make_case(run=LONG), random.Random(3)
-    for kill in range(40):
+    for kill in range(20):
         folder = tmp_path / str(kill)
         child = _forked(lambda folder=folder: run_case(case, folder))  # type: ignore[misc]
         wait_for(lambda folder=folder: list(folder.glob("*.incomplete/engine.log")))  # type: ignore[misc]
@@ -97,9 +98,8 @@ def _front_that_lingers(folder: Path, seconds: int) -> str:
     """An engine that first starts, once, a child which the kernel does not end and which keeps all that is open."""
     front = folder / "front"
     mark = folder / "lingering"
-    front.write_text(
-        f'#!/bin/sh\n[ -e "{mark}" ] || {{ sleep {seconds} & touch "{mark}"; exec sleep 60; }}\nexec liggghts "$@"\n'
-    )
+    once = f'sleep {seconds} & echo $! > "{mark}.new"; mv "{mark}.new" "{mark}"; exec sleep 60'
+    front.write_text(f'#!/bin/sh\n[ -e "{mark}" ] || {{ {once}; }}\nexec liggghts "$@"\n')
     front.chmod(0o755)
     return str(front)
 
@@ -116,7 +116,7 @@ def test_what_keeps_a_lock_for_long_is_refused_in_the_end(tmp_path: Path, monkey
         with pytest.warns(OrphanLockWarning), pytest.raises(RunBusy):
             run_case(case, tmp_path / "runs", engine=front)
     finally:
-        subprocess.run(["pkill", "-f", "sleep 600"], check=False)
+        os.kill(int((tmp_path / "lingering").read_text()), signal.SIGKILL)
 
 
 def test_a_closed_terminal_ends_the_engine_and_the_lock(in_folder: Path) -> None:

@@ -17,9 +17,14 @@ from walkers.templates.engine import ALONE
 LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
 
 
+@pytest.mark.slow
 def test_of_two_hundred_engines_eight_at_a_time_all_start(tmp_path: Path) -> None:
     """5,000 of them by `make bench-starts`."""
     assert failed_starts(200, tmp_path) == []
+
+
+def test_of_forty_engines_eight_at_a_time_all_start(tmp_path: Path) -> None:
+    assert failed_starts(40, tmp_path) == []
 
 
 @pytest.fixture

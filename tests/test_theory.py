@@ -259,6 +259,9 @@ def test_the_program_prints_theory_beside_the_engine(in_folder: Path) -> None:
     told = call("theory", "test.toml", "--json", check=True).stdout
     contents = json.loads(told)
     assert contents["engine"]["velocity"]["mean"] == pytest.approx(contents["viscous"]["velocity"], rel=0.08)
+    sideways = document(boundary={"tilt": "10 deg", "uphill": "90 deg"})
+    (in_folder / "sideways.toml").write_text(to_toml(sideways))
+    assert "boundary.uphill: the theory is one of planes" in call("theory", "sideways.toml").stderr
     (in_folder / "up.toml").write_text(to_toml(document(drive={"axis": "z"})))
     done = call("theory", "up.toml")
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -69,8 +70,11 @@ def _walker_of(case: WalkerCase, *, viscous: bool) -> Walker:
 
 
 def _check(*cases: WalkerCase) -> None:
-    if any(not case.drive.is_plain or case.drive.direction[2] != 0.0 for case in cases):
-        raise ValueError("the theory is one of drives along the substrate")
+    for case in cases:
+        if not case.drive.is_plain or case.drive.direction[2] != 0.0:
+            raise ValueError("drive: the theory is one of a single harmonic along the plane, without a phase")
+        if hypot(*case.gravity_vector[:2]) > abs(case.axial_gravity) + 1e-9:
+            raise ValueError("boundary.uphill: the theory is one of planes that are tilted along the drive")
 
 
 def threshold(case: WalkerCase, *, viscous: bool = True) -> float:
@@ -134,7 +138,7 @@ def predict(case: WalkerCase) -> dict[str, Any]:
         },
         **{
             name: {
-                "velocity": _number(float(motion.velocity[0])),
+                "velocity": _number(float(motion.velocity[0])) if motion.periodic[0] else None,
                 "rotation": [float(value) for value in motion.rotation[:, 0]],
                 "sliding": [float(value) for value in motion.sliding[:, 0]],
                 "reason": _reason(motion),
@@ -154,6 +158,8 @@ def _number(value: float) -> float | None:
 def _reason(motion: Motion) -> str | None:
     if not motion.solved[0]:
         return "the forces have no solution"
+    if not motion.periodic[0]:
+        return "it comes to no steady motion"
     if not motion.opened[0]:
         return None
     return f"{CONTACTS[int(np.argmin(motion.smallest_normal_force[:, 0]))]} would open"

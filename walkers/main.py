@@ -6,7 +6,8 @@ import os
 import signal
 import sys
 import warnings
-from io import TextIOWrapper
+from contextlib import suppress
+from io import TextIOBase, TextIOWrapper
 from types import FrameType
 from typing import Any, NoReturn, TextIO
 
@@ -62,6 +63,37 @@ for command in (
 INTERRUPTED = 130
 
 
+class Forgiving(TextIOBase):
+    """A stream whose reader may go: what is written to it from then on goes nowhere, and nothing stops for it."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        with suppress(OSError, ValueError):
+            return self.stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush the stream."""
+        with suppress(OSError, ValueError):
+            self.stream.flush()
+
+    def isatty(self) -> bool:
+        """Whether the stream is a terminal."""
+        return self.stream.isatty()
+
+    def fileno(self) -> int:
+        """Number of the stream's file."""
+        return self.stream.fileno()
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        """Of the stream."""
+        return self.stream.encoding
+
+
 class _Terminated(BaseException):
     """SIGTERM, or SIGHUP of a terminal that is closed, as an exception: engines are stopped on the way out."""
 
@@ -99,6 +131,7 @@ def _open_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    sys.stderr = Forgiving(sys.stderr)
 
 
 def _show_warning(
@@ -133,7 +166,7 @@ def _told(stop: BaseException) -> int:
     status = stop.status if isinstance(stop, _Terminated) else next((s for k, s in known if isinstance(stop, k)), None)
     if status is not None:
         return _tell(str(stop) or "interrupted", status)
-    # Click ends so where nobody reads what is printed; it is no failure that the reader has had enough.
+    # So it ends where nobody reads what is printed: it is no failure that the reader has had enough.
     if isinstance(stop if isinstance(stop, OSError) else stop.__context__, BrokenPipeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 0

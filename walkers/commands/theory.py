@@ -22,7 +22,8 @@ def command(case: Case, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
     try:
         prediction = predict(load_case(case))
     except ValueError as error:
-        raise InputError(case, [Problem("drive.axis", None, str(error))]) from error
+        key, _, told = str(error).partition(": ")
+        raise InputError(case, [Problem(key, None, told)]) from error
     result: dict[str, Any] | None = None
     with suppress(InputError, EngineMissing):  # not run yet, or never to be run here
         result = current_result(find_run(case, out).directory)
