@@ -238,6 +238,7 @@ def reduced(values: dict[str, float]) -> dict[str, Any]:
     return {**copy.deepcopy(REDUCED), "observations": [*observations, ratio]}
 
 
+@pytest.mark.slow
 def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: Path) -> None:
     guess = read_calibration(
         reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3}), source="truth", name="truth", folder=tmp_path

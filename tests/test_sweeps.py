@@ -498,6 +498,7 @@ def test_folders_that_are_no_sweeps(tmp_path: Path) -> None:
         assert len(done.stderr.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_a_sweep_that_is_killed_eight_times(
     sweep_file: Callable[..., str], in_folder: Path, counting_engine: tuple[str, Callable[[], list[str]]]
 ) -> None:
