@@ -15,7 +15,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import chdir, redirect_stderr, redirect_stdout, suppress
+from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -242,3 +242,16 @@ def call(*arguments: str, check: bool = False, folder: Path | None = None) -> su
     if check:
         assert done.returncode == 0, done.stderr
     return done
+
+
+@contextmanager
+def mounted(place: Path, size: str) -> Iterator[Path]:
+    """A file system of a size such as ``2m``; tests that need one are for root."""
+    place.mkdir()
+    arguments = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(place)]
+    if subprocess.run(arguments, capture_output=True, check=False).returncode:
+        pytest.skip("a small file system can only be mounted by root")
+    try:
+        yield place
+    finally:
+        subprocess.run(["umount", "-l", str(place)], check=True)

@@ -25,6 +25,7 @@ from tests.conftest import (
     document,
     engines_in,
     make_case,
+    mounted,
     processes_in,
     to_toml,
     wait_for,
@@ -204,15 +205,8 @@ def test_time_limit(tmp_path: Path) -> None:
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
     """A file system of two megabytes."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(place)], capture_output=True, check=False
-    )
-    if mounted.returncode:
-        pytest.skip("a small file system can only be mounted by root")
-    yield place
-    subprocess.run(["umount", "-l", str(place)], check=True)
+    with mounted(tmp_path / "disk", "2m") as place:
+        yield place
 
 
 def test_no_room_for_the_dump_is_seen_before_the_launch(small_disk: Path) -> None:

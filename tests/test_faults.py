@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.conftest import PROGRAM, SHORT, call, document, make_case, to_toml
+from tests.conftest import PROGRAM, SHORT, call, document, make_case, mounted, to_toml
 from tests.test_calibration import reduced
 from walkers import run_case
 from walkers.calibration.calibrate import _determinants, _kept, calibrate
@@ -228,18 +228,11 @@ def test_axes_that_would_make_the_same_point_twice_are_refused(name: str, tmp_pa
 @pytest.fixture
 def full_disk(tmp_path: Path) -> Iterator[Path]:
     """A file system without a byte left."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(place)], capture_output=True, check=False
-    )
-    if mounted.returncode:
-        pytest.skip("a small file system can only be mounted by root")
-    with pytest.raises(OSError, match="No space left"), (place / "ballast").open("wb", buffering=0) as ballast:
-        while True:
-            ballast.write(b"\0" * 4096)
-    yield place
-    subprocess.run(["umount", "-l", str(place)], check=True)
+    with mounted(tmp_path / "disk", "256k") as place:
+        with pytest.raises(OSError, match="No space left"), (place / "ballast").open("wb", buffering=0) as ballast:
+            while True:
+                ballast.write(b"\0" * 4096)
+        yield place
 
 
 def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(full_disk: Path, in_folder: Path) -> None:

@@ -85,13 +85,17 @@ def test_a_dying_engine_is_waited_for_with_a_line(tmp_path: Path) -> None:
     """A child that outlives its dead owner for a second keeps the lock; the next call says that it waits, and runs."""
     case = make_case(run=BRIEF)
     front = _front_that_lingers(tmp_path, seconds=2)
-    child = _forked(lambda: run_case(case, tmp_path / "runs", engine=front))
-    wait_for((tmp_path / "lingering").exists)
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
+    _kill_once_it_lingers(case, tmp_path, front)
     with pytest.warns(OrphanLockWarning, match="waiting for what is left of a run that was killed"):
         outcome = run_case(case, tmp_path / "runs", engine=front)
     assert not outcome.cached
+
+
+def _kill_once_it_lingers(case: WalkerCase, folder: Path, front: str) -> None:
+    child = _forked(lambda: run_case(case, folder / "runs", engine=front))
+    wait_for((folder / "lingering").exists)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
 
 
 def _front_that_lingers(folder: Path, seconds: int) -> str:
@@ -108,10 +112,7 @@ def test_what_keeps_a_lock_for_long_is_refused_in_the_end(tmp_path: Path, monkey
     monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 1.0)
     case = make_case(run=BRIEF)
     front = _front_that_lingers(tmp_path, seconds=600)
-    child = _forked(lambda: run_case(case, tmp_path / "runs", engine=front))
-    wait_for((tmp_path / "lingering").exists)
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
+    _kill_once_it_lingers(case, tmp_path, front)
     try:
         with pytest.warns(OrphanLockWarning), pytest.raises(RunBusy):
             run_case(case, tmp_path / "runs", engine=front)
