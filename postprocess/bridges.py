@@ -38,8 +38,9 @@ def bridge_columns(directory: Path, case: WalkerCase, layout: Layout) -> Columns
     postprocess.dump.DumpError
         If a dump cannot be read.
     """
-    pair_steps, pairs = read_local_dump(directory / layout.pair_bridge_dump, layout.pair_bridge_columns)
-    wall_steps, walls = read_local_dump(directory / layout.wall_bridge_dump, layout.wall_bridge_columns)
+    frames = layout.bridge_frames
+    pair_steps, pairs = read_local_dump(directory / layout.pair_bridge_dump, layout.pair_bridge_columns, frames)
+    wall_steps, walls = read_local_dump(directory / layout.wall_bridge_dump, layout.wall_bridge_columns, frames)
     radius = {
         bead: size for walker in layout.walkers for bead, size in zip(walker.beads, case.beads.radii, strict=True)
     }

@@ -13,7 +13,9 @@ from walkers.postprocess.dump import DumpError, FloatArray
 _HEADER_LINES = 9
 
 
-def read_local_dump(path: Path, columns: tuple[str, ...]) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def read_local_dump(
+    path: Path, columns: tuple[str, ...], number: int | None = None
+) -> tuple[npt.NDArray[np.int64], FloatArray]:
     """Read all rows of a local dump.
 
     Parameters
@@ -22,6 +24,8 @@ def read_local_dump(path: Path, columns: tuple[str, ...]) -> tuple[npt.NDArray[n
         The text file.
     columns
         Names of its columns.
+    number
+        Of its frames, where that is known.
 
     Returns
     -------
@@ -32,9 +36,11 @@ def read_local_dump(path: Path, columns: tuple[str, ...]) -> tuple[npt.NDArray[n
     Raises
     ------
     DumpError
-        As for `local_frames`.
+        As for `local_frames`, or if frames are missing.
     """
     frames = list(local_frames(path, columns))
+    if number is not None and len(frames) != number:
+        raise DumpError(f"{path}: holds {len(frames)} of {number} frames")
     steps = np.repeat(
         np.array([step for step, _ in frames], dtype=np.int64), [len(rows) for _, rows in frames] if frames else 0
     )

@@ -119,6 +119,8 @@ def test_a_local_dump_is_read_whole_or_not_at_all(local_dump: tuple[Path, tuple[
         read_local_dump(cut, columns)
     cut.write_bytes(whole[:last_frame])
     assert len(read_local_dump(cut, columns)[0]) == 6 * 2
+    with pytest.raises(DumpError, match=r"cut\.txt: holds 6 of 7 frames"):
+        read_local_dump(cut, columns, 7)
 
 
 @pytest.mark.parametrize("nonsense", [b"nan", b"inf", b"x", b"1 2", b""])
