@@ -52,11 +52,6 @@ class Drive:
     harmonics: tuple[Harmonic, ...]
     frame: Frame
 
-    @classmethod
-    def along(cls, axis: str, frequency: float, peak_acceleration: float, frame: Frame) -> Drive:
-        """One harmonic along x, y or z."""
-        return cls((Harmonic(AXES[axis], frequency, peak_acceleration),), frame)
-
     @property
     def largest(self) -> Harmonic:
         """The harmonic of the largest peak acceleration, the first of equal ones."""
@@ -142,6 +137,8 @@ def common_frequency(frequencies: list[float]) -> float:
         If one is in no ratio of whole numbers up to `LARGEST_RATIO` to the first, or a cycle is too long.
     """
     first = frequencies[0]
+    if len(frequencies) == 1:  # asked for at every turn of a sweep's plan
+        return first
     ratios = [Fraction(one / first).limit_denominator(LARGEST_RATIO) for one in frequencies]
     for one, ratio in zip(frequencies, ratios, strict=True):
         if not isclose(float(ratio) * first, one, rel_tol=1e-9) or ratio.numerator > LARGEST_RATIO:

@@ -7,7 +7,7 @@ from math import cos, sin
 
 from walkers.inputs.drive import Vector
 
-_EXACT = 1e-15
+_LEAST = 1e-13
 
 
 @dataclass(frozen=True)
@@ -36,4 +36,4 @@ class Plane:
 
 def _round(value: float) -> float:
     """Zero for what is zero but for rounding: a wall's weight does not press at all."""
-    return 0.0 if abs(value) < _EXACT * 100.0 else value
+    return 0.0 if abs(value) < _LEAST else value

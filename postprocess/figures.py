@@ -129,7 +129,7 @@ def _gait_figure(trajectory: Trajectory) -> Figure:
     for label, values, marker, colour in series:
         mean = values[:-1].mean() * 1e3
         axes.plot(phase, values * 1e3, marker=marker, color=colour, label=f"{label} (mean {mean:.2f} mm/s)")
-    shaken = trajectory.substrate_velocity[last] @ trajectory.drive_axis
+    shaken = trajectory.substrate_velocity[last] @ np.array(trajectory.case.drive.direction)
     if np.any(shaken):
         facing = trajectory.layout.walkers[0].facing
         axes.plot(phase, facing * shaken * 1e3, color="0.6", ls=":", label="substrate")

@@ -87,7 +87,7 @@ def render_film(directory: Path, destination: Path | None = None, *, slowdown: f
     destination
         The MP4 to write (H.264); ``pile.mp4`` in the run directory if None.
     slowdown
-        How many times slowdown than in reality: every frame of the drive is shown, one after the other.
+        How many times slower than in reality: every frame of the drive is shown, one after the other.
 
     Raises
     ------

@@ -22,7 +22,7 @@ from walkers.postprocess.trajectory import Trajectory, read_trajectory
 from walkers.runner.files import read_json, write_json
 
 RESULT_NAME = "result.json"
-_NEWEST_KEYS = {"separated_fraction", "kept_heading", "goes_uphill", "drive"}
+_NEWEST_KEYS = {"velocity", "walkers", "gamma0", "separated_fraction", "kept_heading", "goes_uphill", "drive"}
 """Of a result; one that lacks any is of an earlier version."""
 NEAR = 1.5
 """Walkers whose mass centres come within this many lengths of a dimer have met."""
