@@ -5,6 +5,7 @@ PYTHON ?= python3
 WALKERS := .venv/bin/walkers
 OUT ?= runs
 CASE ?= fig1b
+PILE ?= pile-small
 SWEEP ?= fig2
 CALIBRATION ?= ruby
 
@@ -27,13 +28,8 @@ sweep: setup ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.tom
 	  [ $$status -gt 1 ] || $(WALKERS) table $(OUT)/$(basename $(notdir $(SWEEP))); exit $$status
 
 .PHONY: pile
-pile: setup ## Shake the small pile (or CASE=pile-fig1a): what climbed, pictures; goes on where it was interrupted
-	@$(WALKERS) run $(if $(filter pile% cluster,$(CASE)),$(CASE),pile-small) --out $(OUT)
-	@echo "pictures:"
-	@$(WALKERS) plot $(if $(filter pile% cluster,$(CASE)),$(CASE),pile-small) --out $(OUT) | sed 's/^/  /'
-	@$(WALKERS) render $(if $(filter pile% cluster,$(CASE)),$(CASE),pile-small) --out $(OUT) | sed 's/^/  /'
-	@echo "for ParaView:"
-	@$(WALKERS) vtk $(if $(filter pile% cluster,$(CASE)),$(CASE),pile-small) --every 2 --out $(OUT) | sed 's/^/  /'
+pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures; goes on where it was interrupted
+	@$(MAKE) --no-print-directory walker CASE=$(PILE) OUT=$(OUT)
 
 .PHONY: figures
 figures: setup ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)

@@ -14,28 +14,32 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs import resolve_case
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.boundary import Face
+from walkers.inputs.case import Case
+from walkers.inputs.drive import Vector
 from walkers.inputs.errors import Stopped
 from walkers.postprocess.dump import BinaryDump, FloatArray
 from walkers.postprocess.local_dump import read_local_dump
 from walkers.runner.binary import Engine
 from walkers.runner.directory import write_deck
 from walkers.runner.launch import Progress, launch
-from walkers.templates.deck import Deck, Plan, Recording, compose
+from walkers.templates.deck import Deck, Plan, Recording, compose, plan_of
 from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds
-from walkers.templates.layout import BEAD_COLUMNS, Layout
-from walkers.templates.scene import Bead, Face, Point, Scene
+from walkers.templates.layout import BEAD_COLUMNS, FORCE_COLUMNS, WALL_BRIDGES, Layout
+from walkers.templates.scene import Bead, Scene
 
-TORQUE_COLUMNS = ("tqx", "tqy", "tqz")
 FIRST_BEAD = 2
 """Id of the first bead of a scene with one carrier."""
+_BEAD_COLUMNS = (*BEAD_COLUMNS, *FORCE_COLUMNS)
+_WALL_BRIDGE_COLUMNS = tuple(" ".join(WALL_BRIDGES).split())
 FLOOR = Face("z", 1, (0.0, 0.0, 0.0))
 
 
-def bench_case(**changes: dict[str, Any]) -> WalkerCase:
+def bench_case(**changes: dict[str, Any]) -> Case:
     """A case without friction, damping, viscosity, gravity and drive, to which a check adds what it measures."""
     tables: dict[str, dict[str, Any]] = {
-        "beads": {"radii": ["0.3 mm", "0.2 mm"], "density": "4.0 g/cm^3"},
+        "beads": {"density": "4.0 g/cm^3"},
+        "dimers": {"radii": ["0.3 mm", "0.2 mm"]},
         "liquid": {"surface_tension": "19.2 mN/m", "dynamic_viscosity": "0 Pa*s"},
         "boundary": {"material": "glass"},
         "contact": {"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": 0.0, "restitution": 1.0},
@@ -46,7 +50,7 @@ def bench_case(**changes: dict[str, Any]) -> WalkerCase:
     return changed_case(tables, changes)
 
 
-def changed_case(tables: dict[str, dict[str, Any]], changes: dict[str, dict[str, Any]]) -> WalkerCase:
+def changed_case(tables: dict[str, dict[str, Any]], changes: dict[str, dict[str, Any]]) -> Case:
     """A case from its tables with those of a check merged in."""
     merged = {table: {**tables.get(table, {}), **changes.get(table, {})} for table in {**tables, **changes}}
     return resolve_case(merged, source="<audit>", name="audit")
@@ -136,7 +140,7 @@ class Bench:
         Parameters
         ----------
         plan
-            Torques are read where its recording has `TORQUE_COLUMNS`; see `bench_recording`.
+            Torques are read where its recording has `FORCE_COLUMNS`; see `bench_recording`.
         carry
             A file to put into the deck's directory, such as a restart file.
         """
@@ -161,10 +165,16 @@ def read_series(deck: Deck, directory: Path) -> Measured:
         start = dump.column(name)
         return frames[:, :, start : start + 3]
 
-    torque = vectors("tqx") if "tqx" in dump.columns else np.zeros_like(vectors("x"))
-    return Measured(
-        dump.steps, vectors("x"), vectors("vx"), vectors("omegax"), vectors("fx"), torque, directory, deck.layout
-    )
+    unknown = np.full_like(vectors("x"), np.nan)  # a line that stands on what was not recorded fails
+    force, torque = (vectors(name) if name in dump.columns else unknown for name in ("fx", "tqx"))
+    return Measured(dump.steps, vectors("x"), vectors("vx"), vectors("omegax"), force, torque, directory, deck.layout)
+
+
+def bench_plan(case: Case, workarounds: Workarounds) -> Plan:
+    """The plan of a case that records forces as well, as `bench_recording` does."""
+    plan = plan_of(case, workarounds=workarounds)
+    recording = replace(plan.recording, bead_columns=_BEAD_COLUMNS, wall_bridge_columns=_WALL_BRIDGE_COLUMNS)
+    return replace(plan, recording=recording)
 
 
 def bench_recording(steps: int, sample_every: int) -> Recording:
@@ -174,7 +184,8 @@ def bench_recording(steps: int, sample_every: int) -> Recording:
         sample_every=sample_every,
         bridge_every=steps,
         status_every=steps,
-        bead_columns=(*BEAD_COLUMNS, *TORQUE_COLUMNS),
+        bead_columns=_BEAD_COLUMNS,
+        wall_bridge_columns=_WALL_BRIDGE_COLUMNS,
     )
 
 
@@ -182,5 +193,5 @@ def scene_on_floor(beads: list[Bead], half_width: float = 0.02, height: float = 
     """Beads over the floor z = 0 with its carrier in the corner; ids are given here, from 2 (`FIRST_BEAD`)."""
     numbered = tuple(replace(bead, id=FIRST_BEAD + number) for number, bead in enumerate(beads))
     edge = half_width + 2e-3
-    carrier: Point = (half_width + 1e-3, half_width + 1e-3, height + 1e-3)
+    carrier: Vector = (half_width + 1e-3, half_width + 1e-3, height + 1e-3)
     return Scene(numbered, (FLOOR,), (carrier,), (-edge, -edge, -2e-3), (edge, edge, height + 2e-3))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.case import Case
 from walkers.physics.capillary import (
     bridge_volume_at_wall,
     bridge_volume_between_beads,
@@ -41,7 +41,7 @@ class Partner:
         return radius if self.wall else radius * self.radius / (radius + self.radius)
 
 
-def capillary_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
+def capillary_law(case: Case, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
     """Attraction at each gap, N (`walkers.physics.capillary`); zero past rupture."""
     liquid = case.liquid
     tension, angle = liquid.surface_tension, liquid.contact_angle
@@ -54,7 +54,7 @@ def capillary_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatA
     return np.where(gap < rupture_distance(volume, angle), values, 0.0)
 
 
-def hertz_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
+def hertz_law(case: Case, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
     """Repulsion, N (`walkers.physics.contact`)."""
     modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     if partner.wall:
@@ -62,7 +62,7 @@ def hertz_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray
     return np.array([hertz_repulsion(-float(h), partner.reduced_radius(radius), modulus) for h in gap])
 
 
-def lubrication_drags(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
+def lubrication_drags(case: Case, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
     """Normal and tangential coefficients of the viscous force (`walkers.physics.lubrication`), N s/m, (2, F)."""
     size = partner.reduced_radius(radius)
     laws = (normal_drag_at_wall, tangential_drag_at_wall) if partner.wall else (normal_drag, tangential_drag)
@@ -89,7 +89,7 @@ class Exerted:
 
 
 def bridge_law(  # noqa: PLR0913, PLR0917, the kinematics of a contact
-    case: WalkerCase,
+    case: Case,
     radius: float,
     partner: Partner,
     normal: FloatArray,

@@ -156,7 +156,7 @@ def calibrate(
     runner.EngineFailure
         If there is no engine, or its audit failed.
     """
-    space, seed = Space(calibration.parameters), calibration.seed
+    space, seed = Space(calibration.parameters), calibration.design.seed
     check_ranges(calibration)
     folder = out / calibration.name
     folder.mkdir(parents=True, exist_ok=True)
@@ -164,21 +164,21 @@ def calibrate(
     runner = _Engine(calibration, out, replace(options, final=FINAL), arguments, progress_of, {})
     unit, outcome = np.zeros((0, space.dimensions)), np.zeros((0, len(calibration.observations)))
     filling = 0
-    for number, points in enumerate(calibration.waves, 1):
+    for number, points in enumerate(calibration.design.waves, 1):
         make = partial(next_wave, calibration, unit, outcome, points, filling)
         design = _kept(folder / f"wave-{number}.json", _determinants(calibration, number), make)
         wave = runner.run(f"wave-{number}", design)
         unit, outcome = np.concatenate([unit, design]), np.concatenate([outcome, wave.outcome])
         filling = filling or len(design)
     emulators = fit_emulators(unit, outcome, calibration.observations, seed, filling)
-    posterior = sample_posterior(emulators, space, calibration.steps, seed)
+    posterior = sample_posterior(emulators, space, calibration.design.steps, seed)
     held_out = {
-        name: sample_posterior(emulators, space, calibration.steps, seed, groups)
-        for name, groups in calibration.held_out.items()
+        name: sample_posterior(emulators, space, calibration.design.steps, seed, groups)
+        for name, groups in calibration.file.held_out.items()
     }
     seen = sha256(posterior.unit.tobytes() + posterior.log_density.tobytes())
-    draw = partial(_drawn, posterior, calibration.predictive)
-    follows = f"{seen.hexdigest()} {calibration.predictive}"
+    draw = partial(_drawn, posterior, calibration.design.predictive)
+    follows = f"{seen.hexdigest()} {calibration.design.predictive}"
     drawn = _kept(folder / "predictive.json", _determinants(calibration, 0), draw, follows)
     predictive = runner.run("predictive", drawn)
     first_of_all = ranking(calibration, np.concatenate([outcome, predictive.outcome]))[:1]
@@ -234,9 +234,9 @@ def _determinants(calibration: Calibration, wave: int) -> dict[str, Any]:
     guesses = [list(guess) for guess in calibration.guesses]
     return {
         "parameters": parameters,
-        "seed": calibration.seed,
+        "seed": calibration.design.seed,
         "guesses": guesses,
-        "waves": [*calibration.waves[:wave]],
+        "waves": [*calibration.design.waves[:wave]],
     }
 
 
@@ -273,7 +273,7 @@ def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArra
 def first_wave(calibration: Calibration, space: Space) -> FloatArray:
     """The guesses, and sets that fill the ranges, shape (G + P, D)."""
     guesses = space.unit(np.reshape(np.array(calibration.guesses, np.float64), (-1, space.dimensions)))
-    filling = space.design(calibration.waves[0], calibration.seed)
+    filling = space.design(calibration.design.waves[0], calibration.design.seed)
     return np.concatenate([np.clip(guesses, 0.0, 1.0), filling])
 
 
@@ -293,11 +293,11 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
     filling
         How many of the sets were the first wave.
     """
-    space, seed = Space(calibration.parameters), calibration.seed
+    space, seed = Space(calibration.parameters), calibration.design.seed
     if not len(unit):
         return first_wave(calibration, space)
     emulators = fit_emulators(unit, outcome, calibration.observations, seed, filling)
-    posterior = sample_posterior(emulators, space, min(_STEPS_BETWEEN_WAVES, calibration.steps), seed)
+    posterior = sample_posterior(emulators, space, min(_STEPS_BETWEEN_WAVES, calibration.design.steps), seed)
     samples, places = np.unique(posterior.unit, axis=0, return_index=True)
     likely = samples[np.argsort(posterior.log_density[places])[::-1]][: len(samples) // 2]
     draw = np.random.default_rng([seed, len(unit)])

@@ -31,11 +31,11 @@ def draw(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
     """Write ``corner.png``, ``predictions.png``, ``sobol.png`` and, if the file has any, ``bands.png``."""
     sources = [Path(run).name for run in found.predictive.table["run"]]
     figures = {"corner": _corner(found), "predictions": _predictions(rows), "sobol": _sobol(found)}
-    if found.calibration.bands:
+    if found.calibration.file.bands:
         figures["bands"] = _bands(found)
     files = []
     for name, figure in figures.items():
-        files += save_figure(figure, to / f"{name}.png", sources, title=f"{found.calibration.title}: {name}")
+        files += save_figure(figure, to / f"{name}.png", sources, title=f"{found.calibration.file.title}: {name}")
     return files
 
 
@@ -105,7 +105,7 @@ def _bars(axes: Axes, rows: list[Row], places: np.ndarray[tuple[int], np.dtype[n
 @styled
 def _bands(found: Outcome) -> Figure:
     """The engine over the posterior and at the best set, against what the experiments differ in."""
-    bands = found.calibration.bands
+    bands = found.calibration.file.bands
     columns = min(len(bands), 3)
     figure, axes = new_figure(3.3 * columns, 2.9 * -(-len(bands) // columns), nrows=-(-len(bands) // columns),
                               ncols=columns, squeeze=False)  # fmt: skip

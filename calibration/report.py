@@ -103,7 +103,7 @@ def rows_of(found: Outcome) -> list[Row]:
                 held_out={
                     name: _predicted(found.emulators[place], posterior, scale)
                     for name, posterior in found.held_out.items()
-                    if observation.group in found.calibration.held_out[name]
+                    if observation.group in found.calibration.file.held_out[name]
                 },
             )
         )
@@ -201,9 +201,9 @@ def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
 
 def as_markdown(found: Outcome, rows: list[Row]) -> str:
     """The tables as a page."""
-    trials = list(found.calibration.held_out)
+    trials = list(found.calibration.file.held_out)
     lines = [
-        f"# {found.calibration.title or found.calibration.name}",
+        f"# {found.calibration.file.title or found.calibration.name}",
         "",
         f"{sum(row.agrees for row in rows)} of {len(rows)} observations agree at the best set: the engine lies within "
         f"the published deviation. {len(found.unit)} parameter sets were run.",

@@ -13,13 +13,12 @@ import numpy.typing as npt
 from walkers.calibration.space import Space
 from walkers.inputs.calibration import Calibration, Observation
 from walkers.inputs.errors import InputError, Problem
-from walkers.inputs.reading import is_of_a_pile
 from walkers.inputs.sweep import Sweep, expand
 from walkers.paper.sensitivity import misalignment
 from walkers.postprocess.steady_state import steady_walkers, together
 from walkers.postprocess.tables import read_table
 from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Failure, Options, Progress
+from walkers.sweeps.scheduler import Failure, Options, SweepProgress
 from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
@@ -86,10 +85,17 @@ def wave_sweep(
                     )
             for key, value in point.items():
                 columns.setdefault(key, []).append(value)
-    document = {"title": calibration.title, "case": calibration.case, "set": calibration.settings, "zip": [columns]}
+    document = {
+        "title": calibration.file.title,
+        "case": calibration.file.case,
+        "set": calibration.file.set,
+        "zip": [columns],
+    }
     sweep = expand(document, source=calibration.source, name=name, folder=calibration.folder)
-    if is_of_a_pile(sweep.document):
-        raise InputError(calibration.source, [Problem("case", f'"{calibration.case}"', "expected a walker's case")])
+    if "dimers" not in sweep.document:
+        raise InputError(
+            calibration.source, [Problem("case", f'"{calibration.file.case}"', "expected a case of dimers")]
+        )
     return sweep
 
 
@@ -109,7 +115,7 @@ def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
     labels = list(calibration.experiments)
     seen = seen_in(calibration, table, {observation.quantity for observation in calibration.observations})
 
-    def mean(observation: Observation, experiments: tuple[str, ...]) -> FloatArray:
+    def mean(observation: Observation, experiments: list[str]) -> FloatArray:
         return np.asarray(seen[observation.quantity][:, [labels.index(one) for one in experiments]].mean(axis=1))
 
     columns = []
@@ -155,7 +161,7 @@ def run_wave(  # noqa: PLR0913
     extra: Mapping[str, Mapping[str, Any]] | None = None,
     engine: str | None = None,
     allow_failed_audit: bool = False,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[SweepProgress], None] | None = None,
 ) -> tuple[Wave, list[Failure]]:
     """Run what is missing of a wave.
 

@@ -3,21 +3,8 @@
 It stands on the laws alone (`walkers.physics`) and knows nothing of the engine's language.
 """
 
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, WalkersError
-from walkers.inputs.pile import PileCase
-from walkers.inputs.reading import load_any, load_case, load_pile, resolve_case, resolve_pile_case, shipped_cases
+from walkers.inputs.reading import load_case, resolve_case, shipped_cases
 
-__all__ = [
-    "InputError",
-    "PileCase",
-    "Problem",
-    "WalkerCase",
-    "WalkersError",
-    "load_any",
-    "load_case",
-    "load_pile",
-    "resolve_case",
-    "resolve_pile_case",
-    "shipped_cases",
-]
+__all__ = ["Case", "InputError", "Problem", "WalkersError", "load_case", "resolve_case", "shipped_cases"]

@@ -82,7 +82,7 @@ class ObservationTable(_Table):
     derived: bool = False
 
 
-class BandTable(_Table):
+class Band(_Table):
     """``[[bands]]``: a picture of a quantity of some experiments against a column of their sweep's table."""
 
     title: str = ""
@@ -110,80 +110,33 @@ class CalibrationFile(_Table):
     experiments: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
     observations: Annotated[list[ObservationTable], Field(min_length=1)]
     guesses: list[dict[str, Number]] = []
-    bands: list[BandTable] = []
+    bands: list[Band] = []
     held_out: dict[str, list[str]] = {}
     design: DesignTable = DesignTable()
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """A free parameter.
-
-    Attributes
-    ----------
-    name, symbol
-        In tables and in figures.
-    keys
-        Of the case, that take its value.
-    low, high, unit
-        Its range, in its unit.
-    log
-        Whether designs and priors are even in its logarithm.
-    experiments
-        Those that it belongs to.
-    normal
-        Mean and standard deviation of a normal prior; where ``log``, the median and the deviation of the natural
-        logarithm. None: even in the range.
-    """
+class Parameter(ParameterTable):
+    """A free parameter: its table, its name, and the experiments that it belongs to."""
 
     name: str
-    symbol: str
-    keys: tuple[str, ...]
-    low: float
-    high: float
-    log: bool
-    experiments: frozenset[str]
-    normal: tuple[float, float] | None
-    unit: str = ""
+    experiments: list[str]
+
+    @property
+    def low(self) -> float:
+        """The smaller end of its range, in its unit."""
+        return self.range[0]
+
+    @property
+    def high(self) -> float:
+        """The larger end of its range, in its unit."""
+        return self.range[1]
 
 
-@dataclass(frozen=True)
-class Observation:
-    """A published number: SI units, angles in degrees.
+class Observation(ObservationTable):
+    """A published number: its table, value and deviation in SI units, angles in degrees."""
 
-    Attributes
-    ----------
-    name, group, title
-        What it is; groups are held out together and share a discrepancy.
-    quantity
-        Of `QUANTITIES`.
-    of, over
-        Experiments: the mean over the first, divided by that over the others if there are any.
-    value, deviation
-        As published, with its standard deviation.
-    derived
-        Whether it follows from others and is left out of the posterior.
-    """
-
-    name: str
-    group: str
-    title: str
-    quantity: str
-    of: tuple[str, ...]
-    over: tuple[str, ...]
-    value: float
-    deviation: float
-    derived: bool = False
-
-
-@dataclass(frozen=True)
-class Band:
-    """A picture of the predictions: a quantity of some experiments against a column of their sweep's table."""
-
-    title: str
-    of: tuple[str, ...]
-    against: str
-    quantity: str
+    value: Number
+    deviation: Number
 
 
 @dataclass(frozen=True)
@@ -192,45 +145,31 @@ class Calibration:
 
     Attributes
     ----------
-    name, title, source, folder
+    name, source, folder
         Of the file.
-    case, settings
-        Base case and what all experiments have in common.
+    file
+        What it says.
     parameters, observations
         What is free and what it is to give.
     experiments
         Values of the same keys for each.
     guesses
         Sets that the first wave has beside those that fill the ranges: values in the order of the parameters.
-    bands
-        What is drawn of the predictions.
-    held_out
-        Names of trials, each with the groups that it leaves out.
-    seed, waves, predictive, steps
-        Of the design.
     """
 
     name: str
-    title: str
     source: str
     folder: Path
-    case: str
-    settings: Mapping[str, Any]
+    file: CalibrationFile
     parameters: tuple[Parameter, ...]
-    experiments: Mapping[str, Mapping[str, Value]]
     observations: tuple[Observation, ...]
+    experiments: Mapping[str, Mapping[str, Value]]
     guesses: tuple[tuple[float, ...], ...]
-    bands: tuple[Band, ...]
-    held_out: Mapping[str, tuple[str, ...]]
-    seed: int
-    waves: tuple[int, ...]
-    predictive: int
-    steps: int
 
     @property
-    def groups(self) -> tuple[str, ...]:
-        """Groups of observations, in their order."""
-        return tuple(dict.fromkeys(observation.group for observation in self.observations))
+    def design(self) -> DesignTable:
+        """Sizes of the waves and of the walk through the posterior."""
+        return self.file.design
 
 
 def shipped_calibrations() -> dict[str, Path]:
@@ -256,34 +195,29 @@ def read_calibration(document: Mapping[str, Any], *, source: str, name: str, fol
     problems = _problems(file)
     if problems:
         raise InputError(source, problems)
-    experiments = {label: flatten(table, lambda _: False) for label, table in file.experiments.items()}
+    everywhere = list(file.experiments)
     return Calibration(
         name=name,
-        title=file.title,
         source=source,
         folder=folder,
-        case=file.case,
-        settings=file.set,
-        parameters=tuple(_parameter(label, table, file) for label, table in file.parameters.items()),
-        experiments=experiments,
-        observations=tuple(_observation(table) for table in file.observations),
+        file=file,
+        parameters=tuple(
+            Parameter(
+                **{**vars(table), "symbol": table.symbol or label, "experiments": table.experiments or everywhere},
+                name=label,
+            )
+            for label, table in file.parameters.items()
+        ),
+        observations=tuple(map(_observation, file.observations)),
+        experiments={label: flatten(table, lambda _: False) for label, table in file.experiments.items()},
         guesses=tuple(tuple(guess[label] for label in file.parameters) for guess in file.guesses),
-        bands=tuple(Band(table.title, tuple(table.of), table.against, table.quantity) for table in file.bands),
-        held_out={label: tuple(groups) for label, groups in file.held_out.items()},
-        seed=file.design.seed,
-        waves=tuple(file.design.waves),
-        predictive=file.design.predictive,
-        steps=file.design.steps,
     )
 
 
-def _parameter(name: str, table: ParameterTable, file: CalibrationFile) -> Parameter:
-    everywhere = frozenset(file.experiments)
-    experiments = everywhere if table.experiments is None else frozenset(table.experiments)
-    low, high = table.range
-    return Parameter(
-        name, table.symbol or name, tuple(table.keys), low, high, table.log, experiments, table.normal, table.unit
-    )
+def _observation(table: ObservationTable) -> Observation:
+    value, deviation = (_number(one, table.quantity) for one in (table.value, table.deviation))
+    named = {"title": table.title or table.name, "value": value, "deviation": deviation}
+    return Observation(**{**vars(table), **named})
 
 
 def _number(value: str | float, quantity: str) -> float:
@@ -294,14 +228,6 @@ def _number(value: str | float, quantity: str) -> float:
 
 
 _DEGREES = 57.29577951308232
-
-
-def _observation(table: ObservationTable) -> Observation:
-    value, deviation = (_number(one, table.quantity) for one in (table.value, table.deviation))
-    return Observation(
-        table.name, table.group, table.title or table.name, table.quantity, tuple(table.of), tuple(table.over), value,
-        deviation, table.derived,
-    )  # fmt: skip
 
 
 def _problems(file: CalibrationFile) -> list[Problem]:

@@ -5,101 +5,180 @@ This is what the deck is rendered from, what a run directory stores as ``case.js
 
 from __future__ import annotations
 
-from dataclasses import dataclass, is_dataclass, replace
-from math import cos, hypot, sin
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from functools import cache
+from math import cos, hypot, inf, sin
+from typing import Annotated, Any
 
+from pydantic import Field, TypeAdapter, ValidationError
+
+from walkers.inputs.bodies import Body, Mixture, Placed, Walkers
+from walkers.inputs.boundary import Shape
 from walkers.inputs.drive import AXES, Drive, Vector
-from walkers.inputs.plane import Plane
 from walkers.physics.matter import Contact, Liquid
 
 
 @dataclass(frozen=True)
-class Beads:
-    """Radii (m) in the order of the case, density (kg/m³)."""
-
-    radii: tuple[float, float]
-    density: float
-    material: str | None
-
-
-def without_no_film(liquid: dict[str, Any]) -> None:
-    """Leave out a film that is none, in place: what ran before there were films keeps its name."""
-    if not liquid["film_viscosity"]:
-        del liquid["film_viscosity"]
-
-
-@dataclass(frozen=True)
-class Start:
-    """Where the walkers begin: angles in rad, gap (m, negative: touching; None: equilibrium), spacing (m)."""
-
-    replicates: int
-    facing: Literal["both", "right", "left"]
-    angle: float
-    angle_spread: float
-    gap: float | None
-    gap_spread: float
-    spacing: float
-    seed: int
-
-
-@dataclass(frozen=True)
 class Run:
-    """Time step (s) and counts: a cycle is a whole multiple of the sampling interval, whatever the frequency."""
+    """How long, how fine and in which segments; a cycle is a whole multiple of the sampling interval.
+
+    Attributes
+    ----------
+    time_step
+        s.
+    steps_per_cycle
+        Of the drive.
+    cycles
+        Driven.
+    settling_cycles
+        Of these, before velocities are measured.
+    samples_per_cycle, cycles_per_sample
+        Beads are recorded this often a cycle, or once in so many cycles; one of them is 1.
+    samples_per_bridge_sample
+        Bridges are recorded with one of so many samples.
+    cycles_per_segment
+        The run is made in segments of so many cycles, each with a restart file at its end if there are several.
+    settled_below, longest_settling
+        Before the drive the beads rest until their root mean square velocity (m/s) is below, or so many s are over;
+        of walkers, which stand from the first, 0 s.
+    ranks
+        MPI processes.
+    """
 
     time_step: float
     steps_per_cycle: int
     cycles: int
     settling_cycles: int
     samples_per_cycle: int
-    bridge_samples_per_cycle: int
+    cycles_per_sample: int
+    samples_per_bridge_sample: int
+    cycles_per_segment: int
+    settled_below: float
+    longest_settling: float
+    ranks: int
 
     @property
     def steps(self) -> int:
-        """Steps of the whole run."""
+        """Steps of the whole drive."""
         return self.steps_per_cycle * self.cycles
+
+    @property
+    def steps_per_sample(self) -> int:
+        """Steps between samples."""
+        return self.steps_per_cycle * self.cycles_per_sample // self.samples_per_cycle
+
+    @property
+    def settled_strobes(self) -> int:
+        """Stroboscopic samples, one a cycle or rarer, before velocities are measured."""
+        return -(-self.settling_cycles // self.cycles_per_sample)
+
+    @property
+    def rests(self) -> bool:
+        """Whether the beads rest before the drive."""
+        return self.longest_settling > 0.0
+
+    @property
+    def in_one(self) -> bool:
+        """Whether one deck makes all of the run."""
+        return not self.rests and self.cycles_per_segment >= self.cycles
 
 
 @dataclass(frozen=True)
-class WalkerCase:
-    """A dimer on a shaken wet plane, resolved.
+class Case:
+    """Bodies on a boundary under a drive, resolved.
 
-    Attributes are SI; ``name`` and ``title`` do not determine the run and stay out of `determinants`.
+    Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²); ``name`` and ``title`` do not determine
+    the run and stay out of `determinants`. ``seed`` is that of all that is drawn at the start.
     """
 
     name: str
     title: str
-    beads: Beads
-    liquid: Liquid
-    boundary: Plane
-    contact: Contact
+    walkers: tuple[Walkers, ...]
+    mixture: Mixture | None
+    placed: Placed | None
+    boundary: Annotated[Shape, Field(discriminator="shape")]
     drive: Drive
-    start: Start
-    run: Run
     gravity: float
+    material: str | None
+    density: float
+    liquid: Liquid
+    contact: Contact
+    seed: int
+    run: Run
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies, the walkers first."""
+        return (*self.walkers, *(body for body in (self.mixture, self.placed) if body is not None))
+
+    @property
+    def all_radii(self) -> list[float]:
+        """Radius of every bead, m."""
+        return [radius for body in self.bodies for radius in body.all_radii]
+
+    @property
+    def count(self) -> int:
+        """How many beads there are."""
+        return len(self.all_radii)
+
+    @property
+    def radii(self) -> list[float]:
+        """The different radii of the beads, m, in the order of the bodies."""
+        return list(dict.fromkeys(radius for body in self.bodies for radius in body.radii))
+
+    @property
+    def loose(self) -> bool:
+        """Whether there are beads that are no walkers' but may form clusters."""
+        return self.mixture is not None or self.placed is not None
+
+    @property
+    def border(self) -> float:
+        """A radius between those of the small and of the large beads, m; infinite where there is but one class."""
+        if self.mixture is not None:
+            return (max(self.mixture.small) + min(self.mixture.large)) / 2.0
+        sizes = sorted(self.radii)
+        middle = (sizes[0] + sizes[-1]) / 2.0
+        large = [size for size in sizes if size > middle]
+        return (max(size for size in sizes if size <= middle) + large[0]) / 2.0 if large else inf
+
+    def tops_of_others(self, body: Body) -> float:
+        """Height up to which the other bodies reach at the start, m."""
+        walkers = [2.0 * max(one.radii) for one in self.walkers if one is not body]
+        placed = self.placed.beads if self.placed is not None and self.placed is not body else ()
+        return max([*walkers, *(z + radius for _, _, z, radius in placed)], default=0.0)
+
+    @property
+    def independent(self) -> bool:
+        """Whether its walkers are independent of each other, so that others' may stand beside them in a deck."""
+        return not self.loose and self.run.in_one and self.boundary.walls == ("floor",) and not self.meets
+
+    @property
+    def meets(self) -> bool:
+        """Whether walkers are meant to meet."""
+        return any(walkers.meet for walkers in self.walkers)
 
     @property
     def drive_axis(self) -> Vector:
-        """Direction from which orientations are measured: the drive's within the plane, or x where it has none."""
+        """Direction from which orientations are measured: the drive's within the floor, or x where it has none."""
         x, y, _ = self.drive.direction
         length = hypot(x, y)
         return (x / length, y / length, 0.0) if length else AXES["x"]
 
     @property
     def goes_uphill(self) -> bool:
-        """Whether the drive axis is the steepest way up a tilted plane: right is up then, and left down."""
+        """Whether the drive axis is the steepest way up a tilted floor: right is up then, and left down."""
         x, y, _ = self.drive_axis
         uphill = (cos(self.boundary.uphill), sin(self.boundary.uphill))
         return bool(self.boundary.tilt) and x * uphill[0] + y * uphill[1] > 1.0 - 1e-9
 
     @property
     def gravity_vector(self) -> Vector:
-        """Acceleration of gravity in the frame of the plane, m/s²."""
+        """Acceleration of gravity in the frame of the boundary, m/s²."""
         return self.boundary.gravity(self.gravity)
 
     @property
     def pressing_gravity(self) -> float:
-        """The part of gravity that presses the beads to the plane, m/s²."""
+        """The part of gravity that presses the beads to the floor, m/s²."""
         return -self.gravity_vector[2]
 
     @property
@@ -109,38 +188,34 @@ class WalkerCase:
 
     def determinants(self) -> dict[str, Any]:
         """Everything that the run's outcome depends on, as plain JSON types."""
-        # Not dataclasses.asdict: it copies every number, and a sweep asks this of thousands of cases.
-        values = {
-            key: dict(vars(value)) if is_dataclass(value) else value
-            for key, value in vars(self).items()
-            if key not in ("name", "title")
-        }
-        values["beads"]["radii"] = list(self.beads.radii)
-        values["drive"] = self.drive.as_dict()
-        without_no_film(values["liquid"])
+        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude={"name", "title"})
         return values
 
     def as_dict(self) -> dict[str, Any]:
         """The whole case as plain JSON types, SI units."""
-        return {"name": self.name, "title": self.title, **self.determinants()}
+        values: dict[str, Any] = _adapter().dump_python(self, mode="json")
+        return values
 
     @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> WalkerCase:
-        """Rebuild a case from `as_dict` (a run directory's ``case.json``)."""
-        beads = {**values["beads"], "radii": tuple(values["beads"]["radii"])}
-        return cls(
-            name=values["name"],
-            title=values["title"],
-            beads=Beads(**beads),
-            liquid=Liquid(**values["liquid"]),
-            boundary=Plane(**values["boundary"]),
-            contact=Contact(**values["contact"]),
-            drive=Drive.from_dict(values["drive"]),
-            start=Start(**values["start"]),
-            run=Run(**values["run"]),
-            gravity=values["gravity"],
-        )
+    def from_dict(cls, values: dict[str, Any]) -> Case:
+        """Rebuild a case from `as_dict` (a run directory's ``case.json``).
 
-    def renamed(self, name: str) -> WalkerCase:
+        Raises
+        ------
+        ValueError
+            If it is none.
+        """
+        try:
+            return _adapter().validate_python(values)
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+    def renamed(self, name: str) -> Case:
         """The same case under another name."""
         return replace(self, name=name)
+
+
+@cache
+def _adapter() -> TypeAdapter[Case]:
+    return TypeAdapter(Case)

@@ -12,13 +12,13 @@ from pydantic_core import ErrorDetails
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
-from walkers.inputs.schema import WalkerFile
+from walkers.inputs.schema import CaseFile
 
 File = TypeVar("File", bound=BaseModel)
 
 _EXAMPLES = {
-    "beads": 'a [beads] table with the radii, such as radii = ["0.3 mm", "0.2 mm"]',
-    "beads.radii": 'such as ["0.3 mm", "0.2 mm"]',
+    "beads": 'a [beads] table, such as material = "ruby"',
+    "dimers.radii": 'such as ["0.3 mm", "0.2 mm"]',
     "liquid": 'a [liquid] table, such as name = "Si AK5"',
     "boundary": 'a [boundary] table, such as material = "chromium-coated glass"',
     "boundary.material": 'such as "chromium-coated glass"',
@@ -100,7 +100,9 @@ def _entries(key: str) -> str:
     """What is wrong with a list of places or radii that is too short or too long."""
     if key.endswith(".at"):
         return "expected three places: x, y, z"
-    return "expected two radii" if "beads" in key else "expected two numbers"
+    if key.startswith("clusters"):
+        return "expected two places: ahead and to the left"
+    return "expected two radii" if "radii" in key or key.startswith("mixture") else "expected two numbers"
 
 
 def _dotted(location: Sequence[str | int]) -> str:
@@ -114,7 +116,7 @@ def _expectation(details: ErrorDetails, key: str, file: type[BaseModel], whole: 
     kind, context = details["type"], details.get("ctx", {})
     if kind == "too_long":
         most = context["max_length"]
-        return _entries(key) if "beads" in key or most == 2 else f"expected at most {most} entries"
+        return _entries(key) if "radii" in key or most == 2 else f"expected at most {most} entries"
     if kind in _PLAIN:
         return _PLAIN[kind] + (f", {_EXAMPLES[key]}" if kind == "tuple_type" and key in _EXAMPLES else "")
     if kind == "extra_forbidden":
@@ -165,7 +167,7 @@ def _case_keys(file: type[BaseModel]) -> frozenset[str]:
     return frozenset(_all_keys(file))
 
 
-def suggested_key(key: str, file: type[BaseModel] = WalkerFile) -> str | None:
+def suggested_key(key: str, file: type[BaseModel] = CaseFile) -> str | None:
     """What to say of a dotted key of a kind of case file if there is no such key; None if there is."""
     if key in _case_keys(file):
         return None
@@ -183,4 +185,4 @@ def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     if not hint and elsewhere:
         hint = f'; did you mean "{elsewhere[0]}"?'
     place = f"[{'.'.join(location[:-1])}]" if location[:-1] else whole
-    return f"unknown key; {place} takes {', '.join(siblings)}{hint}"
+    return f"unknown key{f'; {place} takes ' if siblings else ''}{', '.join(siblings)}{hint}"

@@ -8,22 +8,17 @@ from __future__ import annotations
 import re
 import stat
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.inputs.messages import quoted, validated
-from walkers.inputs.pile import PileCase
-from walkers.inputs.pile_file import PileFile, resolve_pile
 from walkers.inputs.resolving import UnusableKeyError, resolve
-from walkers.inputs.schema import Table, WalkerFile
+from walkers.inputs.schema import CaseFile
 
-AnyCase = WalkerCase | PileCase
-_File = TypeVar("_File", bound=Table)
-_Case = TypeVar("_Case")
 _SHIPPED = Path(__file__).parent / "cases"
 _MOST_BYTES = 16 << 20
 
@@ -33,8 +28,8 @@ def shipped_cases() -> dict[str, Path]:
     return {path.stem: path for path in sorted(_SHIPPED.glob("*.toml"))}
 
 
-def load_case(case: str | Path) -> WalkerCase:
-    """Read and resolve a case of a walker or a climber; `load_any` takes piles as well.
+def load_case(case: str | Path) -> Case:
+    """Read and resolve a case.
 
     Parameters
     ----------
@@ -43,28 +38,22 @@ def load_case(case: str | Path) -> WalkerCase:
 
     Returns
     -------
-    WalkerCase
+    Case
         Named after the file.
 
     Raises
     ------
     InputError
         If there is no such file or anything in it cannot be used.
+
+    Examples
+    --------
+    >>> case = load_case("fig1b")
+    >>> case.walkers[0].radii, case.drive.frequency
+    ((0.0003, 0.0002), 80.0)
     """
     path = find_input(case, shipped_cases(), "case")
     return resolve_case(read_toml(path), source=str(case), name=path.stem)
-
-
-def load_any(case: str | Path) -> AnyCase:
-    """Read and resolve a case of any kind; parameters and errors as for `load_case`."""
-    path = find_input(case, shipped_cases(), "case")
-    return resolve_any(read_toml(path), source=str(case), name=path.stem)
-
-
-def load_pile(case: str | Path) -> PileCase:
-    """Read and resolve a case of a pile; parameters and errors as for `load_case`."""
-    path = find_input(case, shipped_cases(), "case")
-    return resolve_pile_case(read_toml(path), source=str(case), name=path.stem)
 
 
 def find_input(name: str | Path, shipped: Mapping[str, Path], kind: str) -> Path:
@@ -111,7 +100,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(str(path), [Problem("", None, f"cannot be read: {error.strerror}")]) from error
 
 
-def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> WalkerCase:
+def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> Case:
     """Validate a case given as nested tables and fill in what the library supplies.
 
     Parameters
@@ -128,27 +117,16 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     InputError
         If anything in it cannot be used.
     """
-    if is_of_a_pile(document):
-        problem = Problem("boundary.shape", quoted(document, ["boundary", "shape"]), 'expected "plane", for walkers')
-        raise InputError(source, [problem])
-    return _resolved(WalkerFile, resolve, document, source, name)
-
-
-def resolve_any(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> AnyCase:
-    """`resolve_case` for a case of any kind."""
-    resolver = resolve_pile_case if is_of_a_pile(document) else resolve_case
-    return resolver(document, source=source, name=name)
-
-
-def resolve_pile_case(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> PileCase:
-    """`resolve_case` for a pile."""
-    return _resolved(PileFile, resolve_pile, document, source, name)
-
-
-def is_of_a_pile(document: Mapping[str, Any]) -> bool:
-    """Whether a case's boundary is a container, into which a pile is poured."""
-    boundary = document.get("boundary")
-    return isinstance(boundary, Mapping) and boundary.get("shape", "plane") != "plane"
+    _refuse_old_words(document, source)
+    file = validated(CaseFile, document, source)
+    try:
+        return resolve(file, name)
+    except ArithmeticError as error:
+        raise InputError(source, [Problem("", None, f"inconsistent values: {error}")]) from error
+    except UnusableKeyError as unusable:
+        parts = re.findall(r"[^.\[\]]+", unusable.key)
+        value = quoted(document, [int(part) if part.isdigit() else part for part in parts])
+        raise InputError(source, [Problem(unusable.key, value, unusable.expected)]) from unusable
 
 
 _OLD_WORDS = {
@@ -156,26 +134,26 @@ _OLD_WORDS = {
     'shape "box" or "cylinder")',
     "substrate": "[substrate] is now [boundary]: its material, and its tilt if it is not level",
     "container": "[container] is now [boundary], with its shape",
+    "start": "[start] is part of the bodies now: [dimers] has replicates, facing, angle, gap, spacing; [run] the seed",
+    **dict.fromkeys(
+        ("beads.radii", "beads.mean_radius", "beads.sin_delta"),
+        "[beads] says what beads are made of; the radii of dimers are in [dimers]",
+    ),
+    **dict.fromkeys(
+        ("beads.small", "beads.large", "beads.count", "beads.fill_height", "beads.small_share", "beads.mixed_by"),
+        "[beads] says what beads are made of; what is poured is a [mixture]",
+    ),
+    "beads.placed": "[[beads.placed]] is now [[placed]]",
 }
 
 
 def _refuse_old_words(document: Mapping[str, Any], source: str) -> None:
     """Say what the words of older case files are called now."""
-    problems = [Problem(key, quoted(document, [key]), told) for key, told in _OLD_WORDS.items() if key in document]
+    problems = []
+    for key, told in _OLD_WORDS.items():
+        table, _, name = key.rpartition(".")
+        within = document.get(table, {}) if table else document
+        if isinstance(within, Mapping) and name in within:
+            problems.append(Problem(key, quoted(document, key.split(".")), told))
     if problems:
         raise InputError(source, problems)
-
-
-def _resolved(
-    model: type[_File], resolver: Callable[[_File, str], _Case], document: Mapping[str, Any], source: str, name: str
-) -> _Case:
-    _refuse_old_words(document, source)
-    file = validated(model, document, source)
-    try:
-        return resolver(file, name)
-    except ArithmeticError as error:
-        raise InputError(source, [Problem("", None, f"inconsistent values: {error}")]) from error
-    except UnusableKeyError as unusable:
-        parts = re.findall(r"[^.\[\]]+", unusable.key)
-        value = quoted(document, [int(part) if part.isdigit() else part for part in parts])
-        raise InputError(source, [Problem(unusable.key, value, unusable.expected)]) from unusable

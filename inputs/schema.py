@@ -16,14 +16,17 @@ from walkers.inputs.units import (
     Acceleration,
     Angle,
     Density,
+    Duration,
     DynamicViscosity,
     Frequency,
     KinematicViscosity,
     Length,
     Modulus,
     NonNegativeAngle,
+    NonNegativeDuration,
     Radius,
     SignedLength,
+    Speed,
     SurfaceTension,
     Time,
 )
@@ -53,12 +56,22 @@ ALTERNATIVES: dict[str, tuple[str, ...]] = {
     "drive.gamma0": ("drive.peak_acceleration",),
     "liquid.kinematic_viscosity": ("liquid.dynamic_viscosity",),
     "liquid.dynamic_viscosity": ("liquid.kinematic_viscosity",),
-    "beads.radii": ("beads.mean_radius", "beads.sin_delta"),
-    "beads.mean_radius": ("beads.radii",),
-    "beads.sin_delta": ("beads.radii",),
+    "dimers.radii": ("dimers.mean_radius", "dimers.sin_delta"),
+    "dimers.mean_radius": ("dimers.radii",),
+    "dimers.sin_delta": ("dimers.radii",),
+    **{
+        key: (other,)
+        for pair in (
+            ("run.cycles", "run.duration"),
+            ("run.samples_per_cycle", "run.frames_per_second"),
+            ("mixture.count", "mixture.fill_height"),
+        )
+        for key, other in (pair, pair[::-1])
+    },
 }
 """Keys that say the same in other words: a change of one puts the others out of force."""
 
+MOST_BEADS = 20_000
 AUTO = BeforeValidator(_auto)
 """Reads "auto" as None."""
 Number = Annotated[float, BeforeValidator(_plain_number), Field(allow_inf_nan=False)]
@@ -73,7 +86,30 @@ class Table(BaseModel):
 
 
 class BeadsTable(Table):
-    """``[beads]``: the radii, first the bead that leads (the large one, as in the paper), and what they are made of.
+    """``[beads]``: what all beads are made of."""
+
+    material: str | None = None
+    density: Density | None = None
+
+
+class WalkersTable(Table):
+    """What ``[dimers]`` and ``[[clusters]]`` have in common: how many walkers there are and how each begins.
+
+    ``meet = true`` says that they may stand and come as near as they like; without it they are replicates.
+    """
+
+    replicates: Annotated[Whole, Field(ge=1, le=1000)] = 6
+    facing: Literal["both", "right", "left", "up", "down"] = "both"
+    angle: Angle = 0.0
+    angle_spread: NonNegativeAngle = 0.017453292519943295
+    gap: Annotated[SignedLength | None, AUTO] = None
+    gap_spread: Annotated[Number, Field(ge=0, lt=1)] = 0.2
+    spacing: Annotated[Length | None, AUTO] = None
+    meet: bool = False
+
+
+class DimersTable(WalkersTable):
+    """``[dimers]``: the radii, first the bead that leads (the large one, as in the paper).
 
     The radii may also be given by their mean and the asymmetry parameter sin δ = (R1 - R2)/(R1 + R2).
     """
@@ -81,8 +117,36 @@ class BeadsTable(Table):
     radii: tuple[Radius, Radius] | None = None
     mean_radius: Radius | None = None
     sin_delta: Annotated[Number, Field(gt=-0.9, lt=0.9)] | None = None
-    material: str | None = None
-    density: Density | None = None
+
+
+class ClusterTable(WalkersTable):
+    """One of ``[[clusters]]``: walkers of several beads, in an arrangement, or at places beside each other.
+
+    ``at`` has a place for each bead, ahead and to the left, in the direction that the walker faces.
+    """
+
+    radii: Annotated[list[Radius], Field(min_length=2, max_length=100)]
+    arrangement: str | None = None
+    at: Annotated[list[tuple[SignedLength, SignedLength]], Field(max_length=100)] | None = None
+
+
+class MixtureTable(Table):
+    """``[mixture]``: beads that are poured: two classes, each a range of radii filled with ``sizes`` constant radii."""
+
+    small: tuple[Radius, Radius]
+    large: tuple[Radius, Radius]
+    small_share: Annotated[Number, Field(ge=0, le=1)] = 0.5
+    mixed_by: Literal["mass", "volume", "number"] = "mass"
+    sizes: Annotated[Whole, Field(ge=1, le=20)] = 4
+    count: Annotated[Whole, Field(ge=1, le=MOST_BEADS)] | None = None
+    fill_height: Length | None = None
+
+
+class PlacedTable(Table):
+    """One of ``[[placed]]``: a bead and where it begins, from the middle of the floor."""
+
+    radius: Radius
+    at: tuple[SignedLength, SignedLength, SignedLength]
 
 
 class LiquidTable(Table):
@@ -104,14 +168,18 @@ class LiquidTable(Table):
     contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] | None = None
 
 
-class PlaneTable(Table):
-    """``[boundary]`` of walkers: a plane, level (0°), tilted or a wall (90°).
+class BoundaryTable(Table):
+    """``[boundary]``: what the beads stand on and lie in.
 
-    ``uphill`` is the direction of the steepest way up, from that of the drive within the plane.
+    A plane, a channel (two walls and a floor, of a ``width``), or a container open above (of a ``width`` and a
+    ``height``). It leans by ``tilt``: 0° is level, a plane at 90° a wall. ``uphill`` is the direction of the steepest
+    way up, from that of the drive within the floor.
     """
 
-    shape: Literal["plane"] = "plane"
+    shape: Literal["plane", "channel", "box", "cylinder"] = "plane"
     material: str
+    width: Length | None = None
+    height: Length | None = None
     tilt: Annotated[NonNegativeAngle, Field(le=1.5708)] = 0.0
     uphill: Angle = 0.0
 
@@ -180,28 +248,28 @@ class DriveTable(Table):
     harmonics: Annotated[list[HarmonicTable], Field(max_length=24)] = []
 
 
-class StartTable(Table):
-    """``[start]``: how many walkers there are and how each begins."""
-
-    replicates: Annotated[Whole, Field(ge=1, le=1000)] = 6
-    facing: Literal["both", "right", "left", "up", "down"] = "both"
-    angle: Angle = 0.0
-    angle_spread: NonNegativeAngle = 0.017453292519943295
-    gap: Annotated[SignedLength | None, AUTO] = None
-    gap_spread: Annotated[Number, Field(ge=0, lt=1)] = 0.2
-    spacing: Annotated[Length | None, AUTO] = None
-    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 1
-
-
 class RunTable(Table):
-    """``[run]``: the time step, the length of the run and what is recorded."""
+    """``[run]``: the time step, the length of the run and what is recorded.
+
+    The length is given by ``cycles`` or as a ``duration``, the sampling by ``samples_per_cycle`` or
+    ``frames_per_second``. Left out, walkers run for 60 cycles of 20 samples, the first 20 of them to settle; loose
+    beads have a duration, are recorded 60 times a second, and rest before the drive (``settled_below``,
+    ``longest_settling``).
+    """
 
     time_step: Annotated[Time | None, AUTO] = None
     allow_unstable: bool = False
-    cycles: Annotated[Whole, Field(ge=2, le=1_000_000)] = 60
-    settling_cycles: Annotated[Whole, Field(ge=0, le=1_000_000)] = 20
-    samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] = 20
-    bridge_samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] = 1
+    cycles: Annotated[Whole, Field(ge=2, le=1_000_000)] | None = None
+    duration: Duration | None = None
+    settling_cycles: Annotated[Whole, Field(ge=0, le=1_000_000)] | None = None
+    samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] | None = None
+    bridge_samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] | None = None
+    frames_per_second: Annotated[Number, Field(gt=0, le=1e6)] | None = None
+    segment: Duration | None = None
+    settled_below: Speed = 5e-3
+    longest_settling: NonNegativeDuration | None = None
+    ranks: Annotated[Whole, Field(ge=1, le=64)] = 1
+    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 1
 
 
 class EnvironmentTable(Table):
@@ -210,15 +278,18 @@ class EnvironmentTable(Table):
     gravity: Acceleration = 9.81
 
 
-class WalkerFile(Table):
-    """A case file of walkers on a plane."""
+class CaseFile(Table):
+    """A case file: bodies on a boundary under a drive, with a liquid and contacts."""
 
     title: str = ""
     beads: BeadsTable
-    liquid: LiquidTable
-    boundary: PlaneTable
-    contact: ContactTable = ContactTable()
+    dimers: DimersTable | None = None
+    clusters: Annotated[list[ClusterTable], Field(max_length=100)] = []
+    mixture: MixtureTable | None = None
+    placed: Annotated[list[PlacedTable], Field(max_length=MOST_BEADS)] = []
+    boundary: BoundaryTable
     drive: DriveTable
-    start: StartTable = StartTable()
+    liquid: LiquidTable
+    contact: ContactTable = ContactTable()
     run: RunTable = RunTable()
     environment: EnvironmentTable = EnvironmentTable()

@@ -36,11 +36,11 @@ from walkers.inputs.axes import (
     written,
     zipped,
 )
+from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.messages import quoted, suggested_key, validated
-from walkers.inputs.pile_file import PileFile
-from walkers.inputs.reading import AnyCase, find_input, is_of_a_pile, read_toml, resolve_any, shipped_cases
-from walkers.inputs.schema import ALTERNATIVES, Table, WalkerFile, Whole
+from walkers.inputs.reading import find_input, read_toml, resolve_case, shipped_cases
+from walkers.inputs.schema import ALTERNATIVES, CaseFile, Whole
 from walkers.inputs.units import Speed
 
 _SHIPPED = Path(__file__).parent / "sweeps"
@@ -136,7 +136,7 @@ class Sweep:
     rows: Sequence[tuple[Value, ...]]
     descent: Descent | None
 
-    def cases(self) -> Iterator[AnyCase]:
+    def cases(self) -> Iterator[Case]:
         """The case of each point, resolved.
 
         Raises
@@ -151,7 +151,7 @@ class Sweep:
                 document = changed(self.document, dict(zip(self.keys, row, strict=True)))
             except UnusableAxisError as unusable:
                 raise InputError(where, [Problem(unusable.key, None, unusable.expected)]) from unusable
-            yield resolve_any(document, source=where, name=self.case_name)
+            yield resolve_case(document, source=where, name=self.case_name)
 
 
 def shipped_sweeps() -> dict[str, Path]:
@@ -204,7 +204,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         for key in (*settings, *keys):
             if key == "title" and key in keys:
                 raise UnusableAxisError(key, None, "does not vary: points with other titles alone are the same run")
-            _check_key(key, PileFile if is_of_a_pile(given) else WalkerFile)
+            _check_key(key)
         tables = changed(given, settings)
         changed(tables, dict(zip(keys, rows[0], strict=True)))
     except UnusableAxisError as unusable:
@@ -235,10 +235,10 @@ def _base(case: str, source: str, folder: Path) -> Path:
         raise InputError(source, [Problem("case", f'"{case}"', error.problems[0].expected)]) from error
 
 
-def _check_key(key: str, file: type[Table]) -> None:
+def _check_key(key: str) -> None:
     if "" in key.split("."):
         raise UnusableAxisError(key, None, "is no key of a case")
-    unknown = suggested_key(_INDEX.sub("", key), file)
+    unknown = suggested_key(_INDEX.sub("", key), CaseFile)
     if unknown is not None:
         raise UnusableAxisError(key, None, unknown)
 
@@ -275,7 +275,7 @@ def _descending(table: DescendTable) -> list[Value]:
 
 
 def changed(document: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[str, Any]:
-    """A case's tables with dotted keys (``beads.radii[0]`` for one of a list) given other values.
+    """A case's tables with dotted keys (``dimers.radii[0]`` for one of a list) given other values.
 
     Raises
     ------

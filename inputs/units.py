@@ -159,6 +159,7 @@ Acceleration = Annotated[float, _validator(ACCELERATION, positive=True, zero=Tru
 Speed = Annotated[float, _validator(SPEED, positive=True, zero=False)]
 Time = Annotated[float, _validator(TIME, positive=True, zero=False)]
 Duration = Annotated[float, _validator(DURATION, positive=True, zero=False)]
+NonNegativeDuration = Annotated[float, _validator(DURATION, positive=True, zero=True)]
 Angle = Annotated[float, _validator(ANGLE, positive=False, zero=True)]
 NonNegativeAngle = Annotated[float, _validator(ANGLE, positive=True, zero=True)]
 Density = Annotated[float, _validator(DENSITY, positive=True, zero=False)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.paper import dimers, published
 from walkers.paper.sources import Sources
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from walkers.postprocess.trajectory import Trajectory
+    from walkers.postprocess.motion import Group
 
 LARGEST_DRIVE = 10.0
 """Peak acceleration in g up to which the paper shakes."""
@@ -37,7 +37,7 @@ def fig_alignment(sources: Sources) -> Figure:
     shown = {"asymmetric": ~dimers.symmetric(table), "symmetric": dimers.symmetric(table)}
     for name, chosen in shown.items():
         for _, row in table[chosen].iterrows():
-            _turns(axes[name], sources.trajectory(row["run"]), row["start.angle"])
+            _turns(axes[name], sources.trajectory(row["run"]), row["dimers.angle"])
     axes["asymmetric"].set_title("asymmetric: along the axis, ψ = 0, ±180°, …")
     axes["symmetric"].set_title("symmetric: across the axis, ψ = ±90°")
     axes["asymmetric"].set_yticks(np.arange(-540, 541, 180))
@@ -45,8 +45,8 @@ def fig_alignment(sources: Sources) -> Figure:
     handles, labels = axes["asymmetric"].get_legend_handles_labels()
     figure.legend(handles, labels, title="started at", fontsize=7, title_fontsize=7, loc="outside right center")
     asymmetric = table[shown["asymmetric"]]
-    for _, row in asymmetric[asymmetric["start.angle"].isin(_BEGINNINGS)].iterrows():
-        _beginning(axes["beginning"], sources.trajectory(row["run"]), row["start.angle"])
+    for _, row in asymmetric[asymmetric["dimers.angle"].isin(_BEGINNINGS)].iterrows():
+        _beginning(axes["beginning"], sources.trajectory(row["run"]), row["dimers.angle"])
     axes["beginning"].plot([], [], color="0.2", label="engine")
     axes["beginning"].plot([], [], "--", color="0.2", label="rolling without sliding")
     axes["beginning"].legend(fontsize=7)
@@ -62,18 +62,18 @@ def _shade(angle: float) -> str:
     return f"{0.75 * angle / 90.0:.2f}"
 
 
-def _turns(axes: Axes, trajectory: Trajectory, angle: float) -> None:
+def _turns(axes: Axes, trajectory: Group, angle: float) -> None:
     strobe = trajectory.case.run.samples_per_cycle
     lines = axes.plot(trajectory.time[::strobe], np.degrees(trajectory.orientation[::strobe]), color=_shade(angle))
     lines[0].set_label(f"{angle:g}°")
     axes.set(xlabel="time (s)", ylabel=r"orientation $\psi$ (°)")
 
 
-def _beginning(axes: Axes, trajectory: Trajectory, angle: float) -> None:
+def _beginning(axes: Axes, trajectory: Group, angle: float) -> None:
     """Each walker with the solution that begins as it does."""
     drive, parameters = trajectory.case.drive, _of(trajectory)
     few = trajectory.time <= _SMALL
-    for number, walker in enumerate(trajectory.layout.walkers):
+    for number, walker in enumerate(trajectory.walkers):
         psi = trajectory.orientation[few, number]
         axes.plot(trajectory.time[few] * 1e3, np.degrees(psi), color=_shade(angle))
         # The substrate moves as sin 2πft: it accelerates as -sin 2πft along x, to or against the heading.
@@ -83,7 +83,7 @@ def _beginning(axes: Axes, trajectory: Trajectory, angle: float) -> None:
     axes.set(xlabel="time (ms)", ylabel=r"orientation $\psi$ (°)")
 
 
-def _of(trajectory: Trajectory) -> Alignment:
+def _of(trajectory: Group) -> Alignment:
     case = trajectory.case
     return alignment(dimer_of(case), case.drive.frequency, case.drive.peak_acceleration)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.paper import dimers, published
 from walkers.paper.alignment import paper_drives
@@ -22,7 +22,7 @@ from walkers.theory.prediction import motion_of, threshold
 if TYPE_CHECKING:
     import pandas as pd
 
-    from walkers.inputs.case import WalkerCase
+    from walkers.inputs.case import Case
 
 AGREES = 0.15
 """A number within this share of the published one agrees with it, where the paper gives no spread."""
@@ -159,7 +159,7 @@ def _speed_of_all(rows: pd.DataFrame, theory: float) -> Value:
     return Value(mean, low, high, theory)
 
 
-def _theory(case: WalkerCase) -> float:
+def _theory(case: Case) -> float:
     return float(motion_of(case).velocity[0]) * 1e3
 
 
@@ -209,7 +209,7 @@ def _mean(values: list[Value]) -> Value:
     return Value(float(np.mean(engine)), min(engine), max(engine), theory, left_out)
 
 
-def _quotient(table: pd.DataFrame, case: WalkerCase, upper: tuple[float, float], lower: tuple[float, float]) -> Value:
+def _quotient(table: pd.DataFrame, case: Case, upper: tuple[float, float], lower: tuple[float, float]) -> Value:
     """A ratio of two speeds, each at a frequency in Hz and an acceleration in g."""
 
     def at(drive: tuple[float, float]) -> Value:

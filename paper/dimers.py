@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive, Harmonic
+from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.paper.published import GRAVITY
 
@@ -19,7 +19,7 @@ FIG2 = "fig1b"
 """The case whose beads, liquid and contacts Figs. 1b and 2 have."""
 
 
-def shipped(name: str = FIG2) -> WalkerCase:
+def shipped(name: str = FIG2) -> Case:
     """A shipped case."""
     return load_case(name)
 
@@ -29,7 +29,7 @@ def symmetric(table: pd.DataFrame) -> pd.Series[bool]:
     return table["sin_delta"].abs() < 1e-9
 
 
-def driven(case: WalkerCase, frequency: float, accelerations: Iterable[float]) -> list[WalkerCase]:
+def driven(case: Case, frequency: float, accelerations: Iterable[float]) -> list[Case]:
     """A case at another frequency, Hz, and peak accelerations, m/s²."""
     return [
         replace(case, drive=Drive((Harmonic(case.drive.direction, float(frequency), float(peak)),), case.drive.frame))
@@ -37,20 +37,20 @@ def driven(case: WalkerCase, frequency: float, accelerations: Iterable[float]) -
     ]
 
 
-def of_asymmetry(case: WalkerCase, sin_delta: float, gamma0: float) -> WalkerCase:
+def of_asymmetry(case: Case, sin_delta: float, gamma0: float) -> Case:
     """A case with beads of the same mean radius and another asymmetry, driven at a Γ0."""
     mean = dimer_of(case).mean_radius
     return of_radii(case, (mean * (1.0 + sin_delta), mean * (1.0 - sin_delta)), gamma0)
 
 
-def of_radii(case: WalkerCase, radii: tuple[float, float], gamma0: float) -> WalkerCase:
+def of_radii(case: Case, radii: tuple[float, float], gamma0: float) -> Case:
     """A case with other beads, radii in m, driven at a Γ0."""
-    dimer = replace(case, beads=replace(case.beads, radii=radii))
+    dimer = replace(case, walkers=(replace(case.walkers[0], radii=radii),))
     return replace(dimer, drive=case.drive.with_peak(dimer_of(dimer).peak_acceleration(gamma0)))
 
 
-def described(case: WalkerCase) -> str:
+def described(case: Case) -> str:
     """Radii, drive and liquid of a case in a few words, for titles."""
-    radii = "/".join(f"{radius * 1e3:g}" for radius in case.beads.radii)
+    radii = "/".join(f"{radius * 1e3:g}" for radius in case.walkers[0].radii)
     drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration / GRAVITY:.3g} g"
     return f"R = {radii} mm, {drive}, {case.liquid.name}"

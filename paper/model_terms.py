@@ -17,7 +17,7 @@ from statistics import fmean
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.paper import dimers, published
 from walkers.physics.film import film_drag
@@ -142,7 +142,7 @@ class Fit:
 
 
 @cache
-def walkers_of_the_paper() -> dict[str, WalkerCase]:
+def walkers_of_the_paper() -> dict[str, Case]:
     """The walkers of Figs. 2, 3 and 4a by name, as one would take them without a calibration (see `_bare`)."""
     base = dimers.shipped()
     found = {
@@ -158,7 +158,7 @@ def walkers_of_the_paper() -> dict[str, WalkerCase]:
     return {name: _bare(case) for name, case in found.items()}
 
 
-def _bare(case: WalkerCase) -> WalkerCase:
+def _bare(case: Case) -> Case:
     """With perfectly wetting bridges of 1 % liquid, of its own viscosity, and without a film."""
     from walkers.inputs import library
 
@@ -247,7 +247,9 @@ def _fixed() -> tuple[Walker, FloatArray, FloatArray]:
     cases = list(walkers_of_the_paper().values())
     walkers = Walker.joined([Walker.of_case(case) for case in cases])
     drag = np.stack([bridge_drag(case) for case in cases], axis=-1)
-    films = [[film_drag(case.liquid.dynamic_viscosity, case.beads.radii[bead]) for case in cases] for bead in range(2)]
+    films = [
+        [film_drag(case.liquid.dynamic_viscosity, case.walkers[0].radii[bead]) for case in cases] for bead in range(2)
+    ]
     return walkers, drag, np.array(films)
 
 

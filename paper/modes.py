@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.loads import dimer_of
 from walkers.paper import dimers
 from walkers.paper.sources import Sources
 from walkers.postprocess.drawing import new_figure, styled
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from walkers.postprocess.trajectory import Trajectory
+    from walkers.postprocess.motion import Group
     from walkers.theory.motion import Motion
 
 FloatArray = npt.NDArray[np.float64]
@@ -33,7 +33,7 @@ MODES = ("at rest", "large bead rolls", "large bead rolls and slides", "leaves t
 _MARKERS = ("x", "o", "s", "v", "*")
 
 
-def sliding_share(trajectory: Trajectory) -> float:
+def sliding_share(trajectory: Group) -> float:
     """Sliding over rotation velocity of the large beads after the settling cycles, root mean squares."""
     motion, samples = gait(trajectory), settled_samples(trajectory)
     return _share(motion.sliding[samples][..., 0].ravel(), motion.rotation[samples][..., 0].ravel())

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from walkers.postprocess.trajectory import Trajectory
+    from walkers.postprocess.motion import Group
 
 _CYCLES = 2
 _SERIES = (("walker", "s", "#c4473a"), ("large bead", "o", "#111111"), ("small bead", "^", "#1f5fa8"))
@@ -56,7 +56,7 @@ def _published(letter: str) -> list[tuple[str, float, str]]:
     return means if letter == "a" else [*means, ("large bead", published.FIG4B_ROTATION, large)]
 
 
-def _draw(axes: Axes, trajectory: Trajectory, means: Sequence[float]) -> None:
+def _draw(axes: Axes, trajectory: Group, means: Sequence[float]) -> None:
     """The last cycles of the first walker, the theory's last cycle beside it; means (m/s) are over all walkers."""
     case = trajectory.case
     samples = case.run.samples_per_cycle
@@ -74,7 +74,7 @@ def _draw(axes: Axes, trajectory: Trajectory, means: Sequence[float]) -> None:
     )
 
 
-def model(trajectory: Trajectory) -> list[npt.NDArray[np.float64]]:
+def model(trajectory: Group) -> list[npt.NDArray[np.float64]]:
     """Velocity of the walker and rotation velocities of its beads as the theory has them, through the cycles shown.
 
     Returns
@@ -87,6 +87,6 @@ def model(trajectory: Trajectory) -> list[npt.NDArray[np.float64]]:
     velocity = translation(sliding)
     # The theory's substrate accelerates as cos 2πft, the engine's, which moves as sin 2πft, as -sin 2πft along x.
     quarter = sliding.shape[1] // 4
-    ahead = quarter if trajectory.layout.walkers[0].facing > 0 else -quarter
+    ahead = quarter if trajectory.walkers[0].facing > 0 else -quarter
     one = [np.roll(series, 1 - ahead) for series in (velocity, velocity - sliding[0], velocity - sliding[1])]
     return [np.concatenate([np.tile(series, _CYCLES), series[:1]]) for series in one]

@@ -122,10 +122,10 @@ def sensitivities(sources: Sources) -> pd.DataFrame:
         experiments = group.set_index(
             pd.MultiIndex.from_arrays(
                 [
-                    group["beads.radii[0]"],
+                    group["dimers.radii[0]"],
                     group["drive.frequency"],
                     group["drive.peak_acceleration"],
-                    group["start.angle"],
+                    group["dimers.angle"],
                 ]
             )
         )

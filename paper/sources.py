@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 from walkers.inputs.errors import WalkersError
 from walkers.inputs.sweep import load_sweep
-from walkers.postprocess.trajectory import Trajectory, read_trajectory
+from walkers.postprocess.motion import Group, read_motion
 from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Failure, Options, Progress
+from walkers.sweeps.scheduler import Failure, Options, SweepProgress
 from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
     import pandas as pd
 
-ProgressOf = Callable[[str], AbstractContextManager[Callable[[Progress], None]]]
+ProgressOf = Callable[[str], AbstractContextManager[Callable[[SweepProgress], None]]]
 
 
 class NothingFinishedError(WalkersError):
@@ -43,9 +43,9 @@ class Sources:
         """The table of a sweep, see `walkers.sweeps.table.load`, its run directories from where the process is."""
         return load(self.out / sweep)
 
-    def _trajectory(self, run: str) -> Trajectory:
-        """The motion in a run directory."""
-        return read_trajectory(Path(run))
+    def _trajectory(self, run: str) -> Group:
+        """The motion of the (first) walkers in a run directory."""
+        return read_motion(run).groups[0]
 
     def finished(self, sweep: str) -> pd.DataFrame:
         """The points of a sweep that are finished.

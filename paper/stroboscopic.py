@@ -9,7 +9,7 @@ import numpy as np
 from walkers.paper import dimers
 from walkers.paper.sources import Sources
 from walkers.postprocess.drawing import new_figure, styled
-from walkers.postprocess.rendering import top_view
+from walkers.postprocess.pictures import top_view
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,7 +24,7 @@ def fig1b(sources: Sources) -> Figure:
     """The first walker of the alignment's dimers that start on the axis, seen from above."""
     table = sources.finished("alignment")
     asymmetric = table[~dimers.symmetric(table)]
-    trajectory = sources.trajectory(asymmetric.sort_values("start.angle")["run"].iloc[0])
+    trajectory = sources.trajectory(asymmetric.sort_values("dimers.angle")["run"].iloc[0])
     case = trajectory.case
     strobe = case.run.samples_per_cycle
     apart = round(INTERVAL * case.drive.frequency) * strobe

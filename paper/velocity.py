@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.loads import dimer_of
 from walkers.paper import dimers, published
 from walkers.paper.sources import Sources
 from walkers.postprocess.drawing import new_figure, styled

@@ -13,12 +13,11 @@ Speeds of the AK5 walker agree within 0.5 % from 1 to 10 µs, the latter being i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, inf, pi, sqrt
 
 from walkers.physics.contact import reduced_modulus
-from walkers.physics.dimer import Dimer
 from walkers.physics.film import film_drag
 from walkers.physics.lubrication import normal_drag, normal_drag_at_wall
 from walkers.physics.matter import Contact, Liquid
@@ -49,42 +48,58 @@ class TimeStepLimits:
         return [name for name, limit in self.as_dict().items() if time_step > limit]
 
 
-def time_step_limits(dimer: Dimer, contact: Contact, liquid: Liquid, peak_velocity: float) -> TimeStepLimits:
-    """Limits of the time step for a dimer on a substrate of this peak velocity (m/s); see the module."""
+Bridged = Sequence[tuple[float, Sequence[float]]]
+"""Radius of each bead and the radii of those that bridges join to it, beside a wall, m."""
+
+
+def time_step_limits(
+    bridged: Bridged, density: float, contact: Contact, liquid: Liquid, peak_velocity: float
+) -> TimeStepLimits:
+    """Limits of the time step for beads on a substrate of this peak velocity (m/s); see the module."""
+    radii = [radius for radius, _ in bridged]
     return TimeStepLimits(
-        rayleigh=_rayleigh_time(dimer, contact),
-        hertz=_hertz_time(dimer, contact, peak_velocity),
-        viscous=_viscous_limit(dimer, contact, liquid),
+        rayleigh=_rayleigh_time(min(radii), density, contact),
+        hertz=_hertz_time(bridged, density, contact, peak_velocity),
+        viscous=_viscous_limit(bridged, density, contact, liquid),
     )
 
 
-def _rayleigh_time(dimer: Dimer, contact: Contact) -> float:
+def _mass(radius: float, density: float) -> float:
+    return 4.0 / 3.0 * pi * radius**3 * density
+
+
+def _rayleigh_time(radius: float, density: float, contact: Contact) -> float:
     shear_modulus = contact.youngs_modulus / (2.0 * (1.0 + contact.poissons_ratio))
     speed_factor = 0.1631 * contact.poissons_ratio + 0.8766
-    return pi * min(dimer.radii) * sqrt(dimer.density / shear_modulus) / speed_factor
+    return pi * radius * sqrt(density / shear_modulus) / speed_factor
 
 
-def _hertz_time(dimer: Dimer, contact: Contact, velocity: float) -> float:
+def _hertz_time(bridged: Bridged, density: float, contact: Contact, velocity: float) -> float:
     if velocity == 0.0:
         return inf
     modulus = reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
-    first, second = dimer.masses
-    colliding = [(first * second / (first + second), dimer.reduced_radius)]
-    colliding += list(zip(dimer.masses, dimer.radii, strict=True))
+    colliding = []
+    for radius, neighbours in bridged:
+        mass = _mass(radius, density)
+        colliding.append((mass, radius))
+        for other in neighbours:
+            other_mass = _mass(other, density)
+            colliding.append((mass * other_mass / (mass + other_mass), radius * other / (radius + other)))
     return min(2.87 * float((mass**2 / (radius * modulus**2 * velocity)) ** 0.2) for mass, radius in colliding)
 
 
-def _viscous_limit(dimer: Dimer, contact: Contact, liquid: Liquid) -> float:
+def _viscous_limit(bridged: Bridged, density: float, contact: Contact, liquid: Liquid) -> float:
     viscosity, nearest = liquid.dynamic_viscosity, contact.minimum_separation_ratio
-    first, second = dimer.masses
-    between_beads = normal_drag(viscosity, dimer.reduced_radius, nearest) * (1.0 / first + 1.0 / second)
-    rates = [
-        normal_drag_at_wall(viscosity, radius, nearest) / mass + between_beads
-        for radius, mass in zip(dimer.radii, dimer.masses, strict=True)
-    ]
-    rates += [
-        film_drag(liquid.film_viscosity, radius) / mass for radius, mass in zip(dimer.radii, dimer.masses, strict=True)
-    ]
+    rates = []
+    for radius, neighbours in bridged:
+        mass = _mass(radius, density)
+        between = sum(
+            normal_drag(viscosity, radius * other / (radius + other), nearest)
+            * (1.0 / mass + 1.0 / _mass(other, density))
+            for other in neighbours
+        )
+        rates.append(normal_drag_at_wall(viscosity, radius, nearest) / mass + between)
+        rates.append(film_drag(liquid.film_viscosity, radius) / mass)
     return 2.0 / max(rates) if max(rates) > 0.0 else inf
 
 

@@ -1,7 +1,7 @@
 """What runs mean: tables, velocities, pictures, files for ParaView. Reads run directories, never starts the engine."""
 
-from walkers.postprocess.result import read_result, tabulate
+from walkers.postprocess.analysis import current_result, read_result, tabulate
+from walkers.postprocess.motion import Group, Motion, read_motion
 from walkers.postprocess.tables import read_table
-from walkers.postprocess.trajectory import Trajectory, read_trajectory
 
-__all__ = ["Trajectory", "read_result", "read_table", "read_trajectory", "tabulate"]
+__all__ = ["Group", "Motion", "current_result", "read_motion", "read_result", "read_table", "tabulate"]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.pile import Container
+from walkers.inputs.boundary import Boundary
 from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
-from walkers.postprocess.pile import Bridges, PileMotion
+from walkers.postprocess.motion import Bridges, Motion
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -54,7 +54,7 @@ class Bed:
     bulk: int
 
 
-def bed_of(motion: PileMotion, frame: int, bulk: npt.NDArray[np.bool_], bridges: Bridges, liquid: FloatArray) -> Bed:
+def bed_of(motion: Motion, frame: int, bulk: npt.NDArray[np.bool_], bridges: Bridges, liquid: FloatArray) -> Bed:
     """The state of a pile in a frame.
 
     Parameters
@@ -69,7 +69,7 @@ def bed_of(motion: PileMotion, frame: int, bulk: npt.NDArray[np.bool_], bridges:
         Of `liquid_of_beads`.
     """
     position, radius, large = motion.position[frame], motion.radius, motion.large
-    container = motion.case.container  # its cross-section is cut into cells of about four large radii
+    container = motion.case.boundary  # its cross-section is cut into cells of about four large radii
     tops = surface_cells(position[bulk], radius[bulk], container, 4.0 * float(radius.max()))
     # With no bulk the floor is the surface.
     low, middle, high = (float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0)))
@@ -107,10 +107,10 @@ def liquid_of_beads(radius: FloatArray, volume_fraction: float, bridges: Bridges
     return liquid
 
 
-def surface_cells(position: FloatArray, radius: FloatArray, container: Container, cell: float) -> FloatArray:
+def surface_cells(position: FloatArray, radius: FloatArray, container: Boundary, cell: float) -> FloatArray:
     """Height of the highest bead top in each x-y cell that has a bead, m."""
-    across = max(1, int(container.width / cell))
-    place = np.clip(((position[:, :2] / container.width + 0.5) * across).astype(int), 0, across - 1)
+    across = max(1, int(container.inner_width / cell))
+    place = np.clip(((position[:, :2] / container.inner_width + 0.5) * across).astype(int), 0, across - 1)
     number = place[:, 0] * across + place[:, 1]
     tops = np.full(across * across, -np.inf)
     np.maximum.at(tops, number, position[:, 2] + radius)
@@ -127,7 +127,7 @@ def segregation(height: FloatArray, large: npt.NDArray[np.bool_]) -> float:
 
 
 def packing_profile(
-    position: FloatArray, radius: FloatArray, liquid: FloatArray, container: Container, layer: float
+    position: FloatArray, radius: FloatArray, liquid: FloatArray, container: Boundary, layer: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Packing fraction and liquid against height, averaged over frames.
 

@@ -23,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from walkers.postprocess.pile import FLOOR, Bridges
+from walkers.postprocess.motion import FLOOR, Bridges
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]

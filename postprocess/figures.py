@@ -1,4 +1,4 @@
-"""Figures of a run (matplotlib): where the walkers went and turned, and their gait through two cycles."""
+"""Figures of a run (matplotlib): where walkers went and turned, their gait; what clusters rose over a pile."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.case import Case
+from walkers.inputs.loads import dimer_of
 from walkers.postprocess.drawing import new_figure, plain_text, save_figure, styled
 from walkers.postprocess.gait import distance_walked, fit_slopes, gait
-from walkers.postprocess.trajectory import Trajectory, read_trajectory
+from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.piles import PileAnalysis, analyse
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,19 +20,15 @@ if TYPE_CHECKING:
 
 WALK_NAME = "walk.png"
 GAIT_NAME = "gait.png"
+CLIMB_NAME = "climb.png"
+_MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
+"""How events are marked (`walkers.postprocess.events`)."""
 _FEWEST_SAMPLES = 8
 """Samples a cycle below which a gait shows nothing."""
 
 
-def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
-    """Draw the figures of a run.
-
-    Parameters
-    ----------
-    directory
-        A run directory.
-    destination
-        Folder for the pictures; the run directory itself if None.
+def plot_walkers(directory: Path, destination: Path) -> list[Path]:
+    """Draw the walkers of a run.
 
     Returns
     -------
@@ -40,70 +37,69 @@ def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
         least eight times a cycle, ``gait.png`` (velocity and rotation velocities through two cycles, as in Fig. 4 of
         Khan et al.).
     """
-    trajectory = read_trajectory(directory)
-    destination = destination or directory
-    destination.mkdir(parents=True, exist_ok=True)
-    written = save_figure(_walk_figure(trajectory), destination / WALK_NAME, [directory.name])
-    samples = trajectory.case.run.samples_per_cycle
-    if samples >= _FEWEST_SAMPLES and len(trajectory.time) > 2 * samples:
-        written += save_figure(_gait_figure(trajectory), destination / GAIT_NAME, [directory.name])
+    groups = read_motion(directory).groups
+    written = save_figure(_walk_figure(groups), destination / WALK_NAME, [directory.name])
+    samples = groups[0].case.run.samples_per_cycle
+    if samples >= _FEWEST_SAMPLES and len(groups[0].time) > 2 * samples:
+        written += save_figure(_gait_figure(groups[0]), destination / GAIT_NAME, [directory.name])
     return written
 
 
-def _title(case: WalkerCase) -> str:
-    gamma0 = dimer_of(case).gamma0(case.drive.peak_acceleration)
-    first, second = (f"{radius * 1e3:g}" for radius in case.beads.radii)
-    return (
-        f"{plain_text(case.title or case.name)}\nR = {first}/{second} mm, {case.drive.described()} "
-        f"($\\Gamma_0$ = {gamma0:.3g})"
-    )
+def _title(case: Case) -> str:
+    makes = [" / ".join(f"{radius * 1e3:g}" for radius in make.radii) for make in case.walkers]
+    gamma0 = ""
+    if len(case.walkers[0].radii) == 2:
+        gamma0 = f" ($\\Gamma_0$ = {dimer_of(case).gamma0(case.drive.peak_acceleration):.3g})"
+    return f"{plain_text(case.title or case.name)}\nR = {'; '.join(makes)} mm, {case.drive.described()}{gamma0}"
 
 
 @styled
-def _walk_figure(trajectory: Trajectory) -> Figure:
+def _walk_figure(groups: list[Group]) -> Figure:
     figure, axes = new_figure(7.6, 5.4, mosaic=[["strobe", "walked"], ["strobe", "turned"]], width_ratios=[1, 1.6])
     top, middle, bottom = axes["strobe"], axes["walked"], axes["turned"]
-    figure.suptitle(_title(trajectory.case), fontsize=10)
-    _draw_strobe(top, trajectory)
-    time, distance = distance_walked(trajectory)
-    settled = trajectory.case.run.settling_cycles
-    slope, _ = fit_slopes(time[settled:], distance[settled:])
-    strobe = trajectory.case.run.samples_per_cycle
-    for number, walker in enumerate(trajectory.layout.walkers):
-        label = f"{number}: {'right' if walker.facing > 0 else 'left'}, {slope[number] * 1e3:.3g} mm/s"
-        middle.plot(time, distance[:, number] * 1e3, "o" if number % 2 == 0 else "s", mfc="none", label=label)
-        bottom.plot(time, np.degrees(trajectory.orientation[::strobe, number]))
-    middle.axvspan(0.0, time[settled], color="0.93", zorder=0, label="settling")
+    figure.suptitle(_title(groups[0].case), fontsize=10)
+    _draw_strobe(top, groups[0])
+    run = groups[0].case.run
+    for group in groups:
+        time, distance = distance_walked(group)
+        slope, _ = fit_slopes(time[run.settled_strobes :], distance[run.settled_strobes :])
+        for place, walker in enumerate(group.walkers):
+            number = walker.walker
+            label = f"{number}: {'right' if walker.facing > 0 else 'left'}, {slope[place] * 1e3:.3g} mm/s"
+            middle.plot(time, distance[:, place] * 1e3, "o" if number % 2 == 0 else "s", mfc="none", label=label)
+            bottom.plot(time, np.degrees(group.orientation[:: run.samples_per_cycle, place]))
+    middle.axvspan(0.0, time[run.settled_strobes], color="0.93", zorder=0, label="settling")
     middle.set(ylabel="distance walked (mm)", xlabel="time (s)")
-    if len(trajectory.layout.walkers) <= 12:
+    if sum(len(group.walkers) for group in groups) <= 12:
         middle.legend(fontsize=7, ncols=2, title="walker: facing at the start, velocity", title_fontsize=7)
     bottom.set(ylabel=r"orientation $\psi$ (°)", xlabel="time (s)")
     return figure
 
 
-def _draw_strobe(axes: Axes, trajectory: Trajectory) -> None:
-    """The first walker from above, both beads to scale, at eight times (as in Fig. 1b of the paper).
+def _draw_strobe(axes: Axes, group: Group) -> None:
+    """The first walker from above, its beads to scale, at eight times (as in Fig. 1b of the paper).
 
     Rows are even: the way along the drive axis and the orientation are shown, not the drift across the axis.
     """
     from matplotlib.patches import Circle
 
-    strobe = trajectory.case.run.samples_per_cycle
-    ground = np.stack([trajectory.drive_axis, trajectory.across_axis], axis=-1)
-    position = trajectory.position[::strobe, 0] @ ground * 1e3
-    radii = trajectory.radii * 1e3
+    strobe = group.case.run.samples_per_cycle
+    ground = np.stack([group.drive_axis, group.across_axis], axis=-1)
+    position = group.position[::strobe, 0] @ ground * 1e3
+    radii = group.radii * 1e3
     middle = position.mean(axis=1)
     shown = np.unique(np.linspace(0, len(position) - 1, 8).round().astype(int))
-    pitch = 2.6 * float(radii.max())
+    extent = max(float(np.ptp(position[..., 1], axis=1).max()), 0.6 * float(radii.max()))
+    pitch = 2.0 * float(radii.max()) + extent
     ends = []
     for row, frame in enumerate(shown):
-        for bead in range(2):
+        for bead in range(len(radii)):
             along = float(position[frame, bead, 0] - middle[0, 0])
             across = float(position[frame, bead, 1] - middle[frame, 1]) - row * pitch
             size = float(radii[bead])
-            axes.add_patch(Circle((along, across), size, fc="0.75" if bead else "0.45", ec="0.2", lw=0.6))
+            axes.add_patch(Circle((along, across), size, fc="0.45" if bead == 0 else "0.75", ec="0.2", lw=0.6))
             ends += [along - size, along + size]
-        seconds = f"{trajectory.time[frame * strobe]:.2f} s"
+        seconds = f"{group.time[frame * strobe]:.2f} s"
         place = (1.01, -row * pitch)
         axes.annotate(seconds, place, xycoords=("axes fraction", "data"), fontsize=7, va="center")
     axes.set(xlim=(min(ends) - radii.max(), max(ends) + radii.max()), ylim=(-pitch * (len(shown) - 0.4), 0.6 * pitch))
@@ -113,25 +109,24 @@ def _draw_strobe(axes: Axes, trajectory: Trajectory) -> None:
 
 
 @styled
-def _gait_figure(trajectory: Trajectory) -> Figure:
-    run = trajectory.case.run
-    motion = gait(trajectory)
-    cycles = (len(trajectory.time) - 1) // run.samples_per_cycle
+def _gait_figure(group: Group) -> Figure:
+    run = group.case.run
+    motion = gait(group)
+    cycles = (len(group.time) - 1) // run.samples_per_cycle
     last = slice((cycles - 2) * run.samples_per_cycle, cycles * run.samples_per_cycle + 1)
-    phase = trajectory.time[last] * trajectory.case.drive.frequency - (cycles - 2)
+    phase = group.time[last] * group.case.drive.frequency - (cycles - 2)
     figure, axes = new_figure(6.4, 3.8)
-    figure.suptitle(_title(trajectory.case), fontsize=10)
-    series = [
-        ("walker", motion.velocity[last, 0], "s", "#c4473a"),
-        ("bead 1", motion.rotation[last, 0, 0], "o", "0.1"),
-        ("bead 2", motion.rotation[last, 0, 1], "^", "#1f3b73"),
-    ]
+    figure.suptitle(_title(group.case), fontsize=10)
+    marks = [("o", "0.1"), ("^", "#1f3b73"), ("v", "#3f7f93"), ("D", "0.5")]
+    series = [("walker", motion.velocity[last, 0], "s", "#c4473a")]
+    beads = range(len(group.radii))
+    series += [(f"bead {bead + 1}", motion.rotation[last, 0, bead], *marks[bead % len(marks)]) for bead in beads]
     for label, values, marker, colour in series:
         mean = values[:-1].mean() * 1e3
         axes.plot(phase, values * 1e3, marker=marker, color=colour, label=f"{label} (mean {mean:.2f} mm/s)")
-    shaken = trajectory.substrate_velocity[last] @ np.array(trajectory.case.drive.direction)
+    shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
     if np.any(shaken):
-        facing = trajectory.layout.walkers[0].facing
+        facing = group.walkers[0].facing
         axes.plot(phase, facing * shaken * 1e3, color="0.6", ls=":", label="substrate")
     axes.axhline(0.0, color="0.4", lw=0.6)
     axes.set(
@@ -140,3 +135,68 @@ def _gait_figure(trajectory: Trajectory) -> Figure:
     )
     figure.legend(fontsize=7, ncols=4, loc="outside lower center")
     return figure
+
+
+def plot_pile(directory: Path, destination: Path) -> list[Path]:
+    """Draw what a pile did.
+
+    Returns
+    -------
+    list of Path
+        ``climb.png``: heights of the clusters' leaders over the pile's surface against time with the events in their
+        lives, the Brazil-nut index, the mean square velocity.
+    """
+    return save_figure(_climb_figure(analyse(directory)), destination / CLIMB_NAME, [directory.name])
+
+
+@styled
+def _climb_figure(found: PileAnalysis) -> Figure:
+    figure, axes = new_figure(7.6, 6.4, mosaic=[["height"], ["height"], ["index"], ["agitation"]], sharex=True)
+    time, case = found.motion.time, found.motion.case
+    _heights(axes["height"], found)
+    axes["index"].plot(time, [bed.brazil_nut for bed in found.beds], color="C0", label="all beads")
+    axes["index"].plot(time, [bed.brazil_nut_of_bulk for bed in found.beds], "--", color="C2", label="bulk alone")
+    axes["index"].set_ylabel("Brazil-nut\nindex")
+    axes["index"].legend(fontsize=7)
+    axes["agitation"].semilogy(time, [max(bed.mean_square_velocity, 1e-12) for bed in found.beds], color="C0")
+    axes["agitation"].set(
+        xlabel="time from the begin of the drive (s)", ylabel="mean square\nvelocity, strobed\n(m²/s²)"
+    )
+    figure.suptitle(
+        f"{plain_text(case.title or case.name)}\n{case.count} beads, {case.drive.described()}",
+        fontsize=10,
+    )
+    return figure
+
+
+def _heights(axes: Axes, found: PileAnalysis) -> None:
+    time, height = found.motion.time, found.motion.position[:, :, 2]
+    low, middle, high = (
+        np.array([getattr(bed, name) for bed in found.beds]) * 1e3
+        for name in ("surface_low", "surface", "surface_high")
+    )
+    axes.fill_between(time, low, high, color="0.85", lw=0, label="surface, 10th to 90th percentile")
+    axes.plot(time, middle, color="0.4", lw=1.0, label="surface, median")
+    for track, climb in zip(found.tracks, found.climbs, strict=True):
+        places = [frame for frame, members in zip(track.frames, track.members, strict=True) if climb.leader in members]
+        leads = "large" if found.motion.large[climb.leader] else "small"
+        colour, width = ("C2", 1.6) if climb.climbed else ("C1", 0.6)
+        line = axes.plot(time[places], height[places, climb.leader] * 1e3, color=colour, lw=width)[0]
+        if climb.climbed:
+            told = f"climb led by a {leads} bead, {climb.size} beads: {climb.speed * 1e3:.1f} mm/s"
+            line.set_label(told)
+    _mark_events(axes, found)
+    axes.set(ylabel="height (mm)")
+    axes.legend(fontsize=7, loc="upper left", ncols=2)
+
+
+def _mark_events(axes: Axes, found: PileAnalysis) -> None:
+    """A mark where something happened to a cluster, at the height of its leader in the frame nearest to it."""
+    for kind, marker in _MARKS.items():
+        told = [event for event in found.events if event.kind == kind]
+        if not told:
+            continue
+        frames = np.searchsorted(found.motion.time, [event.time for event in told])
+        leaders = [found.climbs[event.track].leader for event in told]
+        heights = found.motion.position[frames.astype(int), np.array(leaders, dtype=int), 2] * 1e3
+        axes.plot([event.time for event in told], heights, marker, ms=4, color="0.3", mfc="none", lw=0, label=kind)

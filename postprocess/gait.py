@@ -3,7 +3,8 @@
 Velocities are along the walker's heading, from the small bead to the large one, relative to the substrate. With e the
 heading, z the normal of the substrate and ω a bead's angular velocity, the rotation velocity R ω·(z × e) is the paper's
 −R dφ/dt (Fig. 4), and the sliding velocity at a contact with the substrate, v·e − R ω·(z × e), its R dφ/dt + v_x. At
-the contact between the beads the sliding velocity is R1 dφ1/dt + R2 dφ2/dt.
+the contact between the beads the sliding velocity is R1 dφ1/dt + R2 dφ2/dt. Beads beside each other turn about the
+line that is level and across the one between them; a bead slides on the wall that is nearest to it, with its normal.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.postprocess.dump import DumpError, FloatArray
-from walkers.postprocess.trajectory import Trajectory
+from walkers.postprocess.motion import Group
 
 STEADY_DIFFERENCE = 0.05
 """A walker is steady if the velocities of the two halves of the fitted cycles differ by less than this share …"""
@@ -24,15 +25,15 @@ STEADY_SPEED = 1e-5
 
 @dataclass(frozen=True)
 class Gait:
-    """Time series of F frames and W walkers; SI units. Contacts 0, 1: beads on the substrate, 2: bead on bead.
+    """Time series of F frames and W walkers of n beads; SI units. Contacts: the beads with walls, then their pairs.
 
     Attributes
     ----------
     velocity : ndarray, shape (F, W)
         Of the mass centre along the heading.
-    rotation : ndarray, shape (F, W, 2)
+    rotation : ndarray, shape (F, W, n)
         Rotation velocity of the beads.
-    sliding, gap : ndarray, shape (F, W, 3)
+    sliding, gap : ndarray, shape (F, W, n + pairs)
         Sliding velocity and gap (negative: overlap) at the contacts.
     """
 
@@ -42,21 +43,44 @@ class Gait:
     gap: FloatArray
 
 
-def gait(trajectory: Trajectory) -> Gait:
+def gait(group: Group) -> Gait:
     """Rotation, sliding and gaps through the run."""
-    radii = trajectory.radii
-    heading = trajectory.heading
-    across = np.cross([0.0, 0.0, 1.0], heading)
-    along = np.einsum("fwbx,fwx->fwb", trajectory.velocity, heading)
-    rotation = radii * np.einsum("fwbx,fwx->fwb", trajectory.spin, across)
+    radii, heading, upward = group.radii, group.heading, np.array([0.0, 0.0, 1.0])
+    along = np.einsum("fwbx,fwx->fwb", group.velocity, heading)
+    rotation = radii * np.einsum("fwbx,fwx->fwb", group.spin, np.cross(upward, heading))
     weights = radii**3 / np.sum(radii**3)
-    distance = np.linalg.norm(trajectory.position[:, :, 0] - trajectory.position[:, :, 1], axis=-1)
+    gap, normal = _nearest_wall(group)
+    turning = rotation if normal is None else radii * np.einsum(
+        "fwbx,fwbx->fwb", group.spin, np.cross(normal, heading[:, :, None])
+    )  # fmt: skip
+    sliding, gaps = [along - turning], [gap]
+    for one, other in group.make.pairs:
+        arm = group.position[:, :, one] - group.position[:, :, other]
+        distance = np.linalg.norm(arm, axis=-1)
+        arm[..., 2] = 0.0
+        arm *= np.where(np.einsum("fwx,fwx->fw", arm, heading) < 0.0, -1.0, 1.0)[..., None]
+        arm /= np.maximum(np.linalg.norm(arm, axis=-1, keepdims=True), 1e-300)
+        spin = radii[one] * group.spin[:, :, one] + radii[other] * group.spin[:, :, other]
+        sliding.append(-np.einsum("fwx,fwx->fw", spin, np.cross(upward, arm))[..., None])
+        gaps.append((distance - (radii[one] + radii[other]))[..., None])
     return Gait(
         velocity=along @ weights,
         rotation=rotation,
-        sliding=np.concatenate([along - rotation, -rotation.sum(axis=-1, keepdims=True)], axis=-1),
-        gap=np.concatenate([trajectory.position[..., 2] - radii, (distance - radii.sum())[..., None]], axis=-1),
+        sliding=np.concatenate(sliding, axis=-1),
+        gap=np.concatenate(gaps, axis=-1),
     )
+
+
+def _nearest_wall(group: Group) -> tuple[FloatArray, FloatArray | None]:
+    """Gap of each bead to the wall that is nearest to it, and that wall's normal; None where there is but a floor."""
+    faces = group.case.boundary.faces()
+    if len(faces) == 1:
+        return group.position[..., 2] - group.radii, None
+    normals = np.array([face.normal for face in faces])
+    away = np.einsum("kx,kx->k", normals, np.array([face.centroid for face in faces]))
+    heights = group.position @ normals.T - away
+    nearest = np.argmin(heights, axis=-1)
+    return np.take_along_axis(heights, nearest[..., None], axis=-1)[..., 0] - group.radii, normals[nearest]
 
 
 @dataclass(frozen=True)
@@ -77,7 +101,7 @@ class Walk:
     steady: npt.NDArray[np.bool_]
 
 
-def distance_walked(trajectory: Trajectory) -> tuple[FloatArray, FloatArray]:
+def distance_walked(group: Group) -> tuple[FloatArray, FloatArray]:
     """Distance along the heading at the end of each cycle, as a stroboscope sees it.
 
     Returns
@@ -88,11 +112,11 @@ def distance_walked(trajectory: Trajectory) -> tuple[FloatArray, FloatArray]:
         m; each cycle's displacement is projected on the mean of the headings at its ends, so that a walker that turns
         is followed around the curve.
     """
-    strobe = trajectory.case.run.samples_per_cycle
-    centre, heading = trajectory.mass_centre[::strobe], trajectory.heading[::strobe]
+    strobe = group.case.run.samples_per_cycle
+    centre, heading = group.mass_centre[::strobe], group.heading[::strobe]
     steps = np.einsum("fwx,fwx->fw", np.diff(centre, axis=0), (heading[1:] + heading[:-1]) / 2.0)
     distance = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
-    return trajectory.time[::strobe], distance
+    return group.time[::strobe], distance
 
 
 def fit_slopes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -119,7 +143,7 @@ def fit_slopes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatA
     return slope, error
 
 
-def walk(trajectory: Trajectory) -> Walk:
+def walk(group: Group) -> Walk:
     """Fit the velocities of a run's walkers.
 
     Raises
@@ -127,8 +151,8 @@ def walk(trajectory: Trajectory) -> Walk:
     postprocess.dump.DumpError
         If the dump was cut short within the settling cycles.
     """
-    settled = trajectory.case.run.settling_cycles
-    time, distance = distance_walked(trajectory)
+    settled = group.case.run.settled_strobes
+    time, distance = distance_walked(group)
     if len(time) < settled + 2:
         raise DumpError(f"the dump holds {len(time) - 1} cycles, no more than the {settled} settling ones")
     time, distance = time[settled:], distance[settled:]
@@ -139,21 +163,22 @@ def walk(trajectory: Trajectory) -> Walk:
         second, _ = fit_slopes(time[middle - 1 :], distance[middle - 1 :])
     else:
         first = second = velocity
-    strobe = trajectory.case.run.samples_per_cycle
-    centre = trajectory.mass_centre[::strobe][settled:]
+    strobe = group.case.run.samples_per_cycle
+    centre = group.mass_centre[::strobe][settled:]
     allowed = np.maximum(STEADY_DIFFERENCE * np.abs(velocity), STEADY_SPEED)
     return Walk(
         velocity=velocity,
         standard_error=error,
         first_half=first,
         second_half=second,
-        axial=fit_slopes(time, centre @ trajectory.drive_axis)[0],
-        lateral=fit_slopes(time, centre @ trajectory.across_axis)[0],
+        axial=fit_slopes(time, centre @ group.drive_axis)[0],
+        lateral=fit_slopes(time, centre @ group.across_axis)[0],
         steady=np.abs(first - second) <= allowed,
     )
 
 
-def settled_samples(trajectory: Trajectory) -> slice:
+def settled_samples(group: Group) -> slice:
     """The samples of whole cycles after the settling ones, each phase equally often."""
-    run = trajectory.case.run
-    return slice(run.settling_cycles * run.samples_per_cycle, run.cycles * run.samples_per_cycle)
+    run = group.case.run
+    samples = run.samples_per_cycle
+    return slice(run.settled_strobes * samples, run.cycles // run.cycles_per_sample * samples)

@@ -1,4 +1,4 @@
-"""Files for ParaView: beads, bridges and the moving substrate as .vtp, joined by one .pvd in physical seconds."""
+"""Files for ParaView: beads, bridges and the moving boundary as .vtp, joined by one .pvd in physical seconds."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,14 +15,12 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.dimer import dimer_of
 from walkers.inputs.errors import InputError, Problem
+from walkers.postprocess.analysis import analyses_of
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.tables import read_table
-from walkers.postprocess.trajectory import Trajectory, read_trajectory
+from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
 
 if TYPE_CHECKING:
-    import pandas as pd
     import pyvista as pv
 
 FOLDER_NAME = "vtk"
@@ -33,7 +31,7 @@ _END_OF_VTK = b"</VTKFile>\n"
 def write_vtk(
     directory: Path,
     *,
-    every_sample: bool = False,
+    every: int | None = None,
     vtu: bool = False,
     as_placed: bool = False,
     destination: Path | None = None,
@@ -43,32 +41,31 @@ def write_vtk(
     Parameters
     ----------
     directory
-        A run directory with its tables.
-    every_sample
-        All samples instead of one frame a cycle. Bridges are in the frames in which the engine reported them.
+        A run directory.
+    every
+        Take one of so many samples of the drive; one a cycle if left out. Bridges are in the frames in which they were
+        recorded.
     vtu
         Also write the beads as ``.vtu`` (through meshio).
     as_placed
-        Leave the walkers where the deck has them, centimetres apart, instead of drawing them side by side.
+        Leave independent walkers where the deck has them, centimetres apart, instead of drawing them side by side.
     destination
         Folder to write, replaced if it holds nothing but files of this function; ``vtk`` in the run directory if None.
 
     Returns
     -------
     Path
-        The ``.pvd`` file: its times are seconds; part 0 the beads, part 1 the substrate, part 2 the bridges.
+        The ``.pvd`` file: its times are seconds; part 0 the beads, part 1 the boundary, part 2 the bridges.
 
     Raises
     ------
     InputError
         If the folder holds anything else than such files.
     """
-    trajectory = read_trajectory(directory)
-    if not as_placed:
-        trajectory = gathered(trajectory)
-    bridges = read_table(directory, "bridges")
-    stride = 1 if every_sample else trajectory.case.run.samples_per_cycle
-    frames = (_frame(trajectory, bridges, frame) for frame in range(0, len(trajectory.time), stride))
+    motion = read_motion(directory)
+    if motion.case.independent and not as_placed:
+        motion = gathered(motion)
+    frames = _frames(motion, every or motion.case.run.samples_per_cycle)
     return write_series(destination or directory / FOLDER_NAME, COLLECTION_NAME, frames, vtu=vtu)
 
 
@@ -153,13 +150,12 @@ def _check_replaceable(place: Path) -> None:
             raise InputError(str(place), [Problem("", None, f"{expected}; it holds {path.name}")])
 
 
-def gathered(trajectory: Trajectory) -> Trajectory:
+def gathered(motion: Motion) -> Motion:
     """The same walkers on parallel lanes two lengths apart; as independent replicates they may stand anywhere."""
-    walkers = trajectory.layout.walkers
-    lane = 2.0 * dimer_of(trajectory.case).length
-    origins = np.array([[*walker.origin, 0.0] for walker in walkers])
-    shift = -np.outer(np.arange(len(walkers)) * lane, trajectory.across_axis) - origins
-    return replace(trajectory, position=trajectory.position + shift[:, None])
+    lane = 2.0 * max(make.length for make in motion.case.walkers)
+    across = np.cross([0.0, 0.0, 1.0], motion.case.drive_axis)
+    shift = np.array([-number * lane * across - [*one.origin, 0.0] for number, one in enumerate(motion.walkers)])
+    return replace(motion, position=motion.position + shift[motion.walker_of])
 
 
 @dataclass(frozen=True)
@@ -169,82 +165,114 @@ class _Entry:
     file: str
 
 
-def _frame(trajectory: Trajectory, bridges: pd.DataFrame, frame: int) -> Frame:
-    meshes: dict[int, tuple[str, pv.PolyData]] = {
-        0: ("beads", beads_at(trajectory, frame)),
-        1: ("substrate", substrate_at(trajectory, frame)),
-    }
-    joined = bridges_at(trajectory, bridges, frame)
-    if joined is not None:
-        meshes[2] = ("bridges", joined)
-    return Frame(float(trajectory.time[frame]), frame, meshes)
+def _frames(motion: Motion, every: int) -> Iterator[Frame]:
+    recorded = {bridges.frame: bridges for bridges in read_bridges(motion)}
+    further = [one.point_data(motion) for one in analyses_of(motion.case)]
+    outline = boundary_of(motion)
+    for frame in range(motion.first_driven, len(motion.time), every):
+        beads, bridges = beads_at(motion, frame), recorded.get(frame)
+        meshes = {0: ("beads", beads), 1: ("boundary", outline.translate(motion.substrate[frame], inplace=False))}
+        if bridges is not None:
+            for arrays in (one(bridges) for one in further):
+                for name, values in arrays.items():
+                    beads.point_data[name] = values
+            meshes[2] = ("bridges", bridges_at(motion, bridges))
+        yield Frame(float(motion.time[frame]), frame, meshes)
 
 
-def _in_frame_of_run(trajectory: Trajectory, frame: int) -> FloatArray:
-    """Bead centres, shape (W, 2, 3), with the motion of the substrate put back (in the container frame it has none)."""
-    moved: FloatArray = trajectory.position[frame] + trajectory.substrate[frame]
-    return moved
-
-
-def beads_at(trajectory: Trajectory, frame: int) -> pv.PolyData:
+def beads_at(motion: Motion, frame: int) -> pv.PolyData:
     """Beads of a frame as points, positions in the frame of the run, SI units.
 
-    Point data: ``id``, ``type`` (the engine's), ``walker``, ``bead`` (1 or 2), ``radius``, ``omega``, and ``velocity``
-    relative to the substrate.
+    Point data: ``bead`` (number, from 0), ``walker`` (its number, -1 for none), ``radius``, ``large``, ``omega``, and
+    ``velocity`` and ``speed`` relative to the boundary.
     """
     import pyvista as pv
 
-    walkers = trajectory.layout.walkers
-    count = len(walkers)
-    mesh = pv.PolyData(_in_frame_of_run(trajectory, frame).reshape(-1, 3).copy())
+    mesh = pv.PolyData(motion.position[frame] + motion.substrate[frame])
+    velocity = motion.velocity[frame]
     arrays: dict[str, npt.NDArray[Any]] = {
-        "id": np.array([bead for walker in walkers for bead in walker.beads]),
-        "walker": np.repeat([walker.walker for walker in walkers], 2),
-        "bead": np.tile([1, 2], count),
-        "type": np.ones(2 * count, dtype=np.int64),
-        "radius": np.tile(trajectory.radii, count),
-        "velocity": trajectory.velocity[frame].reshape(-1, 3),
-        "omega": trajectory.spin[frame].reshape(-1, 3),
+        "bead": np.arange(len(motion.radius)),
+        "walker": motion.walker_of,
+        "radius": motion.radius,
+        "large": motion.large.astype(np.int64),
+        "velocity": velocity,
+        "speed": np.linalg.norm(velocity, axis=1),
+        "omega": motion.spin[frame],
     }
     for name, values in arrays.items():
         mesh.point_data[name] = np.ascontiguousarray(values)
     return mesh
 
 
-def substrate_at(trajectory: Trajectory, frame: int) -> pv.PolyData:
-    """The part of the substrate that the walkers use, as a rectangle that moves with it."""
+def boundary_of(motion: Motion) -> pv.PolyData:
+    """The walls: of a container up to its rim, of what has no end the part that the beads use."""
     import pyvista as pv
 
-    ground = trajectory.position[..., :2]
-    margin = 4.0 * float(trajectory.radii.max())
-    low, high = ground.min(axis=(0, 1, 2)) - margin, ground.max(axis=(0, 1, 2)) + margin
-    corners = np.array([[low[0], low[1], 0], [high[0], low[1], 0], [high[0], high[1], 0], [low[0], high[1], 0]])
-    return pv.PolyData(corners + trajectory.substrate[frame], faces=[4, 0, 1, 2, 3])
+    boundary, margin = motion.case.boundary, 4.0 * float(motion.radius.max())
+    low, high = motion.position.min(axis=(0, 1)) - margin, motion.position.max(axis=(0, 1)) + margin
+    half, top = boundary.inner_width / 2.0, boundary.top
+    if boundary.closed:
+        low, high = np.array([-half, -half, low[2]]), np.array([half, half, top])
+    faces = boundary.faces()
+    planes = [(np.array(face.centroid), np.array(face.normal)) for face in faces]
+    edges = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]
+    points: list[FloatArray] = []
+    cells: list[int] = []
+    for number, (centroid, normal) in enumerate(planes):
+        others = planes[:number] + planes[number + 1 :]
+        corners = _clipped(_square(centroid, normal, 2.0 * float(np.linalg.norm(high - low))), [*others, *edges])
+        if len(corners) > 2:
+            cells += [len(corners), *range(len(points), len(points) + len(corners))]
+            points += list(corners)
+    return pv.PolyData(np.array(points), faces=cells)
 
 
-def bridges_at(trajectory: Trajectory, bridges: pd.DataFrame, frame: int) -> pv.PolyData | None:
-    """Bridges of a frame as lines with ``gap`` (m), ``normal_force`` (N), ``touching`` and ``contact``.
+def _square(centre: FloatArray, normal: FloatArray, size: float) -> FloatArray:
+    """Corners of a square about a point, shape (4, 3)."""
+    first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    first /= np.linalg.norm(first)
+    second = np.cross(normal, first)
+    return np.array([centre + size * (a * first + b * second) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 
-    A line joins two centres, or a centre and the point of the substrate below it. None if the engine reported no
-    bridges in that frame.
+
+def _clipped(corners: FloatArray, planes: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """The part of a convex polygon on the inner side of planes (point, normal), after Sutherland and Hodgman (1974)."""
+    for point, normal in planes:
+        inside = (corners - point) @ normal
+        kept = []
+        for one, other, here, there in zip(
+            corners, np.roll(corners, -1, axis=0), inside, np.roll(inside, -1), strict=True
+        ):
+            if here >= -1e-12:
+                kept.append(one)
+            if (here > 1e-12 and there < -1e-12) or (here < -1e-12 and there > 1e-12):
+                kept.append(one + (other - one) * here / (here - there))
+        corners = np.array(kept).reshape(-1, 3)
+        if len(corners) < 3:
+            break
+    return corners
+
+
+def bridges_at(motion: Motion, bridges: Bridges) -> pv.PolyData:
+    """Bridges of a frame as lines with ``gap`` (m), ``normal_force`` (N), ``touching`` and ``walker`` (first bead's).
+
+    A line joins two centres, or a centre and the nearest point of the wall.
     """
-    half_step = 0.5 * trajectory.layout.time_step
-    rows = bridges[np.abs(bridges["time"] - trajectory.time[frame]) < half_step]
-    if rows.empty:
-        return None
-    centres = {
-        bead: centre
-        for walker, pair in zip(trajectory.layout.walkers, _in_frame_of_run(trajectory, frame), strict=True)
-        for bead, centre in zip(walker.beads, pair, strict=True)
-    }
-    floor = np.array([1.0, 1.0, 0.0])
-    ends = [
-        (centres[first], centres[second] if second else centres[first] * floor)
-        for first, second in zip(rows["bead_1"], rows["bead_2"], strict=True)
-    ]
-    mesh = lines_between(np.array(ends))
-    for name in ("gap", "normal_force", "touching", "contact", "walker"):
-        mesh.cell_data[name] = rows[name].to_numpy().astype(np.float64)
+    centres = motion.position[bridges.frame]
+    boundary = motion.case.boundary
+    feet = []
+    for bead, wall in zip(bridges.wall_beads, bridges.walls, strict=True):
+        faces = [face for face in boundary.faces() if face.wall == boundary.walls[wall]]
+        away = [np.dot(centres[bead] - np.array(face.centroid), face.normal) for face in faces]
+        nearest = int(np.argmin(away))
+        feet.append(centres[bead] - away[nearest] * np.array(faces[nearest].normal))
+    walls = np.stack([centres[bridges.wall_beads], np.array(feet).reshape(-1, 3)], axis=1)
+    mesh = lines_between(np.concatenate([centres[bridges.beads], walls]) + motion.substrate[bridges.frame])
+    gap = np.concatenate([bridges.gap, bridges.wall_gap])
+    mesh.cell_data["gap"] = gap
+    mesh.cell_data["normal_force"] = np.concatenate([bridges.force, bridges.wall_force])
+    mesh.cell_data["touching"] = (gap <= 0.0).astype(np.int64)
+    mesh.cell_data["walker"] = motion.walker_of[np.concatenate([bridges.beads[:, 0], bridges.wall_beads])]
     return mesh
 
 

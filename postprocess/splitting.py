@@ -8,17 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.case import Case
 from walkers.postprocess.dump import BinaryDump, FloatArray
-from walkers.postprocess.result import NEAR, came_near
+from walkers.postprocess.walking import NEAR, came_near
 from walkers.runner.failures import WalkersMet
 from walkers.runner.files import write_json
 from walkers.templates.deck import LAYOUT_NAME
 from walkers.templates.layout import Layout, PlacedWalker
 
 
-def split_output(directory: Path, layout: Layout, cases: Mapping[Path, WalkerCase]) -> None:
+def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) -> None:
     """Write the dumps and the layout of each case into its directory, and remove those of the shared deck.
 
     Beads and walkers are numbered anew in each; they stay where they were in the shared deck.
@@ -49,7 +48,7 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, WalkerCas
     walkers = iter(layout.walkers)
     owners: dict[str, tuple[int, str]] = {}
     for number, (place, case) in enumerate(cases.items()):
-        own = [next(walkers) for _ in range(case.start.replicates)]
+        own = [next(walkers) for make in case.walkers for _ in range(make.replicates)]
         old = [layout.carrier, *(bead for walker in own for bead in walker.beads)]
         new = np.arange(1, len(old) + 1)
         owners |= {str(one): (number, str(other)) for one, other in zip(old, new, strict=True)}
@@ -65,19 +64,19 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, WalkerCas
 
 
 def _own_layout(layout: Layout, walkers: list[PlacedWalker]) -> Layout:
-    first = layout.carrier + 1
-    renumbered = tuple(
-        replace(walker, walker=number, beads=(first + 2 * number, first + 2 * number + 1))
-        for number, walker in enumerate(walkers)
-    )
-    return replace(layout, atoms=layout.carrier + 2 * len(walkers), walkers=renumbered, ranks=1)
+    renumbered, bead = [], layout.carrier + 1
+    for number, walker in enumerate(walkers):
+        after = bead + len(walker.beads)
+        renumbered.append(replace(walker, walker=number, beads=tuple(range(bead, after))))
+        bead = after
+    return replace(layout, atoms=bead - 1, walkers=tuple(renumbered), ranks=1)
 
 
-def _check_apart(frames: FloatArray, layout: Layout, cases: Mapping[Path, WalkerCase], directory: Path) -> None:
+def _check_apart(frames: FloatArray, layout: Layout, cases: Mapping[Path, Case], directory: Path) -> None:
     x, sampled = layout.bead_columns.index("x"), frames[:: next(iter(cases.values())).run.samples_per_cycle]
-    beads = np.array([walker.beads for walker in layout.walkers]) - 1
-    centre = sampled[:, beads, x : x + 2].mean(axis=2)
-    if came_near(centre, NEAR * max(dimer_of(case).length for case in cases.values())):
+    rows = [np.array(walker.beads) - 1 for walker in layout.walkers]
+    centre = np.stack([sampled[:, beads, x : x + 2].mean(axis=1) for beads in rows], axis=1)
+    if came_near(centre, NEAR * max(make.length for case in cases.values() for make in case.walkers)):
         raise WalkersMet(directory)
 
 

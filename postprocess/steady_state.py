@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkers.postprocess.result import read_result
+from walkers.postprocess.analysis import read_result
 from walkers.postprocess.tables import read_table
 
 if TYPE_CHECKING:

@@ -17,33 +17,34 @@ from walkers.runner.files import beside
 if TYPE_CHECKING:
     import pandas as pd
 
-_CONTACTS = "contacts 1, 2: beads on the substrate, 3: bead on bead"
+_CONTACTS = "contacts: the beads with walls in their order, then the pairs of beads that touched at the start"
+
+FAMILIES = {
+    "rotation": ("m/s", "rotation velocity -R dphi/dt of a bead"),
+    "sliding": ("m/s", f"sliding velocity; {_CONTACTS}"),
+    "gap": ("m", f"gap, negative where they touch; {_CONTACTS}"),
+    "open": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
+}
+"""Columns of which there is one for each bead or contact, numbered from 1: ``rotation_1``, ``rotation_2``, …"""
 
 TRAJECTORY = {
     "walker": ("", "number of the walker, from 0"),
-    "time": ("s", "simulated time"),
+    "time": ("s", "from the begin of the drive"),
     "cycle": ("", "time in cycles of the drive"),
     "x": ("m", "mass centre relative to the substrate"),
     "y": ("m", "mass centre relative to the substrate"),
     "z": ("m", "mass centre above the substrate"),
-    "orientation": ("rad", "angle of bead 2 to bead 1 from the direction that the walker was to face"),
-    "velocity": ("m/s", "mass centre relative to the substrate, along the heading (small bead to large bead)"),
-    "rotation_1": ("m/s", "rotation velocity -R dphi/dt of bead 1"),
-    "rotation_2": ("m/s", "rotation velocity -R dphi/dt of bead 2"),
-    "sliding_1": ("m/s", f"sliding velocity; {_CONTACTS}"),
-    "sliding_2": ("m/s", f"sliding velocity; {_CONTACTS}"),
-    "sliding_3": ("m/s", f"sliding velocity; {_CONTACTS}"),
-    "gap_1": ("m", f"gap, negative where they touch; {_CONTACTS}"),
-    "gap_2": ("m", f"gap, negative where they touch; {_CONTACTS}"),
-    "gap_3": ("m", f"gap, negative where they touch; {_CONTACTS}"),
+    "orientation": ("rad", "angle of the walker from the direction that it was to face"),
+    "velocity": ("m/s", "mass centre relative to the substrate, along the heading (small beads to large ones)"),
 }
-"""``trajectory.parquet``: a row a sample and walker."""
+"""``trajectory.parquet``: one row per sample and walker; and ``rotation_1`` …, ``sliding_1`` …, ``gap_1`` …"""
 
 WALKERS = {
     "walker": ("", "number of the walker, from 0"),
-    "facing": ("", "where bead 1 points at the start: 1 along the drive axis (right), -1 against it (left)"),
+    "make": ("", "number of the walker's make in the case, from 0: its dimers, then its clusters"),
+    "facing": ("", "where it is to face at the start: 1 along the drive axis (right), -1 against it (left)"),
     "start_angle": ("rad", "orientation at the start"),
-    "velocity": ("m/s", "along the heading after the settling cycles, positive toward the large bead"),
+    "velocity": ("m/s", "along the heading after the settling cycles, positive toward the large beads"),
     "standard_error": ("m/s", "of the fit of the velocity"),
     "first_half": ("m/s", "velocity in the first half of the fitted cycles"),
     "second_half": ("m/s", "velocity in the second half of the fitted cycles"),
@@ -52,32 +53,36 @@ WALKERS = {
     "lateral_velocity": ("m/s", "mass centre across the drive axis"),
     "orientation_mean": ("rad", "mean orientation after the settling cycles"),
     "orientation_end": ("rad", "orientation at the end"),
-    "rotation_1": ("m/s", "mean rotation velocity -R dphi/dt of bead 1"),
-    "rotation_2": ("m/s", "mean rotation velocity -R dphi/dt of bead 2"),
-    "sliding_1": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
-    "sliding_2": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
-    "sliding_3": ("m/s", f"mean sliding velocity; {_CONTACTS}"),
-    "open_1": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
-    "open_2": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
-    "open_3": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
     "separated_fraction": (
         "",
-        "share of the samples in which the beads are farther apart than a bridge between them reaches",
+        "share of the samples in which two beads are farther apart than the bridge between them reaches",
     ),
 }
-"""``walkers.parquet``: a row a walker; means are over the cycles after the settling ones."""
+"""``walkers.parquet``: one row per walker; and ``rotation_1`` …, ``sliding_1`` …, ``open_1`` …; means are over the
+cycles after the settling ones."""
 
 BRIDGES = {
-    "time": ("s", "simulated time"),
+    "time": ("s", "from the begin of the drive"),
     "walker": ("", "number of the walker, from 0"),
-    "contact": ("", "1, 2: bead on the substrate, 3: bead on bead"),
-    "bead_1": ("", "id of the bead"),
-    "bead_2": ("", "id of the other bead, 0 for the substrate"),
+    "contact": ("", "number of the contact, from 1: beads with walls, then pairs of beads; 0 for any other bridge"),
+    "bead_1": ("", "number of the bead in the run, from 0"),
+    "bead_2": ("", "number of the other bead, -1 for a wall"),
+    "wall": ("", "number of the wall, 0 for the floor, -1 for none"),
+    "other_walker": ("", "number of the walker that the bridge joins it to, -1 for none"),
     "gap": ("m", "gap, negative where they touch"),
     "touching": ("", "whether the surfaces touch"),
     "normal_force": ("N", "net normal force (capillary, viscous, elastic), positive where it pulls the two together"),
 }
-"""``bridges.parquet``: a row a bridge and frame."""
+"""``bridges.parquet``: one row per bridge and frame."""
+
+MEETINGS = {
+    "time": ("s", "from the begin of the drive"),
+    "event": ("", "merged: the first bridge between two walkers is there; parted: the last one is gone"),
+    "walker": ("", "number of one of the two"),
+    "other": ("", "number of the other"),
+    "size": ("", "walkers that are joined by bridges, directly or by others, with the first one after that"),
+}
+"""``meetings.parquet``: one row per event between two walkers that are meant to meet."""
 
 BED = {
     "time": ("s", "from the begin of the drive; negative while the pile settles"),
@@ -118,14 +123,14 @@ CLUSTERS = {
     "wall_names": ("", "which ones: -x, +x, -y, +y, of a cylinder side"),
     "merged_into": ("", "number of the track that took it over, -1 if none did"),
 }
-"""``clusters.parquet``: a row a cluster of a pile."""
+"""``clusters.parquet``: one row per cluster of a pile."""
 
 PROFILE = {
     "height": ("m", "middle of a layer"),
     "packing_fraction": ("", "volume of beads over that of the container, mean over the second half of the drive"),
     "liquid_fraction": ("", "volume of bridges over that of the container, as above"),
 }
-"""``profile.parquet``: a row a layer of a pile."""
+"""``profile.parquet``: one row per layer of a pile."""
 
 EVENTS = {
     "time": ("s", "from the begin of the drive"),
@@ -135,12 +140,16 @@ EVENTS = {
 }
 """``events.parquet``: one row per event in the lives of a pile's clusters."""
 
-WALKER_TABLES = ("trajectory", "walkers", "bridges")
-PILE_TABLES = ("bed", "clusters", "events", "profile")
 TABLES = {
-    **{"trajectory": TRAJECTORY, "walkers": WALKERS, "bridges": BRIDGES},
+    **{"trajectory": TRAJECTORY, "walkers": WALKERS, "bridges": BRIDGES, "meetings": MEETINGS},
     **{"bed": BED, "clusters": CLUSTERS, "events": EVENTS, "profile": PROFILE},
 }
+
+
+def described(name: str, columns: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of the columns of a table of `TABLES`, those of the `FAMILIES` among them after the others."""
+    families = {key: FAMILIES[key.rpartition("_")[0]] for key in columns if key.rpartition("_")[0] in FAMILIES}
+    return {**TABLES[name], **families}
 
 
 def write_table(directory: Path, name: str, columns: Mapping[str, npt.NDArray[Any]]) -> None:
@@ -163,7 +172,7 @@ def write_table(directory: Path, name: str, columns: Mapping[str, npt.NDArray[An
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    description = TABLES[name]
+    description = described(name, columns)
     arrays = [_arrow(columns[key]) for key in description]
     fields = [
         pa.field(key, array.type, metadata={"unit": unit, "meaning": meaning})
@@ -180,7 +189,7 @@ def write_table(directory: Path, name: str, columns: Mapping[str, npt.NDArray[An
         )
 
 
-def intact(directory: Path, names: Iterable[str] = WALKER_TABLES) -> bool:
+def intact(directory: Path, names: Iterable[str]) -> bool:
     """Whether tables of a run directory are there and whole: parquet begins and ends with the same four bytes."""
     for name in names:
         path = directory / f"{name}.parquet"
@@ -216,8 +225,8 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     directory
         The run directory.
     name
-        ``trajectory``, ``walkers`` or ``bridges``, of a pile ``bed``, ``clusters``, ``events`` or ``profile``;
-        their columns are described in `TABLES`.
+        ``trajectory``, ``walkers``, ``bridges`` or ``meetings``, of a pile ``bed``, ``clusters``, ``events`` or
+        ``profile``; their columns are described in `TABLES`.
 
     Returns
     -------
@@ -236,5 +245,5 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     if name not in TABLES:
         raise KeyError(f"no table {name!r}; expected one of {', '.join(TABLES)}")
     frame: pd.DataFrame = pq.read_table(Path(directory) / f"{name}.parquet").to_pandas()
-    frame.attrs["units"] = {column: unit for column, (unit, _) in TABLES[name].items()}
+    frame.attrs["units"] = {column: unit for column, (unit, _) in described(name, frame.columns).items()}
     return frame

@@ -4,9 +4,10 @@ Knows cases and decks (`inputs`, `templates`); knows nothing of what the dumps m
 """
 
 from walkers.runner.binary import Engine, find_engine
-from walkers.runner.directory import FinishedRun, OpenRun, finished_run, open_run, run_name
+from walkers.runner.directory import FinishedRun, finished_run, run_name
 from walkers.runner.failures import EngineFailure
 from walkers.runner.launch import Progress, launch
+from walkers.runner.segments import OpenRun, open_run
 
 __all__ = [
     "Engine",

@@ -15,12 +15,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.case import Case
 from walkers.runner.binary import Engine
 from walkers.runner.directory import (
     CASE_NAME,
+    FIRST_SEGMENT,
     MANIFEST_NAME,
     REPLACED,
+    SEGMENT_NAME,
     UNFINISHED,
     FinishedRun,
     manifest,
@@ -33,7 +35,7 @@ from walkers.runner.directory import (
 from walkers.runner.files import write_json
 from walkers.runner.launch import EngineReport, check_room
 from walkers.runner.locks import locked
-from walkers.templates.deck import Deck
+from walkers.templates.deck import Deck, first_segment
 
 FOLDER = "ensembles"
 
@@ -56,7 +58,7 @@ class OpenEnsemble:
         Seconds since the epoch.
     """
 
-    cases: Mapping[str, WalkerCase]
+    cases: Mapping[str, Case]
     deck: Deck
     engine: Engine
     directory: Path
@@ -68,13 +70,19 @@ class OpenEnsemble:
         """Where a run of the ensemble is made."""
         return self.directory / name
 
+    def record(self, report: EngineReport) -> None:
+        """Say in each run what its segment is."""
+        for name, case in self.cases.items():
+            segment = {**vars(first_segment(case)), **vars(report), "root_mean_square_velocity": None}
+            write_json(self.run_directory(name) / FIRST_SEGMENT / SEGMENT_NAME, segment)
+
     def finish(self, report: EngineReport) -> dict[str, FinishedRun]:
         """Write the manifests and move the ensemble to its place; its runs by name."""
         shared = {"ensemble": self.place.name, "runs": len(self.cases), "walkers": len(self.deck.layout.walkers)}
         for name, case in self.cases.items():
             made = self.run_directory(name)
             said = manifest(case, name, self.engine, report, started=self.started, directory=made)
-            write_json(made / MANIFEST_NAME, {**said, "shared_deck": shared})
+            write_json(made / MANIFEST_NAME, {**said, "drive_from": 0, "segments": 1, "shared_deck": shared})
         first = next(iter(self.cases.values()))
         said = manifest(first, self.place.name, self.engine, report, started=self.started, directory=self.directory)
         write_json(self.directory / MANIFEST_NAME, {**said, "shared_deck": {**shared, "names": list(self.cases)}})
@@ -86,7 +94,7 @@ class OpenEnsemble:
 
 @contextmanager
 def make_ensemble(
-    cases: Mapping[str, WalkerCase], deck: Deck, engine: Engine, out: Path, locks: Sequence[int]
+    cases: Mapping[str, Case], deck: Deck, engine: Engine, out: Path, locks: Sequence[int]
 ) -> Iterator[OpenEnsemble]:
     """Make a fresh directory for an ensemble whose runs are locked, with its deck and the cases of its runs.
 
@@ -99,13 +107,13 @@ def make_ensemble(
     shutil.rmtree(incomplete, ignore_errors=True)
     ensemble = OpenEnsemble(cases, deck, engine, incomplete, place, locks, time.time())
     try:
-        with room_on_disk(incomplete, deck):
+        with room_on_disk(incomplete, deck.layout.bead_dump_bytes):
             place.parent.mkdir(exist_ok=True)
             check_room(place.parent, 2 * deck.layout.bead_dump_bytes)  # the whole and its parts, side by side
             incomplete.mkdir()
             write_deck(deck, incomplete)
             for name, case in cases.items():
-                ensemble.run_directory(name).mkdir()
+                (ensemble.run_directory(name) / FIRST_SEGMENT).mkdir(parents=True)
                 write_json(ensemble.run_directory(name) / CASE_NAME, case.as_dict())
             yield ensemble
     finally:

@@ -99,7 +99,7 @@ class BeadsLost(EngineFailure):
         self.lost = lost
         super().__init__(
             f"{lost} bead(s) left the simulation box before step {step}: walkers went further than the box is wide (a "
-            "larger start.spacing or a shorter run keeps them in), or a pile's beads left over the rim",
+            "larger dimers.spacing or a shorter run keeps them in), or a pile's beads left over the rim",
             directory,
         )
 
@@ -119,10 +119,9 @@ class BlowUp(EngineFailure):
 class DiskFull(EngineFailure):
     """No room for the output. Seen beforehand from the known size of the dump, or while the engine writes."""
 
-    def __init__(self, needed: int, free: int, directory: Path) -> None:
-        super().__init__(
-            f"disk full: {needed / 1e6:.3g} MB are still to be written, {free / 1e6:.3g} MB are free", directory
-        )
+    def __init__(self, needed: int | None, free: int, directory: Path) -> None:
+        wanted = "" if needed is None else f"{needed / 1e6:.3g} MB are still to be written, "
+        super().__init__(f"disk full: {wanted}{free / 1e6:.3g} MB are free", directory)
 
 
 class TimeLimitExceeded(EngineFailure):

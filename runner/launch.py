@@ -50,12 +50,26 @@ _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is: steps done and in all, simulated time in s, wall time in s since the launch."""
+    """How far a run is.
+
+    Attributes
+    ----------
+    step, steps
+        Of the drive, done and in all.
+    simulated
+        Time, s.
+    elapsed, made
+        Wall time of this call, s, and the steps that were made in it.
+    resting
+        Whether the beads still come to rest before the drive.
+    """
 
     step: int
     steps: int
     simulated: float
     elapsed: float
+    made: int = 0
+    resting: bool = False
 
 
 @dataclass(frozen=True)
@@ -263,7 +277,8 @@ class _Watch:
     @property
     def progress(self) -> Progress:
         layout = self.deck.layout
-        return Progress(self.step, layout.steps, self.step * layout.time_step, time.perf_counter() - self.begin)
+        elapsed = time.perf_counter() - self.begin
+        return Progress(self.step, layout.steps, self.step * layout.time_step, elapsed, self.step)
 
     def look(self) -> None:
         """Take in what the engine has written since the last look."""

@@ -1,4 +1,4 @@
-"""Runs made in segments: the pile's, which take long, each segment from a restart file to the next.
+"""Make a run, in one segment or in several, each from a restart file to the next.
 
 A run is made in ``NAME-HASH.incomplete``, its segments in ``segments/0000``, ``segments/0001``, … there. A segment that
 is being made is called ``0003.new`` and gets its name when it is whole; an interrupted run goes on after the last one.
@@ -10,26 +10,28 @@ from __future__ import annotations
 import re
 import shutil
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from walkers.inputs.case import Case
 from walkers.inputs.errors import Stopped, WalkersError
-from walkers.inputs.pile import PileCase
 from walkers.runner.binary import Engine
 from walkers.runner.directory import (
     CASE_NAME,
-    FAILURE_NAME,
     MANIFEST_NAME,
+    SEGMENT_NAME,
+    SEGMENTS,
     FinishedRun,
-    finished_run,
     manifest,
     move_into_place,
     record_failure,
     recover,
     room_on_disk,
     run_place,
+    segment_directories,
     unfinished,
     write_deck,
 )
@@ -37,221 +39,250 @@ from walkers.runner.failures import RunBusy
 from walkers.runner.files import fsync_path, read_json, settle, write_json
 from walkers.runner.launch import EngineReport, Progress, launch
 from walkers.runner.locks import locked
-from walkers.templates.deck import OUTPUT_NAME, Deck
-from walkers.templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Segment, render_segment, settling_steps
+from walkers.templates.deck import (
+    OUTPUT_NAME,
+    PREVIOUS_RESTART_NAME,
+    RESTART_NAME,
+    Deck,
+    Segment,
+    first_segment,
+    render_deck,
+    settling_steps,
+)
 
-SEGMENTS = "segments"
-SEGMENT_NAME = "segment.json"
 _LEAST_BYTES = 150
 """Of a restart file, an atom: whole ones had 300 to 580."""
-
-
-@dataclass(frozen=True)
-class PileProgress:
-    """How far a pile is: simulated time and wall time of this call (s), whether it is driven, share of the drive."""
-
-    simulated: float
-    elapsed: float
-    driven: bool
-    share: float
-
-
-def run_pile(
-    case: PileCase,
-    engine: Engine,
-    out: Path,
-    *,
-    force: bool = False,
-    on_progress: Callable[[PileProgress], None] | None = None,
-    time_limit: float | None = None,
-) -> tuple[FinishedRun, bool]:
-    """Run a pile, or go on with it.
-
-    Parameters
-    ----------
-    case, engine
-        What is run.
-    out
-        Folder of the run directories; made if need be.
-    force
-        Begin anew, also if the run is there.
-    on_progress
-        Called a few times a second.
-    time_limit
-        Wall time in s for each segment.
-
-    Returns
-    -------
-    run
-        Its segments are in ``segments/``.
-    found
-        Whether it was there before.
-
-    Raises
-    ------
-    RunBusy
-        If another process is making the same run.
-    EngineFailure
-        If the engine fails; the segments before stay, and the next call goes on after them.
-    """
-    place = run_place(case, engine, out)
-    out.mkdir(parents=True, exist_ok=True)
-    with locked([place]) as ours:
-        if place not in ours:
-            raise RunBusy(unfinished(place))
-        recover(place)
-        there = finished_run(place)
-        if there is not None and not force:
-            return there, True
-        made = unfinished(place)
-        if force and made.exists():
-            shutil.rmtree(made)
-        try:
-            return _make(_Making(case, engine, made, list(ours.values()), on_progress, time_limit), place), False
-        except Stopped:
-            raise
-        except (WalkersError, OSError) as failure:
-            record_failure(made, failure)
-            raise
-
-
-class _Making:
-    """A run that is being made or gone on with."""
-
-    def __init__(
-        self,
-        case: PileCase,
-        engine: Engine,
-        directory: Path,
-        locks: Sequence[int],
-        on_progress: Callable[[PileProgress], None] | None,
-        time_limit: float | None,
-    ) -> None:
-        self.case, self.engine, self.directory, self.locks = case, engine, directory, locks
-        self.on_progress, self.time_limit = on_progress, time_limit
-        self.begin = time.perf_counter()
-        directory.mkdir(exist_ok=True)
-        (directory / SEGMENTS).mkdir(exist_ok=True)
-        write_json(directory / CASE_NAME, case.as_dict())
-        (directory / FAILURE_NAME).unlink(missing_ok=True)
-        self.done = [_read_segment(path) for path in segment_directories(directory)]
-
-    def make(self, segment: Segment) -> dict[str, Any]:
-        """Make the next segment and say what it was."""
-        number = len(self.done)
-        place = self.directory / SEGMENTS / f"{number:04d}"
-        new = place.with_name(place.name + ".new")
-        shutil.rmtree(new, ignore_errors=True)
-        deck = render_segment(self.case, segment)
-        with room_on_disk(new, deck):
-            said = self._made(segment, deck, new, number)
-            settle(new)
-            new.rename(place)
-            fsync_path(place.parent)
-        # The restart before the last one is kept, should the last one prove bad.
-        if number > 1:
-            (place.with_name(f"{number - 2:04d}") / RESTART_NAME).unlink(missing_ok=True)
-        self.done.append(said)
-        return said
-
-    def _made(self, segment: Segment, deck: Deck, new: Path, number: int) -> dict[str, Any]:
-        """Run the deck of a segment in a fresh directory."""
-        new.mkdir()
-        write_deck(deck, new)
-        if segment.begin:
-            shutil.copyfile(new.with_name(f"{number - 1:04d}") / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
-        report = launch(
-            deck, new, self.engine, on_progress=self._tell(segment), time_limit=self.time_limit, keep_open=self.locks
-        )
-        (new / PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
-        said = {**vars(segment), **vars(report), "root_mean_square_velocity": _agitation(new)}
-        restart = new / RESTART_NAME
-        size = restart.stat().st_size if restart.exists() else 0
-        if size < _LEAST_BYTES * deck.layout.atoms:  # the engine does not look whether there was room for it
-            raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
-        write_json(new / SEGMENT_NAME, said)
-        return said
-
-    def _tell(self, segment: Segment) -> Callable[[Progress], None]:
-        run, tell = self.case.run, self.on_progress
-
-        def advance(progress: Progress) -> None:
-            if tell is None:
-                return
-            step = max(progress.step, segment.begin)
-            driven = 0 if segment.drive_from is None else step - segment.drive_from
-            share = driven / (run.cycles * run.steps_per_cycle)
-            elapsed = time.perf_counter() - self.begin
-            tell(PileProgress(step * run.time_step, elapsed, segment.drive_from is not None, share))
-
-        return advance
-
-
-def _make(making: _Making, place: Path) -> FinishedRun:
-    case, run = making.case, making.case.run
-    started = time.time()
-    while (start := _settled_at(making)) is None:
-        begin = making.done[-1]["end"] if making.done else 0
-        making.make(Segment(begin, begin + settling_steps(case), None))
-    end = start + run.cycles * run.steps_per_cycle
-    while (begin := making.done[-1]["end"]) < end:
-        making.make(Segment(begin, min(begin + run.cycles_per_segment * run.steps_per_cycle, end), start))
-    seconds = [sum(segment[name] for segment in making.done) for name in ("wall_seconds", "loop_seconds")]
-    report = EngineReport(making.done[0]["version"], seconds[0], seconds[1], end)
-    said = manifest(case, place.name, making.engine, report, started=started, directory=making.directory)
-    settling = {"drive_from": start, "settled": making.done[_first_driven(making) - 1]["root_mean_square_velocity"]}
-    for left in [making.directory / "result.json", *making.directory.glob("*.parquet")]:
-        left.unlink(missing_ok=True)  # of somebody who looked before the end
-    # Of all calls that it took.
-    said["seconds"]["total"] = max(said["seconds"]["total"], seconds[0])
-    write_json(making.directory / MANIFEST_NAME, {**said, **settling, "segments": len(making.done)})
-    move_into_place(making.directory, place)
-    return FinishedRun(place)
-
-
-def _first_driven(making: _Making) -> int:
-    driven = [number for number, segment in enumerate(making.done) if segment["drive_from"] is not None]
-    return driven[0] if driven else len(making.done)
-
-
-def _settled_at(making: _Making) -> int | None:
-    """Step at which the drive begins: the end of the first segment that leaves the pile at rest, or the last one."""
-    run = making.case.run
-    for segment in making.done:
-        if segment["drive_from"] is not None:
-            return int(segment["drive_from"])
-        at_rest = segment["root_mean_square_velocity"] < run.settled_below
-        if at_rest or segment["end"] * run.time_step >= run.longest_settling:
-            return int(segment["end"])
-    return None
-
-
-def _read_segment(directory: Path) -> dict[str, Any]:
-    try:
-        said = read_json(directory / SEGMENT_NAME)
-        if said["end"] > said["begin"] and "drive_from" in said:
-            return said
-        raise ValueError("begin, end or drive_from make no sense")
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        told = f"{directory} is damaged ({error}): delete {directory.parent.parent} to have the run made again"
-        raise DamagedSegment(told) from error
 
 
 class DamagedSegment(WalkersError):
     """A segment of an unfinished run that cannot be gone on from."""
 
 
-def _agitation(directory: Path) -> float:
-    """Root mean square velocity of the beads at the end of a segment, by mass, m/s: the deck has it printed last."""
-    told = re.findall(rb"^root mean square velocity (\S+)", (directory / OUTPUT_NAME).read_bytes(), re.MULTILINE)
-    return float(told[-1])
+@dataclass
+class OpenRun:
+    """A run that is being made, or gone on with, in a directory of its own beside its final place.
+
+    Attributes
+    ----------
+    case, engine
+        What determines it.
+    directory, place
+        Where it is made and where it belongs.
+    locks
+        File descriptors that the engine inherits.
+    done
+        What the segments that are whole say of themselves.
+    """
+
+    case: Case
+    engine: Engine
+    directory: Path
+    place: Path
+    locks: Sequence[int]
+    done: list[dict[str, Any]] = field(default_factory=list)
+    started: float = field(default_factory=time.time)
+
+    def make(
+        self,
+        *,
+        on_progress: Callable[[Progress], None] | None = None,
+        time_limit: float | None = None,
+        render: Callable[[Case, Segment], Deck] = render_deck,
+    ) -> None:
+        """Make the segments that are missing.
+
+        Parameters
+        ----------
+        on_progress
+            Called a few times a second.
+        time_limit
+            Wall time in s for each segment.
+        render
+            What makes their decks.
+
+        Raises
+        ------
+        EngineFailure
+            If the engine fails; the segments before stay.
+        """
+        begun, made = time.perf_counter(), 0
+        while (segment := self.next_segment()) is not None:
+            tell = _teller(self.case, segment, on_progress, begun, made) if on_progress else None
+            self._make(segment, render(self.case, segment), tell, time_limit)
+            made += segment.end - segment.begin
+
+    def next_segment(self) -> Segment | None:
+        """The segment that is to be made next; None after the last one."""
+        run = self.case.run
+        if not self.done:
+            return first_segment(self.case)
+        begin, start = int(self.done[-1]["end"]), self._drive_from()
+        if start is None:
+            return Segment(begin, begin + settling_steps(self.case), None)
+        end = start + run.steps
+        if begin >= end:
+            return None
+        return Segment(begin, min(begin + run.cycles_per_segment * run.steps_per_cycle, end), start)
+
+    def _drive_from(self) -> int | None:
+        """Step at which the drive begins: the end of the first segment that leaves the beads at rest, or the last."""
+        run = self.case.run
+        for segment in self.done:
+            if segment["drive_from"] is not None:
+                return int(segment["drive_from"])
+            at_rest = segment["root_mean_square_velocity"] < run.settled_below
+            if at_rest or segment["end"] * run.time_step >= run.longest_settling:
+                return int(segment["end"])
+        return None
+
+    def _make(
+        self, segment: Segment, deck: Deck, tell: Callable[[Progress], None] | None, time_limit: float | None
+    ) -> None:
+        number = len(self.done)
+        place = self.directory / SEGMENTS / f"{number:04d}"
+        new = place.with_name(place.name + ".new")
+        shutil.rmtree(new, ignore_errors=True)
+        with room_on_disk(new, deck.layout.bead_dump_bytes):
+            new.mkdir()
+            write_deck(deck, new)
+            if segment.begin:
+                shutil.copyfile(new.with_name(f"{number - 1:04d}") / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
+            report = launch(deck, new, self.engine, on_progress=tell, time_limit=time_limit, keep_open=self.locks)
+            (new / PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
+            record = {**vars(segment), **vars(report), "root_mean_square_velocity": _rms_velocity(new)}
+            if not self.case.run.in_one:
+                _check_restart(new / RESTART_NAME, deck)
+            write_json(new / SEGMENT_NAME, record)
+            settle(new)
+            new.rename(place)
+            fsync_path(place.parent)
+        # The restart before the last one is kept, should the last one prove bad.
+        if number > 1:
+            (place.with_name(f"{number - 2:04d}") / RESTART_NAME).unlink(missing_ok=True)
+        self.done.append(record)
+
+    def finish(self) -> FinishedRun:
+        """Write the manifest, last, and move the directory to its place."""
+        start = self._drive_from() or 0
+        seconds = [sum(segment[name] for segment in self.done) for name in ("wall_seconds", "loop_seconds")]
+        report = EngineReport(self.done[0]["version"], seconds[0], seconds[1], int(self.done[-1]["end"]))
+        record = manifest(
+            self.case, self.place.name, self.engine, report, started=self.started, directory=self.directory
+        )
+        record["seconds"]["total"] = max(record["seconds"]["total"], seconds[0])  # of all calls that it took
+        rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
+        settling = {"drive_from": start, "settled": rest[-1] if rest else None, "segments": len(self.done)}
+        write_json(self.directory / MANIFEST_NAME, {**record, **settling})
+        move_into_place(self.directory, self.place)
+        return FinishedRun(self.place)
 
 
-def is_pile(directory: Path) -> bool:
-    """Whether a run directory is a pile's."""
-    return (directory / SEGMENTS).is_dir()
+def _teller(
+    case: Case, segment: Segment, tell: Callable[[Progress], None], begun: float, made: int
+) -> Callable[[Progress], None]:
+    """What turns the progress of a segment into that of its run."""
+
+    def advance(progress: Progress) -> None:
+        step = max(progress.step, segment.begin)
+        resting = segment.drive_from is None
+        tell(
+            replace(
+                progress,
+                step=0 if segment.drive_from is None else step - segment.drive_from,
+                steps=case.run.steps,
+                made=made + step - segment.begin,
+                simulated=step * case.run.time_step,
+                elapsed=time.perf_counter() - begun,
+                resting=resting,
+            )
+        )
+
+    return advance
 
 
-def segment_directories(directory: Path) -> list[Path]:
-    """The whole segments of a run, in their order."""
-    return sorted(path for path in (directory / SEGMENTS).glob("[0-9]*") if not path.suffix)
+@contextmanager
+def open_run(case: Case, engine: Engine, out: Path) -> Iterator[OpenRun]:
+    """Make a run in a directory of its own, or go on with it.
+
+    Parameters
+    ----------
+    case, engine
+        What determines the run.
+    out
+        Folder of the run directories; made if need be.
+
+    Yields
+    ------
+    OpenRun
+        Call its `OpenRun.make` and `OpenRun.finish`. Left without the latter, the directory stays as ``….incomplete``,
+        with a ``failure.json`` if something failed.
+
+    Raises
+    ------
+    RunBusy
+        If another process is making the same run.
+    DiskFull
+        If there is no room even for the deck.
+    """
+    place = run_place(case, engine, out)
+    out.mkdir(parents=True, exist_ok=True)
+    with locked([place]) as ours:
+        if place not in ours:
+            raise RunBusy(unfinished(place))
+        with open_locked(case, engine, place, list(ours.values())) as run:
+            yield run
+
+
+@contextmanager
+def open_locked(
+    case: Case, engine: Engine, place: Path, locks: Sequence[int], *, anew: bool = False
+) -> Iterator[OpenRun]:
+    """`open_run` for somebody who has locked the place already; ``anew`` drops what there is of an earlier call."""
+    directory = unfinished(place)
+    recover(place)
+    if anew:
+        shutil.rmtree(directory, ignore_errors=True)
+    try:
+        with room_on_disk(directory):
+            (directory / SEGMENTS).mkdir(parents=True, exist_ok=True)
+            _clear(directory)
+            write_json(directory / CASE_NAME, case.as_dict())
+            done = [_read_segment(path) for path in segment_directories(directory)]
+            yield OpenRun(case, engine, directory, place, locks, done)
+    except Stopped:
+        raise
+    except (WalkersError, OSError) as failure:
+        record_failure(directory, failure)
+        raise
+
+
+def _clear(directory: Path) -> None:
+    """Remove what an earlier call left of a run beside its whole segments: tables, and parts of files and segments."""
+    for path in (*directory.iterdir(), *(directory / SEGMENTS).glob("*.new")):
+        if path.is_dir() and path.name != SEGMENTS:
+            shutil.rmtree(path)
+        elif path.is_file():
+            path.unlink()
+
+
+def _read_segment(directory: Path) -> dict[str, Any]:
+    try:
+        record = read_json(directory / SEGMENT_NAME)
+        if record["end"] > record["begin"] and "drive_from" in record:
+            return record
+        raise ValueError("begin, end or drive_from make no sense")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        message = f"{directory} is damaged ({error}): delete {directory.parent.parent} to have the run made again"
+        raise DamagedSegment(message) from error
+
+
+def _check_restart(restart: Path, deck: Deck) -> None:
+    size = restart.stat().st_size if restart.exists() else 0
+    if size < _LEAST_BYTES * deck.layout.atoms:  # the engine does not look whether there was room for it
+        raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
+
+
+def _rms_velocity(directory: Path) -> float | None:
+    """Root mean square velocity of the beads at the end of a segment, by mass, m/s, if the deck has it printed."""
+    lines = re.findall(rb"^root mean square velocity (\S+)", (directory / OUTPUT_NAME).read_bytes(), re.MULTILINE)
+    return float(lines[-1]) if lines else None

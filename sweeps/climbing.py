@@ -13,10 +13,9 @@ import numpy.typing as npt
 from walkers.inputs.axes import flatten
 from walkers.inputs.errors import InputError, Problem
 from walkers.postprocess.clusters import Climb, ClimbCriteria
-from walkers.postprocess.pile_result import analyse, classified
-from walkers.runner.directory import CASE_NAME, finished_run
+from walkers.postprocess.piles import Pile, analyse, classified
+from walkers.runner.directory import CASE_NAME, MANIFEST_NAME, finished_run
 from walkers.runner.files import read_json
-from walkers.runner.segments import SEGMENTS, is_pile
 from walkers.sweeps.record import RECORD_NAME, read_record, result_in, states
 
 _CONFIDENCE = 0.95
@@ -39,19 +38,18 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
     """
     if (directory / RECORD_NAME).exists():
         found = [state.directory for state in states(read_record(directory)) if state.directory is not None]
-    elif is_pile(directory):
+    elif (directory / CASE_NAME).exists():
         found = [directory]
     else:
-        found = sorted(path.parent for path in directory.glob(f"*/{SEGMENTS}"))
-    finished = {
-        path.name.rpartition("-")[2]: path for path in found if finished_run(path) is not None and is_pile(path)
-    }
-    if not finished:
-        raise InputError(str(directory), [Problem("", None, "expected a finished run of a pile, or a folder or sweep")])
+        found = sorted(path.parent for path in directory.glob(f"*/{MANIFEST_NAME}"))
+    runs = [run for path in found if (run := finished_run(path)) is not None]
     try:
-        cases = {path: _conditions(read_json(path / CASE_NAME)) for path in finished.values()}
+        piles = {run.directory.name.rpartition("-")[2]: run for run in runs if Pile().applies(run.case)}
+        cases = {run.directory: _conditions(read_json(run.directory / CASE_NAME)) for run in piles.values()}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(str(directory), [Problem("", None, f"a case cannot be read ({error})")]) from error
+    if not cases:
+        raise InputError(str(directory), [Problem("", None, "expected a finished run of a pile, or a folder or sweep")])
     first = next(iter(cases.values()))
     differ = [
         key for key in first if key not in _NO_CONDITION and len({str(case.get(key)) for case in cases.values()}) > 1
@@ -134,7 +132,7 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        A row a definition, the usual one first: ``threshold`` and ``value`` (empty and None for the usual one),
+        One row per definition, the usual one first: ``threshold`` and ``value`` (empty and None for the usual one),
         ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s).
     """
     usual = ClimbCriteria()

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
 
-from walkers.inputs.reading import AnyCase
-from walkers.sweeps.kinds import replicates_of, seconds_of, sharing_of
+from walkers.inputs.case import Case
+from walkers.runner.cost import pairs_of_beads, predicted_seconds
+from walkers.templates.sharing import sharing_key
 
 MOST_WALKERS = 96
 """In a deck; with 96 the share of the deck's own cost is down to 4 %."""
@@ -34,7 +35,7 @@ class PlannedDeck:
     seconds: float
 
 
-def pack(cases: Mapping[int, AnyCase], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
+def pack(cases: Mapping[int, Case], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
     """Pack points into decks.
 
     Parameters
@@ -53,7 +54,7 @@ def pack(cases: Mapping[int, AnyCase], workers: int, longest_seconds: float = LO
     """
     groups: dict[Hashable, list[int]] = {}
     for number, case in cases.items():
-        groups.setdefault(sharing_of(case), []).append(number)
+        groups.setdefault(sharing_key(case), []).append(number)
     together = list(groups.values())
     singles = [_deck([number], cases).seconds for number in cases]
     if len(together) == len(cases):
@@ -71,14 +72,14 @@ def pack(cases: Mapping[int, AnyCase], workers: int, longest_seconds: float = LO
     return sorted(plans[good], key=lambda deck: -deck.seconds)
 
 
-def _parted(group: Sequence[int], cases: Mapping[int, AnyCase], longest: float) -> list[PlannedDeck]:
+def _parted(group: Sequence[int], cases: Mapping[int, Case], longest: float) -> list[PlannedDeck]:
     """A group in the fewest decks that keep to the bounds; a point by itself may exceed them."""
-    most_replicates = max(replicates_of(cases[number]) for number in group)
+    most_replicates = max(pairs_of_beads(cases[number]) for number in group)
 
     def allowed(parts: int) -> bool:
         points = ceil(len(group) / parts)
         walkers = points * most_replicates
-        seconds = seconds_of(cases[group[0]], walkers)  # a group shares the number of steps
+        seconds = predicted_seconds(cases[group[0]], walkers)  # a group shares the number of steps
         return points == 1 or (points <= MOST_POINTS and walkers <= MOST_WALKERS and seconds <= longest)
 
     fewest = bisect_left(range(1, len(group)), True, key=allowed) + 1
@@ -91,9 +92,9 @@ def _parts(group: Sequence[int], count: int) -> list[Sequence[int]]:
     return [group[start:end] for start, end in pairwise(edges)]
 
 
-def _deck(points: Sequence[int], cases: Mapping[int, AnyCase]) -> PlannedDeck:
-    walkers = sum(replicates_of(cases[number]) for number in points)
-    return PlannedDeck(tuple(points), seconds_of(cases[points[0]], walkers))
+def _deck(points: Sequence[int], cases: Mapping[int, Case]) -> PlannedDeck:
+    walkers = sum(pairs_of_beads(cases[number]) for number in points)
+    return PlannedDeck(tuple(points), predicted_seconds(cases[points[0]], walkers))
 
 
 def makespan(seconds: Iterable[float], workers: int) -> float:
@@ -106,7 +107,7 @@ def makespan(seconds: Iterable[float], workers: int) -> float:
 
 
 def unfinished_parts(
-    points: Sequence[int], cases: Mapping[int, AnyCase], is_finished: Callable[[int], bool]
+    points: Sequence[int], cases: Mapping[int, Case], is_finished: Callable[[int], bool]
 ) -> list[PlannedDeck]:
     """What is left of a deck: itself, or those of its halves, halves of halves …, of which nothing is finished.
 

@@ -13,18 +13,18 @@ from pathlib import Path
 from typing import Any
 
 from walkers.inputs.axes import plain
+from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, WalkersError
-from walkers.inputs.reading import AnyCase
 from walkers.inputs.sweep import Descent, Sweep
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, run_place, unfinished
 from walkers.runner.ensemble import FOLDER, finished_places
 from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import is_locked
-from walkers.sweeps.kinds import DERIVED, current_result_of, derived_of, kind_of, velocity_in
+from walkers.sweeps.columns import analyses_of_all, derived_columns, derived_of, result_columns, velocity_in
 
 RECORD_NAME = "sweep.json"
-_FORMAT = 1
+_FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,13 @@ class SweepRecord:
     values
         Of each point, one a key.
     derived
-        Of each point, one a column of `walkers.sweeps.kinds.DERIVED`.
+        Of each point, one a column of `walkers.sweeps.columns.derived_columns`.
     runs
         Name of each point's run.
     descent
         How the points depend on each other, if they do.
-    kind
-        Of the cases, ``walker`` (and climber) or ``pile``.
+    analyses
+        Names of the analyses that mean something for its cases.
     """
 
     directory: Path
@@ -59,7 +59,7 @@ class SweepRecord:
     derived: Sequence[Sequence[float]]
     runs: Sequence[str]
     descent: Descent | None
-    kind: str = "walker"
+    analyses: Sequence[str]
 
     @property
     def out(self) -> Path:
@@ -67,7 +67,7 @@ class SweepRecord:
         return self.directory.parent
 
 
-def describe_sweep(sweep: Sweep, cases: Sequence[AnyCase], engine: Engine, out: Path) -> SweepRecord:
+def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Path) -> SweepRecord:
     """The record of a sweep whose points have been resolved.
 
     Raises
@@ -75,7 +75,8 @@ def describe_sweep(sweep: Sweep, cases: Sequence[AnyCase], engine: Engine, out: 
     InputError
         If a sweep cannot have that name, or piles are to descend.
     """
-    if sweep.descent is not None and any(kind_of(case) == "pile" for case in cases):
+    names = analyses_of_all(cases)
+    if sweep.descent is not None and "velocity" not in result_columns(names):
         raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
     if sweep.name == FOLDER:
         raise InputError(sweep.source, [Problem("", None, f"a sweep cannot be called {FOLDER}: rename the file")])
@@ -85,10 +86,10 @@ def describe_sweep(sweep: Sweep, cases: Sequence[AnyCase], engine: Engine, out: 
         title=sweep.title,
         units=dict(zip(sweep.keys, sweep.units, strict=True)),
         values=[[_plain(value) for value in row] for row in sweep.rows],
-        derived=[derived_of(case) for case in cases],
+        derived=[derived_of(case, names) for case in cases],
         runs=[run_place(case, engine, out).name for case in cases],
         descent=sweep.descent,
-        kind=kind_of(cases[0]) if cases else "walker",
+        analyses=names,
     )
 
 
@@ -108,8 +109,8 @@ def write_record(record: SweepRecord) -> None:
             "title": record.title,
             "units": dict(record.units),
             "descent": vars(descent) if descent else None,
-            "kind": record.kind,
-            "derived": list(DERIVED[record.kind]),
+            "analyses": list(record.analyses),
+            "derived": list(derived_columns(record.analyses)),
             "points": [
                 {"values": list(values), "derived": list(derived), "run": run}
                 for values, derived, run in zip(record.values, record.derived, record.runs, strict=True)
@@ -139,7 +140,7 @@ def read_record(directory: str | Path) -> SweepRecord:
             derived=[point["derived"] for point in points],
             runs=[point["run"] for point in points],
             descent=Descent(**contents["descent"]) if contents["descent"] else None,
-            kind=contents.get("kind", "walker"),  # of before there were piles
+            analyses=contents["analyses"],
         )
     except FileNotFoundError as error:
         told = f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"
@@ -228,6 +229,8 @@ def result_in(directory: Path) -> dict[str, Any]:
         If it can neither be read nor be made anew from the dumps.
     """
     try:
-        return current_result_of(directory)
+        from walkers.postprocess.analysis import current_result
+
+        return current_result(directory)
     except (OSError, ValueError, KeyError, TypeError, IndexError, WalkersError) as error:
         raise DamagedRunError(f"{directory} is damaged ({error}): delete it to have it made again") from error

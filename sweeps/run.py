@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from walkers.inputs.reading import AnyCase
+from walkers.inputs.case import Case
 from walkers.inputs.sweep import Sweep
 from walkers.runner.binary import Engine, find_engine
-from walkers.sweeps.kinds import ranks_of, seconds_of
+from walkers.runner.cost import predicted_seconds
 from walkers.sweeps.packing import PlannedDeck, makespan, pack, unfinished_parts
 from walkers.sweeps.record import SweepRecord, describe_sweep, states, write_record
-from walkers.sweeps.scheduler import Failure, Options, Progress, final_failures, schedule
+from walkers.sweeps.scheduler import Failure, Options, SweepProgress, final_failures, schedule
 from walkers.sweeps.shared_deck import check_audit
 from walkers.sweeps.site import check_path
 
@@ -42,7 +42,7 @@ class SweepPlan:
     """
 
     record: SweepRecord
-    cases: Sequence[AnyCase]
+    cases: Sequence[Case]
     engine: Engine
     decks: Sequence[PlannedDeck]
     statuses: Sequence[str]
@@ -52,7 +52,7 @@ class SweepPlan:
     @property
     def core_seconds(self) -> float:
         """Predicted time of the engines, over all of their MPI processes, s."""
-        return sum(deck.seconds * max(ranks_of(self.cases[point]) for point in deck.points) for deck in self.decks)
+        return sum(deck.seconds * max(self.cases[point].run.ranks for point in deck.points) for deck in self.decks)
 
     @property
     def wall_seconds(self) -> float:
@@ -63,7 +63,7 @@ class SweepPlan:
     def core_seconds_apart(self) -> float:
         """What the same points would cost with one deck a point, s."""
         missing = {point for deck in self.decks for point in deck.points}
-        return sum(seconds_of(self.cases[point]) * ranks_of(self.cases[point]) for point in missing)
+        return sum(predicted_seconds(self.cases[point]) * self.cases[point].run.ranks for point in missing)
 
     def as_text(self) -> str:
         """The plan in a few lines."""
@@ -106,7 +106,7 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     """
     binary = find_engine(engine)
     cases = list(sweep.cases())
-    options = options.for_ranks(max(map(ranks_of, cases)))
+    options = options.for_ranks(max(case.run.ranks for case in cases))
     record = describe_sweep(sweep, cases, binary, out)
     if options.site is not None:
         check_path(record.directory)
@@ -134,7 +134,7 @@ def run_sweep(
     *,
     engine: str | None = None,
     allow_failed_audit: bool = False,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[SweepProgress], None] | None = None,
 ) -> tuple[SweepRecord, list[Failure]]:
     """Make all runs of a sweep that are missing.
 
@@ -169,5 +169,5 @@ def run_sweep(
     write_record(plan.record)
     if not plan.decks:
         return plan.record, plan.final
-    options = options.for_ranks(max(map(ranks_of, plan.cases)))
+    options = options.for_ranks(max(case.run.ranks for case in plan.cases))
     return plan.record, schedule(plan.record, plan.cases, plan.engine, options, on_progress)

@@ -14,16 +14,16 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
+from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, WalkersError
-from walkers.inputs.reading import AnyCase
 from walkers.runner.binary import Engine
 from walkers.runner.ensemble import remove_remains
 from walkers.runner.locks import is_locked
-from walkers.sweeps.kinds import sharing_of
 from walkers.sweeps.packing import LONGEST_SECONDS, PlannedDeck, halves, pack, unfinished_parts
 from walkers.sweeps.record import PointState, SweepRecord, chains, states, velocity_of
 from walkers.sweeps.site import Site, pilots, threads
 from walkers.sweeps.worker import STOPS, Report, SweepStopped, Task, work
+from walkers.templates.sharing import sharing_key
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -94,7 +94,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Progress:
+class SweepProgress:
     """How far a sweep is: numbers of points, wall time in s since the start, time left in s as far as one can say."""
 
     points: int
@@ -139,10 +139,10 @@ class _Job:
 
 def schedule(
     record: SweepRecord,
-    cases: Sequence[AnyCase],
+    cases: Sequence[Case],
     engine: Engine,
     options: Options,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[SweepProgress], None] | None = None,
 ) -> list[Failure]:
     """Make all runs of a sweep that are missing.
 
@@ -222,7 +222,7 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[_Workers]:
 
 
 def batches(
-    record: SweepRecord, cases: Sequence[AnyCase], stopped: Callable[[int], bool]
+    record: SweepRecord, cases: Sequence[Case], stopped: Callable[[int], bool]
 ) -> list[Generator[list[int], None, None]]:
     """The order in which points may be made.
 
@@ -243,7 +243,7 @@ def batches(
         return [(numbers for numbers in [list(range(len(cases)))])]
     together: dict[Any, list[list[int]]] = {}
     for chain in chains(record):
-        together.setdefault(sharing_of(cases[chain[0]]), []).append(chain)
+        together.setdefault(sharing_key(cases[chain[0]]), []).append(chain)
 
     def descend(descents: list[list[int]]) -> Generator[list[int], None, None]:
         for step in range(len(descents[0])):
@@ -270,14 +270,14 @@ class _Scheduler:
     def __init__(
         self,
         record: SweepRecord,
-        cases: Sequence[AnyCase],
+        cases: Sequence[Case],
         engine: Engine,
         options: Options,
         workers: _Workers,
-        on_progress: Callable[[Progress], None] | None,
+        on_progress: Callable[[SweepProgress], None] | None,
     ) -> None:
         self.record, self.options, self.parsl, self.engine = record, options, workers, engine
-        self.cases: Mapping[int, AnyCase] = dict(enumerate(cases))
+        self.cases: Mapping[int, Case] = dict(enumerate(cases))
         self.on_progress = on_progress or (lambda _: None)
         found = states(record)
         known = zip(record.runs, found, strict=True)
@@ -407,7 +407,7 @@ class _Scheduler:
             self.told = now
             self.on_progress(self._progress())
 
-    def _progress(self) -> Progress:
+    def _progress(self) -> SweepProgress:
         running = sum(
             len(job.deck.points)
             for job in list(self.out_there)[: 4 * self.options.decks_at_once]
@@ -415,7 +415,7 @@ class _Scheduler:
         )
         waiting = sum(job.deck.seconds for job in [*self.out_there, *(job for _, job in self.later)])
         elapsed = time.perf_counter() - self.begin
-        return Progress(
+        return SweepProgress(
             points=len(self.record.runs),
             found=self.found,
             done=self.found + self.done,

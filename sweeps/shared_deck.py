@@ -1,4 +1,4 @@
-"""Make the runs of several cases with one deck; of a single case with its own."""
+"""Make the runs of several cases with one deck; that of a single case with its own."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.pile import PileCase
-from walkers.inputs.reading import AnyCase
+from walkers.inputs.case import Case
 from walkers.runner.audits import read_audit
 from walkers.runner.binary import Engine
-from walkers.runner.directory import FinishedRun, finished_run, make_run, recover, run_place
+from walkers.runner.directory import FIRST_SEGMENT, FinishedRun, finished_run, recover, run_place
 from walkers.runner.ensemble import finished_place, make_ensemble
-from walkers.runner.failures import AuditFailed, RunBusy, UnauditedEngineWarning
+from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
 from walkers.runner.launch import Progress, launch
 from walkers.runner.locks import locked
-from walkers.runner.segments import run_pile
-from walkers.templates.deck import render_deck, render_shared_deck
+from walkers.runner.segments import open_locked
+from walkers.templates.deck import render_shared_deck
 
 
 @dataclass(frozen=True)
@@ -40,11 +38,8 @@ class Made:
     busy: frozenset[str]
 
 
-_NONE = Made({}, frozenset(), frozenset())
-
-
-def make_together(
-    cases: Sequence[WalkerCase],
+def make_runs(
+    cases: Sequence[Case],
     out: Path,
     engine: Engine,
     *,
@@ -52,7 +47,7 @@ def make_together(
     on_progress: Callable[[Progress], None] | None = None,
     time_limit: float | None = None,
 ) -> Made:
-    """Make the runs that are missing, in one deck, and tabulate them.
+    """Make the runs that are missing, in one deck, and tabulate them; a single one goes on where it was interrupted.
 
     Parameters
     ----------
@@ -67,7 +62,7 @@ def make_together(
     on_progress
         Called a few times a second while the engine runs; what it raises ends the engine.
     time_limit
-        Wall time in s that the engine may take.
+        Wall time in s that the engine may take, for each segment.
 
     Raises
     ------
@@ -85,42 +80,8 @@ def make_together(
         found = frozenset(runs)
         if missing:
             locks = [ours[place] for place in missing]
-            runs |= _make(missing, out, engine, locks, on_progress, time_limit)
+            runs |= _make(missing, out, engine, locks, on_progress, time_limit, anew=force)
     return Made(runs, found, busy)
-
-
-def make_any(
-    cases: Sequence[AnyCase],
-    out: Path,
-    engine: Engine,
-    on_progress: Callable[[object], None],
-    time_limit: float | None,
-) -> Made:
-    """`make_together` for cases of any kind: piles are made one by one, and go on where they were interrupted."""
-    walkers = [case for case in cases if isinstance(case, WalkerCase)]
-    made = make_together(walkers, out, engine, on_progress=on_progress, time_limit=time_limit) if walkers else _NONE
-    for case in cases:
-        if isinstance(case, PileCase):
-            made = _with(made, _make_pile(case, out, engine, on_progress, time_limit))
-    return made
-
-
-def _make_pile(
-    case: PileCase, out: Path, engine: Engine, on_progress: Callable[[object], None], time_limit: float | None
-) -> Made:
-    from walkers.postprocess.pile_result import current_pile_result
-
-    name = run_place(case, engine, out).name
-    try:
-        run, found = run_pile(case, engine, out, on_progress=on_progress, time_limit=time_limit)
-    except RunBusy:
-        return Made({}, frozenset(), frozenset({name}))
-    current_pile_result(run.directory)
-    return Made({name: run}, frozenset({name} if found else ()), frozenset())
-
-
-def _with(one: Made, other: Made) -> Made:
-    return Made({**one.runs, **other.runs}, one.found | other.found, one.busy | other.busy)
 
 
 def _finished(out: Path, name: str) -> FinishedRun | None:
@@ -129,38 +90,39 @@ def _finished(out: Path, name: str) -> FinishedRun | None:
 
 
 def _make(
-    missing: Mapping[Path, WalkerCase],
+    missing: Mapping[Path, Case],
     out: Path,
     engine: Engine,
     locks: Sequence[int],
     on_progress: Callable[[Progress], None] | None,
     time_limit: float | None,
+    *,
+    anew: bool,
 ) -> dict[str, FinishedRun]:
     # Numpy and pyarrow are imported after the engine has run: who is in a hurry loads them while it does.
-    cases = list(missing.values())
-    if len(cases) == 1:
-        (place,) = missing
-        with make_run(cases[0], render_deck(cases[0]), engine, place, locks) as run:
-            report = launch(
-                run.deck, run.directory, engine, on_progress=on_progress, time_limit=time_limit, keep_open=locks
-            )
+    if len(missing) == 1:
+        ((place, case),) = missing.items()
+        with open_locked(case, engine, place, locks, anew=anew) as run:
+            run.make(on_progress=on_progress, time_limit=time_limit)
             _tabulate([run.directory])
-            return {place.name: run.finish(report)}
+            return {place.name: run.finish()}
     named = {place.name: case for place, case in missing.items()}
-    with make_ensemble(named, render_shared_deck(cases), engine, out, locks) as ensemble:
+    with make_ensemble(named, render_shared_deck(list(named.values())), engine, out, locks) as ensemble:
         report = launch(
             ensemble.deck, ensemble.directory, engine, on_progress=on_progress, time_limit=time_limit, keep_open=locks
         )
         from walkers.postprocess.splitting import split_output
 
         directories = {ensemble.run_directory(name): case for name, case in named.items()}
-        split_output(ensemble.directory, ensemble.deck.layout, directories)
+        ensemble.record(report)
+        dumps = {directory / FIRST_SEGMENT: case for directory, case in directories.items()}
+        split_output(ensemble.directory, ensemble.deck.layout, dumps)
         _tabulate(directories)
         return ensemble.finish(report)
 
 
 def _tabulate(directories: Iterable[Path]) -> None:
-    from walkers.postprocess.result import tabulate
+    from walkers.postprocess.analysis import tabulate
 
     for directory in directories:
         tabulate(directory)

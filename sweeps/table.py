@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.runner.files import write_bytes
-from walkers.sweeps.kinds import DERIVED, RESULTS, columns_of
+from walkers.sweeps.columns import derived_columns, result_columns, row_of
 from walkers.sweeps.record import (
     DamagedRunError,
     PointState,
@@ -30,7 +30,8 @@ STATE = {
     "run": ("", "run directory, from where the table was made; of a failed point what is left of it"),
 }
 
-_INPUTS = {name for columns in DERIVED.values() for name in columns}
+_INPUTS = ("peak_velocity",)
+"""Speeds that are no results."""
 _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
     *("standard_error", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2", "open_3"),
@@ -52,9 +53,9 @@ def load(directory: str | Path) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row a point, in the order of the sweep; a descent's points below its end are left out. Columns are ``point``,
-        the keys that vary (in the unit of the sweep file), and (SI units) `walkers.sweeps.kinds.DERIVED`,
-        `walkers.sweeps.kinds.RESULTS` and `STATE`.
+        One row per point, in the order of the sweep; a descent's points below its end are left out. Columns are
+        ``point``, the keys that vary (in the unit of the sweep file), and (SI units)
+        `walkers.sweeps.columns.derived_columns`, `walkers.sweeps.columns.result_columns` and `STATE`.
         ``attrs["units"]`` maps columns to units, ``attrs["meanings"]`` to what they are. Numbers of points that are
         not finished are NaN.
 
@@ -67,7 +68,7 @@ def load(directory: str | Path) -> pd.DataFrame:
 
     record = read_record(directory)
     rows = [_row(record, number, state) for number, state in enumerate(states(record)) if state.status != "not needed"]
-    described = {**_varied(record), **DERIVED[record.kind], **RESULTS[record.kind], **STATE}
+    described = {**_varied(record), **derived_columns(record.analyses), **result_columns(record.analyses), **STATE}
     frame = pd.DataFrame(rows, columns=["point", *described])
     frame.attrs["units"] = {"point": "", **{name: unit for name, (unit, _) in described.items()}}
     frame.attrs["meanings"] = {"point": "number of the point", **{name: told for name, (_, told) in described.items()}}
@@ -89,8 +90,8 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
     row: dict[str, Any] = {"point": number}
     for key, value in zip(record.units, record.values[number], strict=True):
         row |= {f"{key}[{part}]": one for part, one in enumerate(value)} if isinstance(value, list) else {key: value}
-    row |= dict(zip(DERIVED[record.kind], record.derived[number], strict=True))
-    row |= dict.fromkeys(RESULTS[record.kind], nan) | {
+    row |= dict(zip(derived_columns(record.analyses), record.derived[number], strict=True))
+    row |= dict.fromkeys(result_columns(record.analyses), nan) | {
         "status": state.status,
         "lost": state.lost,
         "reason": state.reason or "",
@@ -99,7 +100,7 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
     if state.status != "finished" or state.directory is None:
         return row
     try:
-        return row | columns_of(result_in(state.directory))
+        return row | row_of(result_in(state.directory))
     except DamagedRunError:
         return row | {"status": "failed", "reason": DamagedRunError.__name__}
 
@@ -170,7 +171,7 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row a descent: the other keys that vary, ``moving`` and ``at_rest``, the last values of the lowered key at
+        One row per descent: the other keys that vary, ``moving`` and ``at_rest``, the last values of the lowered key at
         which the walkers moved and the first at which they did not (NaN where there is none, yet or at all), and
         ``gamma0_moving`` and ``gamma0_at_rest``, the dimensionless peak forces Γ0 there.
 

@@ -8,13 +8,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from walkers.inputs.case import Case
 from walkers.inputs.errors import Stopped, WalkersError
-from walkers.inputs.reading import AnyCase
+from walkers.postprocess.analysis import current_result
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import run_place
+from walkers.runner.directory import run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, ProgramDiffers
-from walkers.sweeps.kinds import current_result_of, velocity_in
-from walkers.sweeps.shared_deck import make_any
+from walkers.sweeps.columns import velocity_in
+from walkers.sweeps.shared_deck import make_runs
 
 STOPS: dict[str, threading.Event] = {}
 """Of the sweeps that this process runs, by `Task.sweep`: set to end their engines and to let none begin."""
@@ -46,7 +47,7 @@ class Task:
 
     sweep: str
     runs: tuple[str, ...]
-    cases: tuple[AnyCase, ...]
+    cases: tuple[Case, ...]
     out: Path
     engine: str
     sha256: str
@@ -89,7 +90,7 @@ def work(task: Task) -> Report:
             raise SweepStopped("stopped")
         return _made(task, look)
     except EngineFailure as failure:
-        directory = str(failure.directory) if failure.directory else None
+        directory = str(unfinished(task.out / task.runs[0])) if failure.directory else None
         return Report(failure=failure.reason, message=str(failure), directory=directory)
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
@@ -105,8 +106,8 @@ def _made(task: Task, look: Callable[[object], None]) -> Report:
         raise EngineDiffers(engine.path)
     if task.runs != tuple(run_place(case, engine, task.out).name for case in task.cases):
         raise ProgramDiffers
-    made = make_any(task.cases, task.out, engine, look, task.time_limit)
+    made = make_runs(task.cases, task.out, engine, on_progress=look, time_limit=task.time_limit)
     finished = {
-        name: (str(run.directory), velocity_in(current_result_of(run.directory))) for name, run in made.runs.items()
+        name: (str(run.directory), velocity_in(current_result(run.directory))) for name, run in made.runs.items()
     }
     return Report(finished=finished, busy=tuple(sorted(made.busy)))

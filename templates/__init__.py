@@ -4,6 +4,7 @@ Knows the cases (`inputs`); knows nothing of processes, files on disk or results
 engine, and every workaround for what it gets wrong, is in `walkers.templates.engine`.
 """
 
-from walkers.templates.deck import Deck, Layout, PlacedWalker, render_deck
+from walkers.templates.deck import Deck, render_deck
+from walkers.templates.layout import Layout, PlacedWalker
 
 __all__ = ["Deck", "Layout", "PlacedWalker", "render_deck"]

@@ -5,18 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from math import degrees, inf, sqrt
+from math import degrees, pi, sqrt
 from typing import TYPE_CHECKING
 
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import contact_loads, dimer_of, hop_height, reach
-from walkers.inputs.pile import PileCase
+from walkers.inputs.case import Case
+from walkers.inputs.drive import Vector
+from walkers.inputs.loads import hop_height, reach
+from walkers.physics.capillary import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
 from walkers.physics.film import film_drag
 from walkers.physics.matter import Contact
 from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds, contact_angle_setting, separation_cap, wall_mesh
-from walkers.templates.layout import BEAD_COLUMNS, PAIR_BRIDGE_COLUMNS, WALL_BRIDGE_COLUMNS, Layout, PlacedWalker
-from walkers.templates.placement import place_walkers
-from walkers.templates.scene import Point, Scene, without_carriers
+from walkers.templates.layout import (
+    BEAD_COLUMNS,
+    PAIR_BRIDGE_COLUMNS,
+    PAIR_BRIDGES,
+    WALL_BRIDGE_COLUMNS,
+    WALL_BRIDGES,
+    Layout,
+    PlacedWalker,
+)
+from walkers.templates.placement import place
+from walkers.templates.scene import Scene, without_carriers
 from walkers.templates.sharing import check_sharing, surfaces_of
 
 if TYPE_CHECKING:
@@ -27,10 +36,15 @@ OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
 WALL_NAME = "walls.stl"
 STATUS_LINES_PER_CYCLE = 4
-CONTENT_VERSION = 1
+CONTENT_VERSION = 2
 """Of what decks compute: to be raised where the same case gives another deck, comments aside. Runs are named by it."""
 
-__all__ = ["DECK_NAME", "LAYOUT_NAME", "OUTPUT_NAME", "Deck", "Layout", "PlacedWalker", "render_deck"]
+RESTART_NAME = "state.restart"
+PREVIOUS_RESTART_NAME = "previous.restart"
+SETTLING_SECONDS = 0.05
+"""Length of the segments in which beads come to rest; at the end of each we check whether they have."""
+_SKIN = 2e-4
+"""m; of piles: between 0.1 and 0.3 mm it makes no difference of more than some per cent to the time of a step."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +68,7 @@ class Deck:
     text: str
     files: Mapping[str, str]
     layout: Layout
-    box: tuple[Point, Point]
+    box: tuple[Vector, Vector]
     fastest: float
 
 
@@ -78,9 +92,20 @@ class Recording:
     bridge_every: int
     status_every: int
     bead_columns: tuple[str, ...] = BEAD_COLUMNS
-    begin: int = 0
-    pair_bridge_columns: tuple[str, ...] = PAIR_BRIDGE_COLUMNS
     wall_bridge_columns: tuple[str, ...] = WALL_BRIDGE_COLUMNS
+    begin: int = 0
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A segment of a run: from a step to a step, from a restart file (unless it is the first) to the next.
+
+    ``drive_from`` is the step at which the drive begins; None while the beads come to rest.
+    """
+
+    begin: int
+    end: int
+    drive_from: int | None
 
 
 @dataclass(frozen=True)
@@ -107,20 +132,14 @@ class Plan:
         Restart file to write or to go on from.
     surfaces
         How the beads' surfaces touch, by `walkers.templates.scene.Bead.surface`; the case's own contact if left out.
-    fastest
-        A speed that no bead can reach, m/s; computed from the case if left out.
     drive_from
         Step at which the drive begins; None for a segment before it.
     skin
         How far beyond contact neighbours are looked for, m; if left out, the smallest radius, and wide bins, which
         suits few beads far apart.
-    title
-        What the deck is of, for those who read it.
-    print_rms_velocity
-        Whether the root mean square velocity of the beads is printed at the end.
     """
 
-    case: WalkerCase | PileCase
+    case: Case
     scene: Scene
     recording: Recording
     walkers: tuple[PlacedWalker, ...] = ()
@@ -129,11 +148,8 @@ class Plan:
     ranks: int = 1
     checkpoint: Checkpoint = NO_CHECKPOINT
     surfaces: tuple[Contact, ...] = ()
-    fastest: float | None = None
     drive_from: int | None = 0
     skin: float | None = None
-    title: str = "Wet dimers on a shaken substrate"
-    print_rms_velocity: bool = False
 
     @property
     def shaken(self) -> bool:
@@ -146,13 +162,29 @@ class Plan:
         return self.drive_from == self.recording.begin
 
 
-def render_deck(case: WalkerCase, workarounds: Workarounds = ALL_WORKAROUNDS) -> Deck:
-    """Render a walker case.
+def first_segment(case: Case) -> Segment:
+    """The segment that a run begins with: all of it, or the first cycles, or that in which the beads come to rest."""
+    run = case.run
+    if run.rests:
+        return Segment(0, settling_steps(case), None)
+    return Segment(0, min(run.cycles_per_segment, run.cycles) * run.steps_per_cycle, 0)
+
+
+def settling_steps(case: Case) -> int:
+    """Steps of a segment in which beads come to rest."""
+    sample = case.run.steps_per_sample
+    return max(1, round(SETTLING_SECONDS / case.run.time_step / sample)) * sample
+
+
+def render_deck(case: Case, segment: Segment | None = None, workarounds: Workarounds = ALL_WORKAROUNDS) -> Deck:
+    """Render a case.
 
     Parameters
     ----------
     case
         A resolved case.
+    segment
+        Of its run; the first one if left out.
     workarounds
         Which workarounds for the engine's defects the deck carries.
 
@@ -161,10 +193,10 @@ def render_deck(case: WalkerCase, workarounds: Workarounds = ALL_WORKAROUNDS) ->
     Deck
         Numbers in full precision (the shortest text that reads back as the same double).
     """
-    return compose(walker_plan(case, workarounds=workarounds))
+    return compose(plan_of(case, segment=segment, workarounds=workarounds))
 
 
-def render_shared_deck(cases: Sequence[WalkerCase]) -> Deck:
+def render_shared_deck(cases: Sequence[Case]) -> Deck:
     """Render one deck for the walkers of several cases, in their order.
 
     Raises
@@ -172,23 +204,37 @@ def render_shared_deck(cases: Sequence[WalkerCase]) -> Deck:
     ValueError
         If they cannot share a deck (see `walkers.templates.sharing.sharing_key`).
     """
-    return compose(walker_plan(*cases))
+    return compose(plan_of(*cases))
 
 
-def walker_plan(*cases: WalkerCase, workarounds: Workarounds = ALL_WORKAROUNDS) -> Plan:
-    """The plan of walker cases that share a deck: their replicates on one substrate, recorded as the cases say."""
+def plan_of(*cases: Case, segment: Segment | None = None, workarounds: Workarounds = ALL_WORKAROUNDS) -> Plan:
+    """The plan of a segment of cases that share a deck: their bodies on one boundary, recorded as the cases say."""
     check_sharing(cases)
-    case = cases[0]
-    scene, walkers = place_walkers(cases)
-    run = case.run
+    case, run = cases[0], cases[0].run
+    segment = segment or first_segment(case)
+    scene, walkers = place(cases)
     recording = Recording(
-        steps=run.steps,
-        sample_every=run.steps_per_cycle // run.samples_per_cycle,
-        bridge_every=run.steps_per_cycle // run.bridge_samples_per_cycle,
+        steps=segment.end,
+        sample_every=run.steps_per_sample,
+        bridge_every=run.steps_per_sample * run.samples_per_bridge_sample,
         status_every=-(-run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
+        begin=segment.begin,
     )
-    fastest = max(fastest_of(one) for one in cases)
-    return Plan(case, scene, recording, walkers, workarounds, surfaces=surfaces_of(cases), fastest=fastest)
+    checkpoint = NO_CHECKPOINT
+    if not run.in_one:
+        checkpoint = Checkpoint(RESTART_NAME, PREVIOUS_RESTART_NAME if segment.begin else None)
+    return Plan(
+        case=case,
+        scene=scene,
+        recording=recording,
+        walkers=walkers,
+        workarounds=workarounds,
+        ranks=run.ranks,
+        checkpoint=checkpoint,
+        surfaces=surfaces_of(cases),
+        drive_from=segment.drive_from,
+        skin=_SKIN if case.loose else None,
+    )
 
 
 def compose(plan: Plan) -> Deck:
@@ -198,7 +244,7 @@ def compose(plan: Plan) -> Deck:
     if not workarounds.carriers:
         gone = len(scene.carriers)
         scene = without_carriers(scene)
-        walkers = tuple(replace(one, beads=(one.beads[0] - gone, one.beads[1] - gone)) for one in walkers)
+        walkers = tuple(replace(one, beads=tuple(bead - gone for bead in one.beads)) for one in walkers)
     first = case.drive.harmonics[0]
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
     angle = case.liquid.contact_angle
@@ -230,16 +276,15 @@ def compose(plan: Plan) -> Deck:
         prescribed=plan.prescribed,
         ranks=plan.ranks,
         checkpoint=plan.checkpoint,
-        pair_bridge_terms=_terms("pair_bridges", layout.pair_bridge_columns, PAIR_BRIDGE_COLUMNS),
-        wall_bridge_terms=_terms("wall_bridges", layout.wall_bridge_columns, WALL_BRIDGE_COLUMNS),
+        pair_bridge_terms=_terms("pair_bridges", layout.pair_bridge_columns, " ".join(PAIR_BRIDGES).split()),
+        wall_bridge_terms=_terms("wall_bridges", layout.wall_bridge_columns, " ".join(WALL_BRIDGES).split()),
+        pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
+        wall_bridge_options=" ".join(WALL_BRIDGES.values()),
         skin=plan.skin or min(bead.radius for bead in scene.beads),
         bin_size=None if plan.skin else _bin_size(scene),
     )  # fmt: skip
     files = {WALL_NAME: wall_mesh(scene.faces, max(scene.upper))}
-    fastest = plan.fastest
-    if fastest is None:
-        fastest = fastest_of(case) if isinstance(case, WalkerCase) else inf
-    return Deck(text, files, layout, (scene.lower, scene.upper), fastest)
+    return Deck(text, files, layout, (scene.lower, scene.upper), fastest_of(case, scene))
 
 
 @dataclass(frozen=True)
@@ -251,7 +296,7 @@ class _Film:
     coefficient: float
 
 
-def _films(case: WalkerCase | PileCase, scene: Scene) -> list[_Film]:
+def _films(case: Case, scene: Scene) -> list[_Film]:
     viscosity = case.liquid.film_viscosity
     radii = dict.fromkeys(bead.radius for bead in scene.beads) if viscosity else ()
     return [
@@ -281,7 +326,7 @@ def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
     ]
 
 
-def _contact_model(case: WalkerCase | PileCase) -> str:
+def _contact_model(case: Case) -> str:
     rolling = " rolling_friction cdt" if case.contact.rolling_friction > 0 else ""
     return f"hertz tangential history cohesion easo/capillary/viscous{rolling}"
 
@@ -292,24 +337,31 @@ def _bin_size(scene: Scene) -> float:
     return float(max(4.0 * max(bead.radius for bead in scene.beads), (width * depth * height / 2e4) ** (1.0 / 3.0)))
 
 
-def fastest_of(case: WalkerCase) -> float:
-    """Ten times the substrate's peak velocity, plus a fall from the highest hop, plus what a bridge's pull can give."""
-    loads = contact_loads(case)
-    pull = sqrt(2.0 * max(loads.capillary) * max(loads.rupture) / min(dimer_of(case).masses))
-    fall = sqrt(2.0 * case.gravity * (hop_height(case) if case.boundary.tilt == 0.0 else reach(case)))
-    return 10.0 * case.drive.peak_velocity + fall + pull
+def fastest_of(case: Case, scene: Scene) -> float:
+    """Ten times the boundary's peak velocity (20 in a pile), plus the deepest fall, plus what a bridge can give, m/s.
+
+    Of cases that share a deck any one will do: they have the drive in common, and it is a bound far from anything real.
+    """
+    liquid, sizes = case.liquid, sorted(bead.radius for bead in scene.beads)
+    mass, volume = (
+        4.0 / 3.0 * pi * sizes[0] ** 3 * case.density,
+        bridge_volume_at_wall(sizes[-1], liquid.volume_fraction),
+    )
+    pull = capillary_force_at_wall(liquid.surface_tension, sizes[-1], volume, liquid.contact_angle)
+    work = pull * rupture_distance(volume, liquid.contact_angle)
+    deep = hop_height(case) if case.boundary.tilt == 0.0 else reach(case)
+    fall = sqrt(2.0 * case.gravity * (scene.upper[2] if case.loose else deep))
+    return (20.0 if case.loose else 10.0) * case.drive.peak_velocity + fall + sqrt(2.0 * work / mass)
 
 
-def _layout(
-    case: WalkerCase | PileCase, scene: Scene, recording: Recording, walkers: tuple[PlacedWalker, ...]
-) -> Layout:
+def _layout(case: Case, scene: Scene, recording: Recording, walkers: tuple[PlacedWalker, ...]) -> Layout:
     return Layout(
         bead_dump="beads.bin",
         bead_columns=recording.bead_columns,
         sample_every=recording.sample_every,
         frames=(recording.steps - recording.begin) // recording.sample_every + 1,
         pair_bridge_dump="bridges.pairs.txt",
-        pair_bridge_columns=recording.pair_bridge_columns,
+        pair_bridge_columns=PAIR_BRIDGE_COLUMNS,
         wall_bridge_dump="bridges.walls.txt",
         wall_bridge_columns=recording.wall_bridge_columns,
         bridge_every=recording.bridge_every,

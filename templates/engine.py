@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from math import degrees, sqrt
 
+from walkers.inputs.boundary import Face
 from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
 from walkers.physics.wall import WALL_COPIES
-from walkers.templates.scene import AXES, Face, turned
 
 
 @dataclass(frozen=True)
@@ -266,14 +266,14 @@ def face_triangle(face: Face, size: float) -> str:
     size
         Half of the triangle's width, m; far larger than the box.
     """
-    index = AXES.index(face.axis)
+    index = ("x", "y", "z").index(face.axis)
     # Two axes in the plane of the wall, in the order that makes the corners run counter-clockwise about the normal.
     first, second = ((index + 1) % 3, (index + 2) % 3)[:: face.side]
     corners = []
     for along, up in ((-1.0, -0.6), (1.0, -0.6), (0.0, 1.2)):
         offset = [0.0, 0.0, 0.0]
         offset[first], offset[second] = along * size, up * size
-        away = turned((offset[0], offset[1], offset[2]), face.turn)
+        away = face.turned((offset[0], offset[1], offset[2]))
         corner = [middle + shift for middle, shift in zip(face.centroid, away, strict=True)]
         corners.append("      vertex " + " ".join(repr(float(value)) for value in corner) + "\n")
     normal = " ".join(repr(value) for value in face.normal)

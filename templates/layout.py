@@ -5,30 +5,42 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-BEAD_COLUMNS = (
-    *("id", "type", "radius", "x", "y", "z", "vx", "vy", "vz"),
-    *("omegax", "omegay", "omegaz", "fx", "fy", "fz"),
-)
-"""Columns of the bead dump, in the engine's names (m, m/s, rad/s, N)."""
+BEAD_COLUMNS = ("id", "type", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
+"""Columns of the bead dump, in the engine's names (m, m/s, rad/s)."""
+FORCE_COLUMNS = ("fx", "fy", "fz", "tqx", "tqy", "tqz")
+"""Further ones that it may have (N, N m)."""
 
-PAIR_BRIDGE_COLUMNS = ("x1", "y1", "z1", "x2", "y2", "z2", "id1", "id2", "periodic", "fx", "fy", "fz", "overlap")
+PAIR_BRIDGES = {
+    "x1 y1 z1 x2 y2 z2": "pos",
+    "id1 id2 periodic": "id",
+    "fx fy fz": "force",
+    "overlap": "delta",
+}
+WALL_BRIDGES = {
+    "x y z bead_x bead_y bead_z": "pos",
+    "mesh triangle id": "id",
+    "fx fy fz": "force",
+    "overlap": "delta",
+}
+"""What the engine computes of bridges, in its order: names of the columns and the option that gives them."""
+PAIR_BRIDGE_COLUMNS = ("id1", "id2", "fx", "fy", "fz", "overlap")
 """Columns of the dump of bridges between beads; the force acts on bead ``id1``."""
-
-WALL_BRIDGE_COLUMNS = ("x", "y", "z", "bead_x", "bead_y", "bead_z", "mesh", "triangle", "id", "fx", "fy", "fz")
-"""Columns of the dump of bridges to walls: nearest point of the wall, centre of the bead, force on bead ``id``.
+WALL_BRIDGE_COLUMNS = ("triangle", "id", "fx", "fy", "fz", "overlap")
+"""Columns of the dump of bridges to walls: number of the wall's face, force on bead ``id``.
 A wall that stands twice has two rows."""
 
 
 @dataclass(frozen=True)
 class PlacedWalker:
-    """One walker of a deck: its beads' ids and how it was started.
+    """One walker of a deck: which of the case's makes of walkers it is, its beads' ids, and how it was started.
 
     ``facing`` is the direction in which the first bead points, +1 along the drive axis (right) or −1 (left);
     ``start_angle`` in rad is measured from that direction; ``origin`` in m.
     """
 
     walker: int
-    beads: tuple[int, int]
+    make: int
+    beads: tuple[int, ...]
     facing: int
     start_angle: float
     origin: tuple[float, float]
@@ -74,13 +86,7 @@ class Layout:
     def from_dict(cls, values: dict[str, Any]) -> Layout:
         """Rebuild from `as_dict`."""
         walkers = tuple(
-            PlacedWalker(
-                walker=entry["walker"],
-                beads=(entry["beads"][0], entry["beads"][1]),
-                facing=entry["facing"],
-                start_angle=entry["start_angle"],
-                origin=(entry["origin"][0], entry["origin"][1]),
-            )
+            PlacedWalker(**{**entry, "beads": tuple(entry["beads"]), "origin": tuple(entry["origin"])})
             for entry in values["walkers"]
         )
         columns = {key: tuple(values[key]) for key in values if key.endswith("_columns")}

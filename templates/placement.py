@@ -1,100 +1,69 @@
-"""Where the walkers of a deck begin: a grid of independent walkers on one substrate, each perturbed a little."""
+"""Where the beads of a deck begin: its walkers on a grid, all else where the case has it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from math import atan2, ceil, cos, pi, sin, sqrt
 
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import contact_loads, hop_height, horizontal_distance, reach
+from walkers.inputs.bodies import Standing
+from walkers.inputs.boundary import Span
+from walkers.inputs.case import Case
+from walkers.inputs.loads import hop_height, reach
 from walkers.templates.layout import PlacedWalker
-from walkers.templates.scene import Bead, Face, Scene
+from walkers.templates.scene import Bead, Scene
 from walkers.templates.sharing import surfaces_of
 
-_FIRST_BEAD = 2  # atom 1 is the carrier of the substrate
 
+@lru_cache(maxsize=4)  # the segments of a run begin with the same scene
+def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
+    """Place the bodies of cases that share a deck, and size the box so that no walker can leave it unnoticed.
 
-def place_walkers(cases: Sequence[WalkerCase]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
-    """Place the replicates of cases that share a deck, and size the box so that none can leave it unnoticed.
-
-    Replicates alternate between facing right and left where the case says both. Each draws its start angle and the
-    gap of its contacts from its own random stream (seed, number of the walker in its case), so that walker k is the
-    same whoever shares the deck.
+    Each walker draws its start from its own random stream (seed, number of the walker in its case), so that walker k is
+    the same whoever shares the deck.
     """
-    placed = [(case, number) for case in cases for number in range(case.start.replicates)]
+    standing = [(case, make, one) for case in cases for make, one in _standing(case)]
+    walking = [(case, make, one) for case, make, one in standing if one.walks]
+    spacing = max((walkers.spacing for case in cases for walkers in case.walkers), default=0.0)
+    boundary = cases[0].boundary
+    grid = boundary.grid(len(walking), spacing) if walking else []
+    room = boundary.room(_span(cases, grid, spacing), cases[0].run.ranks)
     surfaces = surfaces_of(cases)
-    spacing = max(case.start.spacing for case in cases)
-    columns = ceil(sqrt(len(placed)))
-    rows = ceil(len(placed) / columns)
     walkers: list[PlacedWalker] = []
     beads: list[Bead] = []
-    for place, (case, number) in enumerate(placed):
-        row, column = divmod(place, columns)
-        origin = ((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing)
-        walker, pair = _place(case, number, place, origin, surface=1 + surfaces.index(case.contact))
-        walkers.append(walker)
-        beads += pair
+    for case, make, one in standing:
+        origin = grid[len(walkers)] if one.walks else (0.0, 0.0)
+        first = len(room.carriers) + 1 + len(beads)
+        surface = 1 + surfaces.index(case.contact)
+        beads += [
+            Bead(first + number, (origin[0] + bead.x, origin[1] + bead.y, bead.z), bead.radius, surface=surface)
+            for number, bead in enumerate(one.beads)
+        ]
+        if one.walks:
+            ids = tuple(range(first, first + len(one.beads)))
+            walkers.append(PlacedWalker(len(walkers), make, ids, one.facing, one.angle, origin))
+    return Scene(tuple(beads), boundary.faces(), room.carriers, room.lower, room.upper), tuple(walkers)
+
+
+def _standing(case: Case) -> list[tuple[int, Standing]]:
+    """What stands in a case, each with the number of its body."""
+    standing: list[tuple[int, Standing]] = []
+    for make, body in enumerate(case.bodies):
+        standing += [(make, one) for one in body.stand(case, len(standing))]
+    return standing
+
+
+def _span(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> Span:
     far = max(spacing / 2.0, *(reach(case) for case in cases))
-    half_x = (rows - 1) / 2.0 * spacing + far
-    half_y = (columns - 1) / 2.0 * spacing + far
-    largest = max(max(case.beads.radii) for case in cases)
+    largest = max(max(case.radii) for case in cases)
     amplitude = cases[0].drive.amplitude
-    margin = 4.0 * largest + 2.0 * amplitude
-    height = 10.0 * largest + max(hop_height(case) for case in cases) + 2.0 * amplitude
-    scene = Scene(
-        beads=tuple(beads),
-        faces=(Face("z", 1, (0.0, 0.0, 0.0)),),
-        # In the corner, beyond the walkers' reach and above it.
-        carriers=((half_x + margin, half_y + margin, height + margin),),
-        lower=(-half_x - 2.0 * margin, -half_y - 2.0 * margin, -margin),
-        upper=(half_x + 2.0 * margin, half_y + 2.0 * margin, height + 2.0 * margin),
+    placed = [bead for case in cases if case.placed is not None for bead in case.placed.beads]
+    return Span(
+        half_x=max([x for x, _ in grid] + [abs(x) for x, *_ in placed], default=0.0) + far,
+        half_y=max([y for _, y in grid] + [abs(y) for _, y, *_ in placed], default=0.0) + far,
+        height=10.0 * largest
+        + max([z for _, _, z, _ in placed], default=0.0)
+        + max(hop_height(case) for case in cases)
+        + 2.0 * amplitude,
+        margin=4.0 * largest + 2.0 * amplitude,
+        largest=largest,
     )
-    return scene, tuple(walkers)
-
-
-def _facing(case: WalkerCase, number: int) -> int:
-    if case.start.facing == "both":
-        return 1 if number % 2 == 0 else -1
-    return 1 if case.start.facing == "right" else -1
-
-
-def _perturbation(case: WalkerCase, number: int) -> tuple[float, float]:
-    """Start angle (rad) and the factor on the equilibrium overlap of one walker."""
-    start = case.start
-    turn, press = _draws(start.seed, number)
-    return start.angle + start.angle_spread * turn, 1.0 + start.gap_spread * press
-
-
-@lru_cache(maxsize=4096)
-def _draws(seed: int, number: int) -> tuple[float, float]:
-    from numpy.random import default_rng
-
-    turn, press = default_rng([seed, number]).uniform(-1.0, 1.0, size=2)
-    return float(turn), float(press)
-
-
-def _place(
-    case: WalkerCase, number: int, place: int, origin: tuple[float, float], *, surface: int
-) -> tuple[PlacedWalker, tuple[Bead, Bead]]:
-    """Walker ``number`` of its case, at a place of the deck."""
-    radii, facing = case.beads.radii, _facing(case, number)
-    angle, factor = _perturbation(case, number)
-    at_rest = contact_loads(case).overlaps if case.start.gap is None else (-case.start.gap,) * 3
-    overlaps = (at_rest[0] * factor, at_rest[1] * factor, at_rest[2] * factor)
-    distance = horizontal_distance(radii, overlaps)
-    heading = atan2(case.drive_axis[1], case.drive_axis[0]) + angle + (0.0 if facing > 0 else pi)
-    # The point of contact of the two beads lies over the origin.
-    lever = distance * radii[0] / sum(radii)
-    arms = (lever, lever - distance)
-    ids = (_FIRST_BEAD + 2 * place, _FIRST_BEAD + 2 * place + 1)
-    first, second = (
-        Bead(
-            identifier,
-            (origin[0] + arm * cos(heading), origin[1] + arm * sin(heading), radius - overlap),
-            radius,
-            surface=surface,
-        )
-        for identifier, arm, radius, overlap in zip(ids, arms, radii, overlaps[:2], strict=True)
-    )
-    return PlacedWalker(place, ids, facing, angle, origin), (first, second)

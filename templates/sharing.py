@@ -9,24 +9,26 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import reach
+from walkers.inputs.case import Case
+from walkers.inputs.loads import reach
 from walkers.physics.matter import Contact
 
 
-def surfaces_of(cases: Sequence[WalkerCase]) -> tuple[Contact, ...]:
+def surfaces_of(cases: Sequence[Case]) -> tuple[Contact, ...]:
     """How the cases' beads touch each other and the walls, each way once, in the order of the cases."""
     return tuple(dict.fromkeys(case.contact for case in cases))
 
 
-def sharing_key(case: WalkerCase) -> Hashable:
+def sharing_key(case: Case) -> Hashable:
     """Cases with equal keys may share a deck: everything of the case that a deck has only once.
 
     The time step is among it. Cases whose ``"auto"`` steps differ (beads of other sizes) stay apart, so that a case is
     integrated with the same step whoever shares the deck.
     """
+    if not case.independent:
+        return case
     # Walkers that are to stand closer than their own reach would not meet the same neighbours in another company.
-    crowded = case if case.start.spacing < 2.0 * reach(case) else None
+    crowded = case if min(one.spacing for one in case.walkers) < 2.0 * reach(case) else None
     contact = replace(
         case.contact,
         friction_bead_bead=0.0,
@@ -37,10 +39,10 @@ def sharing_key(case: WalkerCase) -> Hashable:
     )
     liquid = replace(case.liquid, name=None, density=None)
     boundary = replace(case.boundary, material="")
-    return (boundary, liquid, contact, case.drive, case.run, case.gravity, case.beads.density, crowded)
+    return (boundary, liquid, contact, case.drive, case.run, case.gravity, case.density, crowded)
 
 
-def check_sharing(cases: Sequence[WalkerCase]) -> None:
+def check_sharing(cases: Sequence[Case]) -> None:
     """Raise ``ValueError`` unless the cases, at least one, may share a deck."""
     if len({sharing_key(case) for case in cases}) != 1:
         raise ValueError("these cases cannot share a deck")

@@ -17,9 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
-from walkers import run_case
+from walkers import run as run_case
 from walkers.inputs import load_case
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.case import Case
+from walkers.runner import FinishedRun
 from walkers.theory.friction import Friction
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import friction_of
@@ -61,19 +62,23 @@ def measure_steps(folder: Path) -> None:
             print(f"| {count} | {frame} | {microseconds:.2f} | {microseconds / count:.2f} |")
 
 
-def _ensemble(count: int, frame: str) -> WalkerCase:
+def _ensemble(count: int, frame: str) -> Case:
     case = load_case("fig1b")
     return replace(
         case,
         drive=replace(case.drive, frame="lab" if frame == "lab" else "container"),
-        start=replace(case.start, replicates=count),
+        walkers=(replace(case.walkers[0], replicates=count),),
         run=replace(case.run, cycles=20, settling_cycles=5),
     )
 
 
-def _step_microseconds(case: WalkerCase, out: Path) -> float:
-    loops = [run_case(case, out, force=True).run.manifest["seconds"]["engine_loop"] for _ in range(_REPEATS)]
+def _step_microseconds(case: Case, out: Path) -> float:
+    loops = [_engine_loop(run_case(case, out, force=True).directory) for _ in range(_REPEATS)]
     return min(loops) / case.run.steps * 1e6
+
+
+def _engine_loop(directory: Path) -> float:
+    return float(FinishedRun(directory).manifest["seconds"]["engine_loop"])
 
 
 def measure_theory() -> None:

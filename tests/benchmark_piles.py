@@ -16,22 +16,35 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from walkers.inputs import PileCase, resolve_pile_case, shipped_cases
-from walkers.postprocess.pile import read_pile
-from walkers.runner.binary import find_engine
-from walkers.runner.directory import write_deck
+from walkers.inputs import resolve_case, shipped_cases
+from walkers.inputs.case import Case
+from walkers.postprocess import read_motion, tabulate
+from walkers.runner import FinishedRun, find_engine, open_run
+from walkers.runner.directory import SEGMENTS, write_deck
 from walkers.runner.files import read_json
-from walkers.runner.segments import SEGMENTS, run_pile, segment_directories
-from walkers.templates.deck import DECK_NAME, OUTPUT_NAME
-from walkers.templates.pile import PREVIOUS_RESTART_NAME, RESTART_NAME, Segment, render_segment
+from walkers.templates.deck import (
+    DECK_NAME,
+    OUTPUT_NAME,
+    PREVIOUS_RESTART_NAME,
+    RESTART_NAME,
+    Segment,
+    render_deck,
+)
 
 _REPEATS = 2
 
 
-def _case(name: str, **run: Any) -> PileCase:
+def _case(name: str, **run: Any) -> Case:
     tables = tomllib.loads(shipped_cases()[name].read_text())
     tables["run"] |= run
-    return resolve_pile_case(tables, name=name)
+    return resolve_case(tables, name=name)
+
+
+def _run(case: Case, out: Path) -> FinishedRun:
+    """Make a run, without its tables."""
+    with open_run(case, find_engine(), out) as run:
+        run.make()
+        return run.finish()
 
 
 def measure_loop(out: Path) -> None:
@@ -39,29 +52,29 @@ def measure_loop(out: Path) -> None:
     print("| | ratio |\n|---|---|")
     case = _case("pile-small", duration="0.5 s", segment="0.25 s")
     begin = time.perf_counter()
-    run, _ = run_pile(case, find_engine(None), out, force=True)
+    run = _run(case, out)
     wall = time.perf_counter() - begin
     loop = run.manifest["seconds"]["engine_loop"]
     print(f"| engine's loop over wall time, small pile, segments of 0.25 s | {loop / wall:.3f} |")
     ours, theirs = [], []
-    last = segment_directories(run.directory)[-1]
+    last = run.segments[-1]
     for number in range(_REPEATS):
         again = _case("pile-small", duration="0.5 s", segment="0.25 s")
-        redone, _ = run_pile(again, find_engine(None), out / f"again-{number}", force=True)
-        ours.append(read_json(segment_directories(redone.directory)[-1] / "segment.json")["loop_seconds"])
+        redone = _run(again, out / f"again-{number}")
+        ours.append(read_json(redone.segments[-1] / "segment.json")["loop_seconds"])
         theirs.append(_by_hand(case, last, out / "by-hand"))
     steps = read_json(last / "segment.json")
-    speed = sum(case.beads.counts) * (steps["end"] - steps["begin"])
+    speed = case.count * (steps["end"] - steps["begin"])
     print(f"| its last segment: bead-steps a second, `walkers run` over by hand | {min(theirs) / min(ours):.3f} |")
     print(f"\n{speed / min(ours) / 1e6:.2f} million bead-steps a second on one core")
 
 
-def _by_hand(case: PileCase, segment: Path, folder: Path) -> float:
+def _by_hand(case: Case, segment: Path, folder: Path) -> float:
     """Loop time of a segment's deck when ``liggghts`` is called on it in a folder, s."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     said = read_json(segment / "segment.json")
-    write_deck(render_segment(case, Segment(said["begin"], said["end"], said["drive_from"])), folder)
+    write_deck(render_deck(case, Segment(said["begin"], said["end"], said["drive_from"])), folder)
     before = segment.with_name(f"{int(segment.name) - 1:04d}") / RESTART_NAME
     shutil.copyfile(before, folder / PREVIOUS_RESTART_NAME)
     command = ["liggghts", "-in", DECK_NAME]
@@ -76,17 +89,17 @@ def measure_ranks(out: Path) -> None:
     print("\n| full pile | bead-steps a second |\n|---|---|")
     for ranks in (1, 2):
         case = _case("pile-fig1a", duration="0.1 s", segment="0.1 s", ranks=ranks, longest_settling="0.05 s")
-        run, _ = run_pile(case, find_engine(None), out, force=True)
-        segment = read_json(segment_directories(run.directory)[-1] / "segment.json")
-        speed = (segment["end"] - segment["begin"]) * sum(case.beads.counts) / segment["loop_seconds"] / 1e6
+        run = _run(case, out)
+        segment = read_json(run.segments[-1] / "segment.json")
+        speed = (segment["end"] - segment["begin"]) * case.count / segment["loop_seconds"] / 1e6
         print(f"| {ranks} rank{'s' * (ranks > 1)} | {speed:.2f} million |")
 
 
 def measure_tables(out: Path) -> None:
     """Time and memory of the tables of the full pile with 2,000 frames and their bridges."""
     case = _case("pile-fig1a", duration="0.37 s", frames_per_second=5440.0, segment="0.1 s", longest_settling="0.05 s")
-    run, _ = run_pile(case, find_engine(None), out)
-    frames = len(read_pile(run.directory).time)
+    run = _run(case, out)
+    frames = len(read_motion(run.directory).time)
     begin = time.perf_counter()
     command = [sys.executable, __file__, "tabulate", str(run.directory)]
     told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
@@ -99,9 +112,7 @@ def measure_tables(out: Path) -> None:
 def main() -> None:
     """Print the tables."""
     if sys.argv[1:2] == ["tabulate"]:
-        from walkers.postprocess.pile_result import tabulate_pile
-
-        tabulate_pile(sys.argv[2])
+        tabulate(sys.argv[2])
         print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
         return
     with tempfile.TemporaryDirectory() as folder:

@@ -16,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from walkers import run_case
+from walkers import run as run_case
 from walkers.inputs.sweep import load_sweep
 from walkers.runner.cost import START_UP_SECONDS
 
@@ -31,11 +31,11 @@ drive.peak_acceleration = { linspace = ["0.5 g", "10 g", 100] }
 _TRIVIAL = """
 case = "fig1b"
 [set]
-start.replicates    = 1
+dimers.replicates   = 1
 run.cycles          = 2
 run.settling_cycles = 0
 [axes]
-start.angle = { linspace = ["0 deg", "90 deg", 1000] }
+dimers.angle = { linspace = ["0 deg", "90 deg", 1000] }
 """
 
 
@@ -88,7 +88,7 @@ def measure_fig2(folder: Path) -> None:
     decks, loops, _ = _engine_seconds(folder.glob("runs/fig1b-*/manifest.json"))
     _row("as a sweep", decks, loops + START_UP_SECONDS * decks, swept.seconds * _WORKERS)
     apart = [
-        replace(case, start=replace(case.start, replicates=1, seed=seed))
+        replace(case, walkers=(replace(case.walkers[0], replicates=1),), seed=seed)
         for case in load_sweep("fig2").cases()
         for seed in range(6)
     ]

@@ -21,18 +21,19 @@ from typing import Any, TypeVar
 
 import pytest
 
-from walkers import run_case
+from walkers import run as run_case
 from walkers.inputs import resolve_case
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.case import Case
 from walkers.main import main
 from walkers.postprocess.gait import Walk, walk
-from walkers.postprocess.trajectory import Trajectory, read_trajectory
+from walkers.postprocess.motion import Group, read_motion
 from walkers.runner.failures import RunBusy
 
 # The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, no rolling friction, one walker that starts on the
 # axis in equilibrium.
 REFERENCE: dict[str, Any] = {
-    "beads": {"radii": ["0.3 mm", "0.2 mm"], "material": "ruby"},
+    "beads": {"material": "ruby"},
+    "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
     "liquid": {
         "name": "Si AK5",
         "volume_fraction": 0.01,
@@ -49,7 +50,6 @@ REFERENCE: dict[str, Any] = {
         "minimum_separation_ratio": 0.01,
     },
     "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
-    "start": {"replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
     # Its speed is that of 60 cycles, 20 of them to settle, to nine digits.
     "run": {"cycles": 24, "settling_cycles": 8},
 }
@@ -77,7 +77,7 @@ def document(**changes: Any) -> dict[str, Any]:
     return merged
 
 
-def make_case(**changes: Any) -> WalkerCase:
+def make_case(**changes: Any) -> Case:
     """`document`, resolved."""
     return resolve_case(document(**changes), name="test")
 
@@ -137,12 +137,12 @@ def runs_folder(session_folder: Path) -> Path:
 def run_directory(runs_folder: Path) -> Callable[..., Path]:
     """Run the changed reference case (or a given one) and return its run directory."""
 
-    def run(case: WalkerCase | None = None, **changes: Any) -> Path:
+    def run(case: Case | None = None, **changes: Any) -> Path:
         wanted = case or make_case(**changes)
 
         def directory() -> Path | None:
             with suppress(RunBusy):  # another worker is just making it
-                return run_case(wanted, runs_folder).run.directory
+                return run_case(wanted, runs_folder).directory
             return None
 
         return wait_for(directory)
@@ -151,20 +151,20 @@ def run_directory(runs_folder: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture(scope="session")
-def trajectory(run_directory: Callable[..., Path]) -> Callable[..., Trajectory]:
+def trajectory(run_directory: Callable[..., Path]) -> Callable[..., Group]:
     """Run and read the trajectory."""
 
-    def run(case: WalkerCase | None = None, **changes: Any) -> Trajectory:
-        return read_trajectory(run_directory(case, **changes))
+    def run(case: Case | None = None, **changes: Any) -> Group:
+        return read_motion(run_directory(case, **changes)).groups[0]
 
     return run
 
 
 @pytest.fixture(scope="session")
-def walked(trajectory: Callable[..., Trajectory]) -> Callable[..., Walk]:
+def walked(trajectory: Callable[..., Group]) -> Callable[..., Walk]:
     """Run and fit the velocities."""
 
-    def run(case: WalkerCase | None = None, **changes: Any) -> Walk:
+    def run(case: Case | None = None, **changes: Any) -> Walk:
         return walk(trajectory(case, **changes))
 
     return run

@@ -10,6 +10,7 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,13 +25,15 @@ from tests.conftest import (
     to_toml,
     wait_for_engines,
 )
-from walkers import run_case
+from walkers import Run
+from walkers import run as run_case
 from walkers.audit import AuditReport, Check, Line, Verdict, run_audit
 from walkers.audit.run import CHECKS, record, selected
 from walkers.audit.table import GROUPS, as_dict, as_markdown, as_text
 from walkers.inputs import InputError
 from walkers.runner.audits import AuditRecord, read_audit, write_audit
 from walkers.runner.binary import find_engine
+from walkers.runner.directory import FinishedRun
 from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
 from walkers.templates.engine import DEFECTS, Workarounds
 
@@ -56,6 +59,12 @@ def _failing(report: AuditReport) -> set[str]:
     return {line.what for line in report.failures}
 
 
+def _audit_of(run: Run) -> dict[str, Any] | None:
+    """What the manifest of a run says of its engine's audit."""
+    audit: dict[str, Any] | None = FinishedRun(run.directory).manifest["engine"]["audit"]
+    return audit
+
+
 def _standing_on(report: AuditReport, workaround: str) -> set[str]:
     return {line.what for line in report.lines if workaround in line.needs}
 
@@ -78,6 +87,13 @@ def test_the_surprises_are_there_in_the_raw_engine(report: AuditReport) -> None:
     assert found["a single wall pulls half as hard, over πγR"].measured == pytest.approx(1.7, abs=0.05)
     assert {line.verdict for line in report.lines if line.defect} == {Verdict.PRESENT}
     assert report.count(Verdict.PRESENT) >= 3
+
+
+def test_the_energy_balance_weighs_some_energy(report: AuditReport) -> None:
+    """Work of forces that nobody recorded would be zero, and against zero so little energy is within the tolerance."""
+    (line,) = (line for line in report.lines if line.what.startswith("energy over a cycle: work"))
+    assert line.expected == pytest.approx(3.67e-9, rel=0.01)
+    assert line.measured == pytest.approx(line.expected, rel=0.01)
 
 
 def _quick_but(*longest: str) -> tuple[Check, ...]:
@@ -166,11 +182,11 @@ def test_runs_name_the_audit_of_their_engine(own_cache: Path) -> None:
     case = make_case(run=SHORT)
     with pytest.warns(UnauditedEngineWarning, match="walkers audit"):
         unaudited = run_case(case, own_cache / "a")
-    assert unaudited.run.manifest["engine"]["audit"] is None
+    assert _audit_of(unaudited) is None
     kept = record(run_audit(selected(["hertz"])), quick=True)
     assert kept is not None
     audited = run_case(case, own_cache / "b")
-    assert audited.run.manifest["engine"]["audit"] == {
+    assert _audit_of(audited) == {
         "scope": "quick", "passed": True, "lines": kept.lines, "skipped": 0, "date": kept.date
     }  # fmt: skip
 
@@ -184,7 +200,9 @@ def test_a_binary_that_failed_is_refused_unless_told_otherwise(own_cache: Path) 
     with pytest.raises(AuditFailed, match="Hertz force"):
         run_case(case, own_cache / "runs")
     assert not (own_cache / "runs").exists()
-    assert not run_case(case, own_cache / "runs", allow_failed_audit=True).run.manifest["engine"]["audit"]["passed"]
+    audit = _audit_of(run_case(case, own_cache / "runs", allow_failed_audit=True))
+    assert audit is not None
+    assert not audit["passed"]
 
 
 def test_a_quick_audit_does_not_displace_a_full_one(own_cache: Path) -> None:

@@ -30,11 +30,11 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def parameter(name: str, low: float, high: float, *, log: bool = False, **more: Any) -> Parameter:
-    return Parameter(name, name, (name,), low, high, log, frozenset({"one"}), more.get("normal"))
+    return Parameter(name=name, symbol=name, keys=[name], range=(low, high), log=log, experiments=["one"], **more)
 
 
 def observation(name: str, value: float, deviation: float, group: str = "all") -> Observation:
-    return Observation(name, group, name, "velocity", ("one",), (), value, deviation)
+    return Observation(name=name, group=group, title=name, of=["one"], value=value, deviation=deviation)
 
 
 SPACE = Space((parameter("a", 0.1, 10.0, log=True), parameter("b", -1.0, 3.0)))
@@ -140,7 +140,7 @@ def test_a_posterior_is_the_known_one(known: tuple[Any, list[Observation]]) -> N
 
 def test_what_is_derived_from_others_weighs_nothing(known: tuple[Any, list[Observation]]) -> None:
     emulators, _ = known
-    derived = replace(emulators[1], observation=replace(emulators[1].observation, derived=True))
+    derived = replace(emulators[1], observation=emulators[1].observation.model_copy(update={"derived": True}))
     alone, both = (sample_posterior(chosen, SPACE, 300, 1) for chosen in (emulators[:1], [emulators[0], derived]))
     assert both.groups == ("all",)
     np.testing.assert_array_equal(both.unit, alone.unit)
@@ -206,7 +206,7 @@ REDUCED: dict[str, Any] = {
     "title": "Friction and drag from three speeds",
     "case": "fig1b",
     "set": {
-        "start": {"replicates": 1},
+        "dimers": {"replicates": 1},
         "run": {"cycles": 10, "settling_cycles": 6, "samples_per_cycle": 10, "time_step": "4.5 us"},
     },
     "parameters": {
@@ -308,7 +308,7 @@ def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
     document["observations"] = [one for one in document["observations"] if one["name"] == "strong"]
     del document["held_out"], document["bands"]
     document["set"] = {
-        "start": {"replicates": 1},
+        "dimers": {"replicates": 1},
         "run": {"cycles": 40, "settling_cycles": 20, "samples_per_cycle": 10},
         "liquid": {"volume_fraction": 0.01},
         "contact": {"rolling_friction": 0.003},
@@ -367,7 +367,8 @@ def test_a_set_that_loses_its_beads_is_told_and_not_run_again(tmp_path: Path) ->
 def test_the_example_of_the_docs_can_be_read(tmp_path: Path) -> None:
     page = (Path(__file__).parents[1] / "docs" / "calibration.md").read_text()
     document = tomllib.loads(page.split("```toml\n")[1].split("```")[0])
-    assert read_calibration(document, source="docs", name="docs", folder=tmp_path).groups == ("fig2", "fig4a")
+    found = read_calibration(document, source="docs", name="docs", folder=tmp_path)
+    assert [one.group for one in found.observations] == ["fig2", "fig4a"]
 
 
 @pytest.mark.parametrize("command", ["calibrate ruby --out", "calibrate ruby --to", "model-terms --to"])
@@ -415,7 +416,7 @@ BAD = {
     "unit of a ratio": ("observations/3/value", "1 mm/s", r"observations\[3\]\.value.*ratio"),
     "deviation": ("observations/0/deviation", "0 mm/s", r"observations\[0\]\.deviation"),
     "name": ("observations/1/name", "slow", r"observations\[1\]\.name"),
-    "keys": ("experiments/fast/start.angle", "3 deg", r"experiments\.fast"),
+    "keys": ("experiments/fast/dimers.angle", "3 deg", r"experiments\.fast"),
     "unknown guess": ("guesses", [{"friction": 0.1, "dragg": 1.0, "drag": 1.0}], r"guesses\[0\]\.dragg.*drag"),
     "half a guess": ("guesses", [{"friction": 0.1}], r"guesses\[0\]\.drag.*missing"),
     "guess": ("guesses", [{"friction": 0.1, "drag": 11.0}], r"guesses\[0\]\.drag.*0\.4 to 10"),
@@ -450,5 +451,5 @@ def test_a_key_that_is_none_of_a_case_is_told(tmp_path: Path) -> None:
     pile = _bad("case", "pile-ci") | {"parameters": {"drag": REDUCED["parameters"]["drag"]}}
     pile["experiments"] = {name: {"drive.frequency": "170 Hz"} for name in REDUCED["experiments"]}
     pile["set"] = {}
-    with pytest.raises(InputError, match="expected a walker's case"):
+    with pytest.raises(InputError, match="expected a case of dimers"):
         calibrate(read_calibration(pile, source="bad.toml", name="pile", folder=tmp_path), tmp_path, Options(1))

@@ -2,41 +2,41 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.conftest import document
 from walkers.inputs import InputError, load_case, resolve_case
-from walkers.inputs.case import WalkerCase
-from walkers.postprocess.report import describe_result
-from walkers.postprocess.result import read_result
+from walkers.inputs.case import Case
+from walkers.postprocess.analysis import describe_result, read_result
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
-from walkers.sweeps.shared_deck import make_together
+from walkers.sweeps.shared_deck import make_runs
 from walkers.theory.prediction import motion_of, predict
 
 FRICTIONS = {0.1: -2.2e-3, 0.2: 1.8e-3, 0.3: 5.9e-3}
 """Climbing speeds in m/s, from a prototype deck of the same dimer."""
 
 
-def climber(friction: float = 0.3, **start: object) -> WalkerCase:
+def climber(friction: float = 0.3, **start: Any) -> Case:
     case = load_case("climber")
     contact = replace(case.contact, friction_bead_wall=friction, friction_bead_bead=friction)
-    begin = replace(case.start, replicates=1, angle_spread=0.0, gap_spread=0.0, spacing=0.1, **start)  # type: ignore[arg-type]
-    return replace(case, contact=contact, start=begin)
+    begin = {"replicates": 1, "angle_spread": 0.0, "gap_spread": 0.0, "spacing": 0.1, **start}
+    return replace(case, contact=contact, walkers=(replace(case.walkers[0], **begin),))
 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Climbers of several kinds, side by side in as few decks as may be."""
     case = climber()
-    symmetric = replace(case, beads=replace(case.beads, radii=(0.42625e-3, 0.42625e-3)))
+    symmetric = replace(case, walkers=(replace(case.walkers[0], radii=(0.42625e-3, 0.42625e-3)),))
     cases = {str(friction): climber(friction) for friction in FRICTIONS}
     cases |= {f"below {friction}": climber(friction, facing="left") for friction in (0.2, 0.3)}
     cases["symmetric"] = symmetric
     out = tmp_path_factory.mktemp("climbers")
     engine = find_engine(None)
-    made = make_together(list(cases.values()), out, engine)
+    made = make_runs(list(cases.values()), out, engine)
     return {name: made.runs[run_place(case, engine, out).name].directory for name, case in cases.items()}
 
 
@@ -66,7 +66,7 @@ def test_a_climbers_weight_pulls_along_the_axis() -> None:
     case = climber()
     assert (case.pressing_gravity, case.axial_gravity) == (0.0, case.gravity)
     assert predict(case)["alignment"]["u"] < 0.0  # it stands on its head
-    with pytest.raises(InputError, match=r"start\.facing"):
-        resolve_case(document(boundary={"uphill": "90 deg", "tilt": "90 deg"}, start={"facing": "up"}))
-    with pytest.raises(InputError, match=r"start\.facing"):
-        resolve_case(document(start={"facing": "up"}))
+    with pytest.raises(InputError, match=r"dimers\.facing"):
+        resolve_case(document(boundary={"uphill": "90 deg", "tilt": "90 deg"}, dimers={"facing": "up"}))
+    with pytest.raises(InputError, match=r"dimers\.facing"):
+        resolve_case(document(dimers={"facing": "up"}))

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from walkers.inputs.pile import Container
+from walkers.inputs.boundary import Box
 from walkers.physics.capillary import bridge_volume_between_beads
 from walkers.postprocess.bed import liquid_of_beads, packing_profile, segregation
 from walkers.postprocess.clusters import (
@@ -20,7 +20,7 @@ from walkers.postprocess.clusters import (
     held_clusters,
 )
 from walkers.postprocess.events import events_of
-from walkers.postprocess.pile import Bridges
+from walkers.postprocess.motion import Bridges
 
 BULK = list(range(20))
 TIME = np.arange(0.0, 4.0, 0.02)
@@ -33,10 +33,22 @@ def chain(beads: list[int]) -> list[tuple[int, int]]:
 
 
 def frame(pairs: list[tuple[int, int]], walls: dict[int, int]) -> Bridges:
-    beads = np.array([*chain(BULK), *pairs], dtype=np.int64).reshape(-1, 2)
-    ones = np.ones(len(beads))
+    return bridges_of([*chain(BULK), *pairs], walls)
+
+
+def bridges_of(pairs: list[tuple[int, int]], walls: dict[int, int]) -> Bridges:
+    """Bridges that touch and pull, between beads and of beads to walls."""
+    beads = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    ones, held = np.ones(len(beads)), np.ones(len(walls))
     return Bridges(
-        beads, ones, -ones, np.array(list(walls), dtype=np.int64), np.array(list(walls.values()), dtype=np.int64)
+        frame=0,
+        beads=beads,
+        force=ones,
+        gap=-ones,
+        wall_beads=np.array(list(walls), dtype=np.int64),
+        walls=np.array(list(walls.values()), dtype=np.int64),
+        wall_force=held,
+        wall_gap=-held,
     )
 
 
@@ -265,7 +277,7 @@ def test_the_packing_profile_holds_all_of_the_beads() -> None:
     draw = np.random.default_rng(1)
     radius = draw.uniform(3e-4, 6e-4, 50)
     position = draw.uniform(1e-3, 9e-3, (3, 50, 3))
-    container = Container("box", 5e-3, 20e-3, "glass")
+    container = Box(material="glass", width=5e-3, height=20e-3)
     liquid = draw.uniform(1e-12, 2e-12, (3, 50))
     height, fraction, wet = packing_profile(position, radius, liquid, container, 2e-4)
     volume = float((fraction * container.cross_section * 2e-4).sum())
@@ -277,8 +289,7 @@ def test_the_packing_profile_holds_all_of_the_beads() -> None:
 def test_liquid_is_that_of_the_bridges() -> None:
     """Three beads in a chain, the first on the floor: halves of the bridges between them, all of that at the floor."""
     radius, fraction = np.array([3e-4, 3e-4, 5e-4]), 0.01
-    pairs = np.array([[0, 1], [1, 2]])
-    bridges = Bridges(pairs, np.ones(2), -np.ones(2), np.array([0]), np.array([0]))
+    bridges = bridges_of([(0, 1), (1, 2)], {0: 0})
     equal, unequal = (bridge_volume_between_beads(3e-4, other, fraction) for other in (3e-4, 5e-4))
     floor = 0.5 * fraction * 4.0 / 3.0 * np.pi * 3e-4**3
     expected = [floor + equal / 2.0, (equal + unequal) / 2.0, unequal / 2.0]

@@ -10,16 +10,13 @@ import numpy as np
 import pytest
 
 from tests.conftest import document, make_case
-from walkers.inputs import load_case, load_pile, resolve_case, shipped_cases
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.reading import load_any
+from walkers.inputs import load_case, resolve_case, shipped_cases
+from walkers.inputs.boundary import Cylinder, Face
 from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
 from walkers.templates import render_deck
-from walkers.templates.deck import CONTENT_VERSION, Deck, render_shared_deck
+from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_shared_deck, settling_steps
 from walkers.templates.engine import contact_angle_setting, face_triangle, separation_cap
-from walkers.templates.pile import Segment, render_segment, settling_steps
-from walkers.templates.placement import place_walkers
-from walkers.templates.scene import Face
+from walkers.templates.placement import place
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +31,7 @@ def _lines(deck: str, start: str) -> list[list[str]]:
 def test_the_rider_is_created_first_and_atoms_are_not_sorted(deck: str) -> None:
     case = load_case("fig1b")
     first = _lines(deck, "create_atoms")[0]
-    assert tuple(map(float, first[3:6])) == place_walkers([case])[0].carriers[0]
+    assert tuple(map(float, first[3:6])) == place((case,))[0].carriers[0]
     assert _lines(deck, "group           carrier") == [["group", "carrier", "id", "<=", "1"]]
     assert ["atom_modify", "map", "array", "sort", "0", "0"] in _lines(deck, "atom_modify")
 
@@ -52,7 +49,7 @@ def test_the_triangle_is_far_larger_than_the_box_and_its_centroid_in_it() -> Non
     case = load_case("fig4b")
     (stl,) = render_deck(case).files.values()
     corners = [tuple(map(float, match)) for match in re.findall(r"vertex (\S+) (\S+) (\S+)", stl)]
-    scene, _ = place_walkers([case])
+    scene, _ = place((case,))
     centroid = [sum(corner[axis] for corner in corners) / 3 for axis in range(3)]
     assert all(low < middle < high for low, middle, high in zip(scene.lower, centroid, scene.upper, strict=True))
     assert min(abs(corner[1]) for corner in corners) > 10 * scene.upper[1]
@@ -115,13 +112,14 @@ def test_rolling_friction_is_left_out_where_there_is_none() -> None:
     assert render_deck(make_case(contact={"rolling_friction": 0.003})).text.count("rolling_friction cdt") == 2
 
 
-@pytest.mark.parametrize("name", [name for name in shipped_cases() if isinstance(load_any(name), WalkerCase)])
+@pytest.mark.parametrize("name", shipped_cases())
 def test_numbers_are_rendered_in_full_precision(name: str) -> None:
     case = load_case(name)
     deck = render_deck(case).text
     assert f"timestep        {case.run.time_step!r}\n" in deck
-    starts = [tuple(map(float, line[3:6])) for line in _lines(deck, "create_atoms")[1:]]
-    assert starts == [bead.centre for bead in place_walkers([case])[0].beads]
+    scene, _ = place((case,))
+    starts = [tuple(map(float, line[3:6])) for line in _lines(deck, "create_atoms")]
+    assert starts == [*scene.carriers, *(bead.centre for bead in scene.beads)]
     assert contact_angle_setting(0.0) == 0.0
 
 
@@ -136,7 +134,7 @@ def test_there_is_one_run_and_one_thermo_style(deck: str) -> None:
     assert len(_lines(deck, "thermo_style")) == 1
 
 
-CONTENT = {1: "7dc0566616dc45cc"}
+CONTENT = {1: "7dc0566616dc45cc", 2: "c2be1211d5b6b532"}
 """Digest of all that the engine reads of some cases, by the version of the decks' content."""
 
 
@@ -155,16 +153,17 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
     harmonics = [{"frequency": "80 Hz", "peak_acceleration": "4 g", "axis": [1, 0, 1], "phase": "30 deg"}]
     several = document(contact={"rolling_friction": 0.01}, boundary={"tilt": "20 deg"})
     several["drive"] = {"harmonics": [*harmonics, {"frequency": "120 Hz", "peak_acceleration": "1 g"}]}
-    film = make_case(liquid={"film_drag_ratio": 0.5}, start={"replicates": 3, "angle": "10 deg"})
+    film = make_case(liquid={"film_drag_ratio": 0.5}, dimers={"replicates": 3, "angle": "10 deg"})
     decks = [render_deck(case) for case in (make_case(), film, resolve_case(several), make_case(drive={"axis": "y"}))]
-    decks += [render_shared_deck([make_case(), make_case(contact={"restitution": 0.6}, start={"seed": 2})])]
+    decks += [render_shared_deck([make_case(), make_case(contact={"restitution": 0.6}, run={"seed": 2})])]
     decks += [render_deck(make_case(liquid={"film_drag_ratio": 0.5}, drive={"frame": "container"}))]
-    piles = [load_pile("pile-ci"), load_pile("cluster")]
-    round_one = replace(piles[0].container, shape="cylinder")
-    piles += [replace(piles[0], run=replace(piles[0].run, ranks=2)), replace(piles[0], container=round_one)]
+    piles = [load_case("pile-ci"), load_case("cluster")]
+    square = piles[0].boundary
+    round_one = Cylinder(material=square.material, width=square.width, height=square.height)
+    piles += [replace(piles[0], run=replace(piles[0].run, ranks=2)), replace(piles[0], boundary=round_one)]
     for case in piles:
         settled = settling_steps(case)
         end = settled + case.run.cycles_per_segment * case.run.steps_per_cycle
-        decks += [render_segment(case, Segment(0, settled, None)), render_segment(case, Segment(settled, end, settled))]
+        decks += [render_deck(case, Segment(0, settled, None)), render_deck(case, Segment(settled, end, settled))]
     digest = sha256("\n".join(map(_reads, decks)).encode()).hexdigest()[:16]
     assert digest == CONTENT[CONTENT_VERSION]

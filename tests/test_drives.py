@@ -11,8 +11,8 @@ import pytest
 
 from tests.conftest import document, make_case
 from walkers.inputs import load_case, resolve_case
+from walkers.inputs.boundary import Plane
 from walkers.inputs.drive import Drive, Harmonic, common_frequency
-from walkers.inputs.plane import Plane
 from walkers.postprocess import read_result
 
 BRIEF = {"cycles": 20, "settling_cycles": 8, "samples_per_cycle": 10}
@@ -22,9 +22,9 @@ ONE = {"frequency": "80 Hz", "peak_acceleration": "4 g"}
 def shipped(**changes: Any) -> Any:
     """The shipped walker of Fig. 1b, one of it, briefly."""
     case = load_case("fig1b")
-    start = replace(case.start, replicates=1, facing="right", angle_spread=0.0, gap_spread=0.0)
+    walkers = replace(case.walkers[0], replicates=1, facing="right", angle_spread=0.0, gap_spread=0.0)
     run = replace(case.run, cycles=20, settling_cycles=8)
-    return replace(case, start=start, run=run, **changes)
+    return replace(case, walkers=(walkers,), run=run, **changes)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_a_cycle_that_would_be_too_long_is_refused() -> None:
 
 def test_right_is_up_only_where_the_drive_goes_uphill() -> None:
     def uphill(tilt: float, way: float) -> bool:
-        return bool(shipped(boundary=Plane("glass", radians(tilt), radians(way))).goes_uphill)
+        return bool(shipped(boundary=Plane(material="glass", tilt=radians(tilt), uphill=radians(way))).goes_uphill)
 
     assert [uphill(5.0, 0.0), uphill(5.0, 180.0), uphill(5.0, 90.0), uphill(0.0, 0.0)] == [True, False, False, False]
 
@@ -84,7 +84,7 @@ def _two_tone(phase: float) -> Drive:
 def test_two_tones_move_a_symmetric_dimer_and_their_phase_says_which_way(run_directory: Callable[..., Path]) -> None:
     """f + 2f breaks the symmetry under half a period; shifted by π, 2f is the mirrored drive. Measured: ∓1.62 mm/s."""
     case = shipped()
-    case = replace(case, beads=replace(case.beads, radii=(0.25e-3, 0.25e-3)))
+    case = replace(case, walkers=(replace(case.walkers[0], radii=(0.25e-3, 0.25e-3)),))
 
     def speed(drive: Drive) -> float:
         return float(read_result(run_directory(replace(case, drive=drive)))["velocity"]["mean"])
@@ -98,7 +98,7 @@ def test_two_tones_move_a_symmetric_dimer_and_their_phase_says_which_way(run_dir
 
 @pytest.mark.parametrize(("tilt", "uphill"), [(0.0, 0.0), (30.0, 0.0), (90.0, 0.0), (30.0, 90.0), (90.0, 180.0)])
 def test_gravity_on_a_plane(tilt: float, uphill: float) -> None:
-    found = Plane("glass", radians(tilt), radians(uphill)).gravity(9.81)
+    found = Plane(material="glass", tilt=radians(tilt), uphill=radians(uphill)).gravity(9.81)
     way = (cos(radians(uphill)), sin(radians(uphill)))
     down = 9.81 * sin(radians(tilt))
     np.testing.assert_allclose(found, (-down * way[0], -down * way[1], -9.81 * cos(radians(tilt))), atol=1e-14)
@@ -111,7 +111,7 @@ TILTS = {0.0: 1.335, 5.0: 0.934, 10.0: 0.536, 20.0: -8.0}
 
 @pytest.mark.parametrize("tilt", TILTS)
 def test_a_walker_walks_up_a_slope_until_it_is_too_steep(tilt: float, run_directory: Callable[..., Path]) -> None:
-    case = shipped(boundary=Plane("chromium-coated glass", radians(tilt)))
+    case = shipped(boundary=Plane(material="chromium-coated glass", tilt=radians(tilt)))
     result = read_result(run_directory(case))
     if TILTS[tilt] > 0.0:
         assert result["velocity"]["mean"] == pytest.approx(TILTS[tilt] * 1e-3, rel=0.03)
@@ -120,7 +120,7 @@ def test_a_walker_walks_up_a_slope_until_it_is_too_steep(tilt: float, run_direct
 
 
 def test_downhill_it_is_faster_and_across_the_slope_it_slides(run_directory: Callable[..., Path]) -> None:
-    down = shipped(boundary=Plane("chromium-coated glass", radians(5.0), pi))
+    down = shipped(boundary=Plane(material="chromium-coated glass", tilt=radians(5.0), uphill=pi))
     assert read_result(run_directory(down))["velocity"]["mean"] > 1.5e-3
     climber = load_case("climber")
     assert climber.boundary.tilt == pytest.approx(pi / 2.0)

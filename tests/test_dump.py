@@ -1,31 +1,39 @@
 """The readers of the engine's dumps, on what the engine wrote."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import walkers
 from tests.conftest import SHORT, make_case
-from walkers import run_case
-from walkers.inputs.dimer import contact_loads, dimer_of
+from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.physics.capillary import capillary_force, capillary_force_at_wall, rupture_distance
-from walkers.postprocess import read_table, tabulate
+from walkers.postprocess import tabulate
 from walkers.postprocess.dump import BinaryDump, DumpError
 from walkers.postprocess.local_dump import read_local_dump
 from walkers.runner import finished_run
+from walkers.runner.directory import FIRST_SEGMENT
 from walkers.templates.layout import BEAD_COLUMNS
 
 
 @pytest.fixture(scope="module")
 def directory(run_directory: Callable[..., Path]) -> Path:
-    return run_directory(start={"replicates": 2}, run=SHORT)
+    return run_directory(dimers={"replicates": 2}, run=SHORT)
 
 
-def test_all_frames_are_read(directory: Path) -> None:
+@pytest.fixture(scope="module")
+def beads(directory: Path) -> Path:
+    """The engine's dump of the beads."""
+    return directory / FIRST_SEGMENT / "beads.bin"
+
+
+def test_all_frames_are_read(directory: Path, beads: Path) -> None:
     run = finished_run(directory)
     assert run is not None
-    dump = BinaryDump(directory / "beads.bin", BEAD_COLUMNS)
+    dump = BinaryDump(beads, BEAD_COLUMNS)
     assert len(dump) == run.layout.frames == 61
     assert not dump.truncated
     np.testing.assert_array_equal(np.diff(dump.steps), run.layout.sample_every)
@@ -33,18 +41,18 @@ def test_all_frames_are_read(directory: Path) -> None:
     assert frames.shape == (61, 5, len(BEAD_COLUMNS))
     np.testing.assert_array_equal(frames[:, :, dump.column("id")], np.tile(np.arange(1, 6), (61, 1)))
     np.testing.assert_allclose(frames[0, 1:, dump.column("radius")], [3e-4, 2e-4, 3e-4, 2e-4], rtol=1e-15)
-    assert (directory / "beads.bin").stat().st_size == run.layout.bead_dump_bytes
+    assert beads.stat().st_size == run.layout.bead_dump_bytes
 
 
-@pytest.mark.parametrize("cut", [1, 8, 200, 700])
-def test_a_truncated_last_frame_is_left_out_and_told(directory: Path, tmp_path: Path, cut: int) -> None:
-    whole = (directory / "beads.bin").read_bytes()
+@pytest.mark.parametrize("cut", [1, 8, 200, 470, 550])  # of a frame of 584 bytes, 104 of them its head
+def test_a_truncated_last_frame_is_left_out_and_told(beads: Path, tmp_path: Path, cut: int) -> None:
+    whole = beads.read_bytes()
     short = tmp_path / "short.bin"
     short.write_bytes(whole[:-cut])
     dump = BinaryDump(short, BEAD_COLUMNS)
     assert dump.truncated
     assert len(dump) == 60
-    np.testing.assert_array_equal(dump.stack(), BinaryDump(directory / "beads.bin", BEAD_COLUMNS).stack()[:60])
+    np.testing.assert_array_equal(dump.stack(), BinaryDump(beads, BEAD_COLUMNS).stack()[:60])
 
 
 def test_an_empty_dump_has_no_frames(tmp_path: Path) -> None:
@@ -63,15 +71,15 @@ def test_what_is_no_dump_is_refused(contents: bytes, tmp_path: Path) -> None:
         read_local_dump(tmp_path / "other.bin", ("x",))
 
 
-def test_other_columns_are_refused(directory: Path) -> None:
+def test_other_columns_are_refused(beads: Path) -> None:
     with pytest.raises(DumpError, match="2 columns"):
-        BinaryDump(directory / "beads.bin", ("id", "x"))
+        BinaryDump(beads, ("id", "x"))
 
 
 def test_bridges_of_a_walker_at_rest_carry_the_capillary_load(tmp_path: Path) -> None:
     """On a still substrate the elastic repulsion balances the capillary pull: no net normal force, all touching."""
     case = make_case(drive={"peak_acceleration": "0 g"}, run={"cycles": 4, "settling_cycles": 1})
-    bridges = read_table(run_case(case, tmp_path).run.directory, "bridges")
+    bridges = walkers.run(case, tmp_path).table("bridges")
     last = bridges[bridges["time"] == bridges["time"].max()]
     assert list(last["contact"]) == [1, 2, 3]
     assert last["touching"].all()
@@ -87,11 +95,11 @@ def test_an_open_bridge_pulls_with_the_capillary_force(tmp_path: Path) -> None:
         liquid={"dynamic_viscosity": "1e-9 mPa*s"},
         run={"cycles": 10, "settling_cycles": 2, "bridge_samples_per_cycle": 20},
     )
-    bridges = read_table(run_case(case, tmp_path).run.directory, "bridges")
+    bridges = walkers.run(case, tmp_path).table("bridges")
     # Until the beads first part, 5 ms on: then their bridge's liquid is shared out anew and the volumes change.
     opened = bridges[~bridges["touching"] & (bridges["time"] < 5e-3)]
     assert set(opened["contact"]) >= {1, 3}  # a bead on the substrate and bead on bead
-    volumes, radii = contact_loads(case).bridge_volumes, case.beads.radii
+    volumes, radii = contact_loads(case).bridge_volumes, case.walkers[0].radii
     for contact, gap, found in opened[["contact", "gap", "normal_force"]].itertuples(index=False):
         volume = volumes[contact - 1]
         if contact == 3:
@@ -104,11 +112,9 @@ def test_an_open_bridge_pulls_with_the_capillary_force(tmp_path: Path) -> None:
 
 def test_truncated_dumps_are_tabulated_with_a_warning(directory: Path, tmp_path: Path) -> None:
     copy = tmp_path / "copy"
-    copy.mkdir()
-    for path in directory.iterdir():
-        (copy / path.name).write_bytes(path.read_bytes())
-    whole = (copy / "beads.bin").read_bytes()
-    (copy / "beads.bin").write_bytes(whole[:-100])
+    shutil.copytree(directory, copy)
+    dump = copy / FIRST_SEGMENT / "beads.bin"
+    dump.write_bytes(dump.read_bytes()[:-100])
     result = tabulate(copy)
     assert result["truncated"]
     assert result["velocity"]["mean"] > 0

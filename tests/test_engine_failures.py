@@ -31,9 +31,9 @@ from tests.conftest import (
     wait_for,
     wait_for_engines,
 )
-from walkers import run_case
-from walkers.inputs.case import WalkerCase
-from walkers.runner import Engine, find_engine, launch, open_run
+from walkers import run as run_case
+from walkers.inputs.case import Case
+from walkers.runner import Engine, FinishedRun, find_engine, open_run
 from walkers.runner.failures import (
     BeadsLost,
     BlowUp,
@@ -48,18 +48,20 @@ from walkers.runner.failures import (
 )
 from walkers.runner.launch import Progress, postponed_interrupts
 from walkers.templates import Deck, render_deck
+from walkers.templates.deck import Segment
 
 LONG = {"cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
 
 
-def _launch(case: WalkerCase, out: Path, change: Callable[[str], str] = str, **options: object) -> None:
-    deck = render_deck(case)
-    _launch_deck(case, replace(deck, text=change(deck.text)), out, **options)
+def _launch(case: Case, out: Path, change: Callable[[str], str] = str, **options: object) -> None:
+    """Make a run whose decks are changed."""
 
+    def render(case: Case, segment: Segment) -> Deck:
+        deck = render_deck(case, segment)
+        return replace(deck, text=change(deck.text))
 
-def _launch_deck(case: WalkerCase, deck: Deck, out: Path, **options: object) -> None:
-    with open_run(case, deck, find_engine(), out) as run:
-        launch(deck, run.directory, run.engine, keep_open=run.locks, **options)  # type: ignore[arg-type]
+    with open_run(case, find_engine(), out) as run:
+        run.make(render=render, **options)  # type: ignore[arg-type]
 
 
 def _remains(out: Path) -> dict[str, str]:
@@ -83,7 +85,7 @@ def test_another_version_of_the_engine_is_a_warning(tmp_path: Path) -> None:
     front.chmod(0o755)
     with pytest.warns(EngineVersionWarning, match=r"4\.0\.0.*3\.8\.0"):
         outcome = run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front))
-    assert outcome.run.manifest["engine"]["version"] == "LIGGGHTS-PUBLIC 4.0.0"
+    assert FinishedRun(outcome.directory).manifest["engine"]["version"] == "LIGGGHTS-PUBLIC 4.0.0"
 
 
 def test_the_audited_version_gives_no_warning(tmp_path: Path) -> None:
@@ -96,6 +98,7 @@ def test_error_line_is_quoted(tmp_path: Path) -> None:
     with pytest.raises(EngineError, match=r"ERROR: Unknown command: wobble") as failure:
         _launch(make_case(run=SHORT), tmp_path, lambda text: text.replace("run             ", "wobble          "))
     assert failure.value.line.startswith("ERROR")
+    assert failure.value.directory == next(tmp_path.glob("*.incomplete/segments/0000.new"))
     assert _remains(tmp_path)["reason"] == "EngineError"
 
 
@@ -116,7 +119,7 @@ def test_crash_of_the_engine(tmp_path: Path) -> None:
 
 def test_engine_killed(tmp_path: Path) -> None:
     def kill_soon() -> None:
-        wait_for(lambda: list(tmp_path.glob("*.incomplete/beads.bin")))
+        wait_for(lambda: list(tmp_path.glob("*.incomplete/segments/0000.new/beads.bin")))
         for engine in engines_in(tmp_path):
             os.kill(engine, signal.SIGKILL)
 
@@ -220,7 +223,7 @@ def test_a_disk_that_fills_up_during_the_run(small_disk: Path) -> None:
     case = make_case(run={"cycles": 180, "settling_cycles": 2, "samples_per_cycle": 20})
 
     def fill() -> None:
-        wait_for(lambda: list(small_disk.glob("runs/*.incomplete/beads.bin")))
+        wait_for(lambda: list(small_disk.glob("runs/*.incomplete/segments/0000.new/beads.bin")))
         with suppress(OSError), (small_disk / "ballast").open("wb", buffering=0) as file:
             while file.write(b"\0" * 4096):
                 pass

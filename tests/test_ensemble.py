@@ -3,44 +3,46 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from walkers import run_case
+from walkers import run as run_case
 from walkers.inputs import load_case
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.case import Case
 from walkers.postprocess.gait import walk
-from walkers.postprocess.trajectory import Trajectory
+from walkers.postprocess.motion import Group
 from walkers.runner import find_engine, launch
-from walkers.runner.directory import write_deck
+from walkers.runner.directory import FIRST_SEGMENT, write_deck
 from walkers.templates import render_deck
 
 
 @pytest.fixture(scope="module")
-def ensemble() -> WalkerCase:
+def ensemble() -> Case:
     """The shipped walker of Fig. 1b, six replicates, ten cycles."""
     case = load_case("fig1b")
     return replace(case, run=replace(case.run, cycles=10, settling_cycles=4))
 
 
-def test_walkers_of_an_ensemble_move_as_they_do_alone(
-    trajectory: Callable[..., Trajectory], ensemble: WalkerCase
-) -> None:
+def _started(case: Case, **changes: Any) -> Case:
+    """The case with its walkers started otherwise."""
+    return replace(case, walkers=(replace(case.walkers[0], **changes),))
+
+
+def test_walkers_of_an_ensemble_move_as_they_do_alone(trajectory: Callable[..., Group], ensemble: Case) -> None:
     together = trajectory(ensemble)
-    alone = trajectory(replace(ensemble, start=replace(ensemble.start, replicates=1)))
+    alone = trajectory(_started(ensemble, replicates=1))
     way_together = together.position[:, 0] - together.position[0, 0].mean(axis=0)
     way_alone = alone.position[:, 0] - alone.position[0, 0].mean(axis=0)
     assert np.abs(way_together - way_alone).max() < 1e-6 * np.abs(way_alone).max()
     assert walk(together).velocity[0] == pytest.approx(walk(alone).velocity[0], rel=1e-6)
 
 
-def test_replicates_are_perturbed_and_face_both_ways(
-    trajectory: Callable[..., Trajectory], ensemble: WalkerCase
-) -> None:
+def test_replicates_are_perturbed_and_face_both_ways(trajectory: Callable[..., Group], ensemble: Case) -> None:
     moved = trajectory(ensemble)
-    assert [walker.facing for walker in moved.layout.walkers] == [1, -1, 1, -1, 1, -1]
-    angles = [walker.start_angle for walker in moved.layout.walkers]
+    assert [walker.facing for walker in moved.walkers] == [1, -1, 1, -1, 1, -1]
+    angles = [walker.start_angle for walker in moved.walkers]
     assert len(set(angles)) == 6
     assert max(map(abs, angles)) <= np.radians(1.0)
     np.testing.assert_allclose(moved.orientation[0], angles, atol=1e-12)
@@ -49,31 +51,30 @@ def test_replicates_are_perturbed_and_face_both_ways(
     assert np.all(overlaps > 0.0)
 
 
-def test_another_seed_starts_otherwise_and_the_same_seed_alike(ensemble: WalkerCase) -> None:
+def test_another_seed_starts_otherwise_and_the_same_seed_alike(ensemble: Case) -> None:
     def start(seed: int) -> tuple[float, ...]:
-        changed = replace(ensemble, start=replace(ensemble.start, seed=seed))
-        return tuple(walker.start_angle for walker in render_deck(changed).layout.walkers)
+        return tuple(walker.start_angle for walker in render_deck(replace(ensemble, seed=seed)).layout.walkers)
 
     assert start(1) == start(1)
     assert not set(start(1)) & set(start(2))
 
 
-def test_walkers_keep_their_distance(trajectory: Callable[..., Trajectory], ensemble: WalkerCase) -> None:
+def test_walkers_keep_their_distance(trajectory: Callable[..., Group], ensemble: Case) -> None:
     moved = trajectory(ensemble)
     centre = moved.mass_centre[..., :2]
     first, second = np.triu_indices(6, 1)
-    assert np.linalg.norm(centre[:, first] - centre[:, second], axis=-1).min() > 0.5 * ensemble.start.spacing
+    assert np.linalg.norm(centre[:, first] - centre[:, second], axis=-1).min() > 0.5 * ensemble.walkers[0].spacing
 
 
-def test_a_rerun_is_bitwise_the_same(tmp_path: Path, ensemble: WalkerCase) -> None:
+def test_a_rerun_is_bitwise_the_same(tmp_path: Path, ensemble: Case) -> None:
     dumps = []
     for number in range(2):
-        directory = run_case(ensemble, tmp_path / str(number)).run.directory
+        directory = run_case(ensemble, tmp_path / str(number)).directory / FIRST_SEGMENT
         dumps.append((directory / "beads.bin").read_bytes())
     assert dumps[0] == dumps[1]
 
 
-def test_reporting_bridges_does_not_disturb_the_walkers(tmp_path: Path, ensemble: WalkerCase) -> None:
+def test_reporting_bridges_does_not_disturb_the_walkers(tmp_path: Path, ensemble: Case) -> None:
     """The engine evaluates contacts once more to report them; that must leave no trace in the motion."""
     deck = render_deck(ensemble)
     reports = ("compute pair_bridges", "compute wall_bridges", "dump pairs", "dump walls", "dump_modify pairs")

@@ -6,6 +6,7 @@ import shutil
 import struct
 import subprocess
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,19 +15,19 @@ import pytest
 
 from tests.conftest import PROGRAM, SHORT, call, document, make_case, mounted, to_toml
 from tests.test_calibration import reduced
-from walkers import run_case
+from walkers import run as run_case
 from walkers.calibration.calibrate import _determinants, _kept, calibrate
 from walkers.inputs import InputError, load_case
 from walkers.inputs.calibration import read_calibration
 from walkers.inputs.reading import read_toml
 from walkers.inputs.sweep import expand
 from walkers.postprocess import read_result, tabulate
+from walkers.postprocess.analysis import current_result, describe_result
 from walkers.postprocess.drawing import new_figure, save_figure, styled
 from walkers.postprocess.dump import DumpError
 from walkers.postprocess.local_dump import local_frames, read_local_dump
-from walkers.postprocess.report import describe_result
-from walkers.postprocess.result import current_result
-from walkers.runner.failures import EngineError, EngineFailure
+from walkers.runner.directory import FIRST_SEGMENT
+from walkers.runner.failures import DiskFull, EngineError, EngineFailure
 from walkers.runner.launch import launch
 from walkers.sweeps.scheduler import Failure, Options, _severity
 from walkers.sweeps.worker import Task, work
@@ -46,9 +47,9 @@ def test_bounds_of_a_case_are_the_engines(
     tmp_path: Path, contact: dict[str, object], beyond: dict[str, object]
 ) -> None:
     """The last value that the case check takes runs; the first that it refuses stops the engine."""
-    run = {"time_step": "0.4 us", "cycles": 2, "settling_cycles": 0, "samples_per_cycle": 1, "allow_unstable": True}
+    brief = {"time_step": "0.4 us", "cycles": 2, "settling_cycles": 0, "samples_per_cycle": 1, "allow_unstable": True}
     drive = {"frequency": "2 kHz"}
-    case = make_case(contact=contact, run=run, drive=drive)
+    case = make_case(contact=contact, run=brief, drive=drive)
     assert not run_case(case, tmp_path).cached
     (key,) = beyond
     with pytest.raises(InputError, match=rf"contact\.{key} = .*: expected .*(more than 0\.05|at most 1e\+09)"):
@@ -80,25 +81,25 @@ def unnumbered(tmp_path: Path) -> str:
 
 def test_a_number_that_is_none_at_the_end_of_a_dump_is_a_failure(unnumbered: str, tmp_path: Path) -> None:
     """The engine itself ends as if nothing had happened."""
-    run = {"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 500, "time_step": "2 us"}
+    dense = {"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 500, "time_step": "2 us"}
     with pytest.raises((DumpError, EngineFailure), match="no number"):
-        run_case(make_case(run=run), tmp_path / "runs", engine=unnumbered)
+        run_case(make_case(run=dense), tmp_path / "runs", engine=unnumbered)
     assert not list(tmp_path.glob("runs/*/manifest.json"))
     assert list(tmp_path.glob("runs/*.incomplete/failure.json"))
 
 
 def test_a_dump_that_holds_no_number_is_not_tabulated(run_directory: Callable[..., Path], tmp_path: Path) -> None:
     directory = tmp_path / "copy"
-    shutil.copytree(run_directory(start={"replicates": 2}, run=SHORT), directory)
-    dump = (directory / "beads.bin").read_bytes()
-    (directory / "beads.bin").write_bytes(dump[:-8] + struct.pack("=d", np.nan))
+    shutil.copytree(run_directory(dimers={"replicates": 2}, run=SHORT), directory)
+    dump = (directory / FIRST_SEGMENT / "beads.bin").read_bytes()
+    (directory / FIRST_SEGMENT / "beads.bin").write_bytes(dump[:-8] + struct.pack("=d", np.nan))
     with pytest.raises(DumpError, match=r"beads\.bin: .* is no number at step"):
         tabulate(directory)
 
 
 @pytest.fixture(scope="module")
 def local_dump(run_directory: Callable[..., Path]) -> tuple[Path, tuple[str, ...]]:
-    directory = run_directory(start={"replicates": 2}, run=SHORT)
+    directory = run_directory(dimers={"replicates": 2}, run=SHORT) / FIRST_SEGMENT
     columns = json.loads((directory / "layout.json").read_text())["pair_bridge_columns"]
     return directory / "bridges.pairs.txt", tuple(columns)
 
@@ -163,7 +164,7 @@ def test_closed_streams_do_not_matter(short_case: Path, in_folder: Path, closed:
         assert (done.returncode, b"Traceback" in done.stderr) == (0, False), done.stderr
     (directory,) = in_folder.glob("runs/short-*")
     assert read_result(directory)["velocity"]["mean"] > 0.0
-    assert b"walkers" not in (directory / "engine.log").read_bytes()
+    assert b"walkers" not in (directory / FIRST_SEGMENT / "engine.log").read_bytes()
 
 
 def test_a_reader_who_has_had_enough_is_no_failure(short_case: Path) -> None:
@@ -176,7 +177,7 @@ def test_a_reader_who_has_had_enough_is_no_failure(short_case: Path) -> None:
 def test_progress_that_nobody_reads_stops_nothing(in_folder: Path) -> None:
     """Half a second of walkers, so that a line of progress comes when the reader has gone."""
     (in_folder / "base.toml").write_text(to_toml(document(run={"cycles": 120, "samples_per_cycle": 10})))
-    (in_folder / "sweep.toml").write_text('case = "base.toml"\n[axes]\nstart.angle = ["0 deg", "10 deg"]\n')
+    (in_folder / "sweep.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
     script = f'{PROGRAM} sweep sweep.toml -j 1 2>&1 | true; echo "${{PIPESTATUS[0]}}"'
     done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "0"
@@ -206,7 +207,7 @@ def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
 
 
 BAD_SWEEPS = {
-    "twice": ({"axes": {"start.seed": [1, 2, 1]}}, r"start\.seed = 1: expected different values"),
+    "twice": ({"axes": {"run.seed": [1, 2, 1]}}, r"run\.seed = 1: expected different values"),
     "twice in other words": ({"axes": {"drive.frequency": ["80 Hz", "80.0 Hz"]}}, r'"80\.0 Hz": expected different'),
     "a range without a width": (
         {"axes": {"drive.frequency": {"linspace": ["80 Hz", "80 Hz", 3]}}},
@@ -260,6 +261,38 @@ def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(full_disk:
     left = [path for path in full_disk.rglob("*") if path.is_file() and path.stat().st_size]
     assert left == [full_disk / "ballast"]
     assert not [path for path in full_disk.rglob("*") if ".new" in path.name or path.suffix == ".lock"]
+
+
+def test_a_full_disk_is_a_failure_of_the_run(full_disk: Path) -> None:
+    with pytest.raises(DiskFull, match="disk full"):
+        run_case(make_case(run=SHORT), full_disk / "runs")
+
+
+def test_a_disk_that_is_full_when_the_tables_are_written_is_a_failure_of_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The engine has ended well by then; with room again only the tables are made."""
+    from walkers.postprocess import analysis
+
+    case, tabulated = make_case(run=SHORT), analysis.tabulate
+    with mounted(tmp_path / "disk", "2m") as place:
+
+        def tabulate_without_room(directory: Path) -> object:
+            with suppress(OSError), (place / "ballast").open("wb", buffering=0) as ballast:
+                while True:
+                    ballast.write(b"\0" * 4096)
+            return tabulated(directory)
+
+        monkeypatch.setattr(analysis, "tabulate", tabulate_without_room)
+        with pytest.raises(DiskFull, match="disk full"):
+            run_case(case, place / "runs")
+        assert not list(place.glob("runs/*/manifest.json"))
+        monkeypatch.undo()
+        (place / "ballast").unlink()
+        (dump,) = place.glob("runs/*.incomplete/segments/0000/beads.bin")
+        node = dump.stat().st_ino
+        outcome = run_case(case, place / "runs")
+        assert (outcome.directory / FIRST_SEGMENT / "beads.bin").stat().st_ino == node
 
 
 def test_a_worker_tells_a_full_disk_by_its_name(full_disk: Path) -> None:
@@ -355,7 +388,7 @@ def test_walkers_that_turned_over_are_told_first(run_directory: Callable[..., Pa
 
 def test_a_result_says_what_the_walkers_do_that_kept_their_heading(run_directory: Callable[..., Path]) -> None:
     """Two of three start across the axis, off by more than a right angle; the third walks on."""
-    directory = run_directory(start={"replicates": 3, "facing": "right"}, run=SHORT)
+    directory = run_directory(dimers={"replicates": 3, "facing": "right"}, run=SHORT)
     result = {**current_result(directory)}
     result |= {"turned_round": 2, "kept_heading": {**result["kept_heading"], "n": 1, "mean": 1.5e-3}}
     lines = describe_result(directory, result).splitlines()
@@ -364,13 +397,11 @@ def test_a_result_says_what_the_walkers_do_that_kept_their_heading(run_directory
 
 
 def test_piles_are_run_from_python_as_walkers_are(tmp_path: Path) -> None:
-    from walkers.inputs import load_pile
-
-    case = load_pile("pile-ci")
+    case = load_case("pile-ci")
     brief = replace(case, run=replace(case.run, cycles=case.run.cycles_per_segment, longest_settling=0.02))
     seen: list[object] = []
     outcome = run_case(brief, tmp_path, on_progress=seen.append)
-    assert (outcome.cached, outcome.result["beads"]) == (False, sum(case.beads.counts))
+    assert (outcome.cached, outcome.result["beads"]) == (False, brief.count)
     assert seen
     assert run_case(brief, tmp_path).cached
 

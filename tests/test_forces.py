@@ -7,7 +7,8 @@ import pytest
 
 from tests.conftest import document, make_case
 from walkers.inputs import load_case, resolve_case
-from walkers.inputs.dimer import contact_loads, dimer_of
+from walkers.inputs.loads import contact_loads, dimer_of
+from walkers.inputs.resolving import limits_of
 from walkers.physics.capillary import (
     bridge_volume_at_wall,
     bridge_volume_between_beads,
@@ -18,7 +19,7 @@ from walkers.physics.capillary import (
 )
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.dimer import Dimer
-from walkers.physics.time_step import AUTO_FRACTIONS, fit_into_cycle, time_step_limits
+from walkers.physics.time_step import AUTO_FRACTIONS, fit_into_cycle
 
 GAMMA = 0.0192
 
@@ -85,7 +86,7 @@ def test_drive_given_as_gamma0() -> None:
 def test_time_step_limits_of_the_walker() -> None:
     """By hand for R 0.2 mm, ρ 4000, E 50 MPa, ν 0.3: π R √(ρ/G)/(0.1631 ν + 0.8766) = 9.79 µs."""
     case = make_case()
-    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive.peak_velocity)
+    limits = limits_of(case)
     assert limits.rayleigh == pytest.approx(9.79e-6, rel=1e-3)
     assert limits.rayleigh < limits.hertz < limits.viscous
 
@@ -93,11 +94,12 @@ def test_time_step_limits_of_the_walker() -> None:
 def test_viscous_limit_rules_in_glycerol() -> None:
     """The glycerol climber is wrong at 6 µs and converged at 2 µs: the limit lies between, auto below 2.1 µs."""
     case = make_case(
-        beads={"radii": ["0.545 mm", "0.3075 mm"], "material": "glass"},
+        beads={"material": "glass"},
+        dimers={"radii": ["0.545 mm", "0.3075 mm"]},
         liquid={"name": "glycerol 87 %"},
         drive={"frequency": "170 Hz", "peak_acceleration": "16.2 g"},
     )
-    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive.peak_velocity)
+    limits = limits_of(case)
     assert 2e-6 < limits.viscous < 6e-6
     assert limits.exceeded_by(6e-6) == ["viscous"]
     assert case.run.time_step < 2.1e-6
@@ -106,7 +108,7 @@ def test_viscous_limit_rules_in_glycerol() -> None:
 @pytest.mark.parametrize("name", ["fig1b", "fig4a", "fig4b", "symmetric"])
 def test_auto_respects_every_limit_with_margin(name: str) -> None:
     case = load_case(name)
-    limits = time_step_limits(dimer_of(case), case.contact, case.liquid, case.drive.peak_velocity).as_dict()
+    limits = limits_of(case).as_dict()
     for limit, share in AUTO_FRACTIONS.items():
         assert case.run.time_step <= share * limits[limit]
 

@@ -13,12 +13,11 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import PROGRAM, document, engines_in, make_case, to_toml, wait_for
-from walkers import run_case
-from walkers.inputs.case import WalkerCase
-from walkers.runner.directory import finished_run, open_run
+from walkers import run as run_case
+from walkers.inputs.case import Case
+from walkers.runner import find_engine, finished_run, open_run
 from walkers.runner.failures import RunBusy
 from walkers.runner.locks import OrphanLockWarning, is_locked, locked
-from walkers.templates import render_deck
 
 BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cycle": 2}
 LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
@@ -40,15 +39,15 @@ def test_after_each_kill_the_next_call_runs(tmp_path: Path, kills: int) -> None:
     draw = random.Random(14)
     begun = {"waiting": 0, "running": 0}
     for kill in range(kills):
-        case = make_case(run=BRIEF, start={"seed": kill})
+        case = make_case(run={**BRIEF, "seed": kill})
         child = _forked(lambda case=case: run_case(case, tmp_path, force=True))  # type: ignore[misc]
         time.sleep(draw.uniform(0.0, 0.12))
         begun["running" if engines_in(tmp_path) else "waiting"] += 1
         os.kill(child, signal.SIGKILL)
         outcome = run_case(case, tmp_path)
         os.waitpid(child, 0)
-        assert finished_run(outcome.run.directory) is not None
-        assert not is_locked(outcome.run.directory)
+        assert finished_run(outcome.directory) is not None
+        assert not is_locked(outcome.directory)
     assert begun["running"]  # the moments are spread, and some have an engine
     wait_for(lambda: not engines_in(tmp_path))
     assert not list(tmp_path.glob("*.incomplete"))
@@ -61,7 +60,7 @@ def test_no_engine_is_orphaned_by_a_kill_at_its_birth(tmp_path: Path) -> None:
     for kill in range(20):
         folder = tmp_path / str(kill)
         child = _forked(lambda folder=folder: run_case(case, folder))  # type: ignore[misc]
-        wait_for(lambda folder=folder: list(folder.glob("*.incomplete/engine.log")))  # type: ignore[misc]
+        wait_for(lambda folder=folder: list(folder.glob("*.incomplete/segments/0000.new/engine.log")))  # type: ignore[misc]
         time.sleep(draw.uniform(0.0, 0.02))  # the fork, setpriv, sh and the engine follow within that time
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
@@ -91,7 +90,7 @@ def test_a_dying_engine_is_waited_for_with_a_line(tmp_path: Path) -> None:
     assert not outcome.cached
 
 
-def _kill_once_it_lingers(case: WalkerCase, folder: Path, front: str) -> None:
+def _kill_once_it_lingers(case: Case, folder: Path, front: str) -> None:
     child = _forked(lambda: run_case(case, folder / "runs", engine=front))
     wait_for((folder / "lingering").exists)
     os.kill(child, signal.SIGKILL)
@@ -146,9 +145,9 @@ def test_nohup_outlives_a_closed_terminal(in_folder: Path) -> None:
     assert not engines_in(in_folder)
 
 
-def _replaced(case: WalkerCase, out: Path) -> tuple[Path, Path]:
+def _replaced(case: Case, out: Path) -> tuple[Path, Path]:
     """A finished run, and beside it what a crash within a replacement leaves of the one before."""
-    place = run_case(case, out).run.directory
+    place = run_case(case, out).directory
     left = place.with_name(place.name + ".replaced")
     left.mkdir()
     (left / "manifest.json").write_text((place / "manifest.json").read_text())
@@ -158,18 +157,12 @@ def _replaced(case: WalkerCase, out: Path) -> tuple[Path, Path]:
 def test_a_crash_between_renaming_and_removing_leaves_no_trace(tmp_path: Path) -> None:
     case = make_case(run=BRIEF)
     place, left = _replaced(case, tmp_path)
-    assert run_case(case, tmp_path, force=True).run.directory == place
+    assert run_case(case, tmp_path, force=True).directory == place
     assert not left.exists()
     place, left = _replaced(case, tmp_path)
     assert run_case(case, tmp_path).cached
-    with open_run(case, render_deck(case), _engine(), tmp_path):
+    with open_run(case, find_engine(), tmp_path):
         assert not left.exists()
-
-
-def _engine() -> object:
-    from walkers.runner import find_engine
-
-    return find_engine()
 
 
 def test_what_a_replacement_left_is_no_run(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from tests.conftest import make_case
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.case import Case
 from walkers.inputs.sweep import load_sweep
 from walkers.sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, makespan, pack, unfinished_parts
 from walkers.templates import render_deck
@@ -15,15 +15,15 @@ from walkers.templates.sharing import sharing_key
 STEP = {"time_step": "2 us"}
 
 
-def _numbered(*cases: WalkerCase) -> dict[int, WalkerCase]:
+def _numbered(*cases: Case) -> dict[int, Case]:
     return dict(enumerate(cases))
 
 
 def test_what_may_differ_within_a_deck() -> None:
     same = [
         make_case(run=STEP),
-        make_case(run=STEP, start={"angle": "30 deg", "seed": 2, "replicates": 3}),
-        make_case(run=STEP, beads={"radii": ["0.35 mm", "0.2 mm"]}),
+        make_case(run={**STEP, "seed": 2}, dimers={"angle": "30 deg", "replicates": 3}),
+        make_case(run=STEP, dimers={"radii": ["0.35 mm", "0.2 mm"]}),
         make_case(run=STEP, contact={"friction": {"bead_bead": 0.2, "bead_wall": 0.05}}),
         make_case(run=STEP, contact={"restitution": 0.6}),
     ]
@@ -56,7 +56,7 @@ def test_every_point_travels_once_and_cores_finish_together(sweep: str, workers:
     assert sorted(point for deck in decks for point in deck.points) == list(cases)
     for deck in decks:
         assert len({sharing_key(cases[point]) for point in deck.points}) == 1
-        assert len(deck.points) == 1 or sum(cases[point].start.replicates for point in deck.points) <= MOST_WALKERS
+        assert len(deck.points) == 1 or sum(cases[point].walkers[0].replicates for point in deck.points) <= MOST_WALKERS
         assert len(deck.points) == 1 or deck.seconds <= LONGEST_SECONDS
     seconds = [deck.seconds for deck in decks]
     assert seconds == sorted(seconds, reverse=True)
@@ -65,18 +65,18 @@ def test_every_point_travels_once_and_cores_finish_together(sweep: str, workers:
 
 
 def test_sharing_a_deck_is_cheaper_than_a_deck_each() -> None:
-    cases = _numbered(*(make_case(run=STEP, start={"seed": seed}) for seed in range(48)))
+    cases = _numbered(*(make_case(run={**STEP, "seed": seed}) for seed in range(48)))
     alone = sum(deck.seconds for number, case in cases.items() for deck in pack({number: case}, 1))
     assert sum(deck.seconds for deck in pack(cases, 2)) < 0.35 * alone
 
 
 def test_more_cores_than_decks_part_them_further() -> None:
-    cases = _numbered(*(make_case(run=STEP, start={"seed": seed}) for seed in range(48)))
+    cases = _numbered(*(make_case(run={**STEP, "seed": seed}) for seed in range(48)))
     assert len(pack(cases, 2)) < len(pack(cases, 16))
 
 
 def test_what_is_left_of_a_deck_is_made_of_its_halves() -> None:
-    cases = _numbered(*(make_case(run=STEP, start={"seed": seed}) for seed in range(13)))
+    cases = _numbered(*(make_case(run={**STEP, "seed": seed}) for seed in range(13)))
     points = tuple(cases)
     halves_of_halves = {points}
     for _ in range(4):

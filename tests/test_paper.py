@@ -15,8 +15,8 @@ from PIL import Image
 from tests.conftest import PROGRAM, call
 from walkers.inputs import load_case
 from walkers.inputs.axes import flatten, is_axis
-from walkers.inputs.dimer import dimer_of
 from walkers.inputs.errors import InputError
+from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import read_toml
 from walkers.inputs.sweep import expand, shipped_sweeps
 from walkers.paper import dimers, published
@@ -36,7 +36,7 @@ from walkers.theory.mathieu import alignment, turning
 from walkers.theory.prediction import motion_of
 from walkers.theory.quasistatic import mean_velocity
 
-SHORT = {"start.replicates": 2, "run.cycles": 8, "run.settling_cycles": 4, "run.time_step": "3 us"}
+SHORT = {"dimers.replicates": 2, "run.cycles": 8, "run.settling_cycles": 4, "run.time_step": "3 us"}
 FEWER = {
     "fig2": {
         "drive.frequency": ["60 Hz", "90 Hz"],
@@ -45,8 +45,8 @@ FEWER = {
     "fig2-threshold": {"drive.frequency": ["60 Hz", "90 Hz"]},
     "fig3": {},
     "fig4": {},
-    "alignment": {"start.angle": ["0 deg", "45 deg"]},
-    "modes": {"beads.sin_delta": [0.0, 0.2], "drive.gamma0": [0.05, 0.15, 0.5]},
+    "alignment": {"dimers.angle": ["0 deg", "45 deg"]},
+    "modes": {"dimers.sin_delta": [0.0, 0.2], "drive.gamma0": [0.05, 0.15, 0.5]},
 }
 
 
@@ -228,12 +228,12 @@ def test_the_theory_of_fig4_goes_through_the_cycle_as_the_engine_does(sources: S
 
 def test_dimers_begin_to_turn_as_the_pendulum_does(sources: Sources) -> None:
     table = sources.finished("alignment")
-    (run,) = table["run"][~dimers.symmetric(table) & np.isclose(table["start.angle"], 45.0)]
+    (run,) = table["run"][~dimers.symmetric(table) & np.isclose(table["dimers.angle"], 45.0)]
     trajectory = sources.trajectory(run)
     case = trajectory.case
     parameters = alignment(dimer_of(case), case.drive.frequency, case.drive.peak_acceleration)
     few = trajectory.time < 0.1
-    for number, walker in enumerate(trajectory.layout.walkers):
+    for number, walker in enumerate(trajectory.walkers):
         psi = trajectory.orientation[few, number]
         theta = np.pi * case.drive.frequency * trajectory.time[few]
         predicted = turning(parameters, float(psi[0]), theta, np.pi / 2.0 * walker.facing)

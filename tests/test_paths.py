@@ -43,7 +43,7 @@ def _nothing_was_executed(folder: Path) -> bool:
 @pytest.mark.parametrize("name", ODD)
 def test_odd_paths_without_a_site_file_are_paths(name: str, case_file: Path, in_folder: Path) -> None:
     odd = ODD[name]
-    (in_folder / f"{odd}.toml").write_text('case = "base.toml"\n[axes]\nstart.angle = ["0 deg", "10 deg"]\n')
+    (in_folder / f"{odd}.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
     done = call("sweep", f"./{odd}.toml", "--out", f"./{odd}", "-j", "1")
     assert (done.returncode, done.stderr.count("Traceback")) == (0, 0), done.stderr
     assert list(load(in_folder / odd / odd)["status"]) == ["finished"] * 2

@@ -9,12 +9,12 @@ import pytest
 
 from tests.conftest import make_case
 from walkers.inputs import load_case
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.loads import dimer_of
 from walkers.postprocess.gait import Walk, gait, settled_samples, walk
-from walkers.postprocess.trajectory import Trajectory
+from walkers.postprocess.motion import Group
 
 Walked = Callable[..., Walk]
-Moved = Callable[..., Trajectory]
+Moved = Callable[..., Group]
 MM_PER_S = 1e-3
 
 
@@ -25,7 +25,7 @@ def test_velocity_against_acceleration(walked: Walked, acceleration: str, veloci
     assert found == pytest.approx(velocity * MM_PER_S, rel=0.01)
 
 
-def _means(moved: Trajectory) -> tuple[float, np.ndarray, np.ndarray]:
+def _means(moved: Group) -> tuple[float, np.ndarray, np.ndarray]:
     motion, samples = gait(moved), settled_samples(moved)
     return walk(moved).velocity[0], motion.rotation[samples, 0].mean(axis=0), motion.sliding[samples, 0].mean(axis=0)
 
@@ -33,7 +33,7 @@ def _means(moved: Trajectory) -> tuple[float, np.ndarray, np.ndarray]:
 def test_at_moderate_drive_the_large_bead_rolls_and_the_small_one_slides(trajectory: Moved) -> None:
     """Fig. 4a: published 2.3 mm/s, the large bead rotating with hardly any sliding."""
     moved = trajectory(
-        beads={"radii": ["0.6 mm", "0.3 mm"]},
+        dimers={"radii": ["0.6 mm", "0.3 mm"]},
         drive={"peak_acceleration": "2 g"},
         contact={"friction": {"bead_bead": 0.07, "bead_wall": 0.07}},
     )
@@ -47,7 +47,7 @@ def test_at_moderate_drive_the_large_bead_rolls_and_the_small_one_slides(traject
 def test_at_strong_drive_the_large_bead_slides_as_well(trajectory: Moved) -> None:
     """Fig. 4b: published 8.0 mm/s with mean rotation 13.3 and mean sliding -5.3 mm/s of the large bead."""
     moved = trajectory(
-        beads={"radii": ["0.6 mm", "0.3 mm"]}, liquid={"name": "Si AK10"}, drive={"peak_acceleration": "10 g"}
+        dimers={"radii": ["0.6 mm", "0.3 mm"]}, liquid={"name": "Si AK10"}, drive={"peak_acceleration": "10 g"}
     )
     velocity, rotation, sliding = _means(moved)
     assert velocity == pytest.approx(8.54 * MM_PER_S, rel=0.02)
@@ -56,7 +56,7 @@ def test_at_strong_drive_the_large_bead_slides_as_well(trajectory: Moved) -> Non
 
 
 def test_symmetric_dimer_does_not_walk(walked: Walked) -> None:
-    assert abs(walked(beads={"radii": ["0.25 mm", "0.25 mm"]}).velocity[0]) < 0.01 * MM_PER_S
+    assert abs(walked(dimers={"radii": ["0.25 mm", "0.25 mm"]}).velocity[0]) < 0.01 * MM_PER_S
     # As shipped it leaves the axis meanwhile: a hundredth of a walker's 1.3 mm/s.
     shipped = load_case("symmetric")
     shorter = replace(shipped, run=replace(shipped.run, cycles=30, settling_cycles=10))
@@ -64,10 +64,10 @@ def test_symmetric_dimer_does_not_walk(walked: Walked) -> None:
 
 
 def test_exchanged_beads_walk_the_other_way_at_the_same_speed(walked: Walked) -> None:
-    there, back = walked(), walked(beads={"radii": ["0.2 mm", "0.3 mm"]})
+    there, back = walked(), walked(dimers={"radii": ["0.2 mm", "0.3 mm"]})
     assert back.axial[0] == pytest.approx(-there.axial[0], rel=1e-3)
     assert back.velocity[0] == pytest.approx(there.velocity[0], rel=1e-3)  # toward the large bead in both
-    assert walked(start={"facing": "left"}).axial[0] == pytest.approx(-there.axial[0], rel=1e-3)
+    assert walked(dimers={"facing": "left"}).axial[0] == pytest.approx(-there.axial[0], rel=1e-3)
 
 
 @pytest.mark.parametrize("acceleration", ["2 g", "4 g", "6 g"])
@@ -88,7 +88,7 @@ def test_a_film_drags_beads_that_nothing_else_holds(trajectory: Moved, frame: st
     )
     case, dimer = moved.case, dimer_of(moved.case)
     assert case.liquid.film_viscosity == pytest.approx(50.0 * 5e-6 * 920.0)
-    rate = 6.0 * np.pi * case.liquid.film_viscosity * sum(case.beads.radii) / dimer.total_mass
+    rate = 6.0 * np.pi * case.liquid.film_viscosity * sum(case.walkers[0].radii) / dimer.total_mass
     expected = case.drive.peak_acceleration / np.hypot(case.drive.angular_frequency, rate)
     found = np.sqrt(2.0 * np.mean(moved.velocity[settled_samples(moved), 0, :, 0] ** 2, axis=0))
     np.testing.assert_allclose(found, expected, rtol=2e-4)
@@ -118,8 +118,8 @@ def test_substrate_moves_as_prescribed(trajectory: Moved, axis: str) -> None:
     drive = moved.case.drive
     along = "xyz".index(axis)
     expected = drive.amplitude * np.sin(drive.angular_frequency * moved.time)
-    np.testing.assert_allclose(moved.substrate[:, along], expected, atol=1e-9 * drive.amplitude + 1e-15)
-    assert not np.any(np.delete(moved.substrate, along, axis=1))
+    np.testing.assert_allclose(moved.motion.substrate[:, along], expected, atol=1e-9 * drive.amplitude + 1e-15)
+    assert not np.any(np.delete(moved.motion.substrate, along, axis=1))
 
 
 @pytest.mark.parametrize("frame", ["lab", "container"])
@@ -128,7 +128,7 @@ def test_walkers_start_at_rest_on_the_substrate(trajectory: Moved, frame: str) -
     assert np.abs(moved.velocity[0]).max() < 1e-12
     expected = moved.case.drive.peak_velocity * np.cos(moved.case.drive.angular_frequency * moved.time)
     if frame == "lab":
-        dumped = moved.substrate_velocity[:, 0]
+        dumped = moved.motion.substrate_velocity[:, 0]
         np.testing.assert_allclose(dumped, expected, atol=1e-9 * moved.case.drive.peak_velocity)
 
 
@@ -151,15 +151,14 @@ def test_weight_is_neglectable_beside_the_capillary_forces(walked: Walked) -> No
 
 
 def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(trajectory: Moved) -> None:
-    start = {"angle": "5 deg"}
     contact = {
         "friction": {"bead_bead": 0.2, "bead_wall": 0.2},
         "rolling_friction": 0.003,
         "minimum_separation_ratio": 1.0,
     }
     liquid = {"dynamic_viscosity": "100 mPa*s"}
-    common = {"start": start, "contact": contact, "liquid": liquid, "run": {"cycles": 120, "settling_cycles": 20}}
-    asymmetric = trajectory(**common).orientation[-1, 0]
-    symmetric = trajectory(beads={"radii": ["0.25 mm", "0.25 mm"]}, **common).orientation[-1, 0]
+    common = {"contact": contact, "liquid": liquid, "run": {"cycles": 120, "settling_cycles": 20}}
+    asymmetric = trajectory(dimers={"angle": "5 deg"}, **common).orientation[-1, 0]
+    symmetric = trajectory(dimers={"radii": ["0.25 mm", "0.25 mm"], "angle": "5 deg"}, **common).orientation[-1, 0]
     assert abs(sin(asymmetric)) < 0.5 * sin(np.radians(5.0))
     assert abs(sin(symmetric)) > 2.0 * sin(np.radians(5.0))

@@ -10,83 +10,101 @@ import pytest
 import pyvista as pv
 
 from walkers.inputs import InputError
-from walkers.postprocess import read_table, read_trajectory
-from walkers.postprocess.figures import plot_run
+from walkers.postprocess import Group, read_motion, read_table
+from walkers.postprocess.analysis import plot_run
 from walkers.postprocess.paraview import write_vtk
-from walkers.postprocess.rendering import render_run
+from walkers.postprocess.pictures import render_run
 
 
 @pytest.fixture(scope="module")
 def directory(run_directory: Callable[..., Path]) -> Path:
     return run_directory(
-        start={"replicates": 2, "angle_spread": "1 deg"},
+        dimers={"replicates": 2, "angle_spread": "1 deg"},
         run={"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 10, "bridge_samples_per_cycle": 2},
     )
 
 
 @pytest.fixture(scope="module")
 def collection(directory: Path) -> Path:
-    return write_vtk(directory, every_sample=True, vtu=True, as_placed=True)
+    return write_vtk(directory, every=1, vtu=True, as_placed=True)
 
 
-def test_the_collection_is_in_seconds(directory: Path, collection: Path) -> None:
+@pytest.fixture(scope="module")
+def moved(directory: Path) -> Group:
+    return read_motion(directory).groups[0]
+
+
+def test_the_collection_is_in_seconds(moved: Group, collection: Path) -> None:
     sets = ElementTree.parse(collection).getroot().findall("Collection/DataSet")
     beads = [entry for entry in sets if entry.get("part") == "0"]
     seconds = [float(entry.get("timestep", "nan")) for entry in beads]
-    np.testing.assert_allclose(seconds, read_trajectory(directory).time)
+    np.testing.assert_allclose(seconds, moved.time)
     assert all((collection.parent / str(entry.get("file"))).is_file() for entry in sets)
     assert {entry.get("part") for entry in sets} == {"0", "1", "2"}
 
 
-def test_pyvista_reads_the_collection(directory: Path, collection: Path) -> None:
+def test_pyvista_reads_the_collection(moved: Group, collection: Path) -> None:
     reader = pv.get_reader(collection)
-    moved = read_trajectory(directory)
     np.testing.assert_allclose(reader.time_values, moved.time)
     reader.set_active_time_value(reader.time_values[-1])
     assert len(reader.read()) == 3
 
 
-def test_beads_are_where_the_engine_put_them(directory: Path, collection: Path) -> None:
-    moved = read_trajectory(directory)
+def test_beads_are_where_the_engine_put_them(moved: Group, collection: Path) -> None:
     frame = 13
     beads = pv.read(collection.parent / f"beads_{frame:06d}.vtp")
-    laboratory = moved.position[frame] + moved.substrate[frame]
+    laboratory = moved.position[frame] + moved.motion.substrate[frame]
     np.testing.assert_allclose(beads.points, laboratory.reshape(-1, 3), rtol=1e-12)
     np.testing.assert_array_equal(beads["radius"], [3e-4, 2e-4, 3e-4, 2e-4])
     np.testing.assert_array_equal(beads["walker"], [0, 0, 1, 1])
-    np.testing.assert_array_equal(beads["bead"], [1, 2, 1, 2])
-    np.testing.assert_array_equal(beads["type"], [1, 1, 1, 1])
+    np.testing.assert_array_equal(beads["bead"], [0, 1, 2, 3])
+    np.testing.assert_array_equal(beads["large"], [1, 0, 1, 0])
     np.testing.assert_allclose(beads["velocity"], moved.velocity[frame].reshape(-1, 3))
     np.testing.assert_allclose(beads["omega"], moved.spin[frame].reshape(-1, 3))
 
 
-def test_the_substrate_moves(directory: Path, collection: Path) -> None:
-    moved = read_trajectory(directory)
-    places = [pv.read(collection.parent / f"substrate_{frame:06d}.vtp").points[0] for frame in (0, 3)]
-    np.testing.assert_allclose(places[1] - places[0], moved.substrate[3], atol=1e-12)
-    assert np.linalg.norm(moved.substrate[3]) > 1e-5
+def test_the_substrate_moves(moved: Group, collection: Path) -> None:
+    floors = [pv.read(collection.parent / f"boundary_{frame:06d}.vtp") for frame in (0, 3)]
+    shift = moved.motion.substrate[3]
+    np.testing.assert_allclose(floors[1].points - floors[0].points, np.tile(shift, (4, 1)), atol=1e-12)
+    assert np.linalg.norm(shift) > 1e-5
+    # The part of the plane that the walkers use, all of it at the height of the floor.
+    low_x, high_x, low_y, high_y, *heights = floors[0].bounds
+    places = moved.motion.position
+    assert low_x < places[..., 0].min() < places[..., 0].max() < high_x
+    assert low_y < places[..., 1].min() < places[..., 1].max() < high_y
+    assert heights == [0.0, 0.0]
 
 
-def test_bridges_are_lines_with_force_and_gap(directory: Path, collection: Path) -> None:
+def test_bridges_are_lines_with_force_and_gap(directory: Path, moved: Group, collection: Path) -> None:
     bridges = pv.read(collection.parent / "bridges_000010.vtp")
     assert bridges.n_lines == 6
     table = read_table(directory, "bridges")
-    rows = table[np.isclose(table["time"], read_trajectory(directory).time[10])]
-    np.testing.assert_allclose(bridges.cell_data["gap"], rows["gap"])
-    np.testing.assert_allclose(bridges.cell_data["normal_force"], rows["normal_force"])
+    rows = table[np.isclose(table["time"], moved.time[10])]
     ends = bridges.points[bridges.lines.reshape(-1, 3)[:, 1:]]
+    # The table is sorted by walkers and contacts, the lines are not: a line is known by the beads that it joins.
+    centres = pv.read(collection.parent / "beads_000010.vtp").points
+    apart = np.linalg.norm(ends[:, :, None] - centres, axis=-1)
+    joined = np.where(apart.min(axis=-1) < 1e-12, apart.argmin(axis=-1), -1)
+    contacts = [(0, -1), (1, -1), (0, 1), (2, -1), (3, -1), (2, 3)]
+    assert list(zip(rows["bead_1"], rows["bead_2"], strict=True)) == contacts
+    lines = [tuple(sorted(line, key=lambda bead: (bead < 0, bead))) for line in joined.tolist()]
+    order = [lines.index(contact) for contact in contacts]
+    assert sorted(order) == list(range(6))
+    np.testing.assert_allclose(bridges.cell_data["gap"][order], rows["gap"])
+    np.testing.assert_allclose(bridges.cell_data["normal_force"][order], rows["normal_force"])
+    np.testing.assert_array_equal(bridges.cell_data["walker"][order], rows["walker"])
     length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
     reach = np.array([3e-4, 2e-4, 5e-4] * 2)
-    np.testing.assert_allclose(length - reach, rows["gap"], atol=1e-10)
+    np.testing.assert_allclose(length[order] - reach, rows["gap"], atol=1e-10)
     # The engine reported bridges twice a cycle, beads ten times.
     assert len(list(collection.parent.glob("bridges_*.vtp"))) == 17
     assert len(list(collection.parent.glob("beads_*.vtp"))) == 81
 
 
-def test_meshio_reads_the_vtu(directory: Path, collection: Path) -> None:
+def test_meshio_reads_the_vtu(moved: Group, collection: Path) -> None:
     mesh = meshio.read(collection.parent / "beads_000080.vtu")
-    moved = read_trajectory(directory)
-    np.testing.assert_allclose(mesh.points, (moved.position[80] + moved.substrate[80]).reshape(-1, 3))
+    np.testing.assert_allclose(mesh.points, (moved.position[80] + moved.motion.substrate[80]).reshape(-1, 3))
     np.testing.assert_array_equal(mesh.point_data["radius"], [3e-4, 2e-4, 3e-4, 2e-4])
 
 
@@ -97,12 +115,12 @@ def test_one_frame_a_cycle_is_the_default(directory: Path, tmp_path: Path) -> No
     assert not list(tmp_path.glob("*.new"))
 
 
-def test_walkers_are_drawn_side_by_side(directory: Path, tmp_path: Path) -> None:
+def test_walkers_are_drawn_side_by_side(directory: Path, moved: Group, tmp_path: Path) -> None:
     collection = write_vtk(directory, destination=tmp_path / "gathered")
     points = [pv.read(collection.parent / f"beads_{frame:06d}.vtp").points for frame in (0, 80)]
-    as_placed = read_trajectory(directory).position
-    moved = (points[1] - points[0]).reshape(2, 2, 3)
-    np.testing.assert_allclose(moved, as_placed[80] - as_placed[0], atol=1e-12)
+    as_placed = moved.position
+    walked = (points[1] - points[0]).reshape(2, 2, 3)
+    np.testing.assert_allclose(walked, as_placed[80] - as_placed[0], atol=1e-12)
     assert np.ptp(points[0][:, 1]) < 4e-3 < np.ptp(as_placed[0, ..., 1])
 
 
@@ -131,7 +149,7 @@ def test_a_strobed_run_has_no_gait(run_directory: Callable[..., Path], tmp_path:
 
 
 def test_rendering_shows_ruby_beads_on_a_grey_floor(directory: Path, tmp_path: Path) -> None:
-    path = render_run(directory, tmp_path / "walker.png", images=2)
+    (path,) = render_run(directory, tmp_path / "walker.png", images=2)
     pixels = np.asarray(pv.read(path).point_data.active_scalars)[:, :3].astype(int)
     red = np.mean((pixels[:, 0] > 1.8 * pixels[:, 1]) & (pixels[:, 0] > 60))
     grey = np.mean(np.ptp(pixels, axis=1) < 25)

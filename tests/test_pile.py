@@ -16,22 +16,25 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+import walkers
 from tests.conftest import PROGRAM, call, engines_in, to_toml, wait_for
-from walkers.inputs import InputError, PileCase, load_pile, resolve_pile_case, shipped_cases
+from walkers.inputs import Case, InputError, load_case, resolve_case, shipped_cases
 from walkers.inputs.sweep import expand
-from walkers.postprocess.pile import FLOOR, read_bridges, read_pile
-from walkers.postprocess.pile_result import current_pile_result, tabulate_pile
-from walkers.postprocess.tables import PILE_TABLES, TABLES, read_table
+from walkers.postprocess import current_result, read_motion, read_table, tabulate
+from walkers.postprocess.motion import FLOOR, read_bridges
+from walkers.postprocess.piles import Pile
+from walkers.postprocess.tables import TABLES
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import run_place
+from walkers.runner.directory import run_place, segment_directories
 from walkers.runner.failures import EngineError, RunBusy
-from walkers.runner.segments import run_pile, segment_directories
+from walkers.runner.segments import open_run
 from walkers.sweeps.climbing import describe_climbs, piles_in, summarise_climbs
 from walkers.sweeps.record import states
 from walkers.sweeps.run import plan_sweep, run_sweep
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import Site, SiteFile
 from walkers.sweeps.table import load
+from walkers.templates.deck import Deck, Segment, render_deck
 
 
 def document(**changes: dict[str, Any]) -> dict[str, Any]:
@@ -41,8 +44,8 @@ def document(**changes: dict[str, Any]) -> dict[str, Any]:
     return tables
 
 
-def small(**changes: dict[str, Any]) -> PileCase:
-    return resolve_pile_case(document(**changes), name="pile-ci")
+def small(**changes: dict[str, Any]) -> Case:
+    return resolve_case(document(**changes), name="pile-ci")
 
 
 @pytest.fixture(scope="session")
@@ -50,9 +53,7 @@ def run(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     """The shipped pile of 60 beads."""
 
     def make(out: Path) -> None:
-        finished, found = run_pile(load_pile("pile-ci"), find_engine(None), out)
-        assert not found
-        tabulate_pile(finished.directory)
+        assert not walkers.run("pile-ci", out).cached
 
     (directory,) = once("piles", make).glob("pile-ci-*")
     return directory
@@ -92,30 +93,31 @@ def start_brief(folder: Path, engine: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
-def brief() -> PileCase:
-    return resolve_pile_case(document(run=BRIEF), name="brief")
+def brief() -> Case:
+    return resolve_case(document(run=BRIEF), name="brief")
 
 
 def test_a_pile_settles_is_shaken_and_is_whole(run: Path) -> None:
-    case, motion = load_pile("pile-ci"), read_pile(run)
+    case, motion = load_case("pile-ci"), read_motion(run)
+    assert case.mixture is not None
     manifest = json.loads((run / "manifest.json").read_text())
     assert manifest["settled"] < case.run.settled_below
-    assert len(motion.radius) == sum(case.beads.counts)
-    assert sorted(motion.radius) == pytest.approx(sorted(case.beads.radii))
-    assert int(motion.large.sum()) == case.beads.counts[1]
+    assert len(motion.radius) == sum(case.mixture.counts)
+    assert sorted(motion.radius) == pytest.approx(sorted(case.all_radii))
+    assert int(motion.large.sum()) == case.mixture.counts[1]
     assert motion.time[0] < 0.0
     assert motion.time[-1] == pytest.approx(case.run.cycles / case.drive.frequency)
-    every = case.run.steps_per_frame * case.run.time_step
+    every = case.run.steps_per_sample * case.run.time_step
     np.testing.assert_allclose(np.diff(motion.time), every)
     # All beads are within the container, but for overlaps, and on its floor.
-    room = case.container.width / 2.0 - motion.radius[:, None] + 1e-5
+    room = case.boundary.width / 2.0 - motion.radius[:, None] + 1e-5
     assert (np.abs(motion.position[..., :2]) <= room).all()
     assert (motion.position[..., 2] >= motion.radius - 1e-5).all()
     assert motion.position[-1, :, 2].max() < 8e-3
 
 
 def test_the_drive_shakes_the_pile(run: Path) -> None:
-    motion = read_pile(run)
+    motion = read_motion(run)
     agitation = (motion.velocity**2).sum(axis=2).mean(axis=1)
     start = int(np.searchsorted(motion.time, 0.0))
     assert agitation[start] < 1e-3**2
@@ -123,7 +125,7 @@ def test_the_drive_shakes_the_pile(run: Path) -> None:
 
 
 def test_bridges_are_the_engines(run: Path) -> None:
-    motion = read_pile(run)
+    motion = read_motion(run)
     frames = list(read_bridges(motion))
     assert len(frames) == len(motion.time)
     bridges = frames[-1]
@@ -136,8 +138,8 @@ def test_bridges_are_the_engines(run: Path) -> None:
 
 
 def test_tables_of_a_pile(run: Path) -> None:
-    motion = read_pile(run)
-    for name in PILE_TABLES:
+    motion = read_motion(run)
+    for name in Pile.tables:
         assert list(read_table(run, name).columns) == list(TABLES[name])
     bed = read_table(run, "bed")
     assert len(bed) == len(motion.time)
@@ -147,7 +149,7 @@ def test_tables_of_a_pile(run: Path) -> None:
     # Bridges hold the caps of the films that neighbours cover: some of what was given.
     given = motion.case.liquid.volume_fraction * float((4.0 / 3.0 * np.pi * motion.radius**3).sum())
     assert 0.4 * given < bed["liquid_in_bridges"].iloc[-1] < 0.9 * given
-    layer = float(np.diff(profile["height"])[0]) * motion.case.container.cross_section
+    layer = float(np.diff(profile["height"])[0]) * motion.case.boundary.cross_section
     driven = bed["time"] >= motion.time[-1] / 2.0
     held = float(profile["liquid_fraction"].sum()) * layer
     assert held == pytest.approx(bed["liquid_in_bridges"][driven].mean(), rel=1e-6)
@@ -155,9 +157,7 @@ def test_tables_of_a_pile(run: Path) -> None:
 
 def test_an_interrupted_pile_goes_on_bit_for_bit(halting: Callable[..., str], tmp_path: Path) -> None:
     """Killed while it makes its second segment, and the engine alone while it makes the third."""
-    uninterrupted, _ = run_pile(brief(), find_engine(None), tmp_path)
-    run = uninterrupted.directory
-    tabulate_pile(run)
+    run = walkers.run(brief(), tmp_path).directory
     engine = halting(1, 2)
     place = run_place(brief(), find_engine(engine), tmp_path / "out")
     unfinished = place.with_name(place.name + ".incomplete")
@@ -179,7 +179,7 @@ def test_an_interrupted_pile_goes_on_bit_for_bit(halting: Callable[..., str], tm
     for here, there in zip(segment_directories(place), segment_directories(run), strict=True):
         for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"):
             assert (here / name).read_bytes() == (there / name).read_bytes()
-    for name in PILE_TABLES:
+    for name in Pile.tables:
         assert read_table(place, name).equals(read_table(run, name))
 
 
@@ -194,7 +194,7 @@ def test_a_pile_is_run_once_at_a_time(halting: Callable[..., str], tmp_path: Pat
     try:
         wait_for((tmp_path / "halted-0001").exists)
         with pytest.raises(RunBusy):
-            run_pile(brief(), find_engine(engine), tmp_path / "out")
+            walkers.run(brief(), tmp_path / "out", engine=engine)
     finally:
         program.kill()
         program.wait()
@@ -202,40 +202,41 @@ def test_a_pile_is_run_once_at_a_time(halting: Callable[..., str], tmp_path: Pat
 
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
 def test_two_ranks_make_the_same_kind_of_pile(run: Path, tmp_path: Path) -> None:
-    finished, _ = run_pile(small(run={"ranks": 2, "duration": "0.02 s"}), find_engine(None), tmp_path)
-    one, two = (current_pile_result(directory) for directory in (run, finished.directory))
+    finished = walkers.run(small(run={"ranks": 2, "duration": "0.02 s"}), tmp_path)
+    one, two = current_result(run), finished.result
     assert two["surface"]["start"] == pytest.approx(one["surface"]["start"], rel=0.05)
     assert two["beads"] == one["beads"]
 
 
 def test_both_frames_shake_alike(run: Path, tmp_path: Path) -> None:
-    """Chaotic trajectories segment, their agitation does not."""
+    """Chaotic trajectories part, their agitation does not."""
     case = small(drive={"frame": "lab"})
-    finished, _ = run_pile(case, find_engine(None), tmp_path)
+    finished = walkers.run(case, tmp_path)
 
     def agitation(directory: Path) -> float:
-        motion = read_pile(directory)
+        motion = read_motion(directory)
         return float((motion.velocity[motion.time > 0.03] ** 2).sum(axis=2).mean())
 
     assert agitation(finished.directory) == pytest.approx(agitation(run), rel=0.3)
-    assert read_pile(finished.directory).position[..., 2].min() > 2.9e-4
+    assert finished.motion.position[..., 2].min() > 2.9e-4
 
 
 def test_the_laboratory_frame_is_taken_off_at_any_phase(tmp_path: Path) -> None:
     """The lowest beads lie on the floor throughout the cycle."""
     case = small(drive={"frame": "lab"}, run={"duration": "0.03 s", "frames_per_second": 680.0})
-    finished, _ = run_pile(case, find_engine(None), tmp_path)
-    motion = read_pile(finished.directory)
-    assert case.run.frames_per_cycle == 4
+    finished = walkers.run(case, tmp_path)
+    motion = finished.motion
+    assert case.run.samples_per_cycle == 4
     lowest = (motion.position[..., 2] - motion.radius).min(axis=1)
     assert np.abs(lowest).max() < 0.2 * case.drive.amplitude
 
 
 def test_settling_ends_at_last(tmp_path: Path) -> None:
     case = small(run={"settled_below": "1 nm/s", "longest_settling": "0.05 s", "duration": "0.01 s"})
-    finished, _ = run_pile(case, find_engine(None), tmp_path)
-    assert finished.manifest["settled"] > case.run.settled_below
-    assert finished.manifest["drive_from"] * case.run.time_step == pytest.approx(0.05, rel=0.2)
+    finished = walkers.run(case, tmp_path)
+    manifest = json.loads((finished.directory / "manifest.json").read_text())
+    assert manifest["settled"] > case.run.settled_below
+    assert manifest["drive_from"] * case.run.time_step == pytest.approx(0.05, rel=0.2)
 
 
 def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
@@ -244,14 +245,15 @@ def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
         shutil.copytree(run, place)
         return place
 
-    gap, cut, said, lines = (broken(name) for name in ("gap", "cut", "said", "lines"))
+    gap, cut, said, lines, lacking = (broken(name) for name in ("gap", "cut", "said", "lines", "lacking"))
     shutil.rmtree(segment_directories(gap)[1])
     dump = segment_directories(cut)[1] / "beads.bin"
     dump.write_bytes(dump.read_bytes()[:-100])
     (segment_directories(said)[1] / "segment.json").write_text("{")
     text = segment_directories(lines)[1] / "bridges.walls.txt"
     text.write_text(text.read_text()[:-200])
-    for place in (gap, cut, said, lines):
+    (lacking / "case.json").write_text('{"name": "pile-ci"}')
+    for place in (gap, cut, said, lines, lacking):
         for command in ("plot", "vtk"):
             done = call(command, str(place))
             assert done.returncode in (1, 2)
@@ -267,42 +269,40 @@ def test_looking_before_the_end_leaves_nothing_stale(halting: Callable[..., str]
     program.kill()
     program.wait()
     (unfinished / "failure.json").write_text("{}")
-    assert tabulate_pile(unfinished)["driven"] == 0.0
-    finished, _ = run_pile(case, engine, tmp_path / "out")
-    assert current_pile_result(finished.directory)["driven"] > 0.04
+    assert tabulate(unfinished)["driven"] == 0.0
+    finished = walkers.run(case, tmp_path / "out", engine=str(engine.path))
+    assert finished.result["driven"] > 0.04
     assert not (finished.directory / "failure.json").exists()
 
 
-def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def written(run: Path) -> dict[str, int]:
+    """When the engine wrote the beads of each whole segment, ns."""
+    return {path.name: (path / "beads.bin").stat().st_mtime_ns for path in segment_directories(run)}
+
+
+def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path) -> None:
     case, engine = brief(), find_engine(None)
     place = run_place(case, engine, tmp_path)
-    from walkers.runner import segments
 
-    honest = segments.render_segment
-
-    def broken(case: PileCase, segment: segments.Segment) -> Any:
-        deck = honest(case, segment)
+    def broken(case: Case, segment: Segment) -> Deck:
+        deck = render_deck(case, segment)
         return deck if segment.drive_from is None else replace(deck, text=deck.text.replace("nve/sphere", "nve/cube"))
 
-    monkeypatch.setattr(segments, "render_segment", broken)
-    with pytest.raises(EngineError, match="nve/cube"):
-        run_pile(case, engine, tmp_path)
-    monkeypatch.undo()
+    with pytest.raises(EngineError, match="nve/cube"), open_run(case, engine, tmp_path) as opened:
+        opened.make(render=broken)
     unfinished = place.with_name(place.name + ".incomplete")
     assert json.loads((unfinished / "failure.json").read_text())["reason"] == "EngineError"
-    kept = {path: path.stat().st_mtime_ns for path in segment_directories(unfinished)}
+    kept = written(unfinished)
     assert kept
-    finished, _ = run_pile(case, engine, tmp_path)
-    assert {finished.directory / "segments" / path.name for path in kept} <= set(
-        segment_directories(finished.directory)
-    )
+    finished = walkers.run(case, tmp_path)
+    assert kept.items() <= written(finished.directory).items()
 
 
 BAD: dict[str, tuple[dict[str, dict[str, Any]], str]] = {
-    "no count": ({"beads": {"count": None}}, "beads.count"),
-    "both": ({"beads": {"fill_height": "3 mm"}}, "beads.count"),
-    "classes": ({"beads": {"large": ["0.29 mm", "0.4 mm"]}}, "beads.large"),
-    "range": ({"beads": {"small": ["0.32 mm", "0.3 mm"]}}, "beads.small"),
+    "no count": ({"mixture": {"count": None}}, "mixture.count"),
+    "both": ({"mixture": {"fill_height": "3 mm"}}, "mixture.count"),
+    "classes": ({"mixture": {"large": ["0.29 mm", "0.4 mm"]}}, "mixture.large"),
+    "range": ({"mixture": {"small": ["0.32 mm", "0.3 mm"]}}, "mixture.small"),
     "narrow": ({"boundary": {"width": "1.5 mm"}}, "boundary.width"),
     "low": ({"boundary": {"height": "2 mm"}}, "boundary.height"),
     "long": ({"run": {"duration": "9000 s"}}, "run.duration"),
@@ -318,26 +318,31 @@ BAD: dict[str, tuple[dict[str, dict[str, Any]], str]] = {
 def test_a_bad_pile_is_told_by_its_key(name: str) -> None:
     changes, key = BAD[name]
     tables = document(**changes)
-    tables["beads"] = {inner: value for inner, value in tables["beads"].items() if value is not None}
+    tables["mixture"] = {inner: value for inner, value in tables["mixture"].items() if value is not None}
     with pytest.raises(InputError, match=key.replace(".", r"\.")):
-        resolve_pile_case(tables, source="bad.toml", name="bad")
+        resolve_case(tables, source="bad.toml", name="bad")
 
 
 def test_a_fill_height_gives_a_count() -> None:
     tables = document()
-    del tables["beads"]["count"]
-    tables["beads"]["fill_height"] = "2 mm"
-    by_height = resolve_pile_case(tables, name="filled")
+    del tables["mixture"]["count"]
+    tables["mixture"]["fill_height"] = "2 mm"
+    by_height = resolve_case(tables, name="filled")
     # A packing fraction of 0.55, with beads of 0.24 mm³ in the mean.
-    assert 60 <= sum(by_height.beads.counts) <= 90
+    assert by_height.mixture is not None
+    assert 60 <= sum(by_height.mixture.counts) <= 90
 
 
 def test_shares_by_mass_and_by_number() -> None:
-    by_mass = load_pile("pile-fig1a")
-    volumes = [sum(4.0 / 3.0 * np.pi * r**3 for r in sizes) / len(sizes) for sizes, _ in by_mass.beads.classes]
-    (_, few), (_, many) = by_mass.beads.classes
-    assert few * volumes[0] == pytest.approx(many * volumes[1], rel=0.01)
-    assert small(beads={"mixed_by": "number"}).beads.counts == (30, 30)
+    by_mass = load_case("pile-fig1a").mixture
+    assert by_mass is not None
+    classes = (by_mass.small, by_mass.large)
+    volumes = [sum(4.0 / 3.0 * np.pi * r**3 for r in sizes) / len(sizes) for sizes in classes]
+    many, few = by_mass.counts
+    assert many * volumes[0] == pytest.approx(few * volumes[1], rel=0.01)
+    by_number = small(mixture={"mixed_by": "number"}).mixture
+    assert by_number is not None
+    assert by_number.counts == (30, 30)
 
 
 def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
@@ -350,15 +355,15 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     assert told("render", str(run), "--to", "here/row.png", "--interval", "0.05 s").strip() == "here/row.png"
     film = in_folder / told("render", str(run), "--film", "--to", "here/box.mp4").strip()
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(film))
-    assert frames == (read_pile(run).time >= 0.0).sum()
-    assert seconds == pytest.approx(read_pile(run).time[-1], abs=0.1)
+    assert frames == (read_motion(run).time >= 0.0).sum()
+    assert seconds == pytest.approx(read_motion(run).time[-1], abs=0.1)
     pictures = [np.frombuffer(each, np.uint8) for each in list(imageio_ffmpeg.read_frames(str(film)))[1:]]
     assert (pictures[0] != pictures[-1]).mean() > 0.02  # beads move
     assert "as defined" in told("climb", str(run), "--sensitivity")
     collection = told("vtk", str(run), "--every", "4", "--to", "here/vtk").strip()
-    assert collection == "here/vtk/pile.pvd"
+    assert collection == "here/vtk/walkers.pvd"
     reader = pv.get_reader(in_folder / collection)
-    motion = read_pile(run)
+    motion = read_motion(run)
     driven = np.flatnonzero(motion.time >= 0.0)[::4]
     np.testing.assert_allclose(reader.time_values, motion.time[driven], atol=1e-12)
     beads = pv.read(in_folder / "here" / "vtk" / f"beads_{driven[1]:06d}.vtp")
@@ -366,11 +371,13 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     np.testing.assert_array_equal(beads["radius"], motion.radius)
     assert set(np.unique(beads["is_climber"])) <= {0, 1}
     assert pv.read(in_folder / "here" / "vtk" / f"bridges_{driven[1]:06d}.vtp").n_lines > 50
-    container = pv.read(in_folder / "here" / "vtk" / f"container_{driven[1]:06d}.vtp")
-    assert container.n_cells == 5
-    assert container.bounds[4] == 0.0
+    box = pv.read(in_folder / "here" / "vtk" / f"boundary_{driven[1]:06d}.vtp")
+    assert box.n_cells == 5
+    np.testing.assert_allclose(box.bounds, [-2e-3, 2e-3, -2e-3, 2e-3, 0.0, 20e-3], atol=1e-9)
     assert "60 beads" in told("run", "pile-ci", "--out", str(run.parent))
-    assert f"{small().beads.counts[0]} small and {small().beads.counts[1]} large beads" in told("show", "pile-ci")
+    mixture = small().mixture
+    assert mixture is not None
+    assert f"{mixture.counts[0]} small and {mixture.counts[1]} large, " in told("show", "pile-ci")
     assert "Not yet" in told("deck", "pile-ci")
     refusals = [
         ["render", "--interval", "3 s"],
@@ -379,9 +386,10 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
         ["render", "--walker", "1"],
         ["render", "--slowdown", "2"],
         ["render", "--film", "--images", "3"],
+        ["render", "--film", "--interval", "0.05 s"],
+        ["render", "--film", "--walker", "0"],
         ["render", "--film", "--to", "box.png"],
         ["render", "--to", "box.jpg"],
-        ["vtk", "--every-sample"],
         ["vtk", "--as-placed"],
     ]
     for option in refusals:
@@ -395,7 +403,7 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     """Two starts and an interruption; the table has a pile's columns."""
     tables = document(run={"duration": "0.03 s"})
     (tmp_path / "base.toml").write_text(to_toml(tables))
-    sweep = expand({"case": "base.toml", "axes": {"start.seed": [1, 2]}}, source="test", name="test", folder=tmp_path)
+    sweep = expand({"case": "base.toml", "axes": {"run.seed": [1, 2]}}, source="test", name="test", folder=tmp_path)
     out = tmp_path / "runs"
     record, failures = run_sweep(sweep, out, Options(2))
     assert not failures
@@ -415,8 +423,8 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     assert low == 0.0
     assert high == pytest.approx(1.0 - 0.025**0.5)  # none of two, Clopper and Pearson
     assert "0 of 2 runs climbed" in describe_climbs(found)
-    slower = resolve_pile_case({**tables, "drive": {**tables["drive"], "peak_acceleration": "20 g"}}, name="slower")
-    run_pile(slower, find_engine(None), out)
+    slower = resolve_case({**tables, "drive": {**tables["drive"], "peak_acceleration": "20 g"}}, name="slower")
+    walkers.run(slower, out)
     apart = piles_in(out)
     assert sorted(len(runs) for runs in apart.values()) == [1, 2]
     assert all("drive.harmonics[0].peak_acceleration = " in label for label in apart)
@@ -443,22 +451,22 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
         expand({"case": "base.toml", "axes": {"boundary.depth": [1]}}, source="test", name="no", folder=tmp_path)
 
 
-def cluster(friction: float, beads: list[tuple[float, float]], seconds: float = 0.3) -> PileCase:
+def cluster(friction: float, beads: list[tuple[float, float]], seconds: float = 0.3) -> Case:
     """Beads in a row on a wall: radii and heights, mm."""
     tables = tomllib.loads(shipped_cases()["cluster"].read_text())
-    tables["beads"]["placed"] = [
+    tables["placed"] = [
         {"radius": f"{radius} mm", "at": [f"{2.5001 - radius} mm", "0 mm", f"{height} mm"]} for radius, height in beads
     ]
     tables["contact"]["friction"] = {"bead_bead": friction, "bead_wall": friction}
     tables["run"]["duration"] = f"{seconds} s"
-    return resolve_pile_case(tables, name="cluster")
+    return resolve_case(tables, name="cluster")
 
 
 def test_a_placed_dimer_climbs_like_the_climber(tmp_path: Path) -> None:
     """The same dimer as `tests.test_climber`'s, by the other way: a box, the pile's recording, clusters, climbs."""
     case = cluster(0.3, [(0.545, 8.0), (0.3075, 7.18135)], seconds=0.5)
-    finished, _ = run_pile(case, find_engine(None), tmp_path)
-    (climb,) = current_pile_result(finished.directory)["climbs"]
+    finished = walkers.run(case, tmp_path)
+    (climb,) = finished.result["climbs"]
     assert climb["speed"] * 1e3 == pytest.approx(5.9, rel=0.03)
     assert (climb["size"], climb["large"], climb["leader_large"], climb["walls"]) == (2, 1, True, ["+x"])
     assert climb["begin"] == pytest.approx(0.0, abs=0.05)
@@ -466,15 +474,15 @@ def test_a_placed_dimer_climbs_like_the_climber(tmp_path: Path) -> None:
 
 def test_a_cluster_led_by_a_small_bead_does_not_climb(tmp_path: Path) -> None:
     case = cluster(0.3, [(0.3075, 8.0), (0.545, 7.18135)])
-    finished, _ = run_pile(case, find_engine(None), tmp_path)
-    assert current_pile_result(finished.directory)["climbs"] == []
-    assert read_pile(finished.directory).position[-1, :, 2].mean() < 7.2e-3
+    finished = walkers.run(case, tmp_path)
+    assert finished.result["climbs"] == []
+    assert finished.motion.position[-1, :, 2].mean() < 7.2e-3
 
 
 PLACED: dict[str, tuple[dict[str, Any], str]] = {
-    "outside": ({"at": ["2.2 mm", "0 mm", "8 mm"]}, r"beads\.placed\[0\]\.at"),
-    "overlap": ({"at": ["2.1926 mm", "0 mm", "7.4 mm"], "radius": "0.3075 mm"}, r"beads\.placed\[1\]\.at"),
-    "no unit": ({"radius": 0.5}, r"beads\.placed\[0\]\.radius"),
+    "outside": ({"at": ["2.2 mm", "0 mm", "8 mm"]}, r"placed\[0\]\.at"),
+    "overlap": ({"at": ["2.1926 mm", "0 mm", "7.4 mm"], "radius": "0.3075 mm"}, r"placed\[1\]\.at"),
+    "no unit": ({"radius": 0.5}, r"placed\[0\]\.radius"),
 }
 
 
@@ -482,35 +490,36 @@ PLACED: dict[str, tuple[dict[str, Any], str]] = {
 def test_badly_placed_beads_are_told(name: str) -> None:
     tables = tomllib.loads(shipped_cases()["cluster"].read_text())
     changes, key = PLACED[name]
-    tables["beads"]["placed"][0] |= changes
+    tables["placed"][0] |= changes
     with pytest.raises(InputError, match=key):
-        resolve_pile_case(tables, name="bad")
+        resolve_case(tables, name="bad")
 
 
-@pytest.mark.parametrize(("table", "key"), [("beads", "count"), ("beads", "sizes"), ("start", "seed")])
+@pytest.mark.parametrize(("table", "key"), [("beads", "count"), ("beads", "sizes"), ("run", "seed")])
 def test_what_has_no_meaning_for_placed_beads_is_refused(table: str, key: str) -> None:
     tables = tomllib.loads(shipped_cases()["cluster"].read_text())
     tables.setdefault(table, {})[key] = 3
     with pytest.raises(InputError, match=rf"{table}\.{key}"):
-        resolve_pile_case(tables, name="bad")
+        resolve_case(tables, name="bad")
 
 
 def test_placed_beads_reach_the_faces_of_a_cylinders_prism() -> None:
     """Toward an edge of the prism its wall is farther out than toward the middle of a face."""
     tables = tomllib.loads(shipped_cases()["cluster"].read_text())
     tables["boundary"]["shape"] = "cylinder"
-    assert resolve_pile_case(tables, name="cylinder").beads.counts == (2, 1)
+    case = resolve_case(tables, name="cylinder")
+    assert [radius > case.border for radius in case.all_radii] == [True, False, False]
     half, turn = 2.5, np.pi / 24.0
     for beyond, refused in ((0.0, False), (0.02, True)):
         reach = half - 0.545 + beyond
-        tables["beads"]["placed"] = [
+        tables["placed"] = [
             {"radius": "0.545 mm", "at": [f"{reach * np.cos(turn)} mm", f"{reach * np.sin(turn)} mm", "8 mm"]}
         ]
         if refused:
-            with pytest.raises(InputError, match="within the container"):
-                resolve_pile_case(tables, name="cylinder")
+            with pytest.raises(InputError, match="within the boundary"):
+                resolve_case(tables, name="cylinder")
         else:
-            resolve_pile_case(tables, name="cylinder")
+            resolve_case(tables, name="cylinder")
 
 
 def test_a_film_that_does_not_fit_on_the_disk_is_refused(run: Path, tmp_path: Path) -> None:
@@ -534,8 +543,8 @@ def test_ranks_take_cores_of_this_machine_and_of_a_cluster() -> None:
 
 def test_a_cylinder_holds_its_beads(tmp_path: Path) -> None:
     case = small(boundary={"shape": "cylinder", "width": "5 mm"}, run={"duration": "0.05 s"})
-    finished, _ = run_pile(case, find_engine(None), tmp_path)
-    motion = read_pile(finished.directory)
+    finished = walkers.run(case, tmp_path)
+    motion = finished.motion
     out = np.linalg.norm(motion.position[..., :2], axis=2) + motion.radius
     # The faces of the prism touch the cylinder; its edges are 0.9 % farther out.
     assert 0.95 * 2.5e-3 < out[motion.time >= 0.0].max() < 1.009 * 2.5e-3 + 1e-5

@@ -43,7 +43,7 @@ def test_show_tells_what_follows_from_a_case() -> None:
         assert part in shown
     summary = json.loads(call("show", "fig1b", "--json", check=True).stdout)
     assert summary["dimer"]["gamma0"] == pytest.approx(0.3811, abs=1e-4)
-    assert summary["case"]["beads"]["radii"] == [3e-4, 2e-4]
+    assert summary["case"]["walkers"][0]["radii"] == [3e-4, 2e-4]
     assert summary["time_step"]["share"]["rayleigh"] < 0.2
     assert summary["run"]["predicted_seconds"] > 0
     walls = summary["contacts"][:2]
@@ -76,6 +76,7 @@ def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch
     done = call("run", "mine.toml", check=True)
     lines = [line for line in done.stderr.splitlines() if not line.startswith("walkers: warning:")]
     assert lines
+    assert all(line.startswith("mine: ") and " %, " in line for line in lines)
     assert all("s simulated" in line and "steps/s" in line and ("left" in line or "starting" in line) for line in lines)
     assert "\x1b" not in done.stderr
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from walkers.inputs import load_case
-from walkers.postprocess import read_result, read_table, read_trajectory
+from walkers.postprocess import read_motion, read_result, read_table
+from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result
 from walkers.postprocess.gait import distance_walked, fit_slopes, gait, settled_samples, walk
-from walkers.postprocess.report import describe_result
-from walkers.postprocess.result import RESULT_NAME, current_result, walkers_met
+from walkers.postprocess.motion import Group
 from walkers.postprocess.steady_state import steady_walkers
-from walkers.postprocess.tables import TABLES, WALKER_TABLES
-from walkers.postprocess.trajectory import Trajectory
+from walkers.postprocess.tables import FAMILIES, TABLES
+from walkers.postprocess.walking import Walking, walkers_met
 from walkers.runner.files import write_json
 
 
@@ -26,8 +26,8 @@ def directory(run_directory: Callable[..., Path]) -> Path:
 
 
 @pytest.fixture(scope="module")
-def moved(directory: Path) -> Trajectory:
-    return read_trajectory(directory)
+def moved(directory: Path) -> Group:
+    return read_motion(directory).groups[0]
 
 
 def test_slopes_and_their_errors_are_those_of_least_squares() -> None:
@@ -42,20 +42,23 @@ def test_slopes_and_their_errors_are_those_of_least_squares() -> None:
 
 
 def test_a_result_of_before_is_made_anew(directory: Path, tmp_path: Path) -> None:
-    """One that lacks what is told of walkers today."""
+    """One of an earlier method, and one of before methods had versions, lack what is told of walkers today."""
     copy = tmp_path / directory.name
     shutil.copytree(directory, copy)
     known = read_result(copy)
-    write_json(copy / RESULT_NAME, {key: value for key, value in known.items() if key != "separated_fraction"})
-    assert current_result(copy) == known
-    assert read_result(copy) == known
+    assert known["analyses"] == {"walking": Walking.version}
+    lacking = {key: value for key, value in known.items() if key not in ("separated_fraction", "analyses")}
+    for old in ({**lacking, "analyses": {"walking": Walking.version - 1}}, lacking):
+        write_json(copy / RESULT_NAME, old)
+        assert current_result(copy) == known
+        assert read_result(copy) == known
 
 
 def test_symmetric_dimers_need_not_be_on_the_axis_to_be_kept(run_directory: Callable[..., Path]) -> None:
     short = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
-    start = {"angle": "80 deg", "facing": "right"}
+    aside = {"angle": "80 deg", "facing": "right"}
     kept = {
-        radius: len(steady_walkers(run_directory(beads={"radii": [radius, "0.25 mm"]}, start=start, run=short)))
+        radius: len(steady_walkers(run_directory(dimers={"radii": [radius, "0.25 mm"], **aside}, run=short)))
         for radius in ("0.25 mm", "0.26 mm")
     }
     assert kept == {"0.25 mm": 1, "0.26 mm": 0}
@@ -67,11 +70,11 @@ def test_two_points_give_a_slope_without_an_error() -> None:
     assert np.isnan(error[0])
 
 
-def test_velocity_is_the_strobed_displacement_over_time(moved: Trajectory) -> None:
+def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
     run = moved.case.run
     strobed = moved.mass_centre[:: run.samples_per_cycle][run.settling_cycles :]
     seconds = (run.cycles - run.settling_cycles) / moved.case.drive.frequency
-    facing = np.array([walker.facing for walker in moved.layout.walkers])
+    facing = np.array([walker.facing for walker in moved.walkers])
     crude = facing * (strobed[-1, :, 0] - strobed[0, :, 0]) / seconds
     walked = walk(moved)
     np.testing.assert_allclose(facing * walked.axial, crude, rtol=1e-3)
@@ -80,13 +83,13 @@ def test_velocity_is_the_strobed_displacement_over_time(moved: Trajectory) -> No
     assert np.all(walked.standard_error < 1e-3 * walked.velocity)
 
 
-def test_mean_velocity_through_the_cycle_is_the_strobed_one(moved: Trajectory) -> None:
+def test_mean_velocity_through_the_cycle_is_the_strobed_one(moved: Group) -> None:
     """Twenty samples a cycle represent the gait: their mean velocity is the displacement a cycle."""
     through = gait(moved).velocity[settled_samples(moved)].mean(axis=0)
     np.testing.assert_allclose(through, walk(moved).velocity, rtol=0.03)
 
 
-def test_sliding_is_velocity_less_rotation(moved: Trajectory) -> None:
+def test_sliding_is_velocity_less_rotation(moved: Group) -> None:
     motion = gait(moved)
     # The mass centre moves as its beads do, weighted by their masses.
     weights = moved.radii**3 / np.sum(moved.radii**3)
@@ -95,7 +98,7 @@ def test_sliding_is_velocity_less_rotation(moved: Trajectory) -> None:
     np.testing.assert_allclose(motion.sliding[..., 2], -motion.rotation.sum(axis=-1), atol=1e-15)
 
 
-def test_velocities_follow_from_positions(moved: Trajectory) -> None:
+def test_velocities_follow_from_positions(moved: Group) -> None:
     """Central differences of the sampled positions reproduce the dumped velocities of a smooth phase of the cycle."""
     step = moved.time[1] - moved.time[0]
     differences = (moved.position[2:] - moved.position[:-2]) / (2 * step)
@@ -103,13 +106,11 @@ def test_velocities_follow_from_positions(moved: Trajectory) -> None:
     assert np.median(np.abs(differences - moved.velocity[1:-1])) < 0.02 * scale
 
 
-def test_orientation_starts_at_the_start_angle_for_both_facings(moved: Trajectory) -> None:
-    np.testing.assert_allclose(
-        moved.orientation[0], [walker.start_angle for walker in moved.layout.walkers], atol=1e-12
-    )
+def test_orientation_starts_at_the_start_angle_for_both_facings(moved: Group) -> None:
+    np.testing.assert_allclose(moved.orientation[0], [walker.start_angle for walker in moved.walkers], atol=1e-12)
 
 
-def test_distance_is_walked_toward_the_large_bead_by_both_facings(moved: Trajectory) -> None:
+def test_distance_is_walked_toward_the_large_bead_by_both_facings(moved: Group) -> None:
     time, distance = distance_walked(moved)
     assert len(time) == 61
     assert np.all(distance[-1] > distance[20])
@@ -132,14 +133,30 @@ def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
     assert not result["walkers_met"]
 
 
-@pytest.mark.parametrize("name", WALKER_TABLES)
+NUMBERED = {
+    "trajectory": {"rotation": 2, "sliding": 3, "gap": 3},
+    "walkers": {"rotation": 2, "sliding": 3, "open": 3},
+    "bridges": {},
+}
+"""Columns of the tables of dimers that there are for each bead or contact."""
+
+
+def test_tables_of_walkers(directory: Path) -> None:
+    assert Walking.tables == tuple(NUMBERED)
+    assert {path.stem for path in directory.glob("*.parquet")} == set(NUMBERED)
+
+
+@pytest.mark.parametrize("name", NUMBERED)
 def test_tables_have_units_and_meanings(directory: Path, name: str) -> None:
     import pyarrow.parquet as pq
 
     schema = pq.read_schema(directory / f"{name}.parquet")
-    assert schema.names == list(TABLES[name])
+    columns = dict(TABLES[name])
+    for family, number in NUMBERED[name].items():
+        columns |= {f"{family}_{one}": FAMILIES[family] for one in range(1, number + 1)}
+    assert schema.names == list(columns)
     for field in schema:
-        unit, meaning = TABLES[name][field.name]
+        unit, meaning = columns[field.name]
         assert field.metadata[b"unit"].decode() == unit
         assert field.metadata[b"meaning"].decode() == meaning
     assert pq.ParquetFile(directory / f"{name}.parquet").metadata.row_group(0).column(0).compression == "ZSTD"
@@ -169,10 +186,12 @@ def test_walkers_that_have_not_settled_are_reported(run_directory: Callable[...,
     assert "not steady" in describe_result(directory, result)
 
 
-def test_walkers_that_come_close_are_reported(moved: Trajectory, directory: Path) -> None:
-    assert not walkers_met(moved)
+def test_walkers_that_come_close_are_reported(moved: Group, directory: Path) -> None:
+    assert not walkers_met([moved])
     position = moved.position.copy()
     position[600:, 1] += position[600:, 0].mean(axis=1, keepdims=True) - position[600:, 1].mean(axis=1, keepdims=True)
     position[600:, 1, :, 1] += 1.2e-3  # beside walker 0, a fifth of a millimetre between them
-    assert walkers_met(replace(moved, position=position))
+    places = moved.motion.position.copy()
+    places[:, moved.rows] = position
+    assert walkers_met([replace(moved, motion=replace(moved.motion, position=places))])
     assert "not independent" in describe_result(directory, {**read_result(directory), "walkers_met": True})

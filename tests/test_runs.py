@@ -9,6 +9,7 @@ import subprocess
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -23,9 +24,12 @@ from tests.conftest import (
     wait_for,
     wait_for_engines,
 )
-from walkers import find_run, run_case
+from walkers import find_run
+from walkers import run as run_case
 from walkers.inputs import InputError
-from walkers.runner import find_engine, finished_run, open_run, run_name
+from walkers.runner import FinishedRun, Progress, find_engine, finished_run, open_run, run_name
+from walkers.runner.directory import FIRST_SEGMENT
+from walkers.runner.ensemble import finished_place
 from walkers.runner.failures import RunBusy
 from walkers.templates import render_deck
 
@@ -37,27 +41,27 @@ def _name(**changes: object) -> str:
 def test_a_finished_run_is_not_run_again(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
     first = run_case(case, tmp_path)
-    stamp = (first.run.directory / "manifest.json").stat().st_mtime_ns
+    stamp, result = (first.directory / "manifest.json").stat().st_mtime_ns, first.result
     again = run_case(case, tmp_path)
     assert (first.cached, again.cached) == (False, True)
-    assert again.result == first.result
-    assert (first.run.directory / "manifest.json").stat().st_mtime_ns == stamp
+    assert again.result == result
+    assert (first.directory / "manifest.json").stat().st_mtime_ns == stamp
 
 
 def test_force_runs_again(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
-    first = run_case(case, tmp_path).run
-    node = (first.directory / "beads.bin").stat().st_ino
-    with (first.directory / "beads.bin").open("rb"):  # as long as it is open no other file gets its number
+    dump = run_case(case, tmp_path).directory / FIRST_SEGMENT / "beads.bin"
+    node = dump.stat().st_ino
+    with dump.open("rb"):  # as long as it is open no other file gets its number
         again = run_case(case, tmp_path, force=True)
     assert not again.cached
-    assert (again.run.directory / "beads.bin").stat().st_ino != node
-    assert [path.name for path in tmp_path.iterdir()] == [again.run.directory.name]
+    assert (again.directory / FIRST_SEGMENT / "beads.bin").stat().st_ino != node
+    assert [path.name for path in tmp_path.iterdir()] == [again.directory.name]
 
 
 def test_a_forced_run_that_fails_leaves_the_old_one(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
-    old = run_case(case, tmp_path).run
+    old = run_case(case, tmp_path)
     with pytest.raises(KeyboardInterrupt):
         run_case(case, tmp_path, force=True, on_progress=_interrupt)
     assert finished_run(old.directory) is not None
@@ -73,18 +77,50 @@ def test_an_unfinished_run_is_redone(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         run_case(case, tmp_path, on_progress=_interrupt)
     (part,) = tmp_path.glob("*.incomplete")
-    (part / "leftover").touch()
+    (segment,) = part.glob("segments/*")
+    assert segment.name == "0000.new"
+    for folder in (part, segment):
+        (folder / "leftover").touch()
     outcome = run_case(case, tmp_path)
     assert not outcome.cached
     assert not part.exists()
-    assert not (outcome.run.directory / "leftover").exists()
+    assert not list(outcome.directory.rglob("leftover"))
+    assert [path.name for path in outcome.directory.glob("segments/*")] == ["0000"]
+
+
+def test_an_interrupted_run_goes_on_after_its_last_whole_segment(tmp_path: Path) -> None:
+    """Walkers of six cycles in segments of two; what comes out is what a run without an interrupt gives."""
+    case = make_case(run={**SHORT, "segment": "25 ms"})
+    two_cycles = case.run.steps // 3
+
+    def interrupt(progress: Progress) -> None:
+        if progress.step > two_cycles:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(case, tmp_path, on_progress=interrupt)
+    (part,) = tmp_path.glob("*.incomplete")
+    *whole, begun = sorted(path.name for path in part.glob("segments/*"))
+    assert whole
+    assert begun.endswith(".new")
+    node = (part / FIRST_SEGMENT / "beads.bin").stat().st_ino
+    outcome = run_case(case, tmp_path)
+    assert not outcome.cached
+    assert not part.exists()
+    assert (outcome.directory / FIRST_SEGMENT / "beads.bin").stat().st_ino == node
+    straight = run_case(case, tmp_path / "straight")
+    segments = [sorted(run.directory.glob("segments/*/beads.bin")) for run in (outcome, straight)]
+    assert [len(dumps) for dumps in segments] == [3, 3]
+    for one, other in zip(*segments, strict=True):
+        assert one.read_bytes() == other.read_bytes()
+    assert outcome.result == straight.result
 
 
 def test_a_replacement_cut_short_is_put_back(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
-    place = run_case(case, tmp_path).run.directory
+    place = run_case(case, tmp_path).directory
     place.rename(place.with_name(place.name + ".replaced"))
-    with open_run(case, render_deck(case), find_engine(), tmp_path):
+    with open_run(case, find_engine(), tmp_path):
         assert finished_run(place) is not None
 
 
@@ -92,7 +128,7 @@ def test_the_name_depends_on_what_determines_the_run() -> None:
     names = {
         _name(),
         _name(drive={"peak_acceleration": "4.01 g"}),
-        _name(start={"seed": 2}),
+        _name(run={"seed": 2}),
         _name(contact={"rolling_friction": 0.001}),
         _name(run={"cycles": 61}),
         _name(drive={"frame": "container"}),
@@ -109,12 +145,16 @@ def test_the_name_depends_on_the_engine() -> None:
 
 def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
-    run = run_case(case, tmp_path).run
-    names = {path.name for path in run.directory.iterdir()}
-    assert names == {
-        *("case.json", "layout.json", "walker.lig", "walls.stl", "engine.log", "manifest.json", "result.json"),
-        *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
+    run = finished_run(run_case(case, tmp_path).directory)
+    assert run is not None
+    assert {path.name for path in run.directory.iterdir()} == {
+        *("case.json", "manifest.json", "result.json", "segments"),
         *("trajectory.parquet", "walkers.parquet", "bridges.parquet"),
+    }
+    assert {path.name for path in (run.directory / "segments").iterdir()} == {"0000"}
+    assert {path.name for path in (run.directory / FIRST_SEGMENT).iterdir()} == {
+        *("layout.json", "walker.lig", "walls.stl", "engine.log", "segment.json"),
+        *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
     }
     assert run.case == case
     assert run.layout == render_deck(case).layout
@@ -127,12 +167,12 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
 
 
 def test_the_deck_of_a_run_can_be_run_by_hand(tmp_path: Path) -> None:
-    run = run_case(make_case(run=SHORT), tmp_path / "runs").run
+    made = run_case(make_case(run=SHORT), tmp_path / "runs")
     call("deck", _toml(tmp_path), "--to", str(tmp_path / "byhand"), check=True)
     by_hand = tmp_path / "byhand"
     with (by_hand / "engine.log").open("wb") as log:
         subprocess.run(["liggghts", "-in", "walker.lig"], cwd=by_hand, stdout=log, check=True)
-    assert (by_hand / "beads.bin").read_bytes() == (run.directory / "beads.bin").read_bytes()
+    assert (by_hand / "beads.bin").read_bytes() == (made.directory / FIRST_SEGMENT / "beads.bin").read_bytes()
 
 
 def _toml(folder: Path) -> str:
@@ -143,8 +183,8 @@ def _toml(folder: Path) -> str:
 
 def test_two_at_once_do_not_share_a_directory(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
-    deck, engine = render_deck(case), find_engine()
-    with open_run(case, deck, engine, tmp_path), pytest.raises(RunBusy), open_run(case, deck, engine, tmp_path):
+    engine = find_engine()
+    with open_run(case, engine, tmp_path), pytest.raises(RunBusy), open_run(case, engine, tmp_path):
         pass
     assert not list(tmp_path.glob("*.lock"))
 
@@ -160,7 +200,9 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(
     front.write_text('#!/bin/sh\nliggghts "$@"\nexit 0\n')
     front.chmod(0o755)
     program = subprocess.Popen([PROGRAM, "run", "test.toml", "--engine", str(front)], stderr=subprocess.DEVNULL)
-    wait_for(lambda: program.poll() is not None or list(in_folder.glob("runs/*.incomplete/beads.bin")))
+    wait_for(
+        lambda: program.poll() is not None or list(in_folder.glob("runs/*.incomplete/segments/0000.new/beads.bin"))
+    )
     assert program.poll() is None
     program.kill()
     program.wait()
@@ -173,7 +215,7 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(
             os.kill(engine, signal.SIGKILL)
 
     def is_free() -> bool:
-        with suppress(RunBusy), open_run(case, render_deck(case), find_engine(str(front)), in_folder / "runs"):
+        with suppress(RunBusy), open_run(case, find_engine(str(front)), in_folder / "runs"):
             return True
         return False
 
@@ -192,8 +234,8 @@ def test_an_engine_dies_with_its_launcher(in_folder: Path) -> None:
 def test_a_run_is_found_by_its_directory_or_its_case(tmp_path: Path) -> None:
     case_file = _toml(tmp_path)
     outcome = run_case(make_case(run=SHORT), tmp_path / "runs")
-    assert find_run(outcome.run.directory).directory == outcome.run.directory
-    assert find_run(case_file, tmp_path / "runs").directory == outcome.run.directory
+    assert find_run(outcome.directory).directory == outcome.directory
+    assert find_run(case_file, tmp_path / "runs").directory == outcome.directory
 
 
 def test_json_result_of_the_program(in_folder: Path) -> None:
@@ -205,14 +247,22 @@ def test_json_result_of_the_program(in_folder: Path) -> None:
     assert f"{first['velocity']['mean'] * 1e3:.3f}" in shown
 
 
+def _manifest(directory: Path) -> dict[str, Any]:
+    return FinishedRun(directory).manifest
+
+
 def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     case = make_case(run=SHORT)
-    stamp = run_case(case, tmp_path).run.manifest["finished"]
+    stamp = _manifest(run_case(case, tmp_path).directory)["finished"]
+    # It is not there at the first look, but at the second, after the run has been locked.
     answers = iter([None])
-    monkeypatch.setattr("walkers.runner.directory.finished_run", lambda place: next(answers, finished_run(place)))
+    monkeypatch.setattr(
+        "walkers.runner.ensemble.finished_place", lambda out, name: next(answers, finished_place(out, name))
+    )
     outcome = run_case(case, tmp_path)
     assert outcome.cached
-    assert outcome.run.manifest["finished"] == stamp
+    assert not list(answers)  # the first look has been
+    assert _manifest(outcome.directory)["finished"] == stamp
     assert not list(tmp_path.glob("*.incomplete"))
 
 
@@ -221,27 +271,28 @@ def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, mo
 def test_damaged_tables_are_made_anew(tmp_path: Path, damage: str, contents: bytes | None) -> None:
     case = make_case(run=SHORT)
     outcome = run_case(case, tmp_path)
-    path = outcome.run.directory / damage
+    result = outcome.result
+    path = outcome.directory / damage
     if contents is None:
         path.unlink()
     else:
         path.write_bytes(contents)
-    assert run_case(case, tmp_path).result == outcome.result
-    find_run(outcome.run.directory)
+    assert run_case(case, tmp_path).result == result
+    find_run(outcome.directory)
     assert path.stat().st_size > 100
 
 
-@pytest.mark.parametrize("name", ["manifest.json", "case.json", "layout.json", "beads.bin"])
+@pytest.mark.parametrize("name", ["manifest.json", "case.json", "segments/0000/layout.json", "segments/0000/beads.bin"])
 def test_a_run_without_its_description_is_told(tmp_path: Path, name: str) -> None:
-    directory = run_case(make_case(run=SHORT), tmp_path / "runs").run.directory
+    directory = run_case(make_case(run=SHORT), tmp_path / "runs").directory
     (directory / name).unlink()
-    with pytest.raises(InputError, match=name if name != "manifest.json" else "not a finished run"):
+    with pytest.raises(InputError, match=Path(name).name if name != "manifest.json" else "not a finished run"):
         find_run(directory)
 
 
 def test_a_cut_dump_is_drawn_as_far_as_it_goes(tmp_path: Path) -> None:
-    directory = run_case(make_case(run={"cycles": 8, "settling_cycles": 2}), tmp_path / "runs").run.directory
-    dump = directory / "beads.bin"
+    directory = run_case(make_case(run={"cycles": 8, "settling_cycles": 2}), tmp_path / "runs").directory
+    dump = directory / FIRST_SEGMENT / "beads.bin"
     dump.write_bytes(dump.read_bytes()[: dump.stat().st_size // 2])
     for command in ("plot", "vtk", "result"):
         done = call(command, str(directory), check=True)
@@ -250,8 +301,9 @@ def test_a_cut_dump_is_drawn_as_far_as_it_goes(tmp_path: Path) -> None:
     dump.write_bytes(dump.read_bytes()[:1000])
     (directory / "result.json").unlink()
     done = call("plot", str(directory))
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "Traceback" not in done.stderr
+    assert f"walkers: {directory}: the run cannot be read" in done.stderr
 
 
 @pytest.mark.parametrize(

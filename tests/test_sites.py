@@ -87,7 +87,7 @@ def test_what_parsl_is_told(tmp_path: Path) -> None:
 def test_workers_of_another_process_give_the_same(in_folder: Path) -> None:
     """Parsl's local provider: pilots without a scheduler. A point fails there as it does here."""
     (in_folder / "base.toml").write_text(to_toml(document(run=TINY)))
-    axes = '[axes]\ndrive.peak_acceleration = ["1 g", "2 g", "3 g"]\nstart.angle = ["0 deg", "10 deg"]\n'
+    axes = '[axes]\ndrive.peak_acceleration = ["1 g", "2 g", "3 g"]\ndimers.angle = ["0 deg", "10 deg"]\n'
     (in_folder / "test.toml").write_text(f'case = "base.toml"\n{axes}')
     (in_folder / "site.toml").write_text('scheduler = "local"\ncores = 2\n[executor]\naddress = "127.0.0.1"\n')
     command = [PROGRAM, "sweep", "test.toml"]

@@ -10,7 +10,7 @@ import pytest
 
 from tests.benchmark_starts import failed_starts
 from tests.conftest import PROGRAM, SHORT, document, engines_in, make_case, to_toml, wait_for
-from walkers import run_case
+from walkers import run as run_case
 from walkers.runner.failures import EngineNeverStarted
 from walkers.templates.engine import ALONE
 

@@ -12,8 +12,8 @@ from scipy.stats import qmc
 
 from tests.conftest import call, document, to_toml
 from walkers.inputs import InputError
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.case import Case
+from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import Sweep, expand, load_sweep, shipped_sweeps
 
 Make = Callable[..., Sweep]
@@ -30,7 +30,7 @@ def make(tmp_path: Path) -> Make:
     return expanded
 
 
-def _cases(sweep: Sweep) -> list[WalkerCase]:
+def _cases(sweep: Sweep) -> list[Case]:
     return list(sweep.cases())
 
 
@@ -64,17 +64,17 @@ def test_linspace_and_geomspace_are_numpys(make: Make) -> None:
 
 
 def test_whole_numbers_stay_whole(make: Make) -> None:
-    sweep = make(axes={"start.seed": {"linspace": [1, 4, 4]}, "run.cycles": {"geomspace": [10, 40, 3]}})
-    assert [(case.start.seed, case.run.cycles) for case in _cases(make(set={"run.settling_cycles": 2}, axes={
-        "start.seed": {"linspace": [1, 2, 2]}, "run.cycles": {"geomspace": [10, 40, 3]}}))] == [
+    sweep = make(axes={"run.seed": {"linspace": [1, 4, 4]}, "run.cycles": {"geomspace": [10, 40, 3]}})
+    assert [(case.seed, case.run.cycles) for case in _cases(make(set={"run.settling_cycles": 2}, axes={
+        "run.seed": {"linspace": [1, 2, 2]}, "run.cycles": {"geomspace": [10, 40, 3]}}))] == [
         (1, 10), (1, 20), (1, 40), (2, 10), (2, 20), (2, 40)]  # fmt: skip
     assert [row[0] for row in sweep.rows[::3]] == [1, 2, 3, 4]
 
 
 def test_zipped_keys_go_together(make: Make) -> None:
     pairs = [["0.3 mm", "0.2 mm"], ["0.4 mm", "0.2 mm"]]
-    sweep = make(zip=[{"beads.radii": pairs, "start": {"seed": [3, 4]}}], axes={"drive.frequency": ["60 Hz", "90 Hz"]})
-    found = [(case.drive.frequency, case.beads.radii, case.start.seed) for case in _cases(sweep)]
+    sweep = make(zip=[{"dimers.radii": pairs, "run": {"seed": [3, 4]}}], axes={"drive.frequency": ["60 Hz", "90 Hz"]})
+    found = [(case.drive.frequency, case.walkers[0].radii, case.seed) for case in _cases(sweep)]
     assert found == [(f, r, s) for f in (60.0, 90.0) for r, s in (((3e-4, 2e-4), 3), ((4e-4, 2e-4), 4))]
 
 
@@ -97,18 +97,18 @@ def test_samplers_are_scipys_and_seeded(make: Make, method: str, sampler: type[q
 def test_samples_of_quantities_keep_their_unit(make: Make) -> None:
     ranges = {
         "drive.peak_acceleration": {"uniform": ["1 g", "2 g"]},
-        "beads.radii[0]": {"uniform": ["0.3 mm", "0.4 mm"]},
+        "dimers.radii[0]": {"uniform": ["0.3 mm", "0.4 mm"]},
     }
     cases = _cases(make(sample=[{"points": 4, "ranges": ranges}]))
     assert all(9.8 <= case.drive.peak_acceleration <= 19.6 for case in cases)
-    assert all(3e-4 <= case.beads.radii[0] <= 4e-4 and case.beads.radii[1] == 2e-4 for case in cases)
+    assert all(3e-4 <= case.walkers[0].radii[0] <= 4e-4 and case.walkers[0].radii[1] == 2e-4 for case in cases)
 
 
 def test_a_key_that_says_the_same_in_other_words_gives_way(make: Make) -> None:
     (case,) = _cases(make(axes={"drive.gamma0": [0.5]}))
     assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(0.5)
-    (case,) = _cases(make(set={"beads.mean_radius": "0.25 mm"}, axes={"beads.sin_delta": [0.2]}))
-    assert case.beads.radii == (3e-4, 2e-4)
+    (case,) = _cases(make(set={"dimers.mean_radius": "0.25 mm"}, axes={"dimers.sin_delta": [0.2]}))
+    assert case.walkers[0].radii == (3e-4, 2e-4)
 
 
 def test_a_descent_is_the_last_axis_downward(make: Make) -> None:
@@ -136,13 +136,13 @@ def test_shipped_sweeps_are_the_papers() -> None:
     assert {case.drive.frequency for case in fig2} == {60.0, 70.0, 80.0, 90.0}
     accelerations = {round(case.drive.peak_acceleration / 9.8, 9) for case in fig2}
     assert (min(accelerations), max(accelerations)) == (0.5, 10.0)
-    assert {case.start.replicates for case in fig2} == {6}
+    assert {case.walkers[0].replicates for case in fig2} == {6}
     fig3 = _cases(load_sweep("fig3"))
     assert [round(dimer_of(case).sin_delta, 3) for case in fig3] == [0.0, 0.111, 0.143, 0.2, 0.273, 0.333]
     assert all(dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(0.5) for case in fig3)
     assert len({case.drive.peak_acceleration for case in fig3}) == 6
     turned = _cases(load_sweep("alignment"))
-    assert {round(np.degrees(case.start.angle)) for case in turned} == set(range(0, 91, 15))
+    assert {round(np.degrees(case.walkers[0].angle)) for case in turned} == set(range(0, 91, 15))
     assert {dimer_of(case).sin_delta == 0 for case in turned} == {True, False}
     modes = _cases(load_sweep("modes"))
     assert {round(asin(dimer_of(case).sin_delta), 6) for case in modes} == {round(asin(s / 20), 6) for s in range(9)}
@@ -159,14 +159,14 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"axes": {"drive.frequency": {"linspace": ["fast", "90 Hz", 3]}}}, "expected a number"),
     ({"axes": {"liquid.volume_fraction": {"geomspace": [0, 1, 3]}}}, "above zero"),
     ({"axes": {"drive.frequency": ["60 Hz", "60 mHz"]}}, "one unit throughout"),
-    ({"axes": {"beads.radii[2]": ["1 mm"]}}, "no beads.radii of that length"),
-    ({"axes": {"start.seed": {"linspace": [1, 1000, 2000]}, "drive.frequency": {"linspace": ["60 Hz", "90 Hz", 999]}}},
+    ({"axes": {"dimers.radii[2]": ["1 mm"]}}, "no dimers.radii of that length"),
+    ({"axes": {"run.seed": {"linspace": [1, 1000, 2000]}, "drive.frequency": {"linspace": ["60 Hz", "90 Hz", 999]}}},
      "1998000 points"),
-    ({"axes": {"start.seed": [1]}, "zip": [{"start.seed": [1]}]}, "varies on two axes"),
-    ({"zip": [{"start.seed": [1, 2], "start.angle": ["0 deg"]}]}, "as many values .*seed has 2, start.angle has 1"),
+    ({"axes": {"run.seed": [1]}, "zip": [{"run.seed": [1]}]}, "varies on two axes"),
+    ({"zip": [{"run.seed": [1, 2], "dimers.angle": ["0 deg"]}]}, "as many values .*seed has 2, dimers.angle has 1"),
     ({"zip": [{}]}, "keys and their values"),
     ({"sample": [{"points": 4, "method": "sobbol", "ranges": {}}]}, 'did you mean "sobol"'),
-    ({"sample": [{"points": 4, "ranges": {"start.seed": [1, 2]}}]}, "uniform"),
+    ({"sample": [{"points": 4, "ranges": {"run.seed": [1, 2]}}]}, "uniform"),
     ({"sample": [{"points": 4, "ranges": {}}]}, "keys and their ranges"),
     ({"sample": [{"points": 0, "ranges": {"contact.restitution": {"uniform": [0.1, 0.2]}}}]}, "at least 1"),
     ({"descend": {"from": "1 g", "to": "2 g", "step": "0.1 g", "until_below": "1 um/s"}}, "must not be below"),
@@ -180,8 +180,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"axes": {"contact.restitution": {"linspace": [0, float("inf"), 3]}}}, "expected a number"),
     ({"axes": {"contact.restitution": {"linspace": [0, 10**400, 3]}}}, "expected a number"),
     ({"axes": {"drive": {"frequency": ["60 Hz"]}, "drive.frequency": ["70 Hz"]}}, "drive.frequency: is given twice"),
-    ({"axes": {"beads.radii": [["0.3 mm", "0.2 mm"]], "beads.radii[1]": ["0.1 mm"]}}, "radii.*varies on two axes"),
-    ({"axes": {"beads.radii[1]": ["0.1 mm"], "beads.radii": [["0.3 mm", "0.2 mm"]]}}, "radii.*varies on two axes"),
+    ({"axes": {"dimers.radii": [["0.3 mm", "0.2 mm"]], "dimers.radii[1]": ["0.1 mm"]}}, "radii.*varies on two axes"),
+    ({"axes": {"dimers.radii[1]": ["0.1 mm"], "dimers.radii": [["0.3 mm", "0.2 mm"]]}}, "radii.*varies on two axes"),
     ({"axes": {".": [1]}}, "is no key of a case"),
     ({"case": ""}, 'case = "": no such file'),
     ({"case": "x" * 5000}, "case = .*cannot be read"),
@@ -218,16 +218,16 @@ def test_a_case_by_mean_radius_and_asymmetry() -> None:
     from walkers.inputs import resolve_case
 
     tables = document()
-    tables["beads"] = {"mean_radius": "0.25 mm", "sin_delta": 0.2, "material": "ruby"}
-    assert resolve_case(tables).beads.radii == (3e-4, 2e-4)
-    for beads, message in (
-        ({"sin_delta": 0.2}, "beads.mean_radius: missing"),
-        ({"mean_radius": "0.2 mm"}, "beads.sin_delta: missing"),
-        ({"radii": ["0.3 mm", "0.2 mm"], "sin_delta": 0.2}, "beads.sin_delta = 0.2: expected either"),
-        ({}, "beads.radii: missing"),
+    tables["dimers"] = {"mean_radius": "0.25 mm", "sin_delta": 0.2}
+    assert resolve_case(tables).walkers[0].radii == (3e-4, 2e-4)
+    for dimers, message in (
+        ({"sin_delta": 0.2}, "dimers.mean_radius: missing"),
+        ({"mean_radius": "0.2 mm"}, "dimers.sin_delta: missing"),
+        ({"radii": ["0.3 mm", "0.2 mm"], "sin_delta": 0.2}, "dimers.sin_delta = 0.2: expected either"),
+        ({}, "dimers.radii: missing"),
     ):
         with pytest.raises(InputError, match=message):
-            resolve_case({**tables, "beads": {"material": "ruby", **beads}})
+            resolve_case({**tables, "dimers": dimers})
 
 
 def test_json_of_a_sweeps_document_survives(make: Make) -> None:

@@ -32,15 +32,16 @@ from tests.conftest import (
     wait_for,
     wait_for_engines,
 )
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
-from walkers.postprocess import read_table, read_trajectory
+from walkers.postprocess import read_motion, read_table
 from walkers.runner import find_engine, finished_run
+from walkers.runner.directory import FIRST_SEGMENT
 from walkers.runner.ensemble import finished_place
 from walkers.runner.failures import WalkersMet
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
-from walkers.sweeps.shared_deck import make_together
+from walkers.sweeps.shared_deck import make_runs
 from walkers.sweeps.table import load, thresholds
 from walkers.sweeps.worker import Task, work
 
@@ -76,15 +77,15 @@ def contents_of(out: Path) -> dict[str, dict[str, bytes]]:
     """What each finished run computed: tables, result and dumps, by the names of runs and files."""
     manifests = [*out.glob("*/manifest.json"), *out.glob("ensembles/*/*/manifest.json")]
     manifests = [path for path in manifests if not any(folder.suffix == ".incomplete" for folder in path.parents)]
-    kept = (
-        "beads.bin",
-        "bridges.pairs.txt",
-        "bridges.walls.txt",
-        "trajectory.parquet",
-        "walkers.parquet",
-        "result.json",
-    )
+    dumps = [str(FIRST_SEGMENT / name) for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt")]
+    kept = (*dumps, "trajectory.parquet", "walkers.parquet", "result.json")
     return {path.parent.name: {name: (path.parent / name).read_bytes() for name in kept} for path in manifests}
+
+
+def made_in(place: str) -> str:
+    """Name of the run, or of the ensemble, that an engine was launched for in a folder."""
+    (folder,) = (part for part in Path(place).parts if part.endswith(".incomplete"))
+    return folder.removesuffix(".incomplete")
 
 
 @pytest.fixture
@@ -98,39 +99,47 @@ def counting_engine(in_folder: Path) -> Iterator[tuple[str, Callable[[], list[st
 
 
 def test_points_of_a_shared_deck_are_what_they_are_alone(tmp_path: Path) -> None:
-    """Other radii, frictions, restitution and starts: the same to rounding, and ordinary run directories."""
+    """Other radii, frictions, restitution, starts and shapes: the same to rounding, and ordinary run directories."""
     run = {**TINY, "cycles": 20, "settling_cycles": 5}
+    fan = {"radii": ["0.3 mm", "0.2 mm", "0.2 mm"], "arrangement": "fan", "replicates": 2}
     cases = [
         make_case(run=run),
         make_case(run=run, contact={"friction": {"bead_bead": 0.05, "bead_wall": 0.2}}),
         make_case(run=run, contact={"restitution": 0.6}),
-        make_case(run=run, beads={"radii": ["0.35 mm", "0.2 mm"]}, start={"angle": "20 deg", "replicates": 3}),
-        make_case(run=run, beads={"radii": ["0.25 mm", "0.25 mm"]}),
+        make_case(run=run, dimers={"radii": ["0.35 mm", "0.2 mm"], "angle": "20 deg", "replicates": 3}),
+        make_case(run=run, clusters=[fan]),  # dimers and clusters
+        make_case(run=run, dimers={"radii": ["0.25 mm", "0.25 mm"]}),
     ]
     engine = find_engine()
-    together = make_together(cases, tmp_path / "together", engine)
+    together = make_runs(cases, tmp_path / "together", engine)
     assert len({run.directory.parent for run in together.runs.values()}) == 1
     for case, (name, run_there) in zip(cases, together.runs.items(), strict=True):
-        alone = make_together([case], tmp_path / "alone", engine).runs[name]
-        one, other = read_trajectory(run_there.directory), read_trajectory(alone.directory)
-        assert one.case == other.case == case
-        assert one.layout.bead_dump_bytes == (run_there.directory / one.layout.bead_dump).stat().st_size
-        way, way_alone = one.position - one.position[0], other.position - other.position[0]
-        assert np.abs(way - way_alone).max() < 1e-12
-        np.testing.assert_allclose(one.orientation, other.orientation, atol=1e-9)
-        np.testing.assert_allclose(one.force, other.force, atol=1e-10)
+        alone = make_runs([case], tmp_path / "alone", engine).runs[name]
+        motion, motion_alone = read_motion(run_there.directory), read_motion(alone.directory)
+        assert motion.case == motion_alone.case == case
+        layout = run_there.layout
+        assert layout.bead_dump_bytes == (run_there.directory / FIRST_SEGMENT / layout.bead_dump).stat().st_size
+        for one, other in zip(motion.groups, motion_alone.groups, strict=True):
+            way, way_alone = one.position - one.position[0], other.position - other.position[0]
+            assert np.abs(way - way_alone).max() < 1e-12
+            np.testing.assert_allclose(one.orientation, other.orientation, atol=1e-9)
         for table in ("walkers", "bridges"):
             left, right = read_table(run_there.directory, table), read_table(alone.directory, table)
             pd.testing.assert_frame_equal(left, right, check_exact=False, rtol=1e-6, atol=1e-9)
-        assert run_there.manifest["shared_deck"]["walkers"] == 7
+        np.testing.assert_allclose(left["normal_force"], right["normal_force"], atol=1e-10)
+        assert run_there.manifest["shared_deck"]["walkers"] == 10
         assert {path.name for path in run_there.directory.iterdir()} == {
-            *("case.json", "layout.json", "manifest.json", "result.json", "beads.bin", "bridges.pairs.txt"),
-            *("bridges.walls.txt", "trajectory.parquet", "walkers.parquet", "bridges.parquet"),
+            *("case.json", "manifest.json", "result.json", "segments"),
+            *("trajectory.parquet", "walkers.parquet", "bridges.parquet"),
+        }
+        assert {str(path.relative_to(run_there.directory)) for path in run_there.directory.glob("segments/*/*")} == {
+            str(FIRST_SEGMENT / name)
+            for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt", "layout.json", "segment.json")
         }
 
 
 def test_a_run_of_a_shared_deck_is_an_ordinary_one(sweep_file: Callable[..., str], in_folder: Path) -> None:
-    name = sweep_file(text='[axes]\nstart.angle = ["0 deg", "10 deg", "20 deg", "30 deg"]')
+    name = sweep_file(text='[axes]\ndimers.angle = ["0 deg", "10 deg", "20 deg", "30 deg"]')
     assert _sweep(name, "-j", "1").returncode == 0
     directory = in_folder / load(in_folder / "runs" / "test")["run"][0]
     assert directory.parent.parent.name == "ensembles"
@@ -147,15 +156,15 @@ def test_walkers_that_meet_are_taken_apart(tmp_path: Path, monkeypatch: pytest.M
     """They have room for more than they walk; so what counts as near is made larger than all of it."""
     monkeypatch.setattr("walkers.postprocess.splitting.NEAR", 1e3)
     with pytest.raises(WalkersMet):
-        make_together([make_case(run=TINY, start={"seed": seed}) for seed in (1, 2)], tmp_path, find_engine())
+        make_runs([make_case(run={**TINY, "seed": seed}) for seed in (1, 2)], tmp_path, find_engine())
     assert not list(tmp_path.glob("ensembles/*"))
 
 
 def test_walkers_that_are_to_stand_close_keep_their_neighbours(sweep_file: Callable[..., str]) -> None:
     """Replicates 1.6 mm apart run into each other; in a deck with others, 60 mm apart, they would not."""
-    text = '[axes]\nstart.spacing = ["1.6 mm", "60 mm", "70 mm"]'
+    text = '[axes]\ndimers.spacing = ["1.6 mm", "60 mm", "70 mm"]'
     name = sweep_file(
-        text=text, run={**TINY, "cycles": 20}, drive={"peak_acceleration": "6 g"}, start={"replicates": 6}
+        text=text, run={**TINY, "cycles": 20}, drive={"peak_acceleration": "6 g"}, dimers={"replicates": 6}
     )
     assert _sweep(name, "-j", "1").returncode == 0
     frame = load("runs/test")
@@ -168,18 +177,18 @@ def test_the_table_of_a_sweep(sweep_file: Callable[..., str], in_folder: Path) -
     text = """
     title = "A small one"
     [axes]
-    beads.radii = [["0.3 mm", "0.2 mm"], ["0.25 mm", "0.25 mm"]]
+    dimers.radii = [["0.3 mm", "0.2 mm"], ["0.25 mm", "0.25 mm"]]
     drive.peak_acceleration = { linspace = ["2 g", "4 g", 2] }
     """
-    name = sweep_file(text=text, start={"replicates": 2})
+    name = sweep_file(text=text, dimers={"replicates": 2})
     done = _sweep(name)
     assert (done.returncode, done.stdout.splitlines()[0]) == (0, "test: 4 points, 4 finished")
     frame = walkers.load(in_folder / "runs" / "test")
     assert list(frame["point"]) == [0, 1, 2, 3]
     assert list(frame["drive.peak_acceleration"]) == [2.0, 4.0, 2.0, 4.0]
-    assert list(frame["beads.radii[0]"]) == [0.3, 0.3, 0.25, 0.25]
+    assert list(frame["dimers.radii[0]"]) == [0.3, 0.3, 0.25, 0.25]
     units = frame.attrs["units"]
-    assert (units["drive.peak_acceleration"], units["beads.radii[1]"], units["velocity"]) == ("g", "mm", "m/s")
+    assert (units["drive.peak_acceleration"], units["dimers.radii[1]"], units["velocity"]) == ("g", "mm", "m/s")
     assert set(frame["status"]) == {"finished"}
     assert list(frame["lost"]) == [0] * 4
     for row in frame.itertuples():
@@ -224,7 +233,7 @@ HOT = """
 [set]
 run.allow_unstable = true
 [[zip]]
-start.seed    = [1, 2, 3, 4, 5]
+run.seed      = [1, 2, 3, 4, 5]
 run.time_step = ["2 us", "2 us", "40 us", "2 us", "2 us"]
 """
 
@@ -250,7 +259,7 @@ def test_a_failing_point_does_not_stop_the_others(
     assert _sweep(name, "--engine", engine, "--retries", "2").returncode == 1
     again = launches()[before:]
     assert len(again) == 3
-    assert {Path(place).name.removesuffix(".incomplete") for place in again} == {
+    assert {made_in(place) for place in again} == {
         json.loads((in_folder / "runs" / "test" / "sweep.json").read_text())["points"][2]["run"]
     }
 
@@ -282,7 +291,7 @@ def test_a_point_that_fails_at_first_is_retried(sweep_file: Callable[..., str], 
 
 
 def test_the_time_limit_takes_shared_decks_apart(sweep_file: Callable[..., str], in_folder: Path) -> None:
-    name = sweep_file(text='[axes]\nstart.angle = ["0 deg", "10 deg"]', run=SLOW)
+    name = sweep_file(text='[axes]\ndimers.angle = ["0 deg", "10 deg"]', run=SLOW)
     done = _sweep(name, "--limit", "0.8", "-j", "1")
     assert done.returncode == 1
     assert done.stderr.count("time limit of 0.8 s") == 2
@@ -343,7 +352,7 @@ def test_an_engine_that_outlives_a_killed_sweep_is_waited_for(sweep_file: Callab
     program = _start(name, "--engine", str(front))
     wait_for(stopped.exists)
     orphan = int(stopped.read_text())
-    (dump,) = in_folder.glob("runs/*.incomplete/beads.bin")
+    (dump,) = in_folder.glob("runs/*.incomplete/segments/0000.new/beads.bin")
     program.kill()
     program.communicate()
     node = dump.stat().st_ino
@@ -437,7 +446,7 @@ def test_a_run_that_was_cut_since_is_told_and_stops_nothing(sweep_file: Callable
     assert _sweep(name).returncode == 0
     run = Path(load("runs/test")["run"][1])
     (run / "result.json").unlink()
-    os.truncate(run / "beads.bin", 100)
+    os.truncate(run / FIRST_SEGMENT / "beads.bin", 100)
     frame = load("runs/test")
     assert list(frame["status"]) == ["finished", "failed", "finished"]
     assert frame["reason"][1] == "DamagedRunError"
@@ -507,7 +516,7 @@ def test_a_sweep_that_is_killed_eight_times(
     [axes]
     drive.frequency         = ["60 Hz", "80 Hz"]
     drive.peak_acceleration = { linspace = ["1 g", "5 g", 6] }
-    start.angle             = ["0 deg", "20 deg"]
+    dimers.angle            = ["0 deg", "20 deg"]
     """
     name = sweep_file(text=text, run={**TINY, "cycles": 10, "settling_cycles": 2})
     engine, launches = counting_engine
@@ -537,16 +546,16 @@ def test_a_sweep_that_is_killed_eight_times(
     assert len(frame) == frame["run"].nunique() == 24
     assert contents_of(in_folder / "runs") == contents_of(in_folder / "undisturbed")
     # The last call made no finished point again: each of its decks holds points that were missing before.
-    again = {Path(place).name.removesuffix(".incomplete") for place in launches()[before:]}
+    again = {made_in(place) for place in launches()[before:]}
     assert not again & finished
     assert not list(in_folder.glob("runs/**/*.incomplete"))
     assert not list(in_folder.glob("runs/**/*.lock"))
 
 
 def test_runs_in_ensembles_are_found_by_their_names(tmp_path: Path) -> None:
-    cases = [make_case(run=SHORT), make_case(run=SHORT, start={"seed": 2, "angle_spread": "1 deg"})]
-    made = make_together(cases, tmp_path, find_engine())
+    cases = [make_case(run=SHORT), make_case(run={**SHORT, "seed": 2}, dimers={"angle_spread": "1 deg"})]
+    made = make_runs(cases, tmp_path, find_engine())
     for name, run in made.runs.items():
         assert finished_place(tmp_path, name) == run.directory
-    again = make_together(cases, tmp_path, find_engine())
+    again = make_runs(cases, tmp_path, find_engine())
     assert again.found == frozenset(made.runs)

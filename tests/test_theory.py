@@ -14,9 +14,9 @@ from sympy.polys.fields import field
 
 from tests.conftest import PROGRAM, call, document, make_case, to_toml
 from walkers.inputs import load_case
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.case import Case
 from walkers.physics.dimer import Dimer
-from walkers.postprocess.result import read_result
+from walkers.postprocess.analysis import read_result
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import thresholds
@@ -231,8 +231,10 @@ def test_mathieu_parameters_of_the_papers_drives() -> None:
     assert found == pytest.approx([0.35, 0.20, 0.17], abs=0.006)
     assert largest_stable_v() == pytest.approx(0.454, abs=5e-4)
     for name in ("fig1b", "fig4a", "fig4b"):
-        case: WalkerCase = load_case(name)
-        one = alignment(Dimer(case.beads.radii, 4000.0, 19.2e-3), case.drive.frequency, case.drive.peak_acceleration)
+        case: Case = load_case(name)
+        one = alignment(
+            Dimer(case.walkers[0].radii, 4000.0, 19.2e-3), case.drive.frequency, case.drive.peak_acceleration
+        )
         assert one.stable
         assert one.v < 0.4
 

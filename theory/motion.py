@@ -16,8 +16,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import contact_loads, dimer_of
+from walkers.inputs.case import Case
+from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.physics.dimer import Dimer
 from walkers.physics.film import film_drag
 from walkers.theory.friction import Friction
@@ -69,11 +69,11 @@ class Walker:
         )
 
     @classmethod
-    def of_case(cls, case: WalkerCase) -> Walker:
+    def of_case(cls, case: Case) -> Walker:
         """A case's walker with the capillary forces that its bridges have in the engine, its weight and its film."""
         dimer = dimer_of(case)
         forces = np.array(contact_loads(case).capillary) + np.array([*dimer.masses, 0.0]) * case.pressing_gravity
-        film = [[film_drag(case.liquid.film_viscosity, radius)] for radius in case.beads.radii]
+        film = [[film_drag(case.liquid.film_viscosity, radius)] for radius in case.walkers[0].radii]
         return replace(cls.of_dimer(dimer), at_rest=(forces / dimer.capillary_scale)[:, None], film=np.array(film))
 
     @classmethod

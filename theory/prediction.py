@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.case import Case
+from walkers.inputs.loads import dimer_of
 from walkers.physics.lubrication import tangential_drag, tangential_drag_at_wall
 from walkers.theory.friction import Friction
 from walkers.theory.mathieu import alignment, largest_stable_v
@@ -22,24 +22,24 @@ _TRIALS = 33
 _ROUNDS = 3
 
 
-def bridge_drag(case: WalkerCase) -> FloatArray:
+def bridge_drag(case: Case) -> FloatArray:
     """Coefficient of the tangential viscous force at each contact as in the engine, N s/m, shape (3,).
 
     Lubrication of touching bridges (`walkers.physics.lubrication`).
     """
     viscosity, nearest = case.liquid.dynamic_viscosity, case.contact.minimum_separation_ratio
-    on_walls = [tangential_drag_at_wall(viscosity, radius, nearest) for radius in case.beads.radii]
+    on_walls = [tangential_drag_at_wall(viscosity, radius, nearest) for radius in case.walkers[0].radii]
     return np.array([*on_walls, tangential_drag(viscosity, dimer_of(case).reduced_radius, nearest)])
 
 
-def friction_of(*cases: WalkerCase, viscous: bool) -> Friction:
+def friction_of(*cases: Case, viscous: bool) -> Friction:
     """Coulomb's law with each case's coefficients, with or without the drag of its bridges."""
     contacts = [case.contact for case in cases]
     dry = Friction.coulomb([one.friction_bead_wall for one in contacts], [one.friction_bead_bead for one in contacts])
     return replace(dry, viscous=np.stack([bridge_drag(case) for case in cases], axis=-1)) if viscous else dry
 
 
-def motion_of(*cases: WalkerCase, viscous: bool = True) -> Motion:
+def motion_of(*cases: Case, viscous: bool = True) -> Motion:
     """The motions of cases' walkers, aligned with the drive, with the capillary forces that the engine gives them.
 
     Parameters
@@ -64,20 +64,24 @@ def motion_of(*cases: WalkerCase, viscous: bool = True) -> Motion:
     )
 
 
-def _walker_of(case: WalkerCase, *, viscous: bool) -> Walker:
+def _walker_of(case: Case, *, viscous: bool) -> Walker:
     walker = Walker.of_case(case)
     return walker if viscous else replace(walker, film=np.zeros_like(walker.film))
 
 
-def _check(*cases: WalkerCase) -> None:
+def _check(*cases: Case) -> None:
     for case in cases:
+        if len(case.walkers) != 1 or len(case.walkers[0].radii) != 2 or case.loose:
+            raise ValueError("bodies: the theory is one of dimers")
+        if case.boundary.walls != ("floor",):
+            raise ValueError("boundary.shape: the theory is one of planes")
         if not case.drive.is_plain or case.drive.direction[2] != 0.0:
             raise ValueError("drive: the theory is one of a single harmonic along the plane, without a phase")
         if hypot(*case.gravity_vector[:2]) > abs(case.axial_gravity) + 1e-9:
             raise ValueError("boundary.uphill: the theory is one of planes that are tilted along the drive")
 
 
-def threshold(case: WalkerCase, *, viscous: bool = True) -> float:
+def threshold(case: Case, *, viscous: bool = True) -> float:
     """Γc: the smallest Γ0 at which a case's walker moves at the case's frequency.
 
     Parameters
@@ -109,7 +113,7 @@ def threshold(case: WalkerCase, *, viscous: bool = True) -> float:
     return (low + high) / 2.0
 
 
-def predict(case: WalkerCase) -> dict[str, Any]:
+def predict(case: Case) -> dict[str, Any]:
     """Everything that ``walkers theory`` prints, SI units; None where the model does not hold, with the reason.
 
     Parameters

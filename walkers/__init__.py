@@ -1,9 +1,9 @@
 """Wet granular walkers, simulated with LIGGGHTS: the one public name of the project.
 
-`load_case` reads a case, `run_case` takes it to its result as ``walkers run`` does, `find_run` finds a finished run,
-`load` gives the table of a sweep. The folders of the project are packages below: `walkers.physics` (the laws),
-`walkers.inputs` (cases), `walkers.templates` (decks), `walkers.runner` (run directories), `walkers.postprocess` (what
-runs mean), and on them `walkers.sweeps`, `walkers.audit`, `walkers.theory`, `walkers.paper`, `walkers.calibration`.
+`load_case` reads a case, `run` takes it to its result as ``walkers run`` does, `find_run` finds a finished run, `sweep`
+makes all points of a sweep, `load` gives its table. The folders of the project are packages below: `physics` (laws),
+`inputs` (cases), `templates` (decks), `runner` (run directories), `postprocess` (what runs mean), and on them `sweeps`,
+`audit`, `theory`, `paper` and `calibration`.
 """
 
 from __future__ import annotations
@@ -11,25 +11,67 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from walkers.pipeline import Outcome, find_run, run_case
+from walkers.pipeline import DEFAULT_OUT, Run, find_run, run
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from walkers.inputs.reading import AnyCase
+    from walkers.inputs.case import Case
 
-__all__ = ["Outcome", "find_run", "load", "load_case", "run_case"]
+__all__ = ["Run", "find_run", "load", "load_case", "run", "sweep"]
 
 
 def __dir__() -> list[str]:
     return __all__
 
 
-def load_case(case: str | Path) -> AnyCase:
-    """Read and resolve a case, of walkers or of a pile; see `walkers.inputs.reading.load_any`."""
-    from walkers.inputs.reading import load_any
+def load_case(case: str | Path) -> Case:
+    """Read and resolve a case; see `walkers.inputs.reading.load_case`.
 
-    return load_any(case)
+    Examples
+    --------
+    >>> walkers.load_case("climber").boundary.shape
+    'plane'
+    """
+    from walkers.inputs.reading import load_case
+
+    return load_case(case)
+
+
+def sweep(sweep: str | Path, out: Path = DEFAULT_OUT, *, jobs: int | None = None) -> pd.DataFrame:
+    """Make the runs of a sweep that are missing, on this machine, and give its table.
+
+    Parameters
+    ----------
+    sweep
+        A sweep file, or the name of a shipped sweep.
+    out
+        Folder of the run directories.
+    jobs
+        Decks at once; all cores if left out.
+
+    Returns
+    -------
+    DataFrame
+        One row per point (`walkers.sweeps.table.load`); points that failed say so in the column ``status``.
+
+    Raises
+    ------
+    InputError
+        If the sweep or one of its points cannot be used.
+
+    Examples
+    --------
+    >>> walkers.sweep("fig4", tmp)[["liquid.name", "status"]].to_dict("list")
+    {'liquid.name': ['Si AK5', 'Si AK10'], 'status': ['finished', 'finished']}
+    """
+    from walkers.inputs.sweep import load_sweep
+    from walkers.sweeps.run import run_sweep
+    from walkers.sweeps.scheduler import Options
+    from walkers.sweeps.site import cores_here
+
+    record, _ = run_sweep(load_sweep(sweep), Path(out), Options(jobs or cores_here()))
+    return load(record.directory)
 
 
 def load(directory: str | Path) -> pd.DataFrame:

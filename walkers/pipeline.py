@@ -12,40 +12,110 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.errors import InputError, Problem, WalkersError
 
 if TYPE_CHECKING:
-    from walkers.inputs.case import WalkerCase
-    from walkers.inputs.pile import PileCase
-    from walkers.inputs.reading import AnyCase
-    from walkers.runner.binary import Engine
-    from walkers.runner.directory import FinishedRun
+    import pandas as pd
+
+    from walkers.inputs.case import Case
+    from walkers.postprocess.motion import Motion
+    from walkers.runner.launch import Progress
 
 DEFAULT_OUT = Path("runs")
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """A finished run, its result (SI units), and whether it was there before."""
+class Run:
+    """A finished run: what it was made of and what it gave.
 
-    run: FinishedRun
-    result: dict[str, Any]
-    cached: bool
+    Attributes
+    ----------
+    directory
+        The run directory.
+    cached
+        Whether it was there before.
+    """
+
+    directory: Path
+    cached: bool = True
+
+    @property
+    def case(self) -> Case:
+        """The resolved case."""
+        from walkers.inputs.case import Case
+        from walkers.runner.directory import CASE_NAME
+        from walkers.runner.files import read_json
+
+        return Case.from_dict(read_json(self.directory / CASE_NAME))
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The result, SI units."""
+        from walkers.postprocess.analysis import current_result
+
+        return current_result(self.directory)
+
+    @property
+    def motion(self) -> Motion:
+        """Places, velocities and spins of all beads, as arrays."""
+        from walkers.postprocess.motion import read_motion
+
+        return read_motion(self.directory)
+
+    @property
+    def trajectory(self) -> pd.DataFrame:
+        """One row per sample and walker, SI units."""
+        return self.table("trajectory")
+
+    @property
+    def walkers(self) -> pd.DataFrame:
+        """One row per walker, SI units."""
+        return self.table("walkers")
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table of the run, see `walkers.postprocess.read_table`."""
+        from walkers.postprocess.tables import read_table
+
+        return read_table(self.directory, name)
+
+    def describe(self) -> str:
+        """The result in a few lines: mm, mm/s, degrees."""
+        from walkers.postprocess.analysis import describe_result
+
+        return describe_result(self.directory, self.result, cached=self.cached)
+
+    def plot(self, to: Path | None = None) -> list[Path]:
+        """Draw its figures, see `walkers.postprocess.analysis.plot_run`."""
+        from walkers.postprocess.analysis import plot_run
+
+        return plot_run(self.directory, to)
+
+    def vtk(self, to: Path | None = None, **options: Any) -> Path:
+        """Write it for ParaView, see `walkers.postprocess.paraview.write_vtk`."""
+        from walkers.postprocess.paraview import write_vtk
+
+        return write_vtk(self.directory, destination=to, **options)
+
+    def render(self, to: Path | None = None, *, images: int = 6) -> list[Path]:
+        """Render pictures of it, see `walkers.postprocess.pictures.render_run`."""
+        from walkers.postprocess.pictures import render_run
+
+        return render_run(self.directory, to, images=images)
 
 
-def run_case(
-    case: AnyCase,
+def run(
+    case: Case | str | Path,
     out: Path = DEFAULT_OUT,
     *,
     engine: str | None = None,
     force: bool = False,
-    on_progress: Callable[[Any], None] | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
     time_limit: float | None = None,
     allow_failed_audit: bool = False,
-) -> Outcome:
-    """Run a case, unless its run is there already, and tabulate it; an interrupted pile goes on.
+) -> Run:
+    """Run a case, unless its run is there already, and tabulate it; an interrupted run goes on.
 
     Parameters
     ----------
     case
-        A resolved case: of walkers (`walkers.inputs.load_case`) or of a pile (`walkers.inputs.load_pile`).
+        A resolved case, a case file, or the name of a shipped one.
     out
         Folder of the run directories.
     engine
@@ -53,80 +123,61 @@ def run_case(
     force
         Run again; the old run is replaced only by a finished one.
     on_progress
-        Called a few times a second while the engine runs, with a `walkers.runner.launch.Progress`, of a pile with a
-        `walkers.runner.segments.PileProgress`.
+        Called a few times a second while the engine runs.
     time_limit
-        Wall time in s that the engine may take, of a pile for each segment.
+        Wall time in s that the engine may take, for each segment of the run.
     allow_failed_audit
         Run on an engine that failed its audit.
 
-    Returns
-    -------
-    Outcome
-
     Raises
     ------
+    InputError
+        If a case cannot be used.
     runner.EngineFailure
         If the engine fails in one of the known ways.
+
+    Examples
+    --------
+    >>> import walkers
+    >>> one = walkers.run("fig1b", tmp)
+    >>> round(1e3 * one.result["velocity"]["mean"], 3)  # mm/s
+    1.335
+    >>> one.walkers[["facing", "steady"]].drop_duplicates("facing").to_dict("list")
+    {'facing': [1, -1], 'steady': [True, True]}
     """
-    from walkers.inputs.pile import PileCase
+    from walkers.inputs.reading import load_case
+    from walkers.postprocess.analysis import current_result
     from walkers.runner.binary import find_engine
-
-    options = {"force": force, "on_progress": on_progress, "time_limit": time_limit}
-    if isinstance(case, PileCase):
-        return _run_pile(case, out, find_engine(engine), allow_failed_audit, options)
-    return _run_walkers(case, out, find_engine(engine), allow_failed_audit, options)
-
-
-def _run_walkers(
-    case: WalkerCase, out: Path, engine: Engine, allow_failed_audit: bool, options: dict[str, Any]
-) -> Outcome:
-    from walkers.runner.directory import finished_run, run_place, unfinished
+    from walkers.runner.directory import run_place, unfinished
     from walkers.runner.ensemble import finished_place
     from walkers.runner.failures import RunBusy
-    from walkers.sweeps.shared_deck import check_audit, make_together
+    from walkers.sweeps.shared_deck import check_audit, make_runs
 
-    place = run_place(case, engine, out)
+    case = load_case(case) if isinstance(case, (str, Path)) else case
+    binary = find_engine(engine)
+    place = run_place(case, binary, out)
     there = finished_place(out, place.name)
-    old = finished_run(there) if there and not options["force"] else None
-    if old is not None:
-        return Outcome(old, _result_of(old), cached=True)
-    check_audit(engine, allow_failed_audit)
+    if there is not None and not force:
+        current_result(there)
+        return Run(there)
+    check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
     threading.Thread(target=_load_postprocess, daemon=True).start()
-    made = make_together([case], out, engine, **options)
+    made = make_runs([case], out, binary, force=force, on_progress=on_progress, time_limit=time_limit)
     if made.busy:
         raise RunBusy(unfinished(place))
-    run = made.runs[place.name]
-    return Outcome(run, _result_of(run), cached=place.name in made.found)
-
-
-def _run_pile(case: PileCase, out: Path, engine: Engine, allow_failed_audit: bool, options: dict[str, Any]) -> Outcome:
-    from walkers.postprocess.pile_result import current_pile_result
-    from walkers.runner.directory import finished_run, run_place
-    from walkers.runner.segments import run_pile
-    from walkers.sweeps.shared_deck import check_audit
-
-    if options["force"] or finished_run(run_place(case, engine, out)) is None:
-        check_audit(engine, allow_failed_audit)
-    run, found = run_pile(case, engine, out, **options)
-    return Outcome(run, current_pile_result(run.directory), found)
+    current_result(made.runs[place.name].directory)
+    return Run(made.runs[place.name].directory, cached=place.name in made.found)
 
 
 def _load_postprocess() -> None:
     import pyarrow.parquet  # noqa: F401
 
-    import walkers.postprocess.result  # noqa: F401
+    import walkers.postprocess.walking  # noqa: F401
 
 
-def _result_of(run: FinishedRun) -> dict[str, Any]:
-    from walkers.postprocess.result import current_result
-
-    return current_result(run.directory)
-
-
-def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
-    """Find a finished run of a walker, a climber or a pile.
+def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
+    """Find a finished run.
 
     Parameters
     ----------
@@ -138,75 +189,55 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> FinishedRun:
     Raises
     ------
     InputError
-        If there is none, or its manifest, case or layout cannot be read.
+        If there is none, or it cannot be read.
     runner.EngineFailure
         If a case is given and there is no engine to look it up for.
     """
     from walkers.runner.directory import finished_run
-    from walkers.runner.segments import is_pile
 
     path = Path(run)
     if path.is_dir():
-        found = finished_run(path)
-        if found is None:
-            raise InputError(
-                str(run), [Problem("", None, "not a finished run: expected a folder with a manifest.json")]
-            )
-    else:
-        there = _place_of(path, out)
-        found = finished_run(there) if there else None
-        if found is None:
-            raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
-    return _readable_pile(found) if is_pile(found.directory) else _readable(found)
+        if finished_run(path) is None:
+            told = "not a finished run: expected a folder with a manifest.json"
+            raise InputError(str(run), [Problem("", None, told)])
+        return _readable(path)
+    there = _place_of(path, out)
+    if there is None or finished_run(there) is None:
+        raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
+    return _readable(there)
 
 
 def _place_of(case: Path, out: Path) -> Path | None:
-    from walkers.inputs.reading import load_any
+    from walkers.inputs.reading import load_case
     from walkers.runner.binary import find_engine
     from walkers.runner.directory import run_place
     from walkers.runner.ensemble import finished_place
 
-    return finished_place(out, run_place(load_any(case), find_engine(), out).name)
+    return finished_place(out, run_place(load_case(case), find_engine(), out).name)
 
 
-def described(directory: Path, result: dict[str, Any], *, cached: bool = False) -> str:
-    """A result as text, whatever it is of."""
-    if result.get("kind") == "pile":
-        from walkers.postprocess.pile_result import describe_pile
-
-        return describe_pile(directory, result, cached=cached)
-    from walkers.postprocess.report import describe_result
-
-    return describe_result(directory, result, cached=cached)
-
-
-def _readable_pile(run: FinishedRun) -> FinishedRun:
-    """A pile's run, if its description can be read; its tables are made anew if need be."""
-    from walkers.postprocess.pile_result import current_pile_result
-
-    try:
-        current_pile_result(run.directory)
-    except (OSError, ValueError, KeyError, TypeError, WalkersError) as error:
-        raise InputError(str(run.directory), [Problem("", None, f"the run cannot be read ({error})")]) from error
-    return run
-
-
-def _readable(run: FinishedRun) -> FinishedRun:
+def _readable(directory: Path) -> Run:
     """The run, if its description can be read; its tables are made anew if need be."""
+    from walkers.postprocess.analysis import current_result
+    from walkers.runner.directory import FIRST_SEGMENT, FinishedRun
+
+    run = FinishedRun(directory)
     for name in ("manifest", "case", "layout"):
         try:
             getattr(run, name)
         except (OSError, ValueError, KeyError, TypeError) as error:
             problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
-            raise InputError(str(run.directory), [problem]) from error
-    layout = run.layout
-    dump = run.directory / layout.bead_dump
+            raise InputError(str(directory), [problem]) from error
+    dump = directory / FIRST_SEGMENT / run.layout.bead_dump
     if not dump.is_file():
-        raise InputError(str(run.directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
-    if dump.stat().st_size < layout.bead_dump_bytes:
+        raise InputError(str(directory), [Problem("", None, f"the run's {run.layout.bead_dump} is missing")])
+    if dump.stat().st_size < run.layout.bead_dump_bytes:
         warnings.warn(f"{dump} is incomplete: what is drawn or written ends early", IncompleteRunWarning, stacklevel=3)
-    _result_of(run)
-    return run
+    try:
+        current_result(directory)
+    except (OSError, ValueError, KeyError, TypeError, WalkersError) as error:
+        raise InputError(str(directory), [Problem("", None, f"the run cannot be read ({error})")]) from error
+    return Run(directory)
 
 
 class IncompleteRunWarning(UserWarning):

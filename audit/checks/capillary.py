@@ -10,7 +10,7 @@ import numpy as np
 from walkers.audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
 from walkers.audit.check import Check, Line
 from walkers.audit.laws import Partner, bridge_law, capillary_law, hertz_law, largest_error
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.case import Case
 from walkers.physics.capillary import (
     bridge_volume_at_wall,
     bridge_volume_between_beads,
@@ -41,7 +41,7 @@ def _pairs(ratios: tuple[float, ...], gap: float, speed: float) -> list[Bead]:
     return beads
 
 
-def _steps_to(distance: float, case: WalkerCase, samples: int = 100) -> tuple[int, int]:
+def _steps_to(distance: float, case: Case, samples: int = 100) -> tuple[int, int]:
     every = max(1, int(distance / (_SPEED * case.run.time_step * samples)))
     return every * samples, every
 
@@ -119,8 +119,8 @@ def before_contact(bench: Bench) -> Iterator[Line]:
         )
 
 
-def _retract_from_wall(bench: Bench, case: WalkerCase, workarounds: Workarounds) -> tuple[FloatArray, FloatArray]:
-    radius = case.beads.radii[0]
+def _retract_from_wall(bench: Bench, case: Case, workarounds: Workarounds) -> tuple[FloatArray, FloatArray]:
+    radius = case.walkers[0].radii[0]
     bead = Bead(0, (0.0, 0.0, radius - _OVERLAP), radius, velocity=(0.0, 0.0, _SPEED))
     volume = bridge_volume_at_wall(radius, case.liquid.volume_fraction)
     steps, every = _steps_to(1.1 * rupture_distance(volume, case.liquid.contact_angle), case)
@@ -133,7 +133,7 @@ def _retract_from_wall(bench: Bench, case: WalkerCase, workarounds: Workarounds)
 def at_wall(bench: Bench) -> Iterator[Line]:
     """Force of the single and of the doubled wall, beside sphere–plane theory."""
     case = bench_case()
-    radius, tension = case.beads.radii[0], case.liquid.surface_tension
+    radius, tension = case.walkers[0].radii[0], case.liquid.surface_tension
     scale = pi * tension * radius
     gap, pull = _retract_from_wall(bench, case, bench.workarounds)
     still = np.zeros((len(gap), 3))
@@ -177,7 +177,7 @@ def contact_angle(bench: Bench) -> Iterator[Line]:
         case = bench_case(liquid={"contact_angle": f"{angle} deg"})
         needs = frozenset({"angle"}) if angle else frozenset[str]()
         gap, pull = _retract_from_wall(bench, case, bench.workarounds)
-        law = _pull_law(case, case.beads.radii[0], Partner(case.beads.radii[0], wall=True), gap)
+        law = _pull_law(case, case.walkers[0].radii[0], Partner(case.walkers[0].radii[0], wall=True), gap)
         yield _angle_line(f"contact angle {angle:g}°, bead on wall", gap, pull, law, needs | _WALL)
         gap, pull = _part_beads(bench, case)
         law = _pull_law(case, _SMALL, Partner(_SMALL), gap)
@@ -186,7 +186,7 @@ def contact_angle(bench: Bench) -> Iterator[Line]:
     gap, pull = _retract_from_wall(bench, case, Workarounds(contact_angle=False))
     # The raw engine takes ½ θi θj: solve its force at the first open gap for the angle that it used.
     number = int(np.argmax(gap > 0))
-    radius, tension = case.beads.radii[0], case.liquid.surface_tension
+    radius, tension = case.walkers[0].radii[0], case.liquid.surface_tension
     volume = bridge_volume_at_wall(radius, case.liquid.volume_fraction)
     angles = np.radians(np.linspace(0.0, 60.0, 6001))
     candidates = [
@@ -197,7 +197,7 @@ def contact_angle(bench: Bench) -> Iterator[Line]:
     yield Line("contactAngle of 30° acts as", "½ θi θj in radians", acting, used, "°", 0.01, defect=True)
 
 
-def _pull_law(case: WalkerCase, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
+def _pull_law(case: Case, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:
     """Net pull at each gap, touching ones included, N."""
     pull: FloatArray = capillary_law(case, radius, partner, gap) - hertz_law(case, radius, partner, gap)
     return pull
@@ -212,7 +212,7 @@ def _angle_line(what: str, gap: FloatArray, pull: FloatArray, law: FloatArray, n
     )
 
 
-def _part_beads(bench: Bench, case: WalkerCase) -> tuple[FloatArray, FloatArray]:
+def _part_beads(bench: Bench, case: Case) -> tuple[FloatArray, FloatArray]:
     volume = bridge_volume_between_beads(_SMALL, _SMALL, case.liquid.volume_fraction)
     steps, every = _steps_to(1.1 * rupture_distance(volume, case.liquid.contact_angle), case)
     scene = scene_on_floor(_pairs((1.0,), -_OVERLAP, _SPEED))

@@ -11,8 +11,8 @@ import numpy as np
 from walkers.audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
 from walkers.audit.check import Check, Line
 from walkers.audit.laws import Partner, hertz_law, largest_error
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import contact_loads
+from walkers.inputs.case import Case
+from walkers.inputs.loads import contact_loads
 from walkers.physics.contact import damping_ratio, reduced_shear_modulus
 from walkers.templates.deck import Plan
 from walkers.templates.engine import Workarounds
@@ -22,10 +22,10 @@ _WALL = frozenset({"walls"})
 _HERTZ = "4/3 E* √R* δ^(3/2)"
 
 
-def _pressed_bead(case: WalkerCase) -> tuple[Bead, float]:
+def _pressed_bead(case: Case) -> tuple[Bead, float]:
     """A bead at the overlap at which the elastic repulsion carries its capillary load, and that load."""
     loads = contact_loads(case)
-    radius = case.beads.radii[0]
+    radius = case.walkers[0].radii[0]
     return Bead(0, (0.0, 0.0, radius - loads.overlaps[0]), radius), loads.capillary[0]
 
 
@@ -82,10 +82,10 @@ def rolling(bench: Bench) -> Iterator[Line]:
     )
 
 
-def _pressed_pair(case: WalkerCase) -> tuple[list[Bead], float]:
+def _pressed_pair(case: Case) -> tuple[list[Bead], float]:
     """Two beads at the overlap that carries the capillary load between them, one above the other, and that load."""
     loads = contact_loads(case)
-    large, small = case.beads.radii
+    large, small = case.walkers[0].radii
     lower = Bead(0, (0.0, 0.0, 5e-3), large)
     return [lower, Bead(0, (0.0, 0.0, 5e-3 + large + small - loads.overlaps[2]), small)], loads.capillary[2]
 
@@ -139,7 +139,7 @@ def reported_forces(bench: Bench) -> Iterator[Line]:
 def hertz(bench: Bench) -> Iterator[Line]:
     """Dry beads pressed onto the wall and onto each other."""
     case = bench_case(liquid={"volume_fraction": 1e-9})
-    radius, small = case.beads.radii
+    radius, small = case.walkers[0].radii
     sink = -0.001
     beads = [
         Bead(0, (0.0, 0.0, radius), radius, velocity=(0.0, 0.0, sink)),
@@ -180,7 +180,7 @@ def restitution(bench: Bench) -> Iterator[Line]:
         case = bench_case(
             liquid={"volume_fraction": 1e-9}, contact={"restitution": coefficient}, run={"time_step": "0.2 us"}
         )
-        radius = case.beads.radii[0]
+        radius = case.walkers[0].radii[0]
         beads = [
             Bead(0, (0.0, 0.0, radius + 1e-7), radius, velocity=(0.0, 0.0, -speed)),
             Bead(0, (6e-3, 0.0, 5e-3), radius, velocity=(0.0, 0.0, speed)),

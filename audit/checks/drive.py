@@ -8,24 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from walkers.audit.bench import FIRST_BEAD, Bench, bench_case, changed_case
+from walkers.audit.bench import FIRST_BEAD, Bench, bench_case, bench_plan, changed_case
 from walkers.audit.check import Check, Line
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.case import Case
+from walkers.inputs.loads import dimer_of
 from walkers.physics.film import film_drag
 from walkers.postprocess.gait import walk
-from walkers.postprocess.trajectory import prescribed_motion, read_trajectory
-from walkers.runner.directory import CASE_NAME
-from walkers.runner.files import write_json
-from walkers.templates.deck import walker_plan
+from walkers.postprocess.motion import motion_of, prescribed_motion
+from walkers.templates.deck import plan_of
 
 _SINE = "A sin ωt, A = a0/ω²"
 
 
-def reference_walker(**changes: dict[str, Any]) -> WalkerCase:
+def reference_walker(**changes: dict[str, Any]) -> Case:
     """The walker of Fig. 2 at 4 g, friction 0.1, alone and on the axis: its speed is known from other engines."""
     tables: dict[str, dict[str, Any]] = {
-        "beads": {"radii": ["0.3 mm", "0.2 mm"], "material": "ruby"},
+        "beads": {"material": "ruby"},
+        "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
         "liquid": {
             "name": "Si AK5",
             "volume_fraction": 0.01,
@@ -40,17 +39,16 @@ def reference_walker(**changes: dict[str, Any]) -> WalkerCase:
             "minimum_separation_ratio": 0.01,
         },
         "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
-        "start": {"replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
         "run": {"cycles": 30, "settling_cycles": 10},
     }
     return changed_case(tables, changes)
 
 
-def walking_speed(bench: Bench, case: WalkerCase) -> float:
+def walking_speed(bench: Bench, case: Case) -> float:
     """Velocity of the first walker of a case, m/s."""
-    series = bench.run(walker_plan(case, workarounds=bench.workarounds))
-    write_json(series.directory / CASE_NAME, case.as_dict())
-    return float(walk(read_trajectory(series.directory)).velocity[0])
+    series = bench.run(plan_of(case, workarounds=bench.workarounds))
+    whole = {"begin": 0, "end": case.run.steps, "drive_from": 0}
+    return float(walk(motion_of(case, [series.directory], [whole]).groups[0]).velocity[0])
 
 
 def wall_motion(bench: Bench) -> Iterator[Line]:
@@ -58,7 +56,7 @@ def wall_motion(bench: Bench) -> Iterator[Line]:
     case = bench_case(
         drive={"axis": "z", "frame": "lab", "peak_acceleration": "1 g"},
         contact={"restitution": 0.3, "friction": {"bead_bead": 0.1, "bead_wall": 0.1}},
-        start={"replicates": 1},
+        dimers={"replicates": 1},
         run={
             "cycles": 6,
             "settling_cycles": 2,
@@ -68,7 +66,7 @@ def wall_motion(bench: Bench) -> Iterator[Line]:
         },
         environment={"gravity": "9.81 m/s^2"},
     )
-    series = bench.run(walker_plan(case, workarounds=bench.workarounds))
+    series = bench.run(bench_plan(case, bench.workarounds))
     drive, time = case.drive, series.steps * case.run.time_step
     expected, speed = (motion[:, 2] for motion in prescribed_motion(drive, time))
     if bench.workarounds.carriers:
@@ -121,13 +119,13 @@ def film(bench: Bench) -> Iterator[Line]:
             drive={"peak_acceleration": "1 g", "frame": frame},
             run={"cycles": 20, "settling_cycles": 10},
         )
-        series = bench.run(walker_plan(case, workarounds=bench.workarounds))
+        series = bench.run(plan_of(case, workarounds=bench.workarounds))
         drive, dimer = case.drive, dimer_of(case)
         last = slice(case.run.settling_cycles * case.run.samples_per_cycle, -1)
         own = series.velocity[last, series.row(FIRST_BEAD), 0]
         if frame == "lab":
             own = own - prescribed_motion(drive, series.steps[last] * case.run.time_step)[1][:, 0]
-        rate = sum(film_drag(case.liquid.film_viscosity, radius) for radius in case.beads.radii) / dimer.total_mass
+        rate = sum(film_drag(case.liquid.film_viscosity, radius) for radius in case.walkers[0].radii) / dimer.total_mass
         expected = drive.peak_acceleration / float(np.hypot(drive.angular_frequency, rate))
         found = float(np.sqrt(2.0 * np.mean(own**2)))
         yield Line(

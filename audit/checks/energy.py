@@ -15,16 +15,15 @@ from math import sqrt
 
 import numpy as np
 
-from walkers.audit.bench import Bench
+from walkers.audit.bench import Bench, bench_plan
 from walkers.audit.check import Check, Line
 from walkers.audit.checks.drive import reference_walker
 from walkers.audit.laws import Partner, lubrication_drags
-from walkers.inputs.case import WalkerCase
-from walkers.inputs.dimer import dimer_of
+from walkers.inputs.case import Case
+from walkers.inputs.loads import dimer_of
 from walkers.physics.contact import damping_ratio, reduced_modulus, reduced_shear_modulus
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.trajectory import prescribed_motion
-from walkers.templates.deck import walker_plan
+from walkers.postprocess.motion import prescribed_motion
 
 _CYCLES = 14
 _LEAD = 2
@@ -62,7 +61,7 @@ class Dissipated:
         return self.friction + self.viscosity + self.damping
 
 
-def dissipation(case: WalkerCase, touch: Touch, begin: int) -> Dissipated:
+def dissipation(case: Case, touch: Touch, begin: int) -> Dissipated:
     """Integrate what a contact takes out from frame ``begin`` on (one frame a step).
 
     Hertz–Mindlin springs with the Coulomb limit and the damping of the engine's ``hertz`` and ``history`` models,
@@ -111,7 +110,7 @@ def balance(bench: Bench) -> Iterator[Line]:
     """The reference walker, recorded every step, its last cycle balanced."""
     case = reference_walker(run={"cycles": _CYCLES, "settling_cycles": 2, "time_step": "auto"})
     cycle = case.run.steps_per_cycle
-    plan = walker_plan(case, workarounds=bench.workarounds)
+    plan = bench_plan(case, bench.workarounds)
     every_step = replace(plan.recording, sample_every=1, bridge_every=cycle, status_every=cycle)
     series = bench.run(replace(plan, recording=every_step))
     kept = slice((_CYCLES - 1 - _LEAD) * cycle, _CYCLES * cycle)
@@ -149,9 +148,9 @@ def balance(bench: Bench) -> Iterator[Line]:
 
 
 def _touches(
-    case: WalkerCase, position: FloatArray, velocity: FloatArray, spin: FloatArray, wall_speed: FloatArray
+    case: Case, position: FloatArray, velocity: FloatArray, spin: FloatArray, wall_speed: FloatArray
 ) -> list[Touch]:
-    radii, masses = case.beads.radii, dimer_of(case).masses
+    radii, masses = case.walkers[0].radii, dimer_of(case).masses
     contact = case.contact
     touches = [
         Touch(

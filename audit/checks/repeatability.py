@@ -14,15 +14,15 @@ from walkers.audit.check import Check, Line, Verdict
 from walkers.audit.checks.drive import reference_walker
 from walkers.audit.checks.viscous import box_errors, box_lines, run_box, viscous_case
 from walkers.audit.laws import largest_error
-from walkers.inputs.case import WalkerCase
-from walkers.templates.deck import Checkpoint, walker_plan
+from walkers.inputs.case import Case
+from walkers.templates.deck import Checkpoint, plan_of
 
 _RESTART_FILE = "half.restart"
 
 
-def _ensemble(replicates: int, frame: str = "lab") -> WalkerCase:
+def _ensemble(replicates: int, frame: str = "lab") -> Case:
     return reference_walker(
-        start={"replicates": replicates, "spacing": "30 mm"},
+        dimers={"replicates": replicates, "spacing": "30 mm"},
         drive={"frequency": "80 Hz", "peak_acceleration": "4 g", "frame": frame},
         run={"cycles": 10, "settling_cycles": 2},
     )
@@ -31,7 +31,7 @@ def _ensemble(replicates: int, frame: str = "lab") -> WalkerCase:
 def independence(bench: Bench) -> Iterator[Line]:
     """A walker among four against the same one alone; a rerun against the run."""
     together, alone, again = (
-        bench.run(walker_plan(_ensemble(count), workarounds=bench.workarounds)) for count in (4, 1, 4)
+        bench.run(plan_of(_ensemble(count), workarounds=bench.workarounds)) for count in (4, 1, 4)
     )
     tracks = [series.position[:, series.row(FIRST_BEAD)] for series in (together, alone)]
     ways = [track - track[0] for track in tracks]
@@ -46,7 +46,7 @@ def independence(bench: Bench) -> Iterator[Line]:
 def restart(bench: Bench) -> Iterator[Line]:
     """Ten cycles at a stretch against five, a restart file, and five more (container frame)."""
     case = _ensemble(2, "container")
-    run, plan = case.run, walker_plan(case, workarounds=bench.workarounds)
+    run, plan = case.run, plan_of(case, workarounds=bench.workarounds)
     whole = bench.run(plan)
     half = replace(plan.recording, steps=run.steps // 2)
     first = bench.run(replace(plan, recording=half, checkpoint=Checkpoint(write=_RESTART_FILE)))

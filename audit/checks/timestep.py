@@ -10,9 +10,10 @@ import numpy as np
 from walkers.audit.bench import Bench, bench_case, bench_recording
 from walkers.audit.check import Check, Line
 from walkers.audit.checks.drive import reference_walker, walking_speed
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.boundary import Face
+from walkers.inputs.case import Case
 from walkers.templates.deck import Plan
-from walkers.templates.scene import Bead, Face, Scene
+from walkers.templates.scene import Bead, Scene
 
 _SIDE = 5.3e-3
 _LARGE, _SMALL = 5.45e-4, 3.075e-4
@@ -31,10 +32,11 @@ def walker_convergence(bench: Bench) -> Iterator[Line]:
         )
 
 
-def pile_case(time_step: float | None = None) -> WalkerCase:
+def pile_case(time_step: float | None = None) -> Case:
     """The paper's glass beads in glycerol, shaken vertically, container frame; at auto's step if none is given."""
     case = bench_case(
-        beads={"radii": [f"{_LARGE} m", f"{_SMALL} m"], "density": "2.5 g/cm^3"},
+        beads={"density": "2.5 g/cm^3"},
+        dimers={"radii": [f"{_LARGE} m", f"{_SMALL} m"]},
         liquid={"name": "glycerol 87 %", "surface_tension": "61 mN/m", "dynamic_viscosity": "120.54 mPa*s"},
         contact={"friction": {"bead_bead": 0.3, "bead_wall": 0.3}, "restitution": 0.3, "rolling_friction": 0.0},
         drive={"axis": "z", "frequency": "170 Hz", "peak_acceleration": "16.2 g", "frame": "container"},

@@ -4,32 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import product
+from typing import Literal
 
 import numpy as np
 
 from walkers.audit.bench import Bench, Measured, bench_case, bench_recording, scene_on_floor
 from walkers.audit.check import Check, Line
 from walkers.audit.laws import Partner, bridge_law, frame_by_frame_error
-from walkers.inputs.case import WalkerCase
+from walkers.inputs.boundary import AxisName, Face
+from walkers.inputs.case import Case
+from walkers.inputs.drive import Vector
 from walkers.physics.capillary import bridge_volume_at_wall, rupture_distance
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.trajectory import prescribed_motion
+from walkers.postprocess.motion import prescribed_motion
 from walkers.templates.deck import Plan
 from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds
-from walkers.templates.scene import AXES, Bead, Face, Point, Scene, vector_along
+from walkers.templates.scene import Bead, Scene
 
+AXES: tuple[AxisName, ...] = ("x", "y", "z")
 HALF = 3e-3
 """Half of the box's inner side, m."""
 _OUTSIDE = 1.2e-3
 _OVERLAP = 2e-6
 _RETREAT = 0.02
-_ALONG: Point = (0.03, -0.02, 0.025)
-_SPIN: Point = (60.0, -80.0, 40.0)
+_ALONG: Vector = (0.03, -0.02, 0.025)
+_SPIN: Vector = (60.0, -80.0, 40.0)
 _NASE = "6πηR* v_n/max(ε, h/R*), Nase et al. in Shi, McCarthy 2008, Eqs. 40, 41"
 _NEEDS = frozenset({"carriers", "walls"})
 
 
-def viscous_case(frame: str = "container", acceleration: str = "0 g", axis: str = "x") -> WalkerCase:
+def viscous_case(frame: str = "container", acceleration: str = "0 g", axis: str = "x") -> Case:
     """Si AK5's viscosity, everything else as on the bench."""
     return bench_case(
         liquid={"dynamic_viscosity": "4.6 mPa*s"},
@@ -39,9 +43,14 @@ def viscous_case(frame: str = "container", acceleration: str = "0 g", axis: str 
 
 def box_scene(radius: float, ranks: int = 1) -> Scene:
     """26 beads at the faces, edges and corners of a cube, six carriers outside it for every rank (split along x)."""
-    faces = [Face(axis, side, vector_along(axis, -side * HALF)) for axis in AXES for side in (1, -1)]
+    sides: tuple[Literal[1], Literal[-1]] = (1, -1)
+    faces = [
+        Face(axis, side, (-side * HALF * (axis == "x"), -side * HALF * (axis == "y"), -side * HALF * (axis == "z")))
+        for axis in AXES
+        for side in sides
+    ]
     far = HALF + _OUTSIDE
-    carriers: list[Point] = []
+    carriers: list[Vector] = []
     for rank in range(ranks):
         x = far if ranks == 1 else (rank - (ranks - 1) / 2.0) * 2.0 * far / ranks
         carriers += [(x, y, z) for y in (-far, far) for z in (-1e-3, 0.0, 1e-3)]
@@ -62,7 +71,7 @@ def box_scene(radius: float, ranks: int = 1) -> Scene:
     return Scene(tuple(beads), tuple(faces), tuple(carriers), (-edge,) * 3, (edge,) * 3)
 
 
-def box_errors(case: WalkerCase, scene: Scene, series: Measured) -> dict[int, FloatArray]:
+def box_errors(case: Case, scene: Scene, series: Measured) -> dict[int, FloatArray]:
     """Largest errors of viscous force and of torque, frame by frame, by the number of walls that a bead is bound to."""
     radius = scene.beads[0].radius
     errors: dict[int, FloatArray] = {}
@@ -95,9 +104,9 @@ def box_errors(case: WalkerCase, scene: Scene, series: Measured) -> dict[int, Fl
     return errors
 
 
-def run_box(bench: Bench, case: WalkerCase, workarounds: Workarounds, ranks: int = 1) -> tuple[Scene, Measured]:
+def run_box(bench: Bench, case: Case, workarounds: Workarounds, ranks: int = 1) -> tuple[Scene, Measured]:
     """Retract the 26 beads from their walls, from touching to past rupture."""
-    radius = case.beads.radii[0]
+    radius = case.walkers[0].radii[0]
     scene = box_scene(radius, ranks)
     rupture = rupture_distance(bridge_volume_at_wall(radius, case.liquid.volume_fraction), 0.0)
     steps = int(1.4 * rupture / (_RETREAT * case.run.time_step) / 100) * 100

@@ -15,15 +15,12 @@ Folder = Annotated[
 
 
 def command(case: Case, to: Folder = None) -> None:
-    """Print the LIGGGHTS deck of a case (of a pile, that in which it settles), or write it with its files."""
+    """Print the LIGGGHTS deck of a case (of a run in segments, the first), or write it with its files."""
     from walkers.inputs.errors import InputError, Problem
-    from walkers.inputs.pile import PileCase
-    from walkers.inputs.reading import load_any
+    from walkers.inputs.reading import load_case
     from walkers.templates.deck import DECK_NAME, render_deck
-    from walkers.templates.pile import render_first_segment
 
-    loaded = load_any(case)
-    deck = render_first_segment(loaded) if isinstance(loaded, PileCase) else render_deck(loaded)
+    deck = render_deck(load_case(case))
     if to is None:
         print(deck.text, end="")
         return

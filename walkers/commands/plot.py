@@ -16,10 +16,6 @@ Folder = Annotated[Path | None, typer.Option("--to", help="Folder for the figure
 def command(run: Run, out: Out = DEFAULT_OUT, to: Folder = None) -> None:
     """Draw where the walkers went and turned, and their gait through two cycles; of a pile, what climbed."""
     from walkers.pipeline import find_run
-    from walkers.postprocess.figures import plot_run
-    from walkers.postprocess.pile_figures import plot_pile
-    from walkers.runner.segments import is_pile
 
-    directory = find_run(run, out).directory
-    for path in (plot_pile if is_pile(directory) else plot_run)(directory, to):
+    for path in find_run(run, out).plot(to):
         print(path)

@@ -10,9 +10,9 @@ from walkers.pipeline import DEFAULT_OUT
 
 def command(run: Run, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
     """Print the result of a finished run."""
-    from walkers.pipeline import described, find_run
-    from walkers.postprocess.result import read_result
+    from dataclasses import replace
 
-    directory = find_run(run, out).directory
-    result = read_result(directory)
-    print(json.dumps(result, indent=2) if as_json else described(directory, result))
+    from walkers.pipeline import find_run
+
+    found = replace(find_run(run, out), cached=False)
+    print(json.dumps(found.result, indent=2) if as_json else found.describe())

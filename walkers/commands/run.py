@@ -28,18 +28,18 @@ def command(
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Run cases, unless they have been run, and print their results (with --json an object a line)."""
-    from walkers.inputs.reading import load_any
-    from walkers.pipeline import described, run_case
+    from walkers.inputs.reading import load_case
+    from walkers.pipeline import run
     from walkers.progress import progress_of
     from walkers.runner.failures import EngineFailure
 
-    loaded = [load_any(case) for case in cases]  # a mistake in the last file shows before the first run starts
+    loaded = [load_case(case) for case in cases]  # a mistake in the last file shows before the first run starts
     check_out(out)
     failed = 0
     for case in loaded:
         try:
-            with progress_of(case) as advance:
-                outcome = run_case(
+            with progress_of(case.name) as advance:
+                done = run(
                     case,
                     out,
                     engine=engine,
@@ -53,7 +53,7 @@ def command(
             failed += 1
             continue
         if as_json:
-            print(json.dumps({**outcome.result, "run": str(outcome.run.directory), "cached": outcome.cached}))
+            print(json.dumps({**done.result, "run": str(done.directory), "cached": done.cached}))
         else:
-            print(described(outcome.run.directory, outcome.result, cached=outcome.cached))
+            print(done.describe())
     return 1 if failed else 0

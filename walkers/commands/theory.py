@@ -15,7 +15,6 @@ def command(case: Case, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
     from walkers.inputs.errors import InputError, Problem
     from walkers.inputs.reading import load_case
     from walkers.pipeline import find_run
-    from walkers.postprocess.result import current_result
     from walkers.runner.failures import EngineMissing
     from walkers.theory.prediction import describe, predict
 
@@ -26,5 +25,5 @@ def command(case: Case, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
         raise InputError(case, [Problem(key, None, told)]) from error
     result: dict[str, Any] | None = None
     with suppress(InputError, EngineMissing):  # not run yet, or never to be run here
-        result = current_result(find_run(case, out).directory)
+        result = find_run(case, out).result
     print(json.dumps({**prediction, "engine": result}, indent=2) if as_json else describe(prediction, result))

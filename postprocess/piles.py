@@ -1,17 +1,21 @@
-"""From a pile's run directory to its tables and its result: what the bed did, which clusters climbed."""
+"""The analysis of loose beads in a container: what the bed did, which clusters came free of it and climbed."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import nan
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from walkers.inputs.boundary import Boundary
+from walkers.inputs.case import Case
+from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
 from walkers.postprocess.bed import Bed, bed_of, liquid_of_beads, packing_profile
-from walkers.postprocess.bridges import Columns
 from walkers.postprocess.clusters import (
     Climb,
     ClimbCriteria,
@@ -24,15 +28,10 @@ from walkers.postprocess.clusters import (
     held_clusters,
 )
 from walkers.postprocess.events import Event, events_of
-from walkers.postprocess.pile import PileMotion, names_of_walls, read_bridges, read_pile
-from walkers.postprocess.result import RESULT_NAME, read_result
-from walkers.postprocess.tables import PILE_TABLES, intact, write_table
-from walkers.runner.files import write_json
+from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
 
 FloatArray = npt.NDArray[np.float64]
 
-METHOD = 2
-"""Of judging climbs: a result that was made by another one is made anew."""
 _LAYERS = 0.5
 """Thickness of the layers of the packing profile, in diameters of the largest bead."""
 
@@ -59,7 +58,7 @@ class PileAnalysis:
         What counted as a climb.
     """
 
-    motion: PileMotion
+    motion: Motion
     beds: list[Bed]
     liquid: FloatArray
     bulks: list[npt.NDArray[np.bool_]]
@@ -70,13 +69,13 @@ class PileAnalysis:
     definition: ClimbCriteria
 
 
-def analyse(directory: str | Path, definition: ClimbCriteria | None = None) -> PileAnalysis:
+def analyse(run: str | Path | Motion, definition: ClimbCriteria | None = None) -> PileAnalysis:
     """Measure a pile, finished or not.
 
     Parameters
     ----------
-    directory
-        A run directory with its segments.
+    run
+        A run directory, or the motion in it.
     definition
         What counts as a climb.
 
@@ -86,17 +85,17 @@ def analyse(directory: str | Path, definition: ClimbCriteria | None = None) -> P
         If a dump cannot be read.
     """
     rule = definition or ClimbCriteria()
-    motion = read_pile(directory)
+    motion = run if isinstance(run, Motion) else read_motion(run)
     case = motion.case
     beds: list[Bed] = []
     liquid, bulks, held = [], [], []
-    for frame, bridges in enumerate(read_bridges(motion)):
+    for bridges in read_bridges(motion):
         labels = components(len(motion.radius), bridges)
-        bulks.append(bulk_of(labels, bridges, heap=not case.beads.placed))
+        bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
         liquid.append(liquid_of_beads(motion.radius, case.liquid.volume_fraction, bridges))
-        beds.append(bed_of(motion, frame, bulks[-1], bridges, liquid[-1]))
+        beds.append(bed_of(motion, bridges.frame, bulks[-1], bridges, liquid[-1]))
         # While the pile falls and settles, most of it is free of the rest.
-        driven = motion.time[frame] >= 0.0
+        driven = motion.time[bridges.frame] >= 0.0
         held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
     return classified(PileAnalysis(motion, beds, np.stack(liquid), bulks, held, [], [], [], rule), rule)
 
@@ -110,41 +109,93 @@ def classified(found: PileAnalysis, definition: ClimbCriteria) -> PileAnalysis:
     return replace(found, tracks=tracks, climbs=climbs, events=events, definition=definition)
 
 
-def tabulate_pile(directory: str | Path, definition: ClimbCriteria | None = None) -> dict[str, Any]:
-    """Write the tables and ``result.json`` of a pile.
+class Pile(Analysis):
+    """What loose beads in a container do: the bed, and the clusters that climb."""
 
-    Parameters
-    ----------
-    directory, definition
-        As for `analyse`.
+    name = "pile"
+    version = 3
+    tables = ("bed", "clusters", "events", "profile")
+    derived: ClassVar[Described] = {
+        "beads": ("", "number of beads"),
+        "large": ("", "number of large beads"),
+        "duration": ("s", "shaken"),
+    }
+    columns: ClassVar[Described] = {
+        "climbs": ("", "clusters that climbed a wall"),
+        "onset": ("s", "when the first of them began"),
+        "speed": ("m/s", "mean of their speeds"),
+        "highest": ("m", "height that the highest of them reached"),
+        "led_by_large": ("", "how many of them were led by a large bead"),
+        "clusters": ("", "clusters that were free of the pile and held to a wall for a while"),
+        "surface_end": ("m", "height of the pile's surface at the end"),
+        "brazil_nut_end": ("", "Brazil-nut index at the end"),
+        "settling": ("s", "before the drive"),
+    }
 
-    Returns
-    -------
-    dict
-        The result, as in ``result.json``: SI units.
-    """
-    directory = Path(directory)
-    found = analyse(directory, definition)
-    write_table(directory, "bed", _bed_columns(found))
-    write_table(directory, "clusters", _cluster_columns(found))
-    write_table(directory, "events", _event_columns(found.events))
-    write_table(directory, "profile", _profile_columns(found))
-    outcome = _result(found)
-    write_json(directory / RESULT_NAME, outcome)
-    return outcome
+    def applies(self, case: Case) -> bool:
+        """Of loose beads in a container."""
+        return case.loose and case.boundary.closed
 
+    def of(self, motion: Motion) -> Measured:
+        """The bed, the clusters, what happened to them, and the packing."""
+        found = analyse(motion)
+        tables = {
+            "bed": _bed_columns(found),
+            "clusters": _cluster_columns(found),
+            "events": _event_columns(found.events),
+            "profile": _profile_columns(found),
+        }
+        return Measured(tables, _result(found))
 
-def current_pile_result(directory: str | Path) -> dict[str, Any]:
-    """The result of a pile; tabulated anew if it or a table is gone or damaged."""
-    directory = Path(directory)
-    try:
-        result = read_result(directory)
-        usual = result.get("definition") == vars(ClimbCriteria()) and result.get("method") == METHOD
-        if usual and result.keys() >= {"climbs", "surface"} and intact(directory, PILE_TABLES):
-            return result
-    except (OSError, ValueError):
-        pass
-    return tabulate_pile(directory)
+    def derived_of(self, case: Case) -> dict[str, float]:
+        """Numbers of beads and the length of the drive."""
+        return {
+            "beads": case.count,
+            "large": sum(radius > case.border for radius in case.all_radii),
+            "duration": case.run.cycles / case.drive.frequency,
+        }
+
+    def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
+        """Its climbs, and the bed at the end."""
+        climbs = result["climbs"]
+        speeds = [climb["speed"] for climb in climbs if climb["speed"] is not None]
+        return {
+            "climbs": len(climbs),
+            "onset": min((climb["begin"] for climb in climbs), default=nan),
+            "speed": sum(speeds) / len(speeds) if speeds else nan,
+            "highest": max((climb["height"] for climb in climbs), default=nan),
+            "led_by_large": sum(climb["leader_large"] for climb in climbs),
+            "clusters": result["clusters"],
+            "surface_end": result["surface"]["end"],
+            "brazil_nut_end": result["brazil_nut"]["end"],
+            "settling": result["settling"],
+        }
+
+    def lines(self, result: Mapping[str, Any]) -> list[str]:
+        """Did it climb, when, how fast, who led."""
+        return _lines(result)
+
+    def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
+        """Cluster and track of each bead, the liquid in its bridges (m³), and whether it climbs."""
+        found = analyse(motion)
+
+        def of_frame(bridges: Bridges) -> Columns:
+            count = len(motion.radius)
+            track, climber = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
+            for number, (one, climb) in enumerate(zip(found.tracks, found.climbs, strict=True)):
+                if members := list(one.members_at(bridges.frame)):
+                    track[members] = number
+                    climber[members] = int(climb.climbed)
+            component, liquid = components(count, bridges), found.liquid[bridges.frame].copy()
+            return {"component": component, "liquid": liquid, "track": track, "is_climber": climber}
+
+        return of_frame
+
+    def plot(self, directory: Path, destination: Path) -> list[Path]:
+        """Heights of the clusters, their events, segregation and agitation."""
+        from walkers.postprocess.figures import plot_pile
+
+        return plot_pile(directory, destination)
 
 
 def _bed_columns(found: PileAnalysis) -> Columns:
@@ -176,7 +227,7 @@ def _cluster_columns(found: PileAnalysis) -> Columns:
         "merged_into": column([-1 if track.merged_into is None else track.merged_into for track in tracks], np.int64),
     }
     columns["wall_names"] = np.array(
-        [names_of_walls(climb.walls, found.motion.case) for climb in climbs], dtype=np.str_
+        [names_of_walls(climb.walls, found.motion.case.boundary) for climb in climbs], dtype=np.str_
     )
     for name in ("begin", "end", "gain", "speed", "standard_error", "height"):
         columns[name] = column([getattr(climb, name) for climb in climbs], np.float64)
@@ -200,9 +251,7 @@ def _profile_columns(found: PileAnalysis) -> Columns:
     driven = motion.time >= min(motion.time[motion.first_driven :].mean(), motion.time[-1])
     layer = _LAYERS * 2.0 * float(motion.radius.max())
     names = ("height", "packing_fraction", "liquid_fraction")
-    profile = packing_profile(
-        motion.position[driven], motion.radius, found.liquid[driven], motion.case.container, layer
-    )
+    profile = packing_profile(motion.position[driven], motion.radius, found.liquid[driven], motion.case.boundary, layer)
     return dict(zip(names, profile, strict=True))
 
 
@@ -211,13 +260,8 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
     case = motion.case
     start = motion.first_driven
     return {
-        "case": case.name,
-        "kind": "pile",
-        "units": "SI: m, s, m/s",
         "beads": len(motion.radius),
         "large": int(motion.large.sum()),
-        "frequency": case.drive.frequency,
-        "peak_acceleration": case.drive.peak_acceleration,
         "driven": float(max(motion.time[-1], 0.0)),
         "settling": float(min(motion.time[-1], 0.0) - motion.time[0]),
         "surface": {"start": beds[start].surface, "end": beds[-1].surface},
@@ -235,22 +279,24 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
                 "height": climb.height,
                 "size": climb.size,
                 "large": climb.large,
-                "walls": names_of_walls(climb.walls, case).split(),
+                "walls": names_of_walls(climb.walls, case.boundary).split(),
             }
             for climb in found.climbs
             if climb.climbed
         ],
         "definition": vars(found.definition),
-        "method": METHOD,
     }
 
 
-def describe_pile(directory: Path, result: dict[str, Any], *, cached: bool = False) -> str:
-    """The result of a pile in a few lines: did it climb, when, how fast, who led; mm and mm/s."""
+def names_of_walls(walls: tuple[int, ...], boundary: Boundary) -> str:
+    """Names of some walls, such as ``-x +y`` for a corner of a box."""
+    return " ".join(boundary.walls[wall] for wall in sorted(walls))
+
+
+def _lines(result: Mapping[str, Any]) -> list[str]:
     surface, nuts = result["surface"], result["brazil_nut"]
     lines = [
-        f"{result['case']}: {result['beads']} beads ({result['large']} large), {result['frequency']:g} Hz, "
-        f"a0 = {result['peak_acceleration']:.4g} m/s²" + (" (already run)" if cached else ""),
+        f"{result['case']}: {result['beads']} beads ({result['large']} large), {result['drive']}",
         f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling",
         f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
         f"  segregation (z of large - z of small)/sum: {nuts['start']:.3f} at the start, {nuts['end']:.3f} at the end",
@@ -268,4 +314,4 @@ def describe_pile(directory: Path, result: dict[str, Any], *, cached: bool = Fal
             f"{climb['height'] * 1e3:.2f} mm {where} at {speed} mm/s, led by a {leader} bead, "
             f"{climb['size']} beads ({climb['large']} large)"
         )
-    return "\n".join([*lines, f"  run        {directory}"])
+    return lines

@@ -1,0 +1,305 @@
+"""The beads of a case: walkers that stand on the boundary, a mixture that is poured, beads placed one by one.
+
+Each knows how to place itself (`stand`) and which of its beads bridges join; nothing else asks what it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from math import asin, atan2, cos, hypot, inf, pi, sin, sqrt
+from typing import TYPE_CHECKING, Literal
+
+from walkers.inputs.arrangements import ARRANGEMENTS, Pairs, Places, touching
+from walkers.inputs.boundary import LOOSE, Boundary
+from walkers.inputs.loads import ContactLoads, contact_loads
+
+if TYPE_CHECKING:
+    from walkers.inputs.case import Case
+
+Facing = Literal["both", "right", "left"]
+_LEAST_LEVER = 0.1
+"""Of a cluster's extent: large and small beads whose centroids are nearer than that give no heading."""
+_TOUCHING = 0.02
+"""Radii by which beads that are given places may be apart and still touch."""
+
+
+@dataclass(frozen=True)
+class StandingBead:
+    """Centre (m) and radius (m) of a bead at the start."""
+
+    x: float
+    y: float
+    z: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Beads that start together.
+
+    Attributes
+    ----------
+    beads
+        Relative to the walker's place, which the deck chooses; of what is no walker, to the boundary.
+    facing, angle
+        +1 along the drive axis or −1, and the angle to that (rad); 0 and 0 of what is no walker.
+    walks
+        Whether it is a walker.
+    """
+
+    beads: tuple[StandingBead, ...]
+    facing: int = 0
+    angle: float = 0.0
+    walks: bool = False
+
+
+@dataclass(frozen=True)
+class Walkers:
+    """Walkers of one make: dimers, or clusters of more beads.
+
+    Attributes
+    ----------
+    radii
+        Of the beads of each, m.
+    arrangement
+        How they stand (`walkers.inputs.arrangements`), or ``given``: at ``places`` (m).
+    replicates
+        How many.
+    facing
+        Where they are to face: along the drive axis (right), against it (left), or every other one (both).
+    angle, angle_spread
+        From there at the start, and how far each may be off, rad.
+    gap, gap_spread
+        Of all contacts at the start (m, negative: touching; None: where forces balance), and its relative spread.
+    spacing
+        From one to the next, m.
+    meet
+        Whether they are meant to meet; else they are replicates that must not.
+    """
+
+    radii: tuple[float, ...]
+    replicates: int
+    facing: Facing
+    angle: float
+    angle_spread: float
+    gap: float | None
+    gap_spread: float
+    spacing: float
+    meet: bool = False
+    arrangement: str = "chain"
+    places: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def all_radii(self) -> list[float]:
+        """Radius of every bead, m."""
+        return [*self.radii] * self.replicates
+
+    @cached_property
+    def pairs(self) -> Pairs:
+        """The beads of a walker that touch at the start, numbered from 0."""
+        if self.places:
+            return touching(self.places, self.radii, _TOUCHING)
+        return ARRANGEMENTS[self.arrangement].pairs(len(self.radii))
+
+    @property
+    def bridged(self) -> list[tuple[float, list[float]]]:
+        """The radius of each bead of a walker and the radii of those that touch it, m."""
+        neighbours: list[list[float]] = [[] for _ in self.radii]
+        for one, other in self.pairs:
+            neighbours[one].append(self.radii[other])
+            neighbours[other].append(self.radii[one])
+        return list(zip(self.radii, neighbours, strict=True))
+
+    def _rigid(self, one: int, other: int) -> float:
+        """Distance seen from above of two beads that touch each other and the floor without overlap, m."""
+        first, second = self.radii[one], self.radii[other]
+        return (first + second) * cos(asin((first - second) / (first + second)))
+
+    @cached_property
+    def _design(self) -> Places:
+        return list(self.places) or ARRANGEMENTS[self.arrangement].places(self.radii, self._rigid)
+
+    @cached_property
+    def length(self) -> float:
+        """From the outermost point of one bead to that of another, seen from above, m."""
+        places, radii = self._design, self.radii
+        known = {} if self.places else {pair: self._rigid(*pair) for pair in self.pairs}
+        return max(
+            known.get((one, other), hypot(places[one][0] - places[other][0], places[one][1] - places[other][1]))
+            + (radii[one] + radii[other])
+            for one in range(len(radii))
+            for other in range(one + 1, len(radii))
+        )
+
+    @cached_property
+    def front(self) -> tuple[float, ...]:
+        """Weight of each bead's place in the vector to where a walker was to face; their sum is zero."""
+        along = [place[0] for place in self._design]
+        middle = sum(along) / len(along)
+        largest = max(abs(place - middle) for place in along)
+        if largest < 1e-9 * self.length:  # all side by side: it faces the way that is to the right of their row
+            return tuple(0.0 for _ in along)
+        return tuple((place - middle) / largest for place in along)
+
+    @cached_property
+    def toward_large(self) -> tuple[float, ...]:
+        """Weight of each bead's place in the heading, from the centroid of the small beads to that of the large ones.
+
+        Where all beads are alike, or the two centroids nearly coincide, the heading is where the walker was to face.
+        """
+        border = (min(self.radii) + max(self.radii)) / 2.0
+        large = [radius > border for radius in self.radii]
+        if not any(large):
+            return self.front
+        many = (sum(large), len(large) - sum(large))
+        weights = tuple(1.0 / many[0] if is_large else -1.0 / many[1] for is_large in large)
+        lever = [
+            sum(weight * place[axis] for weight, place in zip(weights, self._design, strict=True)) for axis in (0, 1)
+        ]
+        return weights if hypot(*lever) > _LEAST_LEVER * self.length else self.front
+
+    def stand(self, case: Case, first: int) -> list[Standing]:
+        """Each walker about the point over which its first two beads touch; ``first`` is the first one's number."""
+        return [self._stand(case, first + number) for number in range(self.replicates)]
+
+    def _stand(self, case: Case, number: int) -> Standing:
+        """A walker whose angle and contacts are drawn from a stream of its own, whoever shares the deck."""
+        facing = {"right": 1, "left": -1}.get(self.facing, 1 if number % 2 == 0 else -1)
+        turn, press = _draws(case.seed, number)
+        angle, factor = self.angle + self.angle_spread * turn, 1.0 + self.gap_spread * press
+        loads = contact_loads(case, self)
+        overlaps = [(overlap if self.gap is None else -self.gap) * factor for overlap in loads.overlaps]
+        axis = case.drive_axis
+        heading = atan2(axis[1], axis[0]) + angle + (0.0 if facing > 0 else pi)
+        sunk = [radius - overlap for radius, overlap in zip(self.radii, overlaps, strict=False)]
+        heights = [case.boundary.rest_height(radius) for radius in sunk]
+        beads = tuple(
+            StandingBead(
+                along * cos(heading) - aside * sin(heading), along * sin(heading) + aside * cos(heading), *rest
+            )
+            for (along, aside), *rest in zip(self._places(heights, overlaps), heights, self.radii, strict=True)
+        )
+        return Standing(beads, facing, angle, walks=True)
+
+    def _places(self, heights: Sequence[float], overlaps: Sequence[float]) -> Places:
+        """Where the beads of a walker stand, in its own frame, given their heights and the overlaps of contacts, m."""
+        if self.places:
+            return list(self.places)
+        known = {pair: overlaps[len(self.radii) + number] for number, pair in enumerate(self.pairs)}
+
+        def apart(one: int, other: int) -> float:
+            between = self.radii[one] + self.radii[other] - known[min(one, other), max(one, other)]
+            return sqrt(between**2 - (heights[one] - heights[other]) ** 2)
+
+        return ARRANGEMENTS[self.arrangement].places(self.radii, apart)
+
+    def loads(self, case: Case) -> ContactLoads:
+        """The loads of a walker's contacts at rest."""
+        return contact_loads(case, self)
+
+
+@lru_cache(maxsize=4096)
+def _draws(seed: int, number: int) -> tuple[float, float]:
+    from numpy.random import default_rng
+
+    turn, press = default_rng([seed, number]).uniform(-1.0, 1.0, size=2)
+    return float(turn), float(press)
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Beads of two size classes, mixed and poured.
+
+    Attributes
+    ----------
+    small, large
+        Radii of either class, m, each occurring equally often (the engine is given no distributions).
+    counts
+        Number of small and of large beads.
+    """
+
+    small: tuple[float, ...]
+    large: tuple[float, ...]
+    counts: tuple[int, int]
+
+    @property
+    def count(self) -> int:
+        """How many beads there are."""
+        return sum(self.counts)
+
+    @property
+    def radii(self) -> tuple[float, ...]:
+        """The different radii, m."""
+        return self.small + self.large
+
+    @property
+    def bridged(self) -> list[tuple[float, list[float]]]:
+        """A large bead beside a small one.
+
+        Beads of a pile have more neighbours, and its viscous limit is lower; ``auto``'s share of the limit allows for
+        it: a glycerol pile at 0.4 of it is agitated as at a quarter of that step, within 0.1 %, and at 0.8 it heats up.
+        """
+        large, small = max(self.large), min(self.small)
+        return [(large, [small]), (small, [large])]
+
+    @property
+    def all_radii(self) -> list[float]:
+        """Radius of every bead, m: the small ones first."""
+        classes = ((self.small, self.counts[0]), (self.large, self.counts[1]))
+        return [sizes[number % len(sizes)] for sizes, count in classes for number in range(count)]
+
+    def level(self, boundary: Boundary) -> float:
+        """Height of the layers from which the beads are poured, m; infinite where there is no place for one."""
+        places = len(boundary.layer(max(self.radii)).places)
+        return -(-self.count // places) * 2.0 * LOOSE * max(self.radii) if places else inf
+
+    def stand(self, case: Case, first: int) -> list[Standing]:
+        """On a loose lattice, the sizes shuffled and the places jittered by the case's seed, to fall and settle."""
+        del first
+        from numpy.random import default_rng
+
+        largest, draw = max(self.radii), default_rng(case.seed)
+        layer = case.boundary.layer(largest)
+        floor = case.tops_of_others(self)
+        beads = []
+        for number, radius in enumerate(float(one) for one in draw.permutation(self.all_radii)):
+            level, place = divmod(number, len(layer.places))
+            x, y = layer.places[place]
+            shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * layer.play(radius, largest)
+            height = (level + 0.5) * 2.0 * LOOSE * largest
+            beads.append(StandingBead(x + float(shift[0]), y + float(shift[1]), floor + height, radius))
+        return [Standing(tuple(beads))]
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Beads placed one by one: x, y, z (m, from the middle of the floor) and radius (m) of each."""
+
+    beads: tuple[tuple[float, float, float, float], ...]
+
+    @property
+    def all_radii(self) -> list[float]:
+        """Radius of every bead, m."""
+        return [bead[3] for bead in self.beads]
+
+    @property
+    def radii(self) -> tuple[float, ...]:
+        """The different radii, m."""
+        return tuple(sorted({bead[3] for bead in self.beads}))
+
+    @property
+    def bridged(self) -> list[tuple[float, list[float]]]:
+        """The largest bead beside the smallest."""
+        large, small = self.radii[-1], self.radii[0]
+        return [(large, [small]), (small, [large])]
+
+    def stand(self, case: Case, first: int) -> list[Standing]:
+        """As they are placed."""
+        del case, first
+        return [Standing(tuple(StandingBead(*bead) for bead in self.beads))]
+
+
+Body = Walkers | Mixture | Placed
+"""The bodies that there are."""

@@ -1,0 +1,348 @@
+"""What beads stand on and lie in: planes, channels, boxes, cylinders. To add one, write a class, name it in `Shape`.
+
+Every boundary has a floor, the plane z = 0 in its own frame, and may have side walls. It may lean: `tilt` is the angle
+of its floor to the horizontal, `uphill` the direction of the steepest way up within the floor.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, cos, hypot, inf, pi, sin, sqrt
+from typing import ClassVar, Literal
+
+from walkers.inputs.drive import Vector
+
+AxisName = Literal["x", "y", "z"]
+FLOOR = "floor"
+LOOSE = 1.03
+"""Pitch of the places from which beads are poured, in diameters of the largest bead."""
+SIDES = 24
+"""Of the prism that stands for a cylinder in the engine; its edges lie 0.9 % of the radius beyond its faces."""
+_LEAST = 1e-13
+_RIM = 2e-4
+"""m; the simulation box of a container reaches this far beyond its walls."""
+
+
+@dataclass(frozen=True)
+class Face:
+    """A flat wall: the axis that it is normal to, the side to which its normal points, its centroid (m).
+
+    ``turn`` (rad) turns an upright one about the vertical; ``wall`` is the wall that the face belongs to.
+    """
+
+    axis: AxisName
+    side: Literal[1, -1]
+    centroid: Vector
+    turn: float = 0.0
+    wall: str = FLOOR
+
+    @property
+    def normal(self) -> Vector:
+        """Unit vector into the space where the beads are."""
+        return self.turned(tuple(float(self.side) * (axis == self.axis) for axis in ("x", "y", "z")))  # type: ignore[arg-type]
+
+    def turned(self, vector: Vector) -> Vector:
+        """A vector of the face's own axes in those of the boundary."""
+        if self.turn == 0.0:
+            return vector
+        x, y, z = vector
+        return (x * cos(self.turn) - y * sin(self.turn), x * sin(self.turn) + y * cos(self.turn), z)
+
+
+@dataclass(frozen=True)
+class Span:
+    """What the beads need of room, m: half the extent of their ways, their height, a margin, the largest radius."""
+
+    half_x: float
+    half_y: float
+    height: float
+    margin: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Room:
+    """Corners of the simulation box and places of the wall-velocity carriers, m."""
+
+    lower: Vector
+    upper: Vector
+    carriers: tuple[Vector, ...]
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A layer of places from which beads are poured: the places (m), their pitch (m), and how far beads may stray."""
+
+    places: Sequence[tuple[float, float]]
+    pitch: float
+    tight: bool = False
+
+    def play(self, radius: float, largest: float) -> float:
+        """How far a bead of a radius may be moved from its place, m."""
+        return (LOOSE * largest - radius) / 2.0 if self.tight else self.pitch / 2.0 - radius
+
+
+@dataclass(frozen=True, kw_only=True)
+class Boundary:
+    """A boundary of a material, leaning or not.
+
+    Attributes
+    ----------
+    material
+        Name.
+    tilt
+        Angle of the floor to the horizontal, rad: 0 level, π/2 a wall.
+    uphill
+        Direction of the steepest way up within the floor, rad from its x axis toward y.
+    """
+
+    material: str
+    tilt: float = 0.0
+    uphill: float = 0.0
+
+    drive_axis: ClassVar[Literal["x", "z"]] = "x"
+    """Along which it is shaken if a case does not say."""
+    closed: ClassVar[bool] = False
+    """Whether beads can be poured into it."""
+
+    def gravity(self, gravity: float) -> Vector:
+        """The acceleration of gravity in the boundary's frame, m/s², of a magnitude (m/s²)."""
+        down, press = gravity * _round(sin(self.tilt)), gravity * _round(cos(self.tilt))
+        return (-down * _round(cos(self.uphill)), -down * _round(sin(self.uphill)), -press)
+
+    @abstractmethod
+    def faces(self) -> tuple[Face, ...]:
+        """The floor first, then the side walls."""
+
+    @property
+    def walls(self) -> tuple[str, ...]:
+        """Names of the walls: the floor first, then the sides."""
+        return tuple(dict.fromkeys(face.wall for face in self.faces()))
+
+    @abstractmethod
+    def room(self, span: Span, ranks: int) -> Room:
+        """The simulation box for beads that need so much, on so many MPI processes."""
+
+    @abstractmethod
+    def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
+        """Places for walkers that stand ``spacing`` (m) apart."""
+
+    def rest_height(self, radius: float) -> float:
+        """Height above the origin at which a bead of a radius (m) rests, m."""
+        return radius
+
+    def side_clearance(self, x: float, y: float) -> float:
+        """Distance of a place from the nearest side wall, m."""
+        del x, y
+        return inf
+
+    @property
+    def inner_width(self) -> float:
+        """Between the side walls, m."""
+        return 2.0 * self.side_clearance(0.0, 0.0)
+
+    @property
+    def top(self) -> float:
+        """Height up to which beads may be placed, m."""
+        return inf
+
+    def layer(self, largest: float) -> Layer:
+        """Places from which beads up to a radius (m) are poured."""
+        raise ValueError(f"nothing can be poured into {type(self).__name__}, {largest}")
+
+    @property
+    def cross_section(self) -> float:
+        """Inner area, m²."""
+        return inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plane(Boundary):
+    """A plane without end."""
+
+    shape: Literal["plane"] = "plane"
+
+    def faces(self) -> tuple[Face, ...]:
+        """The plane."""
+        return (Face("z", 1, (0.0, 0.0, 0.0)),)
+
+    def room(self, span: Span, ranks: int) -> Room:
+        """A box about the ways of all walkers; the carrier is in its corner, beyond their reach and above it."""
+        del ranks
+        half_x, half_y, margin, height = span.half_x, span.half_y, span.margin, span.height
+        return Room(
+            lower=(-half_x - 2.0 * margin, -half_y - 2.0 * margin, -margin),
+            upper=(half_x + 2.0 * margin, half_y + 2.0 * margin, height + 2.0 * margin),
+            carriers=((half_x + margin, half_y + margin, height + margin),),
+        )
+
+    def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
+        """A square grid about the origin."""
+        columns = ceil(sqrt(number))
+        rows = ceil(number / columns)
+        cells = (divmod(place, columns) for place in range(number))
+        return [((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing) for row, column in cells]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel(Boundary):
+    """A floor between two upright walls, without end along x.
+
+    Attributes
+    ----------
+    width
+        Between the walls, m.
+    """
+
+    width: float
+    shape: Literal["channel"] = "channel"
+
+    def faces(self) -> tuple[Face, ...]:
+        """The floor and two walls."""
+        half, level = self.width / 2.0, self.width / 4.0
+        return (
+            Face("z", 1, (0.0, 0.0, 0.0)),
+            Face("y", 1, (0.0, -half, level), wall="-y"),
+            Face("y", -1, (0.0, half, level), wall="+y"),
+        )
+
+    def room(self, span: Span, ranks: int) -> Room:
+        """A box about the walkers' ways, the carriers below the floor."""
+        half_x, half_y = span.half_x + 2.0 * span.margin, self.width / 2.0 + span.margin
+        return _room_above(
+            self, (half_x, half_y), max(span.height + 2.0 * span.margin, self.width), span.largest, ranks
+        )
+
+    def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
+        """A row along the channel."""
+        return [((place - (number - 1) / 2.0) * spacing, 0.0) for place in range(number)]
+
+    def side_clearance(self, x: float, y: float) -> float:
+        """Distance from the nearer wall, m."""
+        del x
+        return self.width / 2.0 - abs(y)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Container(Boundary):
+    """An upright container, open above, its floor about the origin.
+
+    Attributes
+    ----------
+    width
+        Inner side or diameter, m.
+    height
+        m; the walls of the simulation go on above it, to twice that height, where beads are lost.
+    """
+
+    width: float
+    height: float
+
+    drive_axis: ClassVar[Literal["x", "z"]] = "z"
+    closed: ClassVar[bool] = True
+
+    @property
+    def top(self) -> float:
+        """The height, m."""
+        return self.height
+
+    def room(self, span: Span, ranks: int) -> Room:
+        """The container and a little more; climbers may rise above the rim."""
+        edge = self.width / 2.0 + _RIM
+        return _room_above(self, (edge, edge), 2.0 * self.height, span.largest, ranks)
+
+    def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
+        """A square grid about the middle."""
+        return Plane(material=self.material).grid(number, spacing)
+
+    def layer(self, largest: float) -> Layer:
+        """A square lattice as wide as the container."""
+        across = int(self.width / (2.0 * LOOSE * largest))
+        pitch = self.width / max(across, 1)
+        line = [(index + 0.5) * pitch - self.width / 2.0 for index in range(across)]
+        return Layer([(x, y) for x in line for y in line], pitch)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box(Container):
+    """A container with a square cross-section."""
+
+    shape: Literal["box"] = "box"
+
+    def faces(self) -> tuple[Face, ...]:
+        """The floor and four walls; centroids off the middle, where MPI ranks may meet."""
+        half, aside, level = self.width / 2.0, 0.0137 * self.width, self.height / 4.0
+        return (
+            Face("z", 1, (aside, 0.0, 0.0)),
+            Face("x", 1, (-half, 0.0, level), wall="-x"),
+            Face("x", -1, (half, 0.0, level), wall="+x"),
+            Face("y", 1, (aside, -half, level), wall="-y"),
+            Face("y", -1, (aside, half, level), wall="+y"),
+        )
+
+    def side_clearance(self, x: float, y: float) -> float:
+        """Distance from the nearest wall, m."""
+        return self.width / 2.0 - max(abs(x), abs(y))
+
+    @property
+    def cross_section(self) -> float:
+        """Inner area, m²."""
+        return self.width**2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder(Container):
+    """A round container; in the engine a prism whose faces touch it: beads never meet an edge from outside."""
+
+    shape: Literal["cylinder"] = "cylinder"
+
+    def faces(self) -> tuple[Face, ...]:
+        """The floor and the prism's faces, which are one wall."""
+        half, level = self.width / 2.0, self.height / 4.0
+        sides = [((half * cos(turn), half * sin(turn), level), turn) for turn in _turns()]
+        floor = Face("z", 1, (0.0137 * self.width, 0.0, 0.0))
+        return (floor, *(Face("x", -1, place, turn, "side") for place, turn in sides))
+
+    def side_clearance(self, x: float, y: float) -> float:
+        """Distance from the nearest of the prism's faces, m."""
+        return self.width / 2.0 - max(x * cos(turn) + y * sin(turn) for turn in _turns())
+
+    def layer(self, largest: float) -> Layer:
+        """The places of a box that lie within; the wall cuts the outer ones, whose beads stray less."""
+        square = super().layer(largest)
+        within = self.width / 2.0 - LOOSE * largest
+        return Layer([(x, y) for x, y in square.places if hypot(x, y) <= within], square.pitch, tight=True)
+
+    @property
+    def cross_section(self) -> float:
+        """Inner area, m²."""
+        return self.width**2 * (pi / 4.0)
+
+
+Shape = Plane | Channel | Box | Cylinder
+"""The boundaries that there are."""
+
+
+def _turns() -> list[float]:
+    """Directions in which the faces of a cylinder's prism lie, rad about the axis."""
+    return [2.0 * pi * (number + 0.5) / SIDES for number in range(SIDES)]
+
+
+def _room_above(boundary: Boundary, half: tuple[float, float], top: float, largest: float, ranks: int) -> Room:
+    """A box from far below the floor, where the carriers are: for each MPI rank one a face, in its own part."""
+    faces, below = len(boundary.faces()), 4.0 * largest
+    lower = (-half[0], -half[1], -(faces + 2) * below)
+    width = 2.0 * half[0] / ranks
+    carriers = tuple(
+        (lower[0] + (rank + 0.5) * width, 0.0, -(number + 1.5) * below)
+        for rank in range(ranks)
+        for number in range(faces)
+    )
+    return Room(lower, (half[0], half[1], top), carriers)
+
+
+def _round(value: float) -> float:
+    """Zero for what is zero but for rounding: a wall's weight does not press at all."""
+    return 0.0 if abs(value) < _LEAST else value

@@ -1,0 +1,233 @@
+"""What is measured of a run, and by what: a list of analyses, each of which says for which cases it means something.
+
+To add one, write a class like `walkers.postprocess.walking.Walking` and name it in `analyses`. What runs have of
+tables, results, text and figures, and sweeps of columns, follows.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy.typing as npt
+
+from walkers.inputs.case import Case
+from walkers.postprocess.motion import Bridges, Motion, read_motion
+from walkers.postprocess.tables import intact, write_table
+from walkers.runner.directory import CASE_NAME
+from walkers.runner.files import read_json, write_json
+
+RESULT_NAME = "result.json"
+Columns = dict[str, npt.NDArray[Any]]
+Described = Mapping[str, tuple[str, str]]
+"""From the names of columns to their units and meanings."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What an analysis found: tables by name, and its part of the result (SI units)."""
+
+    tables: Mapping[str, Columns]
+    summary: Mapping[str, Any]
+
+
+class Analysis(ABC):
+    """Something that is measured of runs.
+
+    Attributes
+    ----------
+    name
+        Of the analysis.
+    version
+        Of its method: results of another one are made anew.
+    tables
+        Names of the tables that it writes.
+    derived, columns
+        Columns of a sweep's table: what follows from a point's case, and what its run gives.
+    """
+
+    name: ClassVar[str]
+    version: ClassVar[int]
+    tables: ClassVar[tuple[str, ...]]
+    derived: ClassVar[Described] = {}
+    columns: ClassVar[Described] = {}
+
+    def can_show(self, result: Mapping[str, Any]) -> bool:
+        """Whether a result has all that it gives."""
+        try:
+            self.row(result)
+            self.lines(result)
+        except (KeyError, TypeError, ValueError):
+            return False
+        return True
+
+    @abstractmethod
+    def applies(self, case: Case) -> bool:
+        """Whether it means something for a case."""
+
+    @abstractmethod
+    def of(self, motion: Motion) -> Measured:
+        """Measure a motion.
+
+        Raises
+        ------
+        postprocess.dump.DumpError
+            If a dump of bridges cannot be read, or is too short.
+        """
+
+    def derived_of(self, case: Case) -> dict[str, float]:
+        """The columns `derived` of a case."""
+        del case
+        return {}
+
+    def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
+        """The columns `columns` of a result."""
+        del result
+        return {}
+
+    @abstractmethod
+    def lines(self, result: Mapping[str, Any]) -> list[str]:
+        """What it found, as text: mm, mm/s, degrees."""
+
+    def warnings(self, result: Mapping[str, Any]) -> list[str]:
+        """What a reader of the result should know."""
+        del result
+        return []
+
+    def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
+        """What gives, for a frame, further arrays of its beads for ParaView."""
+        del motion
+        return lambda _: {}
+
+    def plot(self, directory: Path, destination: Path) -> list[Path]:
+        """Draw its figures of a run into a folder."""
+        del directory, destination
+        return []
+
+
+@cache
+def analyses() -> tuple[Analysis, ...]:
+    """All analyses."""
+    from walkers.postprocess.meetings import Meetings
+    from walkers.postprocess.piles import Pile
+    from walkers.postprocess.walking import Walking
+
+    return (Walking(), Meetings(), Pile())
+
+
+def analyses_of(case: Case) -> list[Analysis]:
+    """Those that mean something for a case."""
+    return [one for one in analyses() if one.applies(case)]
+
+
+def analyses_in(result: Mapping[str, Any]) -> list[Analysis]:
+    """Those that a result is of."""
+    return [one for one in analyses() if one.name in result["analyses"]]
+
+
+def tabulate(directory: str | Path) -> dict[str, Any]:
+    """Write the tables and ``result.json`` of a run directory.
+
+    Parameters
+    ----------
+    directory
+        A run directory with its segments, finished or not.
+
+    Returns
+    -------
+    dict
+        The result, as in ``result.json``: SI units.
+
+    Raises
+    ------
+    postprocess.dump.DumpError
+        If a dump cannot be read.
+    """
+    directory = Path(directory)
+    motion = read_motion(directory)
+    case = motion.case
+    result: dict[str, Any] = {
+        "case": case.name,
+        "units": "SI: m, s, m/s, rad",
+        "analyses": {one.name: one.version for one in analyses_of(case)},
+        "frequency": case.drive.frequency,
+        "peak_acceleration": case.drive.peak_acceleration,
+        "drive": case.drive.described(),
+        "goes_uphill": case.goes_uphill,
+        "truncated": motion.truncated,
+    }
+    for one in analyses_of(case):
+        measured = one.of(motion)
+        for name, columns in measured.tables.items():
+            write_table(directory, name, columns)
+        result |= measured.summary
+    write_json(directory / RESULT_NAME, result)
+    return result
+
+
+def read_result(directory: str | Path) -> dict[str, Any]:
+    """The result of a run, as `tabulate` wrote it."""
+    return read_json(Path(directory) / RESULT_NAME)
+
+
+def current_result(directory: str | Path) -> dict[str, Any]:
+    """The result of a finished run; tabulated anew if it or a table is gone or damaged, or of an earlier method."""
+    directory = Path(directory)
+    try:
+        result = read_result(directory)
+        wanted = analyses_of(Case.from_dict(read_json(directory / CASE_NAME)))
+        tables = [name for one in wanted for name in one.tables]
+        known = result.get("analyses") == {one.name: one.version for one in wanted} and intact(directory, tables)
+        if known and all(one.can_show(result) for one in wanted):
+            return result
+    except (OSError, ValueError):
+        pass
+    return tabulate(directory)
+
+
+def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool = False) -> str:
+    """The result of a run in a few lines: mm, mm/s, degrees.
+
+    Parameters
+    ----------
+    directory
+        The run directory.
+    result
+        As `tabulate` returns it.
+    cached
+        Whether the run was there before.
+    """
+    found = analyses_in(result)
+    lines = [line for one in found for line in one.lines(result)] or [f"{result['case']}: {result['drive']}"]
+    warnings = [warning for one in found for warning in one.warnings(result)]
+    if result["truncated"]:
+        warnings.append("the dump ends within a frame")
+    if cached:
+        lines[0] += " (already run)"
+    return "\n".join([*lines, *(f"  warning: {warning}" for warning in warnings), f"  run        {directory}"])
+
+
+def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
+    """Draw the figures of a run.
+
+    Parameters
+    ----------
+    directory
+        A run directory.
+    destination
+        Folder for the pictures; the run directory itself if None.
+
+    Returns
+    -------
+    list of Path
+        Of walkers ``walk.png`` and, if the run was sampled at least eight times a cycle, ``gait.png``; of piles
+        ``climb.png``.
+    """
+    destination = destination or directory
+    destination.mkdir(parents=True, exist_ok=True)
+    case = Case.from_dict(read_json(directory / CASE_NAME))
+    return [path for one in analyses_of(case) for path in one.plot(directory, destination)]

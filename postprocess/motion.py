@@ -1,0 +1,399 @@
+"""The motion of a run's beads and their bridges, over all of its segments, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from walkers.inputs.bodies import Walkers
+from walkers.inputs.case import Case
+from walkers.inputs.drive import Drive
+from walkers.postprocess.dump import BinaryDump, DumpError, FloatArray
+from walkers.postprocess.local_dump import local_frames
+from walkers.runner.directory import CASE_NAME, SEGMENT_NAME, segment_directories
+from walkers.runner.files import read_json
+from walkers.templates.deck import LAYOUT_NAME
+from walkers.templates.layout import Layout, PlacedWalker
+
+IntArray = npt.NDArray[np.int64]
+FLOOR = 0
+"""Number of the floor among the walls; the others are the side walls."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Places and velocities relative to the boundary; F frames of N beads, SI units.
+
+    Attributes
+    ----------
+    case
+        Of the run.
+    time : ndarray, shape (F,)
+        s, from the begin of the drive; negative while the beads come to rest.
+    position, velocity : ndarray, shape (F, N, 3)
+        Of the centres.
+    spin : ndarray, shape (F, N, 3)
+        Angular velocity, rad/s.
+    substrate, substrate_velocity : ndarray, shape (F, 3)
+        Displacement and velocity of the boundary in the frame of the run, m and m/s.
+    radius : ndarray, shape (N,)
+    walkers
+        Which beads are whose.
+    first_id
+        The engine's id of the first bead.
+    frames : list of (Path, int)
+        Segment and number of each frame within it, for the bridges.
+    truncated : bool
+        Whether the dump ends within a frame.
+    """
+
+    case: Case
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    spin: FloatArray
+    substrate: FloatArray
+    substrate_velocity: FloatArray
+    radius: FloatArray
+    walkers: tuple[PlacedWalker, ...]
+    first_id: int
+    frames: list[tuple[Path, int]]
+    truncated: bool
+
+    @property
+    def first_driven(self) -> int:
+        """Number of the first frame of the drive; of the last one where it has not begun."""
+        return min(int(np.searchsorted(self.time, 0.0)), len(self.time) - 1)
+
+    @property
+    def driven(self) -> Motion:
+        """The motion without the rest before the drive."""
+        first = self.first_driven
+        if not first:
+            return self
+        names = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames")
+        return replace(self, **{name: getattr(self, name)[first:] for name in names})
+
+    @property
+    def large(self) -> npt.NDArray[np.bool_]:
+        """Whether a bead is of the large class, shape (N,)."""
+        large: npt.NDArray[np.bool_] = self.radius > self.case.border
+        return large
+
+    @cached_property
+    def walker_of(self) -> IntArray:
+        """Number of the walker that each bead belongs to, −1 for none, shape (N,)."""
+        owner = np.full(len(self.radius), -1, dtype=np.int64)
+        for walker in self.walkers:
+            owner[np.array(walker.beads) - self.first_id] = walker.walker
+        return owner
+
+    @cached_property
+    def groups(self) -> list[Group]:
+        """The walkers, make by make, while they are driven."""
+        driven = self.driven
+        return [
+            Group(driven, make, [walker for walker in self.walkers if walker.make == number])
+            for number, make in enumerate(self.case.walkers)
+        ]
+
+
+@dataclass(frozen=True)
+class Group:
+    """The walkers of one make in a motion: W walkers of n beads each.
+
+    Attributes
+    ----------
+    motion
+        Of all beads.
+    make
+        Of these.
+    walkers
+        How each was started.
+    """
+
+    motion: Motion
+    make: Walkers
+    walkers: list[PlacedWalker]
+
+    @property
+    def case(self) -> Case:
+        """Of the run."""
+        return self.motion.case
+
+    @property
+    def time(self) -> FloatArray:
+        """Of the frames, s, shape (F,)."""
+        return self.motion.time
+
+    @property
+    def radii(self) -> FloatArray:
+        """Radii of the beads of each walker, m, shape (n,)."""
+        return np.array(self.make.radii)
+
+    @cached_property
+    def rows(self) -> IntArray:
+        """Numbers of the beads in the motion, shape (W, n)."""
+        return np.array([walker.beads for walker in self.walkers], dtype=np.int64) - self.motion.first_id
+
+    @cached_property
+    def position(self) -> FloatArray:
+        """Of the bead centres, m, shape (F, W, n, 3)."""
+        return self.motion.position[:, self.rows]
+
+    @cached_property
+    def velocity(self) -> FloatArray:
+        """Of the bead centres, m/s, shape (F, W, n, 3)."""
+        return self.motion.velocity[:, self.rows]
+
+    @cached_property
+    def spin(self) -> FloatArray:
+        """Angular velocity, rad/s, shape (F, W, n, 3)."""
+        return self.motion.spin[:, self.rows]
+
+    @cached_property
+    def mass_centre(self) -> FloatArray:
+        """Centres of mass, m, shape (F, W, 3)."""
+        weights = self.radii**3
+        centre: FloatArray = np.einsum("fwbx,b->fwx", self.position, weights / weights.sum())
+        return centre
+
+    @property
+    def drive_axis(self) -> FloatArray:
+        """Direction from which orientations are measured, in the plane of the floor: the drive's, or x."""
+        return np.array(self.case.drive_axis)
+
+    @property
+    def across_axis(self) -> FloatArray:
+        """Direction in the plane of the floor, a quarter turn to the left of `drive_axis`."""
+        across: FloatArray = np.cross([0.0, 0.0, 1.0], self.drive_axis)
+        return across
+
+    @cached_property
+    def heading(self) -> FloatArray:
+        """Unit vectors in the plane of the floor in which walkers head, shape (F, W, 3).
+
+        From the centroid of the small beads to that of the large ones; where there are none, from the hindmost beads to
+        the foremost (`walkers.inputs.bodies.Walkers.toward_large`).
+        """
+        arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.make.toward_large))
+        arm[..., 2] = 0.0
+        heading: FloatArray = arm / np.linalg.norm(arm, axis=-1, keepdims=True)
+        return heading
+
+    @cached_property
+    def orientation(self) -> FloatArray:
+        """ψ, rad, shape (F, W): angle of the foremost beads from the way that the walker was to face, unwrapped."""
+        arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.make.front))
+        facing = np.array([walker.facing for walker in self.walkers])
+        angle = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis))
+        unwrapped: FloatArray = np.unwrap(angle, axis=0)
+        return unwrapped
+
+
+def read_motion(directory: str | Path) -> Motion:
+    """Read the beads of a run, finished or not.
+
+    Parameters
+    ----------
+    directory
+        A run directory with its segments.
+
+    Raises
+    ------
+    postprocess.dump.DumpError
+        If there is no segment, or one cannot be read.
+    FileNotFoundError
+        If it is no such directory.
+
+    Examples
+    --------
+    >>> motion = read_motion(walkers.run("fig1b", tmp).directory)
+    >>> motion.position.shape  # 60 cycles of 20 samples, six walkers of two beads
+    (1201, 12, 3)
+    >>> motion.groups[0].heading.shape
+    (1201, 6, 3)
+    """
+    directory = Path(directory)
+    case = Case.from_dict(read_json(directory / CASE_NAME))
+    segments = segment_directories(directory)
+    if not segments:
+        raise DumpError(f"{directory}: no segment of the run is finished yet")
+    return motion_of(case, segments, [_segment(segment) for segment in segments])
+
+
+def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -> Motion:
+    """The motion in the dumps of segments, each with its record (``begin``, ``end``, ``drive_from``).
+
+    Raises
+    ------
+    postprocess.dump.DumpError
+        If one cannot be read, or one is missing.
+    """
+    start = next((one["drive_from"] for one in records if one["drive_from"] is not None), None)
+    steps: list[int] = []
+    parts: list[FloatArray] = []
+    frames: list[tuple[Path, int]] = []
+    truncated = False
+    for segment, record in zip(segments, records, strict=True):
+        if record["begin"] != (steps[-1] if steps else 0):
+            raise DumpError(f"{segment}: the segment before it is missing")
+        layout, dump = _dump_of(segment)
+        data = dump.stack()
+        whole = len(data) and not dump.truncated and dump.steps[-1] == record["end"]
+        if not whole and not case.run.in_one:
+            raise DumpError(f"{segment}: its dump is incomplete")
+        if len(data) < 2:
+            raise DumpError(f"{dump.path}: {len(data)} complete frames, too few for a motion")
+        if data.shape[1] != layout.atoms:
+            raise DumpError(f"{segment}: {data.shape[1]} rows, expected {layout.atoms}: carriers and beads")
+        truncated = truncated or dump.truncated
+        begin = 1 if steps else 0  # the first frame is the last one of the segment before
+        parts.append(data[begin:])
+        steps += [int(step) for step in dump.steps[begin:]]
+        frames += [(segment, number) for number in range(begin, len(data))]
+    data = np.concatenate(parts) if len(parts) > 1 else parts[0]
+    # Before the drive has begun it is as if it would with the next frame.
+    zero = start if start is not None else steps[-1] + case.run.steps_per_sample
+    time = (np.array(steps, dtype=np.float64) - zero) * case.run.time_step
+
+    def vectors(name: str) -> FloatArray:
+        column = dump.column(name)
+        return data[:, :, column : column + 3]
+
+    position, velocity, first = vectors("x"), vectors("vx"), layout.carriers
+    # In the laboratory frame the carriers move with the walls, in the container's they rest.
+    shift, speed = (position[:, 0] - position[:1, 0], velocity[:, 0]) if first else prescribed_motion(case.drive, time)
+    return Motion(
+        case=case,
+        time=time,
+        position=position[:, first:] - shift[:, None],
+        velocity=velocity[:, first:] - speed[:, None],
+        spin=vectors("omegax")[:, first:],
+        substrate=shift,
+        substrate_velocity=speed,
+        radius=data[0, first:, dump.column("radius")],
+        walkers=layout.walkers,
+        first_id=first + 1,
+        frames=frames,
+        truncated=truncated,
+    )
+
+
+def _segment(directory: Path) -> dict[str, Any]:
+    try:
+        record = read_json(directory / SEGMENT_NAME)
+        return {name: record[name] for name in ("begin", "end", "drive_from")}
+    except (OSError, ValueError, KeyError) as error:
+        raise DumpError(f"{directory / SEGMENT_NAME}: cannot be read ({error})") from error
+
+
+def _dump_of(segment: Path) -> tuple[Layout, BinaryDump]:
+    try:
+        layout = Layout.from_dict(read_json(segment / LAYOUT_NAME))
+        return layout, BinaryDump(segment / layout.bead_dump, layout.bead_columns)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DumpError(f"{segment}: cannot be read ({error})") from error
+
+
+def prescribed_motion(drive: Drive, time: npt.NDArray[np.floating[Any]]) -> tuple[FloatArray, FloatArray]:
+    """Displacement and velocity of the walls in the frame of the run, m and m/s, each of shape (F, 3)."""
+    displacement, velocity = np.zeros((len(time), 3)), np.zeros((len(time), 3))
+    for one in drive.harmonics if drive.frame == "lab" else ():
+        phase = one.angular_frequency * time + one.phase
+        displacement += np.outer(one.amplitude * np.sin(phase), one.direction)
+        velocity += np.outer(one.peak_velocity * np.cos(phase), one.direction)
+    return displacement, velocity
+
+
+@dataclass(frozen=True)
+class Bridges:
+    """The bridges of one frame: K between beads, M to walls.
+
+    Only the normal part of what the engine reports is kept: the tangential part is wrong for sliding contacts (see
+    `walkers.templates.engine`).
+
+    Attributes
+    ----------
+    frame : int
+        Number of the frame in the motion.
+    beads : ndarray of int, shape (K, 2)
+        Numbers of the two beads, from 0.
+    force, gap : ndarray, shape (K,)
+        Net normal force (capillary, viscous and elastic), positive where it pulls the two together, N; and the gap, m,
+        negative where they touch.
+    wall_beads, walls : ndarray of int, shape (M,)
+        Bead and wall, 0 being the floor; a cylinder's side is one wall.
+    wall_force, wall_gap : ndarray, shape (M,)
+        The same of bridges to walls; of a wall that stands twice in the deck the sum.
+    """
+
+    frame: int
+    beads: IntArray
+    force: FloatArray
+    gap: FloatArray
+    wall_beads: IntArray
+    walls: IntArray
+    wall_force: FloatArray
+    wall_gap: FloatArray
+
+
+def read_bridges(motion: Motion) -> Iterator[Bridges]:
+    """The bridges of each frame of a motion in which they were recorded, in their order.
+
+    Raises
+    ------
+    DumpError
+        If a dump cannot be read, or ends early.
+    """
+    stride = motion.case.run.samples_per_bridge_sample
+    wanted = {place: frame for frame, place in enumerate(motion.frames)}
+    for segment in dict.fromkeys(segment for segment, _ in motion.frames):
+        layout = Layout.from_dict(read_json(segment / LAYOUT_NAME))
+        pairs = local_frames(segment / layout.pair_bridge_dump, layout.pair_bridge_columns)
+        walls = local_frames(segment / layout.wall_bridge_dump, layout.wall_bridge_columns)
+        number = -1
+        for number, ((_, between), (_, against)) in enumerate(zip(pairs, walls, strict=False)):
+            frame = wanted.get((segment, stride * number))
+            if frame is not None:
+                yield _bridges(motion, frame, between, against, layout)
+        if number + 1 != layout.bridge_frames:
+            raise DumpError(f"{segment}: its bridges hold {number + 1} of {layout.bridge_frames} frames")
+
+
+def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: Layout) -> Bridges:
+    place = motion.position[frame]
+    pair, wall = layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
+    # Neighbours without a bridge are reported too, with no force.
+    between = between[np.any(between[:, pair("fx") : pair("fx") + 3] != 0.0, axis=1)]
+    against = against[np.any(against[:, wall("fx") : wall("fx") + 3] != 0.0, axis=1)]
+    ids = between[:, [pair("id1"), pair("id2")]].astype(np.int64) - motion.first_id
+    arm = place[ids[:, 1]] - place[ids[:, 0]]
+    force = between[:, pair("fx") : pair("fx") + 3]
+    faces = motion.case.boundary.faces()
+    names = motion.case.boundary.walls
+    beads = against[:, wall("id")].astype(np.int64) - motion.first_id
+    face = against[:, wall("triangle")].astype(np.int64)
+    normal = np.array([one.normal for one in faces])[face]
+    pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normal)
+    keys = np.stack([beads, np.array([names.index(one.wall) for one in faces])[face]], axis=1)
+    held, which = np.unique(keys, axis=0, return_inverse=True)
+    which, held = which.reshape(-1), held.reshape(-1, 2)
+    gap = np.full(len(held), np.inf)
+    np.minimum.at(gap, which, -against[:, wall("overlap")])
+    return Bridges(
+        frame=frame,
+        beads=ids,
+        force=np.einsum("kx,kx->k", force, arm) / np.linalg.norm(arm, axis=1),
+        gap=-between[:, pair("overlap")],
+        wall_beads=held[:, 0],
+        walls=held[:, 1],
+        wall_force=np.bincount(which, weights=pull, minlength=len(held)).astype(np.float64),
+        wall_gap=gap,
+    )

@@ -1,0 +1,491 @@
+"""Pictures rendered off-screen with pyvista, no X server needed: a walker at several times, a whole run, films.
+
+Containers are seen from the side, as in Fig. 1a of Khan et al., planes from above.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Collection, Generator, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from walkers.inputs.case import Case
+from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.units import DURATION, parse_quantity
+from walkers.postprocess.drawing import check_picture, new_figure, save_figure, styled
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.motion import Group, Motion, read_motion
+from walkers.postprocess.piles import Pile, analyse
+from walkers.runner.directory import CASE_NAME
+from walkers.runner.files import beside, read_json
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+PICTURE_NAME = "walker.png"
+SERIES_NAME = "series.png"
+FILM_NAME = "film.mp4"
+_RUBY = ("#b0203c", "#e0566c")
+_GLASS = ("#8c9aa5", "#c9d2d8")
+"""Large and small beads, of those that are pointed out and of the others."""
+_FLOOR = "#c9d2d8"
+_MOST_PIXELS = 4000
+_MANY = 500
+"""Beads from which on spheres are drawn coarser."""
+_SHOWN = 6
+"""Pictures in a time series."""
+_TOLERANCE = 0.1
+"""Of a time between pictures: frames are where they are."""
+_MARGIN = 64
+"""Pixels for the scale beside a film."""
+_LEAST_WIDTH = 200
+"""Pixels; on less the time has no room."""
+
+
+def render_run(directory: Path, destination: Path | None = None, *, images: int = _SHOWN) -> list[Path]:
+    """Render a run: of independent walkers one at several times, of all else views beside each other.
+
+    Parameters and errors are those of `render_walker` and `render_series`.
+    """
+    if Case.from_dict(read_json(directory / CASE_NAME)).independent:
+        return [render_walker(directory, destination, images=images)]
+    return render_series(directory, destination, images=images)
+
+
+def render_walker(
+    directory: Path,
+    destination: Path | None = None,
+    *,
+    walker: int = 0,
+    images: int = 4,
+    size: tuple[int, int] = (1280, 800),
+) -> Path:
+    """Render one walker at several times of its way, one below the other as in Fig. 1b of Khan et al.
+
+    Parameters
+    ----------
+    directory
+        A run directory.
+    destination
+        The PNG to write; ``walker.png`` in the run directory if None.
+    walker
+        Number of the walker.
+    images
+        How many times to show, evenly from the start to the end of the run.
+    size
+        Width and height in pixels.
+
+    Returns
+    -------
+    Path
+        The picture.
+
+    Raises
+    ------
+    StopIteration
+        If there is no such walker.
+    InputError
+        If the destination is no PNG.
+    """
+    path = destination or directory / PICTURE_NAME
+    check_picture(path, ".png")
+    groups = read_motion(directory).groups
+    group, place = next(
+        (group, place) for group in groups for place, one in enumerate(group.walkers) if one.walker == walker
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    plotter = _scene(group, place, images, size)
+    with beside(path) as new:
+        plotter.screenshot(new)
+    plotter.close()
+    return path
+
+
+def _scene(group: Group, walker: int, images: int, size: tuple[int, int]) -> pv.Plotter:
+    _prefer_egl()
+    import pyvista as pv
+
+    strobe = group.case.run.samples_per_cycle
+    frames = np.linspace(0, (len(group.time) - 1) // strobe, images).round().astype(int) * strobe
+    radii = group.radii * 1e3
+    turned = np.stack([group.drive_axis, group.across_axis, np.array([0.0, 0.0, 1.0])], axis=-1)
+    position = group.position[frames, walker] @ turned * 1e3
+    middle = position.mean(axis=1)
+    position[:, :, 0] -= middle[0, 0]
+    position[:, :, 1] -= middle[:, 1, None]  # rows are even: the drift across the axis is left out
+    pitch = 2.4 * float(radii.max()) + float(np.ptp(position[..., 1], axis=1).max())
+    position[:, :, 1] -= pitch * np.arange(images)[:, None]
+    low = position.min(axis=(0, 1)) - 2.2 * radii.max()
+    high = position.max(axis=(0, 1)) + np.array([4.5, 3.0, 0.0]) * radii.max()
+    plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
+    plotter.background_color = pv.Color("white")
+    _add_floor(plotter, low, high)
+    for frame, centres in zip(frames, position, strict=True):
+        for bead, radius in enumerate(radii):
+            sphere = pv.Sphere(radius=radius, center=centres[bead], theta_resolution=80, phi_resolution=80)
+            plotter.add_mesh(sphere, color=_RUBY[int(bead > 0)], smooth_shading=True, specular=0.6, specular_power=40)
+        place = [high[0] - 2.2 * radii.max(), float(centres[:, 1].mean()), float(radii.mean())]
+        _add_label(plotter, place, f"{group.time[frame]:.2f} s")
+    _add_scale_bar(plotter, [low[0] + 0.6 * radii.max(), low[1] + 0.5 * radii.max(), 0.02])
+    _aim(plotter, (low + high) / 2.0, high - low, size)
+    return plotter
+
+
+def top_view(
+    group: Group, walker: int, frame: int, along: tuple[float, float], across: tuple[float, float]
+) -> npt.NDArray[np.uint8]:
+    """One walker seen from above, as a stroboscope shows it.
+
+    Parameters
+    ----------
+    group
+        Of the walkers.
+    walker, frame
+        Which of them, and when.
+    along, across
+        Bounds of the picture along and across the drive axis, m, relative to the substrate.
+
+    Returns
+    -------
+    ndarray, shape (height, width, 3)
+        Red, green, blue; the first row is the farthest to the left of the drive axis, 120 pixels to the smaller radius.
+    """
+    _prefer_egl()
+    import pyvista as pv
+
+    pixels = 120.0 / float(group.radii.min())
+    size = [round((bounds[1] - bounds[0]) * pixels) for bounds in (along, across)]
+    turned = np.stack([group.drive_axis, group.across_axis, np.array([0.0, 0.0, 1.0])], axis=-1)
+    middle = np.array([sum(along) / 2.0, sum(across) / 2.0, 0.0])
+    centres = (group.position[frame, walker] @ turned - middle) * 1e3
+    plotter = pv.Plotter(off_screen=True, window_size=size, lighting="light kit")
+    plotter.background_color = pv.Color(_FLOOR)
+    for bead, radius in enumerate(group.radii * 1e3):
+        sphere = pv.Sphere(radius=radius, center=centres[bead], theta_resolution=80, phi_resolution=80)
+        plotter.add_mesh(sphere, color=_RUBY[int(bead > 0)], smooth_shading=True, specular=0.6, specular_power=40)
+    plotter.camera_position = [(0.0, 0.0, 10.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+    plotter.camera.parallel_projection = True
+    plotter.camera.parallel_scale = (across[1] - across[0]) / 2.0 * 1e3
+    picture: npt.NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
+    plotter.close()
+    return picture
+
+
+class View:
+    """A run seen from the side, along y, or from above, without perspective; one window for any number of frames.
+
+    Parameters
+    ----------
+    motion
+        Of the run.
+    pixels
+        To a millimetre, at most.
+
+    Attributes
+    ----------
+    low, high : ndarray, shape (2,)
+        Corners of the picture, m: along x, and the height or along y.
+    axes
+        What they are called.
+    """
+
+    def __init__(self, motion: Motion, pixels: float = 40.0) -> None:
+        _prefer_egl()
+        import pyvista as pv
+
+        self._motion = motion
+        sideways = motion.case.boundary.closed
+        self.axes = ("x", "height" if sideways else "y")
+        self.low, self.high = _corners(motion, sideways)
+        extents = self.high - self.low
+        pixels = min(pixels, _MOST_PIXELS / (1e3 * float(extents.max())))
+        size = [2 * max(1, round(extent * pixels * 1e3 / 2.0)) for extent in extents]
+        self._plotter = pv.Plotter(off_screen=True, window_size=size, lighting="light kit")
+        self._plotter.background_color = pv.Color("white")
+        rounds = 18 if len(motion.radius) < _MANY else 10
+        ball = pv.Sphere(radius=1.0, theta_resolution=rounds, phi_resolution=rounds)
+        self._around = (motion.radius[:, None, None] * ball.points * 1e3).astype(np.float32)
+        first = np.arange(len(motion.radius), dtype=np.int64) * ball.n_points
+        faces = np.tile(ball.faces.reshape(-1, 4).astype(np.int64), (len(first), 1, 1))
+        faces[:, :, 1:] += first[:, None, None]
+        self._mesh = pv.PolyData(self._around.reshape(-1, 3), faces.ravel())
+        # A sphere's own points are its normals: smooth without computing any.
+        self._mesh.point_data["Normals"] = np.tile(ball.points, (len(motion.radius), 1)).astype(np.float32)
+        self._mesh.point_data.active_normals_name = "Normals"
+        self._mesh.point_data["colour"] = np.zeros((self._mesh.n_points, 3), dtype=np.uint8)
+        self._plotter.add_mesh(self._mesh, scalars="colour", rgb=True, specular=0.4, smooth_shading=False)
+        x, up = (self.low + self.high) / 2.0 * 1e3
+        middle = (x, 0.0, up) if sideways else (x, up, 0.0)
+        camera = (x, -1e2, up) if sideways else (x, up, 1e2)
+        self._plotter.camera_position = [camera, middle, (0.0, 0.0, 1.0) if sideways else (0.0, 1.0, 0.0)]
+        self._plotter.camera.parallel_projection = True
+        self._plotter.camera.parallel_scale = extents[1] / 2.0 * 1e3
+
+    def picture(self, frame: int, coloured: Collection[int]) -> npt.NDArray[np.uint8]:
+        """The beads in a frame, with some beads in another colour: shape (height, width, 3), red, green, blue."""
+        import pyvista as pv
+
+        motion = self._motion
+        chosen = np.zeros(len(motion.radius), dtype=bool)
+        chosen[list(coloured)] = True
+        names = np.where(chosen, np.where(motion.large, *_RUBY), np.where(motion.large, *_GLASS))
+        rgb = {str(name): pv.Color(str(name)).int_rgb for name in np.unique(names)}
+        colours = np.array([rgb[str(name)] for name in names], dtype=np.uint8)
+        self._mesh.points = (self._around + motion.position[frame][:, None] * 1e3).reshape(-1, 3).astype(np.float32)
+        self._mesh.point_data["colour"] = np.repeat(colours, self._around.shape[1], axis=0)
+        self._plotter.render()  # a screenshot does so the first time only
+        return np.array(self._plotter.screenshot(return_img=True), dtype=np.uint8)
+
+    def close(self) -> None:
+        """Give back the window."""
+        self._plotter.close()
+
+
+def _corners(motion: Motion, sideways: bool) -> tuple[FloatArray, FloatArray]:
+    """Of the picture: from the floor to a little above what any bead reaches; from above, all that they reach."""
+    start, radius = motion.first_driven, motion.radius[:, None]
+    reached = motion.position[start:]
+    if sideways:
+        half = motion.case.boundary.inner_width / 2.0
+        return np.array([-half, 0.0]), np.array([half, 1.05 * float((reached[..., 2] + motion.radius).max())])
+    margin = float(motion.radius.max())
+    return (
+        (reached[..., :2] - radius).min(axis=(0, 1)) - margin,
+        (reached[..., :2] + radius).max(axis=(0, 1)) + margin,
+    )
+
+
+@styled
+def render_series(
+    directory: Path, destination: Path | None = None, *, images: int = _SHOWN, apart: float | None = None
+) -> list[Path]:
+    """Views of a run beside each other, walkers and climbers coloured, with times and scales.
+
+    Parameters
+    ----------
+    directory
+        A run directory.
+    destination
+        The PNG to write; ``series.png`` in the run directory if None.
+    images
+        How many, evenly through the drive.
+    apart
+        Seconds between them: the last ones of the run then, as many as ``images``.
+
+    Raises
+    ------
+    InputError
+        If frames were recorded less often, or the drive was shorter than that.
+    """
+    path = destination or directory / SERIES_NAME
+    check_picture(path, ".png")
+    motion = read_motion(directory)
+    frames = _frames_evenly(motion, images) if apart is None else _frames_apart(motion, images, apart, directory)
+    pointed_out = _pointed_out(motion)
+    view = View(motion)
+    low, high = view.low * 1e3, view.high * 1e3
+    wide, tall = high - low
+    across = max(0.8, 4.0 * wide / tall + 0.3)  # inches a picture, which is four inches high
+    scale = min(1.0, 20.0 / (across * len(frames)))  # a page holds so many
+    figure, axes = new_figure(1.0 + scale * across * len(frames), 1.0 + 4.0 * scale, ncols=len(frames), sharey=True)
+    aside = max(1, int(wide * 0.4))  # mm, whole ones within the picture
+    decimals = 2 if apart is None or apart >= 0.1 else 4
+    for panel, frame in zip(np.atleast_1d(axes), frames, strict=True):
+        picture = view.picture(frame, pointed_out(frame))
+        panel.imshow(picture, extent=(low[0], high[0], low[1], high[1]), interpolation="bilinear")
+        panel.set(title=f"{motion.time[frame]:.{decimals}f} s", xlabel=f"{view.axes[0]} (mm)")
+        panel.title.set_fontsize(8)
+        panel.set_xticks([-aside, 0, aside])
+        panel.grid(visible=False)
+    view.close()
+    np.atleast_1d(axes)[0].set_ylabel(f"{view.axes[1]} (mm)")
+    return save_figure(figure, path, [directory.name])
+
+
+def render_film(directory: Path, destination: Path | None = None, *, slowdown: float = 1.0) -> Path:
+    """Film a run, walkers and climbers coloured, with the time and a scale in the picture.
+
+    Parameters
+    ----------
+    directory
+        A run directory.
+    destination
+        The MP4 to write (H.264); ``film.mp4`` in the run directory if None.
+    slowdown
+        How many times slower than in reality: every frame of the drive is shown, one after the other.
+
+    Raises
+    ------
+    InputError
+        If the name is none of an MP4.
+    FilmFailed
+        If ffmpeg could not write all of it.
+    """
+    from imageio_ffmpeg import write_frames
+
+    path = destination or directory / FILM_NAME
+    check_picture(path, ".mp4")
+    motion = read_motion(directory)
+    time = motion.time
+    shown = range(motion.first_driven, len(time))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pictures = _film(motion, shown)
+    first = next(pictures)
+    rate = 1.0 / (float(np.median(np.diff(time[shown.start :]))) * slowdown) if len(shown) > 1 else 1.0
+    size = (first.shape[1], first.shape[0])
+    with closing(pictures), beside(path) as new:
+        writer = write_frames(new, size, fps=rate, codec="libx264", quality=7, macro_block_size=2)
+        writer.send(None)
+        writer.send(np.ascontiguousarray(first))
+        for picture in pictures:
+            writer.send(np.ascontiguousarray(picture))
+        writer.close()
+        _check_film(new, len(shown))
+    return path
+
+
+class FilmFailed(WalkersError):
+    """A film that could not be written as a whole."""
+
+
+def _check_film(path: Path, frames: int) -> None:
+    """Ffmpeg ends in silence when the disk is full."""
+    from imageio_ffmpeg import count_frames_and_secs
+
+    try:
+        written, _ = count_frames_and_secs(str(path))
+    except (RuntimeError, OSError):
+        written = 0
+    if written != frames:
+        raise FilmFailed(f"ffmpeg wrote {written} of the {frames} pictures of {path.parent}: is the disk full?")
+
+
+def _film(motion: Motion, frames: Sequence[int]) -> Generator[npt.NDArray[np.uint8]]:
+    """The pictures of a film, each with a scale on its left and the time above."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    corners = _corners(motion, motion.case.boundary.closed)
+    tall = float(corners[1][1] - corners[0][1])
+    view = View(motion, min(40.0, 1.6 / tall))  # as high as a screen at most
+    pointed_out, font = _pointed_out(motion), ImageFont.load_default(16)
+    try:
+        for frame in frames:
+            box = Image.fromarray(view.picture(frame, pointed_out(frame)))
+            wide = 2 * (max(_MARGIN + box.width + 8, _LEAST_WIDTH) // 2)
+            page = Image.new("RGB", (wide, box.height + 48), "white")
+            page.paste(box, (_MARGIN, 32))
+            draw = ImageDraw.Draw(page)
+            floor, left = 32 + box.height, _MARGIN - 2
+            draw.line(
+                [(left, 32), (left, floor), (_MARGIN + box.width + 1, floor), (_MARGIN + box.width + 1, 32)], "black"
+            )
+            draw.text((_MARGIN, 6), f"{motion.time[frame]:.3f} s", "black", font)
+            for height in range(0, int(tall * 1e3) + 1, 5):
+                level = floor - height * box.height / (tall * 1e3)
+                draw.line([(left - 6, level), (left, level)], "black")
+                draw.text((left - 10, level), f"{height} mm" if height else "0", "black", font, anchor="rm")
+            yield np.asarray(page)
+    finally:
+        view.close()
+
+
+def _frames_evenly(motion: Motion, images: int) -> list[int]:
+    start = motion.first_driven
+    return [int(frame) for frame in np.unique(np.linspace(start, len(motion.time) - 1, images).round().astype(int))]
+
+
+def _frames_apart(motion: Motion, images: int, apart: float, directory: Path) -> list[int]:
+    """The last frames of a run that are so many seconds apart, to a tenth of that."""
+    last = len(motion.time) - 1
+    between = motion.case.run.steps_per_sample * motion.case.run.time_step
+    every = round(apart / between)
+    if not every or abs(every * between / apart - 1.0) > _TOLERANCE:
+        told = f"{apart:.4g} s between pictures: expected a multiple of the {between:.4g} s between frames"
+        raise InputError(str(directory), [Problem("", None, told)])
+    if every > last - motion.first_driven:
+        told = f"{apart:.4g} s between pictures: expected less than the {max(motion.time[-1], 0.0):.3g} s of the drive"
+        raise InputError(str(directory), [Problem("", None, told)])
+    return list(range(last, motion.first_driven - 1, -every))[:images][::-1]
+
+
+def seconds_apart(text: str, directory: Path) -> float:
+    """Read a time between pictures: a duration, or a part or multiple of the drive's cycle such as ``T/4`` or ``2 T``.
+
+    Raises
+    ------
+    InputError
+        If the text is neither.
+    """
+    cycles = re.fullmatch(r"(?P<many>[\d.]*)\s*T\s*(/\s*(?P<parts>\d+))?", text.strip())
+    try:
+        if cycles:
+            frequency = Case.from_dict(read_json(directory / CASE_NAME)).drive.frequency
+            seconds = float(cycles["many"] or 1) / int(cycles["parts"] or 1) / frequency
+        else:
+            seconds = parse_quantity(text, DURATION)
+        if seconds > 0.0:
+            return seconds
+    except (ValueError, ZeroDivisionError):
+        pass
+    raise InputError("--interval", [Problem("", None, f'{text!r}: expected a time such as "2 s", or "T/4" of a cycle')])
+
+
+def _pointed_out(motion: Motion) -> Callable[[int], set[int]]:
+    """What gives, for a frame, the beads to colour: those of walkers, and of the clusters that climb and are free."""
+    walkers = set(np.flatnonzero(motion.walker_of >= 0).tolist())
+    if not Pile().applies(motion.case):
+        return lambda _: walkers
+    found = analyse(motion)
+    climbing = [track for track, climb in zip(found.tracks, found.climbs, strict=True) if climb.climbed]
+    return lambda frame: walkers | {bead for track in climbing for bead in track.members_at(frame)}
+
+
+def _prefer_egl() -> None:
+    """Without this VTK tries an X server first and says so."""
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+
+def _add_floor(plotter: pv.Plotter, low: FloatArray, high: FloatArray) -> None:
+    import pyvista as pv
+
+    middle, extent = (low + high) / 2.0, high - low
+    floor = pv.Plane(center=(middle[0], middle[1], 0.0), i_size=extent[0], j_size=extent[1], direction=(0.0, 0.0, 1.0))
+    plotter.add_mesh(floor, color=_FLOOR, lighting=False)
+
+
+def _add_label(plotter: pv.Plotter, place: list[float], text: str) -> None:
+    plotter.add_point_labels(
+        [place],
+        [text],
+        font_size=20,
+        text_color="black",
+        shape=None,
+        show_points=False,
+        always_visible=True,
+        justification_horizontal="center",
+        justification_vertical="center",
+    )
+
+
+def _add_scale_bar(plotter: pv.Plotter, start: list[float], length: float = 0.5) -> None:
+    import pyvista as pv
+
+    plotter.add_mesh(pv.Line(start, [start[0] + length, *start[1:]]), color="black", line_width=5)
+    _add_label(plotter, [start[0] + length / 2.0, start[1] + 0.5 * length, start[2]], f"{length:g} mm")
+
+
+def _aim(plotter: pv.Plotter, middle: FloatArray, extent: FloatArray, size: tuple[int, int]) -> None:
+    """Look down at 55° from the side of the walkers, without perspective so that the scale bar holds everywhere."""
+    elevation = np.radians(55.0)
+    away = 5.0 * float(extent.max())
+    camera = (middle[0], middle[1] - away * np.cos(elevation), away * np.sin(elevation))
+    plotter.camera_position = [camera, (middle[0], middle[1], 0.0), (0.0, 0.0, 1.0)]
+    plotter.camera.parallel_projection = True
+    height = max(extent[1] * np.sin(elevation), extent[0] * size[1] / size[0])
+    plotter.camera.parallel_scale = 0.52 * float(height)

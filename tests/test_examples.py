@@ -1,0 +1,26 @@
+"""The examples in docstrings, run as they stand."""
+
+from __future__ import annotations
+
+import doctest
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import walkers
+
+
+@pytest.mark.parametrize(
+    "module", ["walkers", "walkers.pipeline", "walkers.inputs.reading", "walkers.postprocess.motion"]
+)
+def test_examples_give_what_they_say(module: str, runs_folder: Path) -> None:
+    """In a folder of the tests (``tmp``), with what a user would have imported."""
+    failed, tried = doctest.testmod(import_module(module), extraglobs={"tmp": runs_folder, "walkers": walkers})
+    assert tried
+    assert not failed
+
+
+def test_the_public_names_are_few_and_documented() -> None:
+    assert dir(walkers) == walkers.__all__ == ["Run", "find_run", "load", "load_case", "run", "sweep"]
+    assert all(getattr(walkers, name).__doc__ for name in walkers.__all__)
