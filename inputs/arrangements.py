@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import acos, asin, cos, hypot, pi, sin
+from math import acos, asin, cos, hypot, pi, sin, sqrt
 
 Apart = Callable[[int, int], float]
 """Distance of two touching beads seen from above, m, by their numbers."""
@@ -20,13 +20,14 @@ Pairs = tuple[tuple[int, int], ...]
 class Arrangement:
     """Which beads touch, given how many there are, and where they stand, given their radii and `Apart`.
 
-    ``fewest`` is the least number of beads, ``meaning`` what the documents say of it.
+    ``fewest`` and ``most`` bound the number of beads, ``meaning`` is what the documents say of it.
     """
 
     pairs: Callable[[int], Pairs]
     places: Callable[[Sequence[float], Apart], Places]
     fewest: int
     meaning: str
+    most: int = 100
 
 
 def _row(number: int) -> Pairs:
@@ -57,6 +58,22 @@ def _fan(radii: Sequence[float], apart: Apart) -> Places:
     return [(front, 0.0), *((front + away * cos(turn), away * sin(turn)) for away, turn in behind)]
 
 
+def _crossed(number: int) -> Pairs:
+    del number
+    return ((0, 1), (0, 2), (1, 2), (1, 3), (2, 3))
+
+
+def _diamond(radii: Sequence[float], apart: Apart) -> Places:
+    """One in front, two side by side behind it, one at the back that touches these two."""
+    front, left, right = _fan(radii[:3], apart)
+    along, across = right[0] - left[0], right[1] - left[1]
+    width, reach, other = apart(1, 2), apart(1, 3), apart(2, 3)
+    share = (reach**2 - other**2 + width**2) / (2.0 * width**2)
+    height = sqrt(reach**2 - (share * width) ** 2) / width
+    back = (left[0] + share * along + height * across, left[1] + share * across - height * along)
+    return [front, left, right, back]
+
+
 def _closed(number: int) -> Pairs:
     return (*_row(number), (0, number - 1)) if number > 2 else _row(number)
 
@@ -85,6 +102,7 @@ def _ring(radii: Sequence[float], apart: Apart) -> Places:
 ARRANGEMENTS: Mapping[str, Arrangement] = {
     "chain": Arrangement(_row, _chain, 2, "one behind the other, the first in front"),
     "fan": Arrangement(_spokes, _fan, 2, "the first in front, the others side by side behind it"),
+    "diamond": Arrangement(_crossed, _diamond, 4, "one in front, two side by side behind it, one at the back", most=4),
     "ring": Arrangement(_closed, _ring, 3, "in a ring, the first in front"),
 }
 """By the names that case files use."""

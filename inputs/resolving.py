@@ -160,8 +160,10 @@ def _arranged(table: ClusterTable, key: str, walkers: Walkers) -> Walkers:
         if name not in ARRANGEMENTS:
             told = f"expected one of {', '.join(ARRANGEMENTS)}{suggestion(name, ARRANGEMENTS)}"
             raise UnusableKeyError(f"{key}.arrangement", told)
-        if len(walkers.radii) < ARRANGEMENTS[name].fewest:
-            raise UnusableKeyError(f"{key}.radii", f"expected at least {ARRANGEMENTS[name].fewest} beads in a {name}")
+        known = ARRANGEMENTS[name]
+        if not known.fewest <= len(walkers.radii) <= known.most:
+            bound = f"at least {known.fewest}" if known.fewest < known.most else str(known.most)
+            raise UnusableKeyError(f"{key}.radii", f"expected {bound} beads in a {name}")
         walkers = replace(walkers, arrangement=name)
         try:
             walkers.front  # noqa: B018, where they stand is computed here

@@ -49,7 +49,8 @@ def of_clusters(*tables: dict[str, Any], **changes: dict[str, Any]) -> Case:
 
 
 @pytest.mark.parametrize(
-    ("arrangement", "sizes"), [("chain", "Lss"), ("fan", "Lss"), ("fan", "Lsss"), ("ring", "Lsss")]
+    ("arrangement", "sizes"),
+    [("chain", "Lss"), ("fan", "Lss"), ("fan", "Lsss"), ("ring", "Lsss"), ("diamond", "Lsss"), ("diamond", "LsLs")],
 )
 def test_beads_of_a_cluster_touch_as_its_arrangement_says(arrangement: str, sizes: str) -> None:
     """Touching pairs overlap by what carries their load, the beads the floor too, and no others overlap."""
@@ -145,6 +146,16 @@ def test_a_large_bead_between_two_small_ones_walks_sideways(trimers: Path) -> No
     assert abs(along["velocity"]["mean"]) < 0.01 * MM_PER_S
     for side in ("right_facing", "left_facing"):
         assert abs(across["axial_velocity"][side]) == pytest.approx(2.217 * MM_PER_S, rel=0.01)
+
+
+def test_a_tetramer_walks_and_keeps_to_the_axis(tmp_path: Path) -> None:
+    """A diamond of a large bead and three small ones: slower than a dimer, the large bead ahead, from 0° and 20°."""
+    run = {"run": {"cycles": 60, "settling_cycles": 40}}
+    case = of_clusters(cluster("diamond", "Lsss"), cluster("diamond", "Lsss", angle="20 deg"), **run)
+    makes = walkers.run(case, tmp_path).result["makes"]
+    assert makes[0]["velocity"]["mean"] == pytest.approx(0.328 * MM_PER_S, rel=0.03)
+    assert abs(np.degrees(makes[0]["orientation_end"]["largest"])) < 2.0
+    assert abs(np.degrees(makes[1]["orientation_end"]["largest"])) < 20.0
 
 
 def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
@@ -315,8 +326,12 @@ def test_a_bead_may_lie_on_a_plane_beside_walkers_or_alone(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"clusters": [cluster("star", "Lss")]}, 'clusters[0].arrangement = "star": expected one of chain, fan, ring'),
+        (
+            {"clusters": [cluster("star", "Lss")]},
+            'clusters[0].arrangement = "star": expected one of chain, fan, diamond, ring',
+        ),
         ({"clusters": [cluster("ring", "Ls")]}, "clusters[0].radii"),
+        ({"clusters": [cluster("diamond", "Lss")]}, "expected 4 beads in a diamond"),
         ({"clusters": [{"radii": ["0.3 mm", "0.2 mm"]}]}, "expected either an arrangement"),
         ({"clusters": [cluster("fan", "L" + 12 * "s")]}, "so many beads do not fit around the first one"),
         ({"clusters": [{"radii": ["0.3 mm", "0.2 mm"], "at": [["0 mm", "0 mm"]]}]}, "expected a place for each"),
@@ -366,7 +381,7 @@ def test_every_arrangement_is_told_of(tmp_path: Path) -> None:
 
 def test_extents_bound_the_beads() -> None:
     """A walker's length is that of its beads seen from above."""
-    for arrangement, sizes in (("chain", "Ls"), ("fan", "Lsss"), ("ring", "Lsss")):
+    for arrangement, sizes in (("chain", "Ls"), ("fan", "Lsss"), ("ring", "Lsss"), ("diamond", "LssL")):
         case = of_clusters(cluster(arrangement, sizes, replicates=1))
         beads = place((case,))[0].beads
         widest = max(
