@@ -29,7 +29,8 @@ _RIM = 2e-4
 class Face:
     """A flat wall: the axis that it is normal to, the side to which its normal points, its centroid (m).
 
-    ``turn`` (rad) turns an upright one about the vertical; ``wall`` is the wall that the face belongs to.
+    ``turn`` (rad) turns an upright one about the vertical, ``lean`` a level one about the x axis; ``wall`` is the wall
+    that the face belongs to.
     """
 
     axis: AxisName
@@ -37,6 +38,7 @@ class Face:
     centroid: Vector
     turn: float = 0.0
     wall: str = FLOOR
+    lean: float = 0.0
 
     @property
     def normal(self) -> Vector:
@@ -45,9 +47,11 @@ class Face:
 
     def turned(self, vector: Vector) -> Vector:
         """A vector of the face's own axes in those of the boundary."""
-        if self.turn == 0.0:
-            return vector
         x, y, z = vector
+        if self.lean:
+            y, z = y * cos(self.lean) - z * sin(self.lean), y * sin(self.lean) + z * cos(self.lean)
+        if self.turn == 0.0:
+            return (x, y, z)
         return (x * cos(self.turn) - y * sin(self.turn), x * sin(self.turn) + y * cos(self.turn), z)
 
 
@@ -226,6 +230,41 @@ class Channel(Boundary):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Groove(Boundary):
+    """A V-shaped channel: two walls that meet in the x axis, without end along it.
+
+    Attributes
+    ----------
+    opening
+        Angle between the walls, rad.
+    """
+
+    opening: float
+    shape: Literal["groove"] = "groove"
+
+    def faces(self) -> tuple[Face, ...]:
+        """The wall to the right and that to the left."""
+        rise, far = (pi - self.opening) / 2.0, 1e-3
+        return tuple(
+            Face("z", 1, (0.0, side * far * cos(rise), far * sin(rise)), wall=name, lean=side * rise)
+            for side, name in ((-1.0, "-y"), (1.0, "+y"))
+        )
+
+    def rest_height(self, radius: float) -> float:
+        """Height at which a bead touches both walls, m."""
+        return radius / sin(self.opening / 2.0)
+
+    def room(self, span: Span, ranks: int) -> Room:
+        """A box about the walkers' ways, the carriers below the walls."""
+        half_x, half_y = span.half_x + 2.0 * span.margin, span.half_y + 2.0 * span.margin
+        return _room_above(self, (half_x, half_y), span.height + 2.0 * span.margin, span.largest, ranks)
+
+    def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
+        """A row along the groove."""
+        return [((place - (number - 1) / 2.0) * spacing, 0.0) for place in range(number)]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Container(Boundary):
     """An upright container, open above, its floor about the origin.
 
@@ -321,7 +360,7 @@ class Cylinder(Container):
         return self.width**2 * (pi / 4.0)
 
 
-Shape = Plane | Channel | Box | Cylinder
+Shape = Plane | Channel | Groove | Box | Cylinder
 """The boundaries that there are."""
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 from walkers.inputs import library
 from walkers.inputs.arrangements import ARRANGEMENTS, gap_between
 from walkers.inputs.bodies import Mixture, Placed, Walkers
-from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Plane, Shape
+from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Groove, Plane, Shape
 from walkers.inputs.case import Case, Run
 from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector
 from walkers.inputs.library import suggestion
@@ -110,15 +110,23 @@ def resolve(file: CaseFile, name: str) -> Case:
 
 def _boundary(table: BoundaryTable) -> Shape:
     material, tilt = table.material, table.tilt
-    for key, of in (("width", ("channel", "box", "cylinder")), ("height", ("box", "cylinder"))):
+    for key, of in (
+        ("opening", ("groove",)),
+        ("width", ("channel", "box", "cylinder")),
+        ("height", ("box", "cylinder")),
+    ):
         given = getattr(table, key)
         if (given is None) == (table.shape in of):
-            expected = 'missing; expected such as "5.3 mm"' if given is None else f"expected none of a {table.shape}"
+            example = "120 deg" if key == "opening" else "5.3 mm"
+            expected = (
+                f'missing; expected such as "{example}"' if given is None else f"expected none of a {table.shape}"
+            )
             raise UnusableKeyError(f"boundary.{key}", expected)
-    width, height = table.width or 0.0, table.height or 0.0
+    width, height, opening = (value or 0.0 for value in (table.width, table.height, table.opening))
     shapes: dict[str, Shape] = {
         "plane": Plane(material=material, tilt=tilt),
         "channel": Channel(material=material, tilt=tilt, width=width),
+        "groove": Groove(material=material, tilt=tilt, opening=opening),
         "box": Box(material=material, tilt=tilt, width=width, height=height),
         "cylinder": Cylinder(material=material, tilt=tilt, width=width, height=height),
     }

@@ -171,13 +171,15 @@ class LiquidTable(Table):
 class BoundaryTable(Table):
     """``[boundary]``: what the beads stand on and lie in.
 
-    A plane, a channel (two walls and a floor, of a ``width``), or a container open above (of a ``width`` and a
+    A plane, a channel (two walls and a floor, of a ``width``), a groove (two walls at an angle, its ``opening``), or a
+    container open above (of a ``width`` and a
     ``height``). It leans by ``tilt``: 0° is level, a plane at 90° a wall. ``uphill`` is the direction of the steepest
     way up, from that of the drive within the floor.
     """
 
-    shape: Literal["plane", "channel", "box", "cylinder"] = "plane"
+    shape: Literal["plane", "channel", "groove", "box", "cylinder"] = "plane"
     material: str
+    opening: Annotated[NonNegativeAngle, Field(ge=0.5, le=3.1)] | None = None
     width: Length | None = None
     height: Length | None = None
     tilt: Annotated[NonNegativeAngle, Field(le=1.5708)] = 0.0

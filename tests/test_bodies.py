@@ -261,6 +261,22 @@ def test_a_bead_in_a_narrow_channel_is_held_by_its_walls(tmp_path: Path) -> None
     assert abs(done.result["velocity"]["mean"]) < 1.0 * MM_PER_S
 
 
+def test_a_dimer_in_a_groove_rolls_on_both_walls(tmp_path: Path) -> None:
+    """It touches both walls, as high as that needs, rolls about its chord, v = R sin(60°) dφ/dt."""
+    dimers = {"dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2}}
+    boundary = {"boundary": {"shape": "groove", "opening": "120 deg", **FIG1B["boundary"]}}
+    done = walkers.run(of_tables(**dimers, **boundary, run={"cycles": 40, "settling_cycles": 20}), tmp_path)
+    height = np.sin(np.radians(60.0)) * done.motion.position[-1, :, 2] / done.motion.radius
+    np.testing.assert_allclose(height, 1.0, atol=1e-3)
+    bridges = done.table("bridges")
+    held = bridges[(bridges["wall"] >= 0) & (bridges["time"] == bridges["time"].max())]
+    assert held.groupby("bead_1")["wall"].apply(sorted).tolist() == [[0, 1]] * 4
+    assert done.result["velocity"]["mean"] == pytest.approx(0.584 * MM_PER_S, rel=0.01)
+    rolling = np.sin(np.radians(60.0)) * done.result["rotation"]["bead_1"]
+    assert rolling == pytest.approx(done.result["velocity"]["mean"], rel=0.04)
+    assert done.vtk().exists()
+
+
 def test_walkers_may_run_in_segments_and_rest_first(tmp_path: Path) -> None:
     """A walker of three segments, and one that rests before the drive, walk as one in one does (restarts: 1e-3)."""
     dimers = {"dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1}}
@@ -344,6 +360,7 @@ def test_a_bead_may_lie_on_a_plane_beside_walkers_or_alone(tmp_path: Path) -> No
             "this has no heading",
         ),
         ({"boundary": {"shape": "channel", "material": "glass"}}, "boundary.width: missing"),
+        ({"boundary": {"shape": "groove", "material": "glass"}}, "boundary.opening: missing"),
         ({"boundary": {"width": "1 mm", "material": "glass"}}, 'boundary.width = "1 mm": expected none of a plane'),
         (
             {
