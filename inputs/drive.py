@@ -9,13 +9,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import degrees, gcd, hypot, isclose, lcm, pi
-from typing import Any, Literal
+from typing import Literal
 
 Vector = tuple[float, float, float]
 Frame = Literal["lab", "container"]
 AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 LARGEST_RATIO = 24
 """Of the frequencies of two harmonics, as a fraction: 24/1 and 23/24 are taken, 25/1 is not."""
+WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
+    "sine": ((1, 1.0),),
+    "triangle": tuple((k, 8.0 / pi**2 / k**2 * (-1.0) ** (k // 2)) for k in range(1, 10, 2)),
+}
+"""Of the acceleration: multiples of the frequency and shares of the peak. A triangle's series is cut at 0.96 of it."""
 MOST_PERIODS = 1000
 """Of the fastest harmonic in a cycle."""
 
@@ -116,17 +121,6 @@ class Drive:
             for one in self.harmonics
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types."""
-        harmonics = [{**vars(one), "direction": list(one.direction)} for one in self.harmonics]
-        return {"harmonics": harmonics, "frame": self.frame}
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Drive:
-        """Rebuild a drive from `as_dict`."""
-        harmonics = (Harmonic(**{**one, "direction": tuple(one["direction"])}) for one in values["harmonics"])
-        return cls(tuple(harmonics), values["frame"])
-
 
 def common_frequency(frequencies: list[float]) -> float:
     """Frequency of the common period of several, Hz.
@@ -149,6 +143,19 @@ def common_frequency(frequencies: list[float]) -> float:
     if max(numerators) > MOST_PERIODS * common:
         raise ValueError(f"their common period is more than {MOST_PERIODS} of the shortest one")
     return first * common / below
+
+
+def waveform(name: str, first: Harmonic) -> tuple[Harmonic, ...]:
+    """The harmonics of a periodic acceleration of `WAVEFORMS`, given its frequency, peak, direction and phase."""
+    return tuple(
+        replace(
+            first,
+            frequency=multiple * first.frequency,
+            peak_acceleration=abs(share) * first.peak_acceleration,
+            phase=multiple * first.phase + (pi if share < 0.0 else 0.0),
+        )
+        for multiple, share in WAVEFORMS[name]
+    )
 
 
 def unit_vector(vector: Vector) -> Vector:

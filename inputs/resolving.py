@@ -11,7 +11,7 @@ from walkers.inputs.arrangements import ARRANGEMENTS, gap_between
 from walkers.inputs.bodies import Mixture, Placed, Walkers
 from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Groove, Plane, Shape
 from walkers.inputs.case import Case, Run
-from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector
+from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector, waveform
 from walkers.inputs.library import suggestion
 from walkers.inputs.loads import contact_loads, reach
 from walkers.inputs.schema import (
@@ -436,7 +436,7 @@ def resolve_drive(table: DriveTable, axis: str, dimer: Dimer | None) -> Drive:
             _harmonic(one, f"drive.harmonics[{number}]", axis, dimer) for number, one in enumerate(table.harmonics)
         )
     else:
-        harmonics = (_harmonic(table, "drive", axis, dimer),)
+        harmonics = waveform(table.waveform, _harmonic(table, "drive", axis, dimer))
     try:
         common_frequency([one.frequency for one in harmonics])
     except ValueError as error:

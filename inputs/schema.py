@@ -237,8 +237,8 @@ class HarmonicTable(Table):
 class DriveTable(Table):
     """``[drive]``: one harmonic by its keys, or several as ``[[drive.harmonics]]``.
 
-    ``axis``, left out, is x on a plane, and the vertical z in a container. ``frame``, left out, is the laboratory's for
-    one harmonic without a phase on a plane, else the container's.
+    The ``waveform`` is that of the acceleration. ``axis``, left out, is x on a plane, the vertical z in containers.
+    ``frame``, left out, is the laboratory's for one harmonic without a phase on a plane, else the container's.
     """
 
     axis: Axis | None = None
@@ -246,6 +246,7 @@ class DriveTable(Table):
     peak_acceleration: Acceleration | None = None
     gamma0: Coefficient | None = None
     phase: Angle = 0.0
+    waveform: Literal["sine", "triangle"] = "sine"
     frame: Literal["lab", "container"] | None = None
     harmonics: Annotated[list[HarmonicTable], Field(max_length=24)] = []
 

@@ -12,8 +12,10 @@ import pytest
 from tests.conftest import document, make_case
 from walkers.inputs import load_case, resolve_case
 from walkers.inputs.boundary import Plane
+from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive, Harmonic, common_frequency
 from walkers.postprocess import read_result
+from walkers.postprocess.gait import Walk
 
 BRIEF = {"cycles": 20, "settling_cycles": 8, "samples_per_cycle": 10}
 ONE = {"frequency": "80 Hz", "peak_acceleration": "4 g"}
@@ -57,7 +59,34 @@ def test_a_drive_is_its_largest_harmonic_where_one_number_is_asked_for() -> None
     drive = Drive((Harmonic((1.0, 0.0, 0.0), 160.0, 10.0), Harmonic((0.0, 0.0, 1.0), 80.0, 30.0, 1.0)), "container")
     assert (drive.direction, drive.peak_acceleration, drive.frequency) == ((0.0, 0.0, 1.0), 30.0, 80.0)
     assert [one.peak_acceleration for one in drive.with_peak(60.0).harmonics] == [20.0, 60.0]
-    assert Drive.from_dict(drive.as_dict()) == drive
+    case = replace(make_case(), drive=drive)
+    assert Case.from_dict(case.as_dict()) == case
+
+
+def test_a_triangle_is_the_sum_of_its_harmonics() -> None:
+    """Of the acceleration: odd harmonics as 1/k², within 4 % of the peak everywhere and 1 % on the flanks."""
+    case = make_case(drive={"waveform": "triangle"})
+    assert [one.frequency for one in case.drive.harmonics] == [80.0, 240.0, 400.0, 560.0, 720.0]
+    assert case.drive.frame == "container"
+    cycle = np.linspace(0.0, 1.0, 401)
+    phases = [one.angular_frequency * cycle / 80.0 + one.phase for one in case.drive.harmonics]
+    summed = sum(one.peak_acceleration * np.sin(phase) for one, phase in zip(case.drive.harmonics, phases, strict=True))
+    triangle = 39.2 * 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * cycle))
+    assert np.abs(summed - triangle).max() < 0.045 * 39.2
+    flank = np.abs(triangle) < 0.8 * 39.2
+    assert np.abs(summed - triangle)[flank].max() < 0.01 * 39.2
+
+
+def test_a_triangle_walks_faster_than_its_fundamental_alone(walked: Callable[..., Walk]) -> None:
+    """Its higher harmonics, a sixth of the acceleration, add to the speed: 0.80 against 0.73 mm/s at 4 g as shipped."""
+    shipped = {"liquid": {"name": "Si AK5"}, "dimers": {"replicates": 1}}
+    base = {key: value for key, value in document().items() if key not in ("liquid", "contact")}
+    speeds = []
+    for drive in ({"waveform": "triangle"}, {"peak_acceleration": f"{4.0 * 8.0 / np.pi**2} g", "frame": "container"}):
+        tables = {**base, **shipped, "drive": {**base["drive"], **drive}}
+        tables["dimers"] = {**base["dimers"], **shipped["dimers"]}
+        speeds.append(walked(resolve_case(tables, name="triangle")).velocity[0])
+    assert speeds == pytest.approx([0.798e-3, 0.734e-3], rel=0.01)
 
 
 def test_one_harmonic_is_the_drive_that_its_keys_describe(run_directory: Callable[..., Path]) -> None:
