@@ -14,6 +14,7 @@ from walkers.calibration.emulator import Emulator, transformed
 from walkers.calibration.posterior import Posterior
 from walkers.calibration.waves import Wave
 from walkers.inputs.calibration import QUANTITIES, Observation, Parameter
+from walkers.inputs.text import rendered
 from walkers.inputs.units import SPEED
 from walkers.runner.files import write_bytes, write_json, write_text
 
@@ -201,52 +202,31 @@ def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
 
 def as_markdown(found: Outcome, rows: list[Row]) -> str:
     """The tables as a page."""
-    trials = list(found.calibration.file.held_out)
-    lines = [
-        f"# {found.calibration.file.title or found.calibration.name}",
-        "",
-        f"{sum(row.agrees for row in rows)} of {len(rows)} observations agree at the best set: the engine lies within "
-        f"the published deviation. {len(found.unit)} parameter sets were run.",
-        "",
-        "| parameter | best | 5 % | median | 95 % | range |",
-        "|---|---|---|---|---|---|",
+    known, checks = intervals(found), emulator_checks(found)
+    parameters = [
+        {
+            "label": labelled(one),
+            "best": found.best[one.name],
+            "interval": known[one.name],
+            "low": one.low,
+            "high": one.high,
+        }
+        for one in found.space.parameters
     ]
-    known = intervals(found)
-    for one in found.space.parameters:
-        low, middle, high = known[one.name]
-        lines.append(
-            f"| {labelled(one)} | {found.best[one.name]:.3g} | {low:.3g} | {middle:.3g} | {high:.3g} | "
-            f"{one.low:g} … {one.high:g} |"
-        )
-    samples = len(found.predictive.unit)
-    head = ["observation", "published", "engine, best set", "over the posterior", "emulator", "agrees", *trials]
-    lines += ["", "| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
-    for row in rows:
-        held = [_pair(*row.held_out[trial]) if trial in row.held_out else "" for trial in trials]
-        cells = [
-            row.title,
-            f"{_pair(row.value, row.deviation)} {row.unit}".strip(),
-            "no walker" if row.engine is None else f"{row.engine:.3g}",
-            "no walker" if row.low is None else f"{row.low:.3g} … {row.high:.3g} ({row.samples} of {samples})",
-            _pair(row.emulator, row.error),
-            "yes" if row.agrees else "**no**",
-            *held,
-        ]
-        lines.append("| " + " | ".join(cells) + " |")
-    lines += ["", "| group | discrepancy, standard deviations |", "|---|---|"]
-    for place, group in enumerate(found.posterior.groups):
-        low, middle, high = np.percentile(found.posterior.discrepancy[:, place], (5.0, 50.0, 95.0))
-        lines.append(f"| {group} | {middle:.2f} ({low:.2f} … {high:.2f}) |")
-    checks = emulator_checks(found)
-    inside = float(np.mean(np.abs(checks) <= _SIGMAS))
-    lines += [
-        "",
-        f"At {len(checks)} sets that no emulator has seen, {inside:.0%} of the engine's values lie within two standard "
-        f"errors of the emulators'. Chain: {found.posterior.steps} steps, autocorrelation time "
-        f"{found.posterior.autocorrelation:.0f}, {found.posterior.acceptance:.0%} of the moves accepted.",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _pair(value: float, error: float) -> str:
-    return f"{value:.3g} ± {error:.2g}"
+    posterior = found.posterior
+    percentiles = np.percentile(posterior.discrepancy, (5.0, 50.0, 95.0), axis=0).T
+    return rendered(
+        "walkers.calibration",
+        "report.md.j2",
+        calibration=found.calibration,
+        rows=rows,
+        agree=sum(row.agrees for row in rows),
+        sets=len(found.unit),
+        parameters=parameters,
+        trials=list(found.calibration.file.held_out),
+        samples=len(found.predictive.unit),
+        discrepancies=dict(zip(posterior.groups, percentiles, strict=True)),
+        checks=len(checks),
+        inside=float(np.mean(np.abs(checks) <= _SIGMAS)),
+        posterior=posterior,
+    )

@@ -9,6 +9,7 @@ import numpy as np
 
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
+from walkers.inputs.text import rendered
 from walkers.paper import dimers, published
 from walkers.paper.alignment import paper_drives
 from walkers.paper.published import NUMBERS, Published
@@ -283,52 +284,12 @@ def as_dict(rows: list[Row]) -> dict[str, object]:
     return {"agree": agree, "of": of, "tolerance": AGREES, "numbers": [asdict(row) for row in rows]}
 
 
-_HEAD = """# Published numbers beside this project's
-
-{agree} of the {of} numbers that test the engine agree, and {derived} of {derived_of} others, which follow from beads
-and drive alone. To agree is to lie within what the paper says (the bounds shown) or, where it gives no spread, within
-{tolerance:.0%} of the published value: the paper's points and error bars are in its figures only. Parameters are the
-shipped ones, which were calibrated to these numbers (docs/calibration.md), the same in all rows but for the friction
-of Fig. 4's other substrate. Theory is Coulomb friction with the drag of bridges and film, with the engine's
-parameters. As in the paper, a velocity is the mean of six walkers, half of them facing each way, seen once a cycle
-(alignment: two walkers a start); those that are not steady, leave the axis or come apart are left out, and so many are
-told (the symmetric dimers need not be on the axis; thresholds and the figures are of all walkers). Brackets hold the
-slowest and the fastest, or the range over the frequencies where a number is one for all of them. Fig. 1a is a pile's
-and is not among them.
-
-| | published | engine | theory | ratio | agrees |
-|---|---|---|---|---|---|
-"""
-
-
 def as_markdown(rows: list[Row]) -> str:
     """The comparison as a table, and below it what disagrees and why."""
-    (agree, of), (derived, derived_of) = (count(rows, measured=measured) for measured in (True, False))
-    text = _HEAD.format(agree=agree, of=of, derived=derived, derived_of=derived_of, tolerance=AGREES)
-    for row in rows:
-        unit = f" {row.unit}" if row.unit else ""
-        told = "in words" if row.published is None else f"{row.published:.4g}{unit}"
-        told += f" ({row.bounds[0]:g} … {row.bounds[1]:g})" if row.bounds else ""
-        spread = ""
-        if row.low is not None and row.high is not None and row.high - row.low > 1e-3 * abs(row.high):
-            spread = f" ({_number(row.low)} … {_number(row.high)})"
-        spread += f", {row.left_out} left out" if row.left_out else ""
-        ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
-        agrees = "yes" if row.agrees else "**no**"
-        text += (
-            f"| {row.what} | {told} | {_number(row.engine)}{spread} | {_number(row.theory)} | {ratio} | {agrees} |\n"
-        )
     reasons: dict[str, list[str]] = {}
     for row in rows:
         if not row.agrees:
             reasons.setdefault(row.why, []).append(row.what)
-    if reasons:
-        text += "\n## Why not\n\n"
-        text += "".join(f"- {'; '.join(names)}. {why}\n" for why, names in reasons.items())
-    return text
-
-
-def _number(value: float | None) -> str:
-    if value is None:
-        return ""
-    return f"{0.0 if abs(value) < 5e-4 else value:.3g}"
+    engine, others = (count(rows, measured=measured) for measured in (True, False))
+    shown = {"engine": engine, "others": others, "tolerance": AGREES, "rows": rows, "reasons": reasons}
+    return rendered("walkers.paper", "comparison.md.j2", **shown)

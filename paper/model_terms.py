@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
+from walkers.inputs.text import rendered
 from walkers.paper import dimers, published
 from walkers.physics.film import film_drag
 from walkers.runner.files import write_json, write_text
@@ -353,35 +354,4 @@ def write_model_terms(fits: Sequence[Fit], to: Path) -> list[Path]:
 
 def as_markdown(fits: Sequence[Fit]) -> str:
     """The fits as a table, and below it what they give."""
-    wanted = targets()
-    lines = [
-        "# Which physics is missing",
-        "",
-        f"The theory (contacts stay closed, walkers on the axis) fitted to {len(wanted)} published numbers: without "
-        "any term, with each by itself and with all of them. Misfit is Σ ln(1 + r²), r the residual in "
-        "deviations, which are 15 % of speeds. Factors of bridges are over those that wet perfectly, of 1 % liquid; "
-        "their drag is that at a minimum separation of 0.01.",
-        "",
-        "| added | misfit | met | missed, the worst first | parameters |",
-        "|---|---|---|---|---|",
-    ]
-    for one in fits:
-        parameters = ", ".join(f"{_name(key)} {_value(key, value):.3g}" for key, value in one.parameters.items())
-        lines.append(
-            f"| {one.name} | {one.misfit:.1f} | {one.met} of {len(wanted)} | {'; '.join(one.missed)} | {parameters} |"
-        )
-    lines += ["", "| | published | " + " | ".join(str(number) for number in range(1, len(fits) + 1)) + " |"]
-    lines.append("|---" * (len(fits) + 2) + "|")
-    for target in wanted:
-        scale, unit = (1.0, "") if target.over else (1e3, " mm/s")
-        cells = ["" if (value := one.values[target.name]) is None else f"{value * scale:.2f}" for one in fits]
-        lines.append(f"| {target.name} | {target.value * scale:.2f}{unit} | {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
-
-
-def _name(key: str) -> str:
-    return key.removeprefix("log10_").replace("_", " ")
-
-
-def _value(key: str, value: float) -> float:
-    return 10.0**value if key.startswith("log10_") else value
+    return rendered("walkers.paper", "model_terms.md.j2", fits=fits, targets=targets())

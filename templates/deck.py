@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from math import degrees, pi, sqrt
-from typing import TYPE_CHECKING
 
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import hop_height, reach
+from walkers.inputs.text import rendered
 from walkers.physics.capillary import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
 from walkers.physics.film import film_drag
 from walkers.physics.matter import Contact
@@ -27,9 +26,6 @@ from walkers.templates.layout import (
 from walkers.templates.placement import place
 from walkers.templates.scene import Scene, without_carriers
 from walkers.templates.sharing import check_sharing, surfaces_of
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
@@ -249,7 +245,9 @@ def compose(plan: Plan) -> Deck:
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
     angle = case.liquid.contact_angle
     surfaces = plan.surfaces or (case.contact,)
-    text = _environment().get_template("walker.lig.j2").render(
+    text = rendered(
+        "walkers.templates",
+        "walker.lig.j2",
         case=case,
         scene=scene,
         layout=layout,
@@ -373,26 +371,3 @@ def _layout(case: Case, scene: Scene, recording: Recording, walkers: tuple[Place
         carriers=len(scene.carriers),
         walkers=walkers,
     )
-
-
-@cache
-def _environment() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("walkers.templates", "."),
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        auto_reload=False,
-    )
-
-    def number(value: float) -> str:
-        return repr(float(value))
-
-    def numbers(values: Iterable[float]) -> str:
-        return " ".join([repr(float(value)) for value in values])
-
-    environment.filters.update(number=number, numbers=numbers, any=any, zip=zip)
-    return environment
