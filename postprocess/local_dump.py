@@ -1,8 +1,8 @@
-"""Read the engine's text dumps of bridges (``dump local``)."""
+"""Read and write the engine's text dumps of bridges (``dump local``)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +84,16 @@ def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, Fl
             if not head[-1].endswith(b"\n") or (body and not body[-1].endswith(b"\n")):
                 raise DumpError(f"{path}: ends within the frame of step {step}")
             yield step, _rows(path, step, body, len(columns))
+
+
+def write_local_dump(path: Path, columns: tuple[str, ...], frames: Iterable[tuple[int, FloatArray]]) -> None:
+    """Write a local dump as the engine does, twelve digits, without the bounds of its box."""
+    lines = []
+    for step, rows in frames:
+        lines += ["ITEM: TIMESTEP", str(step), "ITEM: NUMBER OF ENTRIES", str(len(rows)), "ITEM: BOX BOUNDS ff ff ff"]
+        lines += ["0 0"] * 3 + [f"ITEM: ENTRIES {' '.join(columns)}"]
+        lines += [" ".join([f"{value:.12g}" for value in row]) + " " for row in rows.tolist()]
+    path.write_text("\n".join(lines) + "\n", "ascii")
 
 
 def _rows(path: Path, step: int, body: list[bytes], columns: int) -> FloatArray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.postprocess.dump import BinaryDump, FloatArray
+from walkers.postprocess.local_dump import local_frames, write_local_dump
 from walkers.postprocess.walking import NEAR, came_near
 from walkers.runner.failures import WalkersMet
 from walkers.runner.files import write_json
@@ -41,25 +42,32 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
     dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
     frames = dump.stack()
     _check_apart(frames, layout, cases, directory)
-    texts = {
-        layout.pair_bridge_dump: [layout.pair_bridge_columns.index(name) for name in ("id1", "id2")],
-        layout.wall_bridge_dump: [layout.wall_bridge_columns.index("id")],
-    }
+    owner, renumbered = (np.zeros(layout.atoms + 1, dtype=np.int64) for _ in range(2))
     walkers = iter(layout.walkers)
-    owners: dict[str, tuple[int, str]] = {}
     for number, (place, case) in enumerate(cases.items()):
         own = [next(walkers) for make in case.walkers for _ in range(make.replicates)]
-        old = [layout.carrier, *(bead for walker in own for bead in walker.beads)]
+        old = np.array([layout.carrier, *(bead for walker in own for bead in walker.beads)])
         new = np.arange(1, len(old) + 1)
-        owners |= {str(one): (number, str(other)) for one, other in zip(old, new, strict=True)}
-        own_frames = frames[:, np.array(old) - 1]
+        owner[old], renumbered[old] = number, new
+        own_frames = frames[:, old - 1]
         own_frames[..., dump.column("id")] = new
         own_frames[..., dump.column("type")] = 1
         dump.write_like(own_frames, place / layout.bead_dump)
         write_json(place / LAYOUT_NAME, _own_layout(layout, own).as_dict())
-    for name, columns in texts.items():
-        _split_local_dump(directory / name, columns, owners, [place / name for place in cases])
-    for name in (layout.bead_dump, *texts, LAYOUT_NAME):
+    for name, columns, ids in (
+        (layout.pair_bridge_dump, layout.pair_bridge_columns, ("id1", "id2")),
+        (layout.wall_bridge_dump, layout.wall_bridge_columns, ("id",)),
+    ):
+        bridges = list(local_frames(directory / name, columns))
+        held = [columns.index(one) for one in ids]
+        for number, place in enumerate(cases):
+            parts = []
+            for step, rows in bridges:
+                part = rows[owner[rows[:, held[0]].astype(np.int64)] == number]
+                part[:, held] = renumbered[part[:, held].astype(np.int64)]
+                parts.append((step, part))
+            write_local_dump(place / name, columns, parts)
+    for name in (layout.bead_dump, layout.pair_bridge_dump, layout.wall_bridge_dump, LAYOUT_NAME):
         (directory / name).unlink()
 
 
@@ -78,24 +86,3 @@ def _check_apart(frames: FloatArray, layout: Layout, cases: Mapping[Path, Case],
     centre = np.stack([sampled[:, beads, x : x + 2].mean(axis=1) for beads in rows], axis=1)
     if came_near(centre, NEAR * max(make.length for case in cases.values() for make in case.walkers)):
         raise WalkersMet(directory)
-
-
-def _split_local_dump(path: Path, columns: list[int], owners: dict[str, tuple[int, str]], places: list[Path]) -> None:
-    """Give each row of a local dump to the owner of its bead; ``columns`` hold ids, ``owners`` their new ones."""
-    lines = path.read_text("ascii").split("\n")
-    parts: list[list[str]] = [[] for _ in places]
-    position = 0
-    while position + 9 <= len(lines):
-        head = lines[position : position + 9]
-        rows: list[list[str]] = [[] for _ in places]
-        for line in lines[position + 9 : position + 9 + int(head[3])]:
-            words = line.split()
-            owner = owners[words[columns[0]]][0]
-            for column in columns:
-                words[column] = owners[words[column]][1]
-            rows[owner].append(" ".join(words) + " ")
-        for part, own in zip(parts, rows, strict=True):
-            part += [*head[:3], str(len(own)), *head[4:], *own]
-        position += 9 + int(head[3])
-    for place, part in zip(places, parts, strict=True):
-        place.write_text("\n".join(part) + "\n", "ascii")
