@@ -56,3 +56,12 @@ class InputError(WalkersError):
         self.source = source
         self.problems = tuple(problems)
         super().__init__("\n".join(f"{source}: {problem}" for problem in self.problems))
+
+
+class UnusableKeyError(Exception):
+    """A problem found between keys; `walkers.inputs.reading` adds the file and the value."""
+
+    def __init__(self, key: str, expected: str) -> None:
+        self.key = key
+        self.expected = expected
+        super().__init__(expected)

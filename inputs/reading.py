@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from walkers.inputs.case import Case
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import InputError, Problem, UnusableKeyError
 from walkers.inputs.library import suggestion
 from walkers.inputs.messages import quoted, validated
-from walkers.inputs.resolving import UnusableKeyError, resolve
+from walkers.inputs.resolving import resolve
 from walkers.inputs.schema import CaseFile
 
 _SHIPPED = Path(__file__).parent / "cases"

@@ -154,7 +154,7 @@ class LiquidTable(Table):
 
     ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag;
     ``film_drag_ratio`` a drag on the beads' translation over that of Stokes in the liquid, 6π η R v. The last four,
-    left out, are the library's for the surfaces, else as in `walkers.inputs.resolving`.
+    left out, are the library's for the surfaces, else as in `walkers.inputs.matter_tables`.
     """
 
     name: str | None = None

@@ -9,7 +9,7 @@ from walkers.inputs import library
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
-from walkers.inputs.resolving import limits_of
+from walkers.inputs.run_tables import limits_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics.capillary import capillary_force_limit_at_wall
 from walkers.physics.time_step import AUTO_FRACTIONS, TimeStepLimits

@@ -8,7 +8,7 @@ import pytest
 from tests.conftest import document, make_case
 from walkers.inputs import load_case, resolve_case
 from walkers.inputs.loads import contact_loads, dimer_of
-from walkers.inputs.resolving import limits_of
+from walkers.inputs.run_tables import limits_of
 from walkers.physics.capillary import (
     bridge_volume_at_wall,
     bridge_volume_between_beads,

@@ -1,0 +1,181 @@
+"""From the tables of drive and run to a drive, a time step and how the run is sampled."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import ceil
+
+from walkers.inputs.case import Case, Run
+from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector, waveform
+from walkers.inputs.errors import UnusableKeyError
+from walkers.inputs.schema import DriveTable, HarmonicTable, RunTable
+from walkers.physics.dimer import Dimer
+from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
+
+MOST_STEPS = 2**31 - 1
+_SEGMENT_SECONDS = 0.5
+_LONGEST_SETTLING = 0.5
+_FRAMES_PER_SECOND = 60.0
+
+
+def resolve_drive(table: DriveTable, axis: str, dimer: Dimer | None) -> Drive:
+    """A drive of one harmonic or of several.
+
+    Parameters
+    ----------
+    table
+        What the case says.
+    axis
+        Along which it is shaken if the case does not say.
+    dimer
+        Whose Γ0 a drive may be given by; None where there is none.
+
+    Raises
+    ------
+    UnusableKeyError
+        If something is missing, said twice or contradictory.
+    """
+    besides = sorted(table.model_fields_set - {"harmonics", "frame"})
+    if table.harmonics and besides:
+        raise UnusableKeyError(
+            f"drive.{besides[0]}", f"expected none beside drive.harmonics: write drive.harmonics[0].{besides[0]}"
+        )
+    if table.harmonics:
+        harmonics = tuple(
+            _harmonic(one, f"drive.harmonics[{number}]", axis, dimer) for number, one in enumerate(table.harmonics)
+        )
+    else:
+        harmonics = waveform(table.waveform, _harmonic(table, "drive", axis, dimer))
+    try:
+        common_frequency([one.frequency for one in harmonics])
+    except ValueError as error:
+        raise UnusableKeyError("drive.harmonics", f"expected frequencies with a common period: {error}") from error
+    drive = Drive(harmonics, table.frame or "container")
+    if table.frame is None and axis == "x" and drive.is_plain:
+        return replace(drive, frame="lab")
+    if table.frame == "lab" and not drive.is_plain:
+        told = "several harmonics, or one with a phase, are driven in the container's frame"
+        raise UnusableKeyError("drive.frame", f'expected "container": {told}')
+    return drive
+
+
+def _harmonic(table: DriveTable | HarmonicTable, key: str, axis: str, dimer: Dimer | None) -> Harmonic:
+    if table.frequency is None:
+        raise UnusableKeyError(f"{key}.frequency", 'missing; expected such as "80 Hz"')
+    if dimer is None and table.gamma0 is not None:
+        raise UnusableKeyError(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")
+    if (table.peak_acceleration is None) == (table.gamma0 is None):
+        if table.gamma0 is None:
+            raise UnusableKeyError(f"{key}.peak_acceleration", 'missing; expected it (such as "4 g") or gamma0')
+        raise UnusableKeyError(f"{key}.gamma0", "expected either peak_acceleration or gamma0, not both")
+    acceleration = table.peak_acceleration
+    if acceleration is None:
+        acceleration = dimer.peak_acceleration(table.gamma0 or 0.0) if dimer else 0.0
+    given = axis if table.axis is None else table.axis
+    try:
+        direction = AXES[given] if isinstance(given, str) else unit_vector(given)
+    except ValueError as error:
+        raise UnusableKeyError(f"{key}.axis", str(error)) from error
+    return Harmonic(direction, table.frequency, acceleration, table.phase)
+
+
+def limits_of(case: Case) -> TimeStepLimits:
+    """Limits of the time step for the bodies of a case."""
+    bridged = [entry for body in case.bodies for entry in body.bridged]
+    return time_step_limits(bridged, case.density, case.contact, case.liquid, case.drive.peak_velocity)
+
+
+def resolve_run(table: RunTable, case: Case) -> Run:
+    """The time step, the length and the sampling of a run, given the rest of the case."""
+    frequency = case.drive.frequency
+    largest = largest_time_step(table.time_step, limits_of(case), allow_unstable=table.allow_unstable)
+    samples, cycles_per_sample = _sampling(table, case)
+    time_step, steps = fit_into_cycle(largest, frequency, samples)
+    cycles = _cycles(table, case, cycles_per_sample)
+    settling = table.settling_cycles
+    if settling is None:
+        settling = min(20, cycles // 3) if case.walkers else 0
+    if cycles - settling < 2:
+        raise UnusableKeyError("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
+    rest = table.longest_settling
+    if rest is None:
+        rest = _LONGEST_SETTLING if case.loose else 0.0
+    resting = ceil((rest + 1.0) * frequency) if rest else 0
+    if steps * (cycles + resting) > MOST_STEPS:
+        if table.duration is not None:
+            raise UnusableKeyError("run.duration", "too long: the engine counts steps up to 2^31")
+        most = MOST_STEPS // steps - resting
+        raise UnusableKeyError("run.cycles", f"expected at most {most}: the engine counts steps up to 2^31")
+    # Segments end with a sample, so that each begins where the last one ended.
+    segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if case.loose else None
+    per_segment = (
+        cycles if segment is None else max(1, round(segment * frequency / cycles_per_sample)) * cycles_per_sample
+    )
+    return Run(
+        time_step=time_step,
+        steps_per_cycle=steps,
+        cycles=cycles,
+        settling_cycles=settling,
+        samples_per_cycle=samples,
+        cycles_per_sample=cycles_per_sample,
+        samples_per_bridge_sample=_bridge_sampling(table, case, samples),
+        cycles_per_segment=min(per_segment, cycles),
+        settled_below=table.settled_below,
+        longest_settling=rest,
+        ranks=table.ranks,
+    )
+
+
+def _sampling(table: RunTable, case: Case) -> tuple[int, int]:
+    """Samples a cycle and cycles a sample, one of which is 1."""
+    if table.samples_per_cycle is not None and table.frames_per_second is not None:
+        raise UnusableKeyError("run.frames_per_second", "expected either samples_per_cycle or frames_per_second")
+    if table.samples_per_cycle is not None or (table.frames_per_second is None and not case.loose):
+        return table.samples_per_cycle or 20, 1
+    wanted = case.drive.frequency / (table.frames_per_second or _FRAMES_PER_SECOND)
+    return (round(1.0 / wanted), 1) if wanted < 1.0 else (1, round(wanted))
+
+
+def _bridge_sampling(table: RunTable, case: Case, samples: int) -> int:
+    bridges = table.bridge_samples_per_cycle
+    if case.loose and bridges is not None:
+        raise UnusableKeyError(
+            "run.bridge_samples_per_cycle", "expected none: bridges of loose beads are in every frame"
+        )
+    if bridges is None:
+        return 1 if case.loose else samples
+    if samples % bridges:
+        told = f"expected a divisor of samples_per_cycle = {samples}"
+        raise UnusableKeyError("run.bridge_samples_per_cycle", told)
+    return samples // bridges
+
+
+def _cycles(table: RunTable, case: Case, cycles_per_sample: int) -> int:
+    if table.cycles is not None and table.duration is not None:
+        raise UnusableKeyError("run.duration", "expected either cycles or a duration")
+    if table.duration is not None:
+        return ceil(table.duration * case.drive.frequency / cycles_per_sample * (1.0 - 1e-12)) * cycles_per_sample
+    if table.cycles is None and case.loose:
+        raise UnusableKeyError("run.duration", 'missing; expected such as "4 s"')
+    return ceil((table.cycles or 60) / cycles_per_sample) * cycles_per_sample
+
+
+def largest_time_step(given: float | None, limits: TimeStepLimits, *, allow_unstable: bool) -> float:
+    """The step that a case gives, or the one that ``"auto"`` takes, s.
+
+    Raises
+    ------
+    UnusableKeyError
+        If a given one is beyond a limit and the case does not insist.
+    """
+    if given is None:
+        return limits.recommended()
+    exceeded = limits.exceeded_by(given)
+    if exceeded and not allow_unstable:
+        allowed = min(limits.as_dict().values())
+        raise UnusableKeyError(
+            "run.time_step",
+            f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed * 1e6:.3g} us, "
+            '"auto", or allow_unstable = true',
+        )
+    return given
