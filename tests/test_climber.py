@@ -9,6 +9,7 @@ import pytest
 from tests.conftest import document
 from walkers.inputs import InputError, load_case, resolve_case
 from walkers.inputs.case import Case
+from walkers.inputs.reading import read_toml, shipped_cases
 from walkers.postprocess.analysis import describe_result, read_result
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
@@ -41,6 +42,14 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.mark.parametrize("friction", list(FRICTIONS))
+def test_a_climber_is_a_dimer_on_a_plane_at_90_degrees() -> None:
+    """Facing right is facing up there: the same case, hence the same run."""
+    tables = read_toml(shipped_cases()["climber"])
+    assert tables["boundary"]["tilt"] == "90 deg"
+    tables["dimers"]["facing"] = "right"
+    assert resolve_case(tables).determinants() == load_case("climber").determinants()
+
+
 def test_a_climber_climbs_if_friction_suffices(runs: dict[str, Path], friction: float) -> None:
     velocity = read_result(runs[str(friction)])["velocity"]["mean"]
     assert velocity == pytest.approx(FRICTIONS[friction], rel=0.03)
