@@ -14,6 +14,7 @@ Apart = Callable[[int, int], float]
 """Distance of two touching beads seen from above, m, by their numbers."""
 Places = list[tuple[float, float]]
 Pairs = tuple[tuple[int, int], ...]
+_TOO_SMALL = "a bead is too small to touch two that touch each other"
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,10 @@ def _fan(radii: Sequence[float], apart: Apart) -> Places:
     turns = [0.0]
     for bead in range(1, len(radii) - 1):
         one, other, between = apart(0, bead), apart(0, bead + 1), apart(bead, bead + 1)
-        turns.append(turns[-1] + acos((one**2 + other**2 - between**2) / (2.0 * one * other)))
+        cosine = (one**2 + other**2 - between**2) / (2.0 * one * other)
+        if abs(cosine) > 1.0:
+            raise ValueError(_TOO_SMALL)
+        turns.append(turns[-1] + acos(cosine))
     if turns[-1] + turns[-1] / max(len(turns) - 1, 1) > 2.0 * pi * (1.0 + 1e-9):
         raise ValueError("so many beads do not fit around the first one")
     front = apart(0, 1) * radii[0] / (radii[0] + radii[1])
@@ -69,6 +73,8 @@ def _diamond(radii: Sequence[float], apart: Apart) -> Places:
     along, across = right[0] - left[0], right[1] - left[1]
     width, reach, other = apart(1, 2), apart(1, 3), apart(2, 3)
     share = (reach**2 - other**2 + width**2) / (2.0 * width**2)
+    if reach < abs(share) * width:
+        raise ValueError(_TOO_SMALL)
     height = sqrt(reach**2 - (share * width) ** 2) / width
     back = (left[0] + share * along + height * across, left[1] + share * across - height * along)
     return [front, left, right, back]

@@ -118,13 +118,14 @@ class Walkers:
         return (first + second) * cos(asin((first - second) / (first + second)))
 
     @cached_property
-    def _design(self) -> Places:
+    def design(self) -> Places:
+        """Where the beads stand, in the walker's own frame, were they rigid and on a plane, m."""
         return list(self.places) or ARRANGEMENTS[self.arrangement].places(self.radii, self._rigid)
 
     @cached_property
     def length(self) -> float:
         """From the outermost point of one bead to that of another, seen from above, m."""
-        places, radii = self._design, self.radii
+        places, radii = self.design, self.radii
         known = {} if self.places else {pair: self._rigid(*pair) for pair in self.pairs}
         return max(
             known.get((one, other), hypot(places[one][0] - places[other][0], places[one][1] - places[other][1]))
@@ -136,7 +137,7 @@ class Walkers:
     @cached_property
     def front(self) -> tuple[float, ...]:
         """Weight of each bead's place in the vector to where a walker was to face; their sum is zero."""
-        along = [place[0] for place in self._design]
+        along = [place[0] for place in self.design]
         middle = sum(along) / len(along)
         largest = max(abs(place - middle) for place in along)
         if largest < 1e-9 * self.length:  # all side by side: it faces the way that is to the right of their row
@@ -156,7 +157,7 @@ class Walkers:
         many = (sum(large), len(large) - sum(large))
         weights = tuple(1.0 / many[0] if is_large else -1.0 / many[1] for is_large in large)
         lever = [
-            sum(weight * place[axis] for weight, place in zip(weights, self._design, strict=True)) for axis in (0, 1)
+            sum(weight * place[axis] for weight, place in zip(weights, self.design, strict=True)) for axis in (0, 1)
         ]
         return weights if hypot(*lever) > _LEAST_LEVER * self.length else self.front
 
@@ -191,6 +192,8 @@ class Walkers:
 
         def apart(one: int, other: int) -> float:
             between = self.radii[one] + self.radii[other] - known[min(one, other), max(one, other)]
+            if between < abs(heights[one] - heights[other]):
+                raise ValueError("so unlike beads rest at heights at which they do not touch each other")
             return sqrt(between**2 - (heights[one] - heights[other]) ** 2)
 
         return ARRANGEMENTS[self.arrangement].places(self.radii, apart)

@@ -7,7 +7,7 @@ from math import dist, pi
 from typing import Literal
 
 from walkers.inputs.arrangements import ARRANGEMENTS, gap_between
-from walkers.inputs.bodies import Mixture, Placed, Walkers
+from walkers.inputs.bodies import Mixture, Placed, Standing, Walkers
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.inputs.errors import UnusableKeyError
@@ -74,32 +74,53 @@ def _arranged(table: ClusterTable, key: str, walkers: Walkers) -> Walkers:
     if (table.arrangement is None) == (table.at is None):
         told = f"expected either an arrangement ({', '.join(ARRANGEMENTS)}) or places (at)"
         raise UnusableKeyError(f"{key}.arrangement", told)
-    if table.at is None:
-        name = table.arrangement or ""
-        if name not in ARRANGEMENTS:
-            told = f"expected one of {', '.join(ARRANGEMENTS)}{suggestion(name, ARRANGEMENTS)}"
-            raise UnusableKeyError(f"{key}.arrangement", told)
-        known = ARRANGEMENTS[name]
-        if not known.fewest <= len(walkers.radii) <= known.most:
-            bound = f"at least {known.fewest}" if known.fewest < known.most else str(known.most)
-            raise UnusableKeyError(f"{key}.radii", f"expected {bound} beads in a {name}")
-        walkers = replace(walkers, arrangement=name)
-        try:
-            walkers.front  # noqa: B018, where they stand is computed here
-        except ValueError as error:
-            raise UnusableKeyError(f"{key}.radii", str(error)) from error
-        return walkers
-    if len(table.at) != len(walkers.radii):
+    if table.at is not None:
+        return _at_places(table.at, key, walkers)
+    name = table.arrangement or ""
+    known = ARRANGEMENTS.get(name)
+    if known is None:
+        told = f"expected one of {', '.join(ARRANGEMENTS)}{suggestion(name, ARRANGEMENTS)}"
+        raise UnusableKeyError(f"{key}.arrangement", told)
+    if not known.fewest <= len(walkers.radii) <= known.most:
+        bound = f"at least {known.fewest}" if known.fewest < known.most else str(known.most)
+        raise UnusableKeyError(f"{key}.radii", f"expected {bound} beads in a {name}")
+    walkers = replace(walkers, arrangement=name)
+    try:
+        overlap = _overlap(walkers)
+    except ValueError as error:
+        raise UnusableKeyError(f"{key}.radii", str(error)) from error
+    if overlap is not None:
+        told = f"beads {overlap[0] + 1} and {overlap[1] + 1} would overlap in a {name}"
+        raise UnusableKeyError(f"{key}.radii", told)
+    return walkers
+
+
+def _at_places(places: list[tuple[float, float]], key: str, walkers: Walkers) -> Walkers:
+    """A cluster whose beads are given places: they touch, do not overlap, and have a heading."""
+    if len(places) != len(walkers.radii):
         raise UnusableKeyError(f"{key}.at", f"expected a place for each of the {len(walkers.radii)} beads")
-    for other in range(len(table.at)):
-        for one in range(other):
-            least = -_OVERLAP * min(walkers.radii[one], walkers.radii[other])
-            if gap_between(table.at, walkers.radii, one, other) < least:
-                raise UnusableKeyError(f"{key}.at[{other}]", f"overlaps with {key}.at[{one}]")
-    walkers = replace(walkers, arrangement="given", places=tuple(table.at))
+    walkers = replace(walkers, arrangement="given", places=tuple(places))
+    if (overlap := _overlap(walkers)) is not None:
+        raise UnusableKeyError(f"{key}.at[{overlap[1]}]", f"overlaps with {key}.at[{overlap[0]}]")
     if not any(walkers.front):
         raise UnusableKeyError(f"{key}.at", "expected some beads ahead of others: this has no heading")
+    joined = {0}
+    for _ in walkers.radii:
+        joined |= {bead for pair in walkers.pairs if joined & {*pair} for bead in pair}
+    if len(joined) < len(walkers.radii):
+        alone = min({*range(len(walkers.radii))} - joined)
+        raise UnusableKeyError(f"{key}.at[{alone}]", "expected beads that touch: nothing joins this one to the first")
     return walkers
+
+
+def _overlap(walkers: Walkers) -> tuple[int, int] | None:
+    """Two beads of a walker that overlap by more than a share of their radii, if there are any."""
+    radii, places = walkers.radii, walkers.design
+    for other in range(len(radii)):
+        for one in range(other):
+            if gap_between(places, radii, one, other) < -_OVERLAP * min(radii[one], radii[other]):
+                return one, other
+    return None
 
 
 def mixture_of(table: MixtureTable, boundary: Boundary) -> Mixture:
@@ -145,7 +166,7 @@ def check_bodies(case: Case, file: CaseFile) -> None:
         _check_pour(case.mixture, boundary, case.tops_of_others(case.mixture))
     if case.placed is not None:
         _check_places(case.placed, boundary)
-    if case.walkers and (len(boundary.walls) > 1 or case.placed is not None):
+    if case.walkers and (boundary.walls != ("floor",) or case.placed is not None):
         _check_walkers(case, file)
 
 
@@ -153,12 +174,22 @@ def _check_walkers(case: Case, file: CaseFile) -> None:
     """Walkers between the walls and beside the beads that are placed."""
     keys = [key for number, one in enumerate(case.walkers) for key in [_key_of(file, number)] * one.replicates]
     grid = case.boundary.grid(len(keys), max(walkers.spacing for walkers in case.walkers))
-    standing = [one for walkers in case.walkers for one in walkers.stand(case, 0)]
+    standing: list[Standing] = []
+    for number, walkers in enumerate(case.walkers):
+        try:
+            standing += walkers.stand(case, len(standing))
+        except ValueError as error:
+            raise UnusableKeyError(f"{_key_of(file, number)}.radii", str(error)) from error
+    if case.boundary.inner_width / 2.0 < max(radius for walkers in case.walkers for radius in walkers.radii):
+        raise UnusableKeyError("boundary.width", "expected more than a bead's diameter")
     others = case.placed.beads if case.placed is not None else ()
     for key, (x, y), walker in zip(keys, grid, standing, strict=True):
         for bead in walker.beads:
-            if case.boundary.side_clearance(x + bead.x, y + bead.y) < (1.0 - _OVERLAP) * bead.radius:
-                raise UnusableKeyError(f"{key}.replicates", "so many walkers do not fit between the walls")
+            if case.boundary.side_clearance(x + bead.x, y + bead.y, bead.z) < (1.0 - _OVERLAP) * bead.radius:
+                told = f"so many walkers, or such, do not fit between the walls of the {case.boundary.shape}"
+                raise UnusableKeyError(f"{key}.replicates", told)
+            if bead.z + bead.radius > case.boundary.top:
+                raise UnusableKeyError("boundary.height", f"too low for the walkers of {key}")
             for number, (*there, size) in enumerate(others):
                 if dist((x + bead.x, y + bead.y, bead.z), there) < (1.0 - _OVERLAP) * (bead.radius + size):
                     raise UnusableKeyError(f"placed[{number}].at", f"overlaps with one of {key}")
@@ -180,7 +211,7 @@ def _check_places(placed: Placed, boundary: Boundary) -> None:
     """Beads within the boundary that do not overlap by more than a hundredth of a radius."""
     for number, (x, y, z, radius) in enumerate(placed.beads):
         slack = _OVERLAP * radius
-        if boundary.side_clearance(x, y) < radius - slack or z < radius - slack or z + radius > boundary.top:
+        if boundary.side_clearance(x, y, z) < radius - slack or z < radius - slack or z + radius > boundary.top:
             raise UnusableKeyError(f"placed[{number}].at", "expected a bead within the boundary")
         for other in range(number):
             *there, size = placed.beads[other]

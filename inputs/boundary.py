@@ -1,6 +1,6 @@
 """What beads stand on and lie in: planes, channels, boxes, cylinders. To add one, write a class, name it in `Shape`.
 
-Every boundary has a floor, the plane z = 0 in its own frame, and may have side walls. It may lean: `tilt` is the angle
+Most have a floor, the plane z = 0 in their own frame, and may have side walls. A boundary may lean: `tilt` is the angle
 of its floor to the horizontal, `uphill` the direction of the steepest way up within the floor.
 """
 
@@ -118,11 +118,11 @@ class Boundary:
 
     @abstractmethod
     def faces(self) -> tuple[Face, ...]:
-        """The floor first, then the side walls."""
+        """The floor first, if there is one, then the side walls."""
 
     @property
     def walls(self) -> tuple[str, ...]:
-        """Names of the walls: the floor first, then the sides."""
+        """Names of the walls: the floor first, if there is one, then the sides."""
         return tuple(dict.fromkeys(face.wall for face in self.faces()))
 
     @abstractmethod
@@ -137,15 +137,15 @@ class Boundary:
         """Height above the origin at which a bead of a radius (m) rests, m."""
         return radius
 
-    def side_clearance(self, x: float, y: float) -> float:
+    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
         """Distance of a place from the nearest side wall, m."""
-        del x, y
+        del x, y, z
         return inf
 
     @property
     def inner_width(self) -> float:
-        """Between the side walls, m."""
-        return 2.0 * self.side_clearance(0.0, 0.0)
+        """Between upright side walls, m."""
+        return 2.0 * self.side_clearance(0.0, 0.0, inf)
 
     @property
     def top(self) -> float:
@@ -190,8 +190,16 @@ class Plane(Boundary):
         return [((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing) for row, column in cells]
 
 
+class _Row(Boundary):
+    """What has no end along x: walkers stand in a row."""
+
+    def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
+        """A row along x."""
+        return [((place - (number - 1) / 2.0) * spacing, 0.0) for place in range(number)]
+
+
 @dataclass(frozen=True, kw_only=True)
-class Channel(Boundary):
+class Channel(_Row):
     """A floor between two upright walls, without end along x.
 
     Attributes
@@ -219,18 +227,14 @@ class Channel(Boundary):
             self, (half_x, half_y), max(span.height + 2.0 * span.margin, self.width), span.largest, ranks
         )
 
-    def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
-        """A row along the channel."""
-        return [((place - (number - 1) / 2.0) * spacing, 0.0) for place in range(number)]
-
-    def side_clearance(self, x: float, y: float) -> float:
+    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
         """Distance from the nearer wall, m."""
-        del x
+        del x, z
         return self.width / 2.0 - abs(y)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Groove(Boundary):
+class Groove(_Row):
     """A V-shaped channel: two walls that meet in the x axis, without end along it.
 
     Attributes
@@ -254,14 +258,15 @@ class Groove(Boundary):
         """Height at which a bead touches both walls, m."""
         return radius / sin(self.opening / 2.0)
 
+    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
+        """Distance from the nearer wall, m."""
+        del x
+        return z * sin(self.opening / 2.0) - abs(y) * cos(self.opening / 2.0)
+
     def room(self, span: Span, ranks: int) -> Room:
         """A box about the walkers' ways, the carriers below the walls."""
         half_x, half_y = span.half_x + 2.0 * span.margin, span.half_y + 2.0 * span.margin
         return _room_above(self, (half_x, half_y), span.height + 2.0 * span.margin, span.largest, ranks)
-
-    def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
-        """A row along the groove."""
-        return [((place - (number - 1) / 2.0) * spacing, 0.0) for place in range(number)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -321,8 +326,9 @@ class Box(Container):
             Face("y", -1, (aside, half, level), wall="+y"),
         )
 
-    def side_clearance(self, x: float, y: float) -> float:
+    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
         """Distance from the nearest wall, m."""
+        del z
         return self.width / 2.0 - max(abs(x), abs(y))
 
     @property
@@ -344,8 +350,9 @@ class Cylinder(Container):
         floor = Face("z", 1, (0.0137 * self.width, 0.0, 0.0))
         return (floor, *(Face("x", -1, place, turn, "side") for place, turn in sides))
 
-    def side_clearance(self, x: float, y: float) -> float:
+    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
         """Distance from the nearest of the prism's faces, m."""
+        del z
         return self.width / 2.0 - max(x * cos(turn) + y * sin(turn) for turn in _turns())
 
     def layer(self, largest: float) -> Layer:

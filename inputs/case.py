@@ -148,9 +148,14 @@ class Case:
         return max([*walkers, *(z + radius for _, _, z, radius in placed)], default=0.0)
 
     @property
+    def apart(self) -> bool:
+        """Whether there are walkers alone, which are to be independent of each other."""
+        return bool(self.walkers) and not self.loose and not self.meets
+
+    @property
     def independent(self) -> bool:
-        """Whether its walkers are independent of each other, so that others' may stand beside them in a deck."""
-        return not self.loose and self.run.in_one and self.boundary.walls == ("floor",) and not self.meets
+        """Whether its walkers are so wherever they stand, so that others' may stand beside them in a deck."""
+        return self.apart and self.run.in_one and self.boundary.walls == ("floor",)
 
     @property
     def meets(self) -> bool:

@@ -21,6 +21,7 @@ WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
     "triangle": tuple((k, 8.0 / pi**2 / k**2 * (-1.0) ** (k // 2)) for k in range(1, 10, 2)),
 }
 """Of the acceleration: multiples of the frequency and shares of the peak. A triangle's series is cut at 0.96 of it."""
+_FEW = 3
 MOST_PERIODS = 1000
 """Of the fastest harmonic in a cycle."""
 
@@ -115,11 +116,16 @@ class Drive:
 
     def described(self) -> str:
         """The harmonics in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""
-        return " + ".join(
+        shown = self.harmonics if len(self.harmonics) <= _FEW else (self.largest,)
+        words = [
             f"{one.frequency:g} Hz, a0 = {one.peak_acceleration:.4g} m/s²"
             + (f", {degrees(one.phase):g}°" if one.phase else "")
-            for one in self.harmonics
-        )
+            for one in shown
+        ]
+        if len(shown) < len(self.harmonics):
+            highest = max(one.frequency for one in self.harmonics)
+            words.append(f"{len(self.harmonics) - 1} harmonics up to {highest:g} Hz")
+        return " + ".join(words)
 
 
 def common_frequency(frequencies: list[float]) -> float:

@@ -36,6 +36,8 @@ _BOUNDS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at mos
 _BOUND_UNITS = {
     "contact.youngs_modulus": " Pa (softer contacts change the speed, harder ones the engine refuses)",
     "liquid.contact_angle": " rad",
+    "boundary.tilt": " rad (90 degrees, a wall)",
+    "boundary.opening": " rad (from 30 to 177 degrees)",
 }
 _PLAIN = {
     "tuple_type": "expected a list",

@@ -37,9 +37,8 @@ def resolve_drive(table: DriveTable, axis: str, dimer: Dimer | None) -> Drive:
     """
     besides = sorted(table.model_fields_set - {"harmonics", "frame"})
     if table.harmonics and besides:
-        raise UnusableKeyError(
-            f"drive.{besides[0]}", f"expected none beside drive.harmonics: write drive.harmonics[0].{besides[0]}"
-        )
+        instead = f": write drive.harmonics[0].{besides[0]}" if besides[0] in HarmonicTable.model_fields else ""
+        raise UnusableKeyError(f"drive.{besides[0]}", f"expected none beside drive.harmonics{instead}")
     if table.harmonics:
         harmonics = tuple(
             _harmonic(one, f"drive.harmonics[{number}]", axis, dimer) for number, one in enumerate(table.harmonics)
@@ -95,8 +94,14 @@ def resolve_run(table: RunTable, case: Case) -> Run:
     settling = table.settling_cycles
     if settling is None:
         settling = min(20, cycles // 3) if case.walkers else 0
+    if cycles < 2:
+        key = "run.duration" if table.duration is not None else "run.cycles"
+        raise UnusableKeyError(key, f"expected at least two cycles of the drive, {2.0 / frequency:.4g} s")
     if cycles - settling < 2:
         raise UnusableKeyError("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
+    if case.walkers and cycles // cycles_per_sample <= -(-settling // cycles_per_sample):
+        told = f"expected more: one frame in {cycles_per_sample} cycles leaves none after {settling} settling ones"
+        raise UnusableKeyError("run.frames_per_second", told)
     rest = table.longest_settling
     if rest is None:
         rest = _LONGEST_SETTLING if case.loose else 0.0

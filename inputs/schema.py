@@ -171,8 +171,8 @@ class LiquidTable(Table):
 class BoundaryTable(Table):
     """``[boundary]``: what the beads stand on and lie in.
 
-    A plane, a channel (two walls and a floor, of a ``width``), a groove (two walls at an angle, its ``opening``), or a
-    container open above (of a ``width`` and a
+    A plane, a channel (two walls and a floor, of a ``width``), a groove (two walls at an
+    angle, its ``opening``), or a container open above (of a ``width`` and a
     ``height``). It leans by ``tilt``: 0° is level, a plane at 90° a wall. ``uphill`` is the direction of the steepest
     way up, from that of the drive within the floor.
     """

@@ -309,6 +309,8 @@ def _put(document: dict[str, Any], key: str, value: Value) -> None:
     table: Any = document
     for name, index in tables:
         table = table.setdefault(name, {}) if index is None else _entry(table, name, int(index), key, value)
+        if isinstance(table, list):
+            raise UnusableAxisError(key, value, f"{name} is a list: say which one, such as {name}[0]")
         if not isinstance(table, dict):  # the base case is wrong there, which its own check tells
             return
     name, index = last

@@ -23,10 +23,10 @@ from walkers.templates.layout import Layout, PlacedWalker
 
 IntArray = npt.NDArray[np.int64]
 FLOOR = 0
-"""Number of the floor among the walls; the others are the side walls."""
+"""Number of the floor among the walls of a container; the others are the side walls."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Motion:
     """Places and velocities relative to the boundary; F frames of N beads, SI units.
 
@@ -66,6 +66,9 @@ class Motion:
     frames: list[tuple[Path, int]]
     truncated: bool
 
+    def __repr__(self) -> str:
+        return f"<Motion of {self.case.name}: {len(self.time)} frames of {len(self.radius)} beads>"
+
     @property
     def first_driven(self) -> int:
         """Number of the first frame of the drive; of the last one where it has not begun."""
@@ -104,7 +107,7 @@ class Motion:
         ]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Group:
     """The walkers of one make in a motion: W walkers of n beads each.
 
@@ -121,6 +124,9 @@ class Group:
     motion: Motion
     make: Walkers
     walkers: list[PlacedWalker]
+
+    def __repr__(self) -> str:
+        return f"<Group of {self.case.name}: {len(self.walkers)} walkers of {len(self.make.radii)} beads>"
 
     @property
     def case(self) -> Case:
@@ -195,6 +201,25 @@ class Group:
         angle = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis))
         unwrapped: FloatArray = np.unwrap(angle, axis=0)
         return unwrapped
+
+
+def gathered(motion: Motion) -> Motion:
+    """Independent walkers near each other, to be looked at: on parallel lanes two lengths apart.
+
+    Between walls there is no room for lanes: then the first walker alone. Everything else is left as it is.
+    """
+    case = motion.case
+    if not case.apart:
+        return motion
+    lane = 2.0 * max(make.length for make in case.walkers)
+    across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
+    shift = np.array([-number * lane * across - [*one.origin, 0.0] for number, one in enumerate(motion.walkers)])
+    moved = replace(motion, position=motion.position + shift[motion.walker_of])
+    if case.boundary.walls == ("floor",):
+        return moved
+    count = len(motion.walkers[0].beads)
+    arrays = {name: getattr(moved, name)[:, :count] for name in ("position", "velocity", "spin")}
+    return replace(moved, **arrays, radius=motion.radius[:count], walkers=motion.walkers[:1])
 
 
 def read_motion(directory: str | Path) -> Motion:

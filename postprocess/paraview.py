@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from walkers.inputs.errors import InputError, Problem
 from walkers.postprocess.analysis import analyses_of
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
+from walkers.postprocess.motion import Bridges, Motion, gathered, read_bridges, read_motion
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -148,14 +148,6 @@ def _check_replaceable(place: Path) -> None:
     for path in place.iterdir():
         if path.suffix not in ours:
             raise InputError(str(place), [Problem("", None, f"{expected}; it holds {path.name}")])
-
-
-def gathered(motion: Motion) -> Motion:
-    """The same walkers on parallel lanes two lengths apart; as independent replicates they may stand anywhere."""
-    lane = 2.0 * max(make.length for make in motion.case.walkers)
-    across = np.cross([0.0, 0.0, 1.0], motion.case.drive_axis)
-    shift = np.array([-number * lane * across - [*one.origin, 0.0] for number, one in enumerate(motion.walkers)])
-    return replace(motion, position=motion.position + shift[motion.walker_of])
 
 
 @dataclass(frozen=True)

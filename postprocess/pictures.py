@@ -9,6 +9,7 @@ import os
 import re
 from collections.abc import Callable, Collection, Generator, Sequence
 from contextlib import closing
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_picture, new_figure, save_figure, styled
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.motion import Group, Motion, read_motion
+from walkers.postprocess.motion import Group, Motion, gathered, read_motion
 from walkers.postprocess.piles import Pile, analyse
 from walkers.runner.directory import CASE_NAME
 from walkers.runner.files import beside, read_json
@@ -36,12 +37,16 @@ _GLASS = ("#8c9aa5", "#c9d2d8")
 """Large and small beads, of those that are pointed out and of the others."""
 _FLOOR = "#c9d2d8"
 _MOST_PIXELS = 4000
-_MANY = 500
+_FEW, _MANY = 100, 500
 """Beads from which on spheres are drawn coarser."""
 _SHOWN = 6
 """Pictures in a time series."""
 _TOLERANCE = 0.1
 """Of a time between pictures: frames are where they are."""
+_MOST_PICTURES = 60.0
+"""A second, in a film."""
+_LEAST_PIXELS = 600
+"""Of the longer side of a picture."""
 _MARGIN = 64
 """Pixels for the scale beside a film."""
 _LEAST_WIDTH = 200
@@ -53,7 +58,7 @@ def render_run(directory: Path, destination: Path | None = None, *, images: int 
 
     Parameters and errors are those of `render_walker` and `render_series`.
     """
-    if Case.from_dict(read_json(directory / CASE_NAME)).independent:
+    if Case.from_dict(read_json(directory / CASE_NAME)).apart:
         return [render_walker(directory, destination, images=images)]
     return render_series(directory, destination, images=images)
 
@@ -185,7 +190,7 @@ class View:
     motion
         Of the run.
     pixels
-        To a millimetre, at most.
+        To a millimetre; more of them where the picture would be small, fewer where it would be too large.
 
     Attributes
     ----------
@@ -204,11 +209,12 @@ class View:
         self.axes = ("x", "height" if sideways else "y")
         self.low, self.high = _corners(motion, sideways)
         extents = self.high - self.low
-        pixels = min(pixels, _MOST_PIXELS / (1e3 * float(extents.max())))
+        longest = 1e3 * float(extents.max())
+        pixels = min(max(pixels, _LEAST_PIXELS / longest), _MOST_PIXELS / longest)
         size = [2 * max(1, round(extent * pixels * 1e3 / 2.0)) for extent in extents]
         self._plotter = pv.Plotter(off_screen=True, window_size=size, lighting="light kit")
         self._plotter.background_color = pv.Color("white")
-        rounds = 18 if len(motion.radius) < _MANY else 10
+        rounds = 36 if len(motion.radius) < _FEW else 18 if len(motion.radius) < _MANY else 10
         ball = pv.Sphere(radius=1.0, theta_resolution=rounds, phi_resolution=rounds)
         self._around = (motion.radius[:, None, None] * ball.points * 1e3).astype(np.float32)
         first = np.arange(len(motion.radius), dtype=np.int64) * ball.n_points
@@ -285,7 +291,7 @@ def render_series(
     """
     path = destination or directory / SERIES_NAME
     check_picture(path, ".png")
-    motion = read_motion(directory)
+    motion = gathered(read_motion(directory))
     frames = _frames_evenly(motion, images) if apart is None else _frames_apart(motion, images, apart, directory)
     pointed_out = _pointed_out(motion)
     view = View(motion)
@@ -293,7 +299,8 @@ def render_series(
     wide, tall = high - low
     across = max(0.8, 4.0 * wide / tall + 0.3)  # inches a picture, which is four inches high
     scale = min(1.0, 20.0 / (across * len(frames)))  # a page holds so many
-    figure, axes = new_figure(1.0 + scale * across * len(frames), 1.0 + 4.0 * scale, ncols=len(frames), sharey=True)
+    size = (1.0 + max(scale * across, 0.8) * len(frames), 1.2 + 4.0 * scale)
+    figure, axes = new_figure(*size, ncols=len(frames), sharey=True)
     aside = max(1, int(wide * 0.4))  # mm, whole ones within the picture
     decimals = 2 if apart is None or apart >= 0.1 else 4
     for panel, frame in zip(np.atleast_1d(axes), frames, strict=True):
@@ -318,7 +325,7 @@ def render_film(directory: Path, destination: Path | None = None, *, slowdown: f
     destination
         The MP4 to write (H.264); ``film.mp4`` in the run directory if None.
     slowdown
-        How many times slower than in reality: every frame of the drive is shown, one after the other.
+        How many times slower than in reality; of frames that follow each other faster than any screen some are shown.
 
     Raises
     ------
@@ -331,13 +338,16 @@ def render_film(directory: Path, destination: Path | None = None, *, slowdown: f
 
     path = destination or directory / FILM_NAME
     check_picture(path, ".mp4")
-    motion = read_motion(directory)
+    motion = gathered(read_motion(directory))
     time = motion.time
-    shown = range(motion.first_driven, len(time))
+    between = float(np.median(np.diff(time[motion.first_driven :]))) if len(time) > motion.first_driven + 1 else 1.0
+    # No screen shows more than so many pictures a second.
+    stride = max(1, ceil(1.0 / (_MOST_PICTURES * slowdown * between) - 1e-9))
+    shown = range(motion.first_driven, len(time), stride)
     path.parent.mkdir(parents=True, exist_ok=True)
     pictures = _film(motion, shown)
     first = next(pictures)
-    rate = 1.0 / (float(np.median(np.diff(time[shown.start :]))) * slowdown) if len(shown) > 1 else 1.0
+    rate = 1.0 / (between * stride * slowdown) if len(shown) > 1 else 1.0
     size = (first.shape[1], first.shape[0])
     with closing(pictures), beside(path) as new:
         writer = write_frames(new, size, fps=rate, codec="libx264", quality=7, macro_block_size=2)

@@ -9,14 +9,13 @@ import numpy as np
 
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.tables import read_table
+from walkers.postprocess.walking import SEPARATED
 
 if TYPE_CHECKING:
     import pandas as pd
 
 ASTRAY = np.pi / 4.0
 """rad; a walker that ends farther from where it was to face has left the axis."""
-SEPARATED = 0.1
-"""Share of the time beyond which beads that no bridge can hold together are no walker."""
 
 
 def on_axis(walkers: pd.DataFrame) -> pd.Series[bool]:

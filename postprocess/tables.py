@@ -67,7 +67,7 @@ BRIDGES = {
     "contact": ("", "number of the contact, from 1: beads with walls, then pairs of beads; 0 for any other bridge"),
     "bead_1": ("", "number of the bead in the run, from 0"),
     "bead_2": ("", "number of the other bead, -1 for a wall"),
-    "wall": ("", "number of the wall, 0 for the floor, -1 for none"),
+    "wall": ("", "number of the wall, 0 for the floor if there is one, -1 for none"),
     "other_walker": ("", "number of the walker that the bridge joins it to, -1 for none"),
     "gap": ("m", "gap, negative where they touch"),
     "touching": ("", "whether the surfaces touch"),
@@ -244,6 +244,10 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
 
     if name not in TABLES:
         raise KeyError(f"no table {name!r}; expected one of {', '.join(TABLES)}")
-    frame: pd.DataFrame = pq.read_table(Path(directory) / f"{name}.parquet").to_pandas()
+    path = Path(directory) / f"{name}.parquet"
+    if not path.exists():
+        there = [one for one in TABLES if path.with_stem(one).exists()]
+        raise FileNotFoundError(f"{directory} has no table {name}; it has {', '.join(there) or 'none'}")
+    frame: pd.DataFrame = pq.read_table(path).to_pandas()
     frame.attrs["units"] = {column: unit for column, (unit, _) in described(name, frame.columns).items()}
     return frame

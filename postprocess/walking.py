@@ -18,10 +18,14 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.gait import Gait, Walk, gait, settled_samples, walk
+from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, gait, settled_samples, walk
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
 from walkers.postprocess.tables import WALKERS, described
 
+SEPARATED = 0.1
+"""Share of the time beyond which beads that no bridge can hold together are no walker."""
+SAME = 0.05
+"""Walkers that faced either way and differ by more than this share are told apart first of all."""
 NEAR = 1.5
 """Walkers whose mass centres come within this many lengths of one have met."""
 _DIMERS = [
@@ -34,7 +38,7 @@ class Walking(Analysis):
     """How walkers walk."""
 
     name = "walking"
-    version = 1
+    version = 2
     tables = ("trajectory", "walkers", "bridges")
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
@@ -65,7 +69,7 @@ class Walking(Analysis):
         return bool(case.walkers)
 
     def of(self, motion: Motion) -> Measured:
-        """Tables of all walkers; the result is of all of them, and of each make if there are several."""
+        """Tables of all walkers; the result is of all of them, its contacts of the first make, and of each make."""
         groups, gaits, walks = motion.groups, [gait(one) for one in motion.groups], [walk(one) for one in motion.groups]
         rows = [_walker_columns(*one) for one in zip(groups, gaits, walks, strict=True)]
         walkers = _stacked(rows)
@@ -76,8 +80,11 @@ class Walking(Analysis):
         }
         case = motion.case
         turned = np.concatenate([np.abs(group.orientation).max(axis=0) > np.pi / 2.0 for group in groups])
+        of_first = _summary(rows[0], turned[: len(groups[0].walkers)])
         summary = {
             **_summary(walkers, turned),
+            # A contact's number means another one in another make: these are of the first.
+            **{name: of_first[name] for name in ("rotation", "sliding", "open")},
             "walkers_met": walkers_met(groups),
             "meet": case.meets,
             "contacts": _contact_names(groups[0]),
@@ -143,6 +150,9 @@ class Walking(Analysis):
         warnings = []
         if result["steady"] < result["walkers"]:
             warnings.append("some walkers are not steady: the velocity depends on the length of the run")
+        if (result["separated_fraction"] or 0.0) > SEPARATED:
+            share = f"{100.0 * result['separated_fraction']:.0f} %"
+            warnings.append(f"beads of walkers are farther apart than a bridge reaches for {share} of the time")
         if result["walkers_met"] and not result["meet"]:
             warnings.append("walkers came close to each other and are not independent: give them more spacing")
         return warnings
@@ -365,11 +375,20 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     error, count = velocity["standard_error"], velocity["n"]
     of_what = f"over {count} walkers" if count > 1 else "of the fit"
     doubt = f" (standard error {_speed(error)} {of_what})" if error is not None else ""
-    toward = {0.0: "toward bead 1", None: "ahead"}.get(result["sin_delta"], "toward the large bead")
+    toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
     ways = ("up", "down") if result["goes_uphill"] else ("right", "left")
+    one, other = (result[side]["mean"] for side in ("right_facing", "left_facing"))
+    headline = f"{_speed(velocity['mean'])} mm/s, positive {toward}{doubt}"
+    if (
+        None not in (one, other)
+        and abs(one - other) > SAME * max(abs(one), abs(other))
+        and abs(one - other) > STEADY_SPEED
+    ):
+        # The mean over both is no walker's.
+        headline = f"facing {ways[0]} {_speed(one)}, facing {ways[1]} {_speed(other)} mm/s, positive {toward}"
     return [
         f"{result['case']}: {drive}",
-        f"  velocity   {_speed(velocity['mean'])} mm/s, positive {toward}{doubt}",
+        f"  velocity   {headline}",
         f"    smallest {_speed(velocity['smallest'])}, largest {_speed(velocity['largest'])}; {_steady(result)}",
         f"    started facing {ways[0]} {_side(result['right_facing'])}, {ways[1]} {_side(result['left_facing'])}",
     ]

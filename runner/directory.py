@@ -2,7 +2,8 @@
 
 A run is made in ``<name>-<hash>.incomplete`` and renamed to ``<name>-<hash>`` when its manifest has been written, last:
 a directory without a manifest is not a run, and a run that is made anew replaces the old one only when it has finished.
-What the engine was given and wrote is in ``segments/0000``, ``segments/0001``, …; a walker's run has one.
+What the engine was given and wrote is in ``segments/0000``, ``segments/0001``, …; walkers have one unless their case
+asks for more.
 While it is made, the file ``<name>-<hash>.lock`` is locked, also by the engine itself (see `walkers.runner.locks`).
 """
 

@@ -50,10 +50,8 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
         raise InputError(str(directory), [Problem("", None, f"a case cannot be read ({error})")]) from error
     if not cases:
         raise InputError(str(directory), [Problem("", None, "expected a finished run of a pile, or a folder or sweep")])
-    first = next(iter(cases.values()))
-    differ = [
-        key for key in first if key not in _NO_CONDITION and len({str(case.get(key)) for case in cases.values()}) > 1
-    ]
+    keys = dict.fromkeys(key for case in cases.values() for key in case if key not in _NO_CONDITION)
+    differ = [key for key in keys if len({str(case.get(key)) for case in cases.values()}) > 1]
     groups: dict[str, list[Path]] = {}
     for path, case in cases.items():
         groups.setdefault(", ".join(f"{key} = {_short(case.get(key))}" for key in differ), []).append(path)
@@ -61,10 +59,21 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
 
 
 def _conditions(case: Mapping[str, Any]) -> dict[str, Any]:
-    """Dotted keys of a resolved case, its harmonics one by one."""
-    drive = case["drive"]
-    harmonics = {f"harmonics[{number}]": one for number, one in enumerate(drive["harmonics"])}
-    return flatten({**case, "drive": {"frame": drive["frame"], **harmonics}}, lambda _: False)
+    """Dotted keys of a resolved case, entries of lists of tables one by one."""
+
+    def tables(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            entries = {
+                f"{key}[{number}]": one
+                for key, many in value.items()
+                if isinstance(many, list) and many and isinstance(many[0], Mapping)
+                for number, one in enumerate(many)
+            }
+            rest = {key: one for key, one in value.items() if f"{key}[0]" not in entries}
+            return {key: tables(one) for key, one in {**rest, **entries}.items()}
+        return value
+
+    return flatten(tables(case), lambda _: False)
 
 
 def _short(value: Any) -> str:

@@ -167,8 +167,8 @@ def first_segment(case: Case) -> Segment:
 
 
 def settling_steps(case: Case) -> int:
-    """Steps of a segment in which beads come to rest."""
-    sample = case.run.steps_per_sample
+    """Steps of a segment in which beads come to rest; it ends with a frame of beads and bridges."""
+    sample = case.run.steps_per_sample * case.run.samples_per_bridge_sample
     return max(1, round(SETTLING_SECONDS / case.run.time_step / sample)) * sample
 
 
@@ -348,7 +348,7 @@ def fastest_of(case: Case, scene: Scene) -> float:
     pull = capillary_force_at_wall(liquid.surface_tension, sizes[-1], volume, liquid.contact_angle)
     work = pull * rupture_distance(volume, liquid.contact_angle)
     deep = hop_height(case) if case.boundary.tilt == 0.0 else reach(case)
-    fall = sqrt(2.0 * case.gravity * (scene.upper[2] if case.loose else deep))
+    fall = sqrt(2.0 * case.gravity * (max(scene.upper[2], deep) if case.loose else deep))
     return (20.0 if case.loose else 10.0) * case.drive.peak_velocity + fall + sqrt(2.0 * work / mass)
 
 

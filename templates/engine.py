@@ -110,7 +110,7 @@ DEFECTS = (
     Defect(
         "A restart moves on a little differently",
         "A run that goes on from `read_restart` is not bit for bit the uninterrupted one.",
-        "It is used for statistics; each deck of a walker has one `run`.",
+        "It is used for statistics; walkers are made in one `run` unless their case asks for segments.",
         ("restart",),
     ),
     Defect(

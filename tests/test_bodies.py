@@ -21,6 +21,7 @@ from walkers.postprocess import read_table
 from walkers.postprocess.meetings import groups_of
 from walkers.templates.deck import render_deck
 from walkers.templates.placement import place
+from walkers.theory.prediction import describe, predict
 
 MM_PER_S = 1e-3
 FIG1B: dict[str, Any] = {
@@ -289,6 +290,52 @@ def test_walkers_may_run_in_segments_and_rest_first(tmp_path: Path) -> None:
         assert done.result["velocity"]["mean"] == pytest.approx(1.335 * MM_PER_S, rel=2e-3)
 
 
+@pytest.mark.parametrize("frequency", ["73 Hz", "74 Hz"])
+def test_a_rest_before_the_drive_is_one(tmp_path: Path, frequency: str) -> None:
+    """Whatever part of a cycle it takes: nothing moves meanwhile, the film drags as it does without it."""
+    dimers = {"dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1, "angle_spread": "0 deg"}}
+    drive = {"drive": {"frequency": frequency, "peak_acceleration": "4 g"}}
+    run = {"cycles": 30, "settling_cycles": 20}
+    speeds = []
+    for rest in ("0 s", "0.06 s"):
+        done = walkers.run(of_tables(**dimers, **drive, run={**run, "longest_settling": rest}), tmp_path)
+        speeds.append(done.result["velocity"]["mean"])
+    resting = done.motion.time < 0.0
+    assert resting.any()
+    assert np.abs(done.motion.velocity[resting]).max() < 1e-4
+    assert speeds[1] == pytest.approx(speeds[0], rel=0.01)
+
+
+def test_contacts_are_those_of_the_first_make_where_there_are_several(tmp_path: Path) -> None:
+    """Contact 3 is bead on bead of a dimer, and bead 3 on the floor of a trimer: they are not averaged."""
+    run = {"run": {"cycles": 24, "settling_cycles": 12}}
+    dimers = {"dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1}}
+    both = walkers.run(of_clusters(cluster("fan", "Lss"), **dimers, **run), tmp_path).result
+    assert both["sliding"] == both["makes"][0]["sliding"]
+    assert len(both["makes"][1]["sliding"]) == 6
+
+
+def test_a_sweep_of_an_entry_of_a_list_says_which(tmp_path: Path) -> None:
+    case = to_toml(FIG1B) + "[[clusters]]\n" + to_toml(cluster("fan", "Lss"))
+    (tmp_path / "case.toml").write_text(case)
+    (tmp_path / "sweep.toml").write_text('case = "case.toml"\n[axes]\nclusters.angle = ["0 deg", "45 deg"]\n')
+    done = call("sweep", str(tmp_path / "sweep.toml"), "--dry-run")
+    assert done.returncode == 2
+    assert "clusters is a list: say which one, such as clusters[0]" in done.stderr
+
+
+def test_walkers_on_a_slope_are_told_apart_by_where_they_go(tmp_path: Path) -> None:
+    """Up 0.93, down 1.74 mm/s: the mean is no walker's, and theory is set beside those that go up."""
+    dimers = {"dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2}}
+    boundary = {"boundary": {**FIG1B["boundary"], "tilt": "5 deg"}}
+    done = walkers.run(of_tables(**dimers, **boundary, run={"cycles": 40, "settling_cycles": 20}), tmp_path)
+    assert "velocity   facing up 0.9" in done.describe()
+    assert describe(predict(done.case), done.result).count("engine                            0.9") == 1
+    assert len(repr(done.motion)) < 100 > len(repr(done.motion.groups[0]))
+    with pytest.raises(FileNotFoundError, match="has no table bed; it has trajectory, walkers, bridges"):
+        done.table("bed")
+
+
 def test_a_case_of_every_body_comes_back_from_its_json() -> None:
     case = resolve_case(everything())
     assert Case.from_dict(case.as_dict()) == case
@@ -348,6 +395,33 @@ def test_a_bead_may_lie_on_a_plane_beside_walkers_or_alone(tmp_path: Path) -> No
         ),
         ({"clusters": [cluster("ring", "Ls")]}, "clusters[0].radii"),
         ({"clusters": [cluster("diamond", "Lss")]}, "expected 4 beads in a diamond"),
+        (
+            {"clusters": [{"arrangement": "chain", "radii": ["0.3 mm", "0.05 mm", "0.3 mm"]}]},
+            "beads 1 and 3 would overlap in a chain",
+        ),
+        (
+            {"clusters": [{"radii": ["0.3 mm", "0.2 mm"], "at": [["0 mm", "0 mm"], ["-1 mm", "0 mm"]]}]},
+            "nothing joins this one to the first",
+        ),
+        (
+            {
+                "dimers": {"radii": ["0.5 mm", "0.2 mm"]},
+                "boundary": {"shape": "groove", "opening": "30 deg", "material": "chromium-coated glass"},
+            },
+            "so unlike beads rest at heights at which they do not touch",
+        ),
+        (
+            {
+                "dimers": {"radii": ["0.3 mm", "0.2 mm"]},
+                "boundary": {"shape": "channel", "width": "0.5 mm", "material": "chromium-coated glass"},
+            },
+            "boundary.width",
+        ),
+        ({"dimers": {"radii": ["0.3 mm", "0.2 mm"]}, "beads": {"material": "rubi"}}, 'beads.material = "rubi"'),
+        (
+            {"dimers": {"radii": ["0.3 mm", "0.2 mm"]}, "run": {"cycles": 20, "frames_per_second": 4.0}},
+            "run.frames_per_second",
+        ),
         ({"clusters": [{"radii": ["0.3 mm", "0.2 mm"]}]}, "expected either an arrangement"),
         ({"clusters": [cluster("fan", "L" + 12 * "s")]}, "so many beads do not fit around the first one"),
         ({"clusters": [{"radii": ["0.3 mm", "0.2 mm"], "at": [["0 mm", "0 mm"]]}]}, "expected a place for each"),

@@ -180,15 +180,17 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
     ]
     if result is not None:
         rotation, sliding = result["rotation"], result["sliding"]
+        # On a slope the theory is that of walkers that go up it.
+        side = "right_facing" if result["goes_uphill"] and result["right_facing"]["n"] else "velocity"
         found = {
-            "velocity": result["velocity"]["mean"],
+            "velocity": result[side]["mean"],
             "rotation": [rotation["bead_1"], rotation["bead_2"]],
             "sliding": [sliding[f"contact_{number}"] for number in (1, 2, 3)],
         }
         lines.append(f"  engine                         {_speed(found)}{_details(found)}")
     else:
         lines.append("  engine                         not run; do: walkers run CASE")
-    stays = "small angles stay small" if mathieu["stable"] else "small angles grow"
+    stays = "small angles stay small, if it rolls" if mathieu["stable"] else "small angles grow, if it rolls"
     if mathieu["v"] == mathieu["u"] == 0.0:
         stays = "no tendency to the axis"
     lines += [

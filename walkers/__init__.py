@@ -8,7 +8,9 @@ makes all points of a sweep, `load` gives its table. The folders of the project 
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from walkers.pipeline import DEFAULT_OUT, Run, find_run, run
@@ -21,8 +23,21 @@ if TYPE_CHECKING:
 __all__ = ["Run", "find_run", "load", "load_case", "run", "sweep"]
 
 
+_PACKAGES = (
+    *("physics", "inputs", "templates", "runner", "postprocess"),
+    *("sweeps", "audit", "theory", "paper", "calibration"),
+)
+
+
 def __dir__() -> list[str]:
     return __all__
+
+
+def __getattr__(name: str) -> ModuleType:
+    """The packages, imported when they are first asked for."""
+    if name in _PACKAGES:
+        return import_module(f"walkers.{name}")
+    raise AttributeError(f"module 'walkers' has no attribute {name!r}")
 
 
 def load_case(case: str | Path) -> Case:

@@ -166,7 +166,6 @@ def run(
     made = make_runs([case], out, binary, force=force, on_progress=on_progress, time_limit=time_limit)
     if made.busy:
         raise RunBusy(unfinished(place))
-    current_result(made.runs[place.name].directory)
     return Run(made.runs[place.name].directory, cached=place.name in made.found)
 
 
@@ -219,7 +218,10 @@ def _place_of(case: Path, out: Path) -> Path | None:
 def _readable(directory: Path) -> Run:
     """The run, if its description can be read; its tables are made anew if need be."""
     from walkers.postprocess.analysis import current_result
-    from walkers.runner.directory import FIRST_SEGMENT, FinishedRun
+    from walkers.runner.directory import FinishedRun
+    from walkers.runner.files import read_json
+    from walkers.templates.deck import LAYOUT_NAME
+    from walkers.templates.layout import Layout
 
     run = FinishedRun(directory)
     for name in ("manifest", "case", "layout"):
@@ -228,11 +230,14 @@ def _readable(directory: Path) -> Run:
         except (OSError, ValueError, KeyError, TypeError) as error:
             problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
             raise InputError(str(directory), [problem]) from error
-    dump = directory / FIRST_SEGMENT / run.layout.bead_dump
-    if not dump.is_file():
-        raise InputError(str(directory), [Problem("", None, f"the run's {run.layout.bead_dump} is missing")])
-    if dump.stat().st_size < run.layout.bead_dump_bytes:
-        warnings.warn(f"{dump} is incomplete: what is drawn or written ends early", IncompleteRunWarning, stacklevel=3)
+    for segment in run.segments:
+        layout = Layout.from_dict(read_json(segment / LAYOUT_NAME))
+        dump = segment / layout.bead_dump
+        if not dump.is_file():
+            raise InputError(str(directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
+        if dump.stat().st_size < layout.bead_dump_bytes:
+            told = f"{dump} is incomplete: what is drawn or written ends early"
+            warnings.warn(told, IncompleteRunWarning, stacklevel=3)
     try:
         current_result(directory)
     except (OSError, ValueError, KeyError, TypeError, WalkersError) as error:

@@ -10,7 +10,9 @@ import typer
 
 from walkers.commands.arguments import Json, refuse
 
-Directory = Annotated[Path, typer.Argument(metavar="DIR", help="A sweep of piles, a folder of runs, or one run.")]
+Directory = Annotated[
+    Path, typer.Argument(metavar="DIR", help="A sweep of piles, a folder of runs, or one run (or its case).")
+]
 Within = Annotated[float | None, typer.Option("--within", min=0.0, help="Seconds of drive; all of the shortest run.")]
 Sensitivity = Annotated[
     bool, typer.Option("--sensitivity", help="Instead: how many climbs there are with other thresholds of what is one.")
@@ -21,9 +23,10 @@ def command(
     directory: Directory, within: Within = None, thresholds: Sensitivity = False, as_json: Json = False
 ) -> None:
     """Print how often piles climbed, how soon, how fast, and led by whom."""
+    from walkers.pipeline import DEFAULT_OUT, find_run
     from walkers.sweeps.climbing import describe_climbs, describe_sensitivity, piles_in, sensitivity, summarise_climbs
 
-    groups = piles_in(directory)
+    groups = piles_in(directory if directory.exists() else find_run(str(directory), DEFAULT_OUT).directory)
     if thresholds:
         refuse("--within", within is not None, "has no meaning with --sensitivity")
         tried = {label: sensitivity(runs) for label, runs in groups.items()}
