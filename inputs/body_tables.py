@@ -180,7 +180,9 @@ def _check_walkers(case: Case, file: CaseFile) -> None:
             standing += walkers.stand(case, len(standing))
         except ValueError as error:
             raise UnusableKeyError(f"{_key_of(file, number)}.radii", str(error)) from error
-    if case.boundary.inner_width / 2.0 < max(radius for walkers in case.walkers for radius in walkers.radii):
+    if case.boundary.inner_width / 2.0 < (1.0 - _OVERLAP) * max(
+        radius for walkers in case.walkers for radius in walkers.radii
+    ):
         raise UnusableKeyError("boundary.width", "expected more than a bead's diameter")
     others = case.placed.beads if case.placed is not None else ()
     for key, (x, y), walker in zip(keys, grid, standing, strict=True):

@@ -121,6 +121,7 @@ def of_sweep(folder: Path, name: str) -> list[dict[str, Any]]:
     return [walkers.Run(Path(run)).result for run in table["run"]]
 
 
+@pytest.mark.slow
 def test_a_triangle_turns_to_the_axis_and_walks_slowly(trimers: Path) -> None:
     """From 0°, 30° and 90°: 0.100 mm/s, the large bead leading; an independent engine found the same (0.100)."""
     for result in of_sweep(trimers, "fan"):
@@ -130,6 +131,7 @@ def test_a_triangle_turns_to_the_axis_and_walks_slowly(trimers: Path) -> None:
         np.testing.assert_allclose(np.minimum(turned, 180.0 - turned), 0.0, atol=0.5)
 
 
+@pytest.mark.slow
 def test_a_chain_walks_from_0_and_30_degrees_and_folds_from_90(trimers: Path) -> None:
     """L-s-s along the axis at 0.90 mm/s; started across it, it folds to the triangle (independent engine: the same)."""
     straight, turned, across = of_sweep(trimers, "chain")
@@ -139,6 +141,7 @@ def test_a_chain_walks_from_0_and_30_degrees_and_folds_from_90(trimers: Path) ->
     assert abs(across["axial_velocity"]["right_facing"]) == pytest.approx(0.100 * MM_PER_S, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_large_bead_between_two_small_ones_walks_sideways(trimers: Path) -> None:
     """Across the axis it walks along it at 2.217 mm/s, along the axis across it at 2.146 (independent engine)."""
     along, across = of_sweep(trimers, "between")
@@ -149,6 +152,7 @@ def test_a_large_bead_between_two_small_ones_walks_sideways(trimers: Path) -> No
         assert abs(across["axial_velocity"][side]) == pytest.approx(2.217 * MM_PER_S, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_tetramer_walks_and_keeps_to_the_axis(tmp_path: Path) -> None:
     """A diamond of a large bead and three small ones: slower than a dimer, the large bead ahead, from 0° and 20°."""
     run = {"run": {"cycles": 60, "settling_cycles": 40}}

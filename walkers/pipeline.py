@@ -235,7 +235,7 @@ def _readable(directory: Path) -> Run:
         dump = segment / layout.bead_dump
         if not dump.is_file():
             raise InputError(str(directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
-        if dump.stat().st_size < layout.bead_dump_bytes:
+        if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
             told = f"{dump} is incomplete: what is drawn or written ends early"
             warnings.warn(told, IncompleteRunWarning, stacklevel=3)
     try:
