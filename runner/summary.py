@@ -121,7 +121,8 @@ def _text_of_case(case: dict[str, Any]) -> str:
     tables = [(key, values) for key, values in case.items() if key not in ("name", "title", "walkers")]
     for table, values in [*(("walkers", one) for one in case["walkers"]), *tables]:
         if isinstance(values, dict):
-            shown = ", ".join(f"{key} {_short(value)}" for key, value in values.items())
+            given = {key: value for key, value in values.items() if value not in (None, [])}
+            shown = ", ".join(f"{key} {_short(value)}" for key, value in given.items())
             lines.append(f"  {table:10} {shown}")
         elif values is not None:
             lines.append(f"  {table:10} {_short(values)}")
