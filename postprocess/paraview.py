@@ -158,11 +158,15 @@ class _Entry:
 
 
 def _frames(motion: Motion, every: int) -> Iterator[Frame]:
-    recorded = {bridges.frame: bridges for bridges in read_bridges(motion)}
+    recorded = read_bridges(motion)
+    following = next(recorded, None)
     further = [one.point_data(motion) for one in analyses_of(motion.case)]
     outline = boundary_of(motion)
     for frame in range(motion.first_driven, len(motion.time), every):
-        beads, bridges = beads_at(motion, frame), recorded.get(frame)
+        while following is not None and following.frame < frame:
+            following = next(recorded, None)
+        bridges = following if following is not None and following.frame == frame else None
+        beads = beads_at(motion, frame)
         meshes = {0: ("beads", beads), 1: ("boundary", outline.translate(motion.substrate[frame], inplace=False))}
         if bridges is not None:
             for arrays in (one(bridges) for one in further):
@@ -252,13 +256,15 @@ def bridges_at(motion: Motion, bridges: Bridges) -> pv.PolyData:
     """
     centres = motion.position[bridges.frame]
     boundary = motion.case.boundary
-    feet = []
-    for bead, wall in zip(bridges.wall_beads, bridges.walls, strict=True):
-        faces = [face for face in boundary.faces() if face.wall == boundary.walls[wall]]
-        away = [np.dot(centres[bead] - np.array(face.centroid), face.normal) for face in faces]
-        nearest = int(np.argmin(away))
-        feet.append(centres[bead] - away[nearest] * np.array(faces[nearest].normal))
-    walls = np.stack([centres[bridges.wall_beads], np.array(feet).reshape(-1, 3)], axis=1)
+    faces, names = boundary.faces(), boundary.walls
+    normals = np.array([face.normal for face in faces])
+    away = centres[bridges.wall_beads] @ normals.T - np.einsum("kx,kx->k", normals, [face.centroid for face in faces])
+    # Of the faces of the wall that a bridge is with, the nearest one.
+    other = np.array([names.index(face.wall) for face in faces]) != bridges.walls[:, None]
+    nearest = np.where(other, np.inf, away).argmin(axis=1)
+    held = centres[bridges.wall_beads]
+    feet = held - np.take_along_axis(away, nearest[:, None], axis=1) * normals[nearest]
+    walls = np.stack([held, feet], axis=1)
     mesh = lines_between(np.concatenate([centres[bridges.beads], walls]) + motion.substrate[bridges.frame])
     gap = np.concatenate([bridges.gap, bridges.wall_gap])
     mesh.cell_data["gap"] = gap

@@ -16,15 +16,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_picture, new_figure, save_figure, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Group, Motion, gathered, read_motion
 from walkers.postprocess.piles import Pile, analyse
-from walkers.runner.directory import CASE_NAME
-from walkers.runner.files import beside, read_json
+from walkers.runner.directory import case_of
+from walkers.runner.files import beside
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -45,6 +44,10 @@ _TOLERANCE = 0.1
 """Of a time between pictures: frames are where they are."""
 _MOST_PICTURES = 60.0
 """A second, in a film."""
+_PIXELS = 40.0
+"""To a millimetre of a picture."""
+_SCREEN = 1600
+"""Pixels: as high as a screen at most."""
 _LEAST_PIXELS = 600
 """Of the longer side of a picture."""
 _MARGIN = 64
@@ -58,7 +61,7 @@ def render_run(directory: Path, destination: Path | None = None, *, images: int 
 
     Parameters and errors are those of `render_walker` and `render_series`.
     """
-    if Case.from_dict(read_json(directory / CASE_NAME)).apart:
+    if case_of(directory).apart:
         return [render_walker(directory, destination, images=images)]
     return render_series(directory, destination, images=images)
 
@@ -113,9 +116,6 @@ def render_walker(
 
 
 def _scene(group: Group, walker: int, images: int, size: tuple[int, int]) -> pv.Plotter:
-    _prefer_egl()
-    import pyvista as pv
-
     strobe = group.case.run.samples_per_cycle
     frames = np.linspace(0, (len(group.time) - 1) // strobe, images).round().astype(int) * strobe
     radii = group.radii * 1e3
@@ -128,13 +128,10 @@ def _scene(group: Group, walker: int, images: int, size: tuple[int, int]) -> pv.
     position[:, :, 1] -= pitch * np.arange(images)[:, None]
     low = position.min(axis=(0, 1)) - 2.2 * radii.max()
     high = position.max(axis=(0, 1)) + np.array([4.5, 3.0, 0.0]) * radii.max()
-    plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
-    plotter.background_color = pv.Color("white")
+    plotter = _plotter(size, "white")
     _add_floor(plotter, low, high)
     for frame, centres in zip(frames, position, strict=True):
-        for bead, radius in enumerate(radii):
-            sphere = pv.Sphere(radius=radius, center=centres[bead], theta_resolution=80, phi_resolution=80)
-            plotter.add_mesh(sphere, color=_RUBY[int(bead > 0)], smooth_shading=True, specular=0.6, specular_power=40)
+        _add_walker(plotter, radii, centres)
         place = [high[0] - 2.2 * radii.max(), float(centres[:, 1].mean()), float(radii.mean())]
         _add_label(plotter, place, f"{group.time[frame]:.2f} s")
     _add_scale_bar(plotter, [low[0] + 0.6 * radii.max(), low[1] + 0.5 * radii.max(), 0.02])
@@ -161,19 +158,13 @@ def top_view(
     ndarray, shape (height, width, 3)
         Red, green, blue; the first row is the farthest to the left of the drive axis, 120 pixels to the smaller radius.
     """
-    _prefer_egl()
-    import pyvista as pv
-
     pixels = 120.0 / float(group.radii.min())
     size = [round((bounds[1] - bounds[0]) * pixels) for bounds in (along, across)]
     turned = np.stack([group.drive_axis, group.across_axis, np.array([0.0, 0.0, 1.0])], axis=-1)
     middle = np.array([sum(along) / 2.0, sum(across) / 2.0, 0.0])
     centres = (group.position[frame, walker] @ turned - middle) * 1e3
-    plotter = pv.Plotter(off_screen=True, window_size=size, lighting="light kit")
-    plotter.background_color = pv.Color(_FLOOR)
-    for bead, radius in enumerate(group.radii * 1e3):
-        sphere = pv.Sphere(radius=radius, center=centres[bead], theta_resolution=80, phi_resolution=80)
-        plotter.add_mesh(sphere, color=_RUBY[int(bead > 0)], smooth_shading=True, specular=0.6, specular_power=40)
+    plotter = _plotter(size, _FLOOR)
+    _add_walker(plotter, group.radii * 1e3, centres)
     plotter.camera_position = [(0.0, 0.0, 10.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
     plotter.camera.parallel_projection = True
     plotter.camera.parallel_scale = (across[1] - across[0]) / 2.0 * 1e3
@@ -189,8 +180,8 @@ class View:
     ----------
     motion
         Of the run.
-    pixels
-        To a millimetre; more of them where the picture would be small, fewer where it would be too large.
+    most_high
+        Pixels of its height, at most. It has 40 to a millimetre, more where it would be small, fewer where too large.
 
     Attributes
     ----------
@@ -200,8 +191,7 @@ class View:
         What they are called.
     """
 
-    def __init__(self, motion: Motion, pixels: float = 40.0) -> None:
-        _prefer_egl()
+    def __init__(self, motion: Motion, most_high: int = _MOST_PIXELS) -> None:
         import pyvista as pv
 
         self._motion = motion
@@ -209,11 +199,10 @@ class View:
         self.axes = ("x", "height" if sideways else "y")
         self.low, self.high = _corners(motion, sideways)
         extents = self.high - self.low
-        longest = 1e3 * float(extents.max())
-        pixels = min(max(pixels, _LEAST_PIXELS / longest), _MOST_PIXELS / longest)
+        longest, tall = 1e3 * float(extents.max()), 1e3 * float(extents[1])
+        pixels = min(max(_PIXELS, _LEAST_PIXELS / longest), _MOST_PIXELS / longest, most_high / tall)
         size = [2 * max(1, round(extent * pixels * 1e3 / 2.0)) for extent in extents]
-        self._plotter = pv.Plotter(off_screen=True, window_size=size, lighting="light kit")
-        self._plotter.background_color = pv.Color("white")
+        self._plotter = _plotter(size, "white")
         rounds = 36 if len(motion.radius) < _FEW else 18 if len(motion.radius) < _MANY else 10
         ball = pv.Sphere(radius=1.0, theta_resolution=rounds, phi_resolution=rounds)
         self._around = (motion.radius[:, None, None] * ball.points * 1e3).astype(np.float32)
@@ -380,9 +369,8 @@ def _film(motion: Motion, frames: Sequence[int]) -> Generator[npt.NDArray[np.uin
     """The pictures of a film, each with a scale on its left and the time above."""
     from PIL import Image, ImageDraw, ImageFont
 
-    corners = _corners(motion, motion.case.boundary.closed)
-    tall = float(corners[1][1] - corners[0][1])
-    view = View(motion, min(40.0, 1.6 / tall))  # as high as a screen at most
+    view = View(motion, _SCREEN)
+    tall = float(view.high[1] - view.low[1])
     pointed_out, font = _pointed_out(motion), ImageFont.load_default(16)
     try:
         for frame in frames:
@@ -435,7 +423,7 @@ def seconds_apart(text: str, directory: Path) -> float:
     cycles = re.fullmatch(r"(?P<many>[\d.]*)\s*T\s*(/\s*(?P<parts>\d+))?", text.strip())
     try:
         if cycles:
-            frequency = Case.from_dict(read_json(directory / CASE_NAME)).drive.frequency
+            frequency = case_of(directory).drive.frequency
             seconds = float(cycles["many"] or 1) / int(cycles["parts"] or 1) / frequency
         else:
             seconds = parse_quantity(text, DURATION)
@@ -456,9 +444,24 @@ def _pointed_out(motion: Motion) -> Callable[[int], set[int]]:
     return lambda frame: walkers | {bead for track in climbing for bead in track.members_at(frame)}
 
 
-def _prefer_egl() -> None:
-    """Without this VTK tries an X server first and says so."""
+def _plotter(size: Sequence[int], background: str) -> pv.Plotter:
+    """A window off-screen, of a size in pixels."""
+    # Without this VTK tries an X server first and says so.
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    import pyvista as pv
+
+    plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
+    plotter.background_color = pv.Color(background)
+    return plotter
+
+
+def _add_walker(plotter: pv.Plotter, radii: FloatArray, centres: FloatArray) -> None:
+    """The beads of a walker, mm, the first one darker."""
+    import pyvista as pv
+
+    for bead, (radius, centre) in enumerate(zip(radii, centres, strict=True)):
+        sphere = pv.Sphere(radius=radius, center=centre, theta_resolution=80, phi_resolution=80)
+        plotter.add_mesh(sphere, color=_RUBY[int(bead > 0)], smooth_shading=True, specular=0.6, specular_power=40)
 
 
 def _add_floor(plotter: pv.Plotter, low: FloatArray, high: FloatArray) -> None:

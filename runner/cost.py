@@ -29,11 +29,11 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
     segments = -(-run.cycles // run.cycles_per_segment) + (_RESTING_SEGMENTS if run.rests else 0)
     steps = run.steps + (_RESTING_SEGMENTS * settling_steps(case) if run.rests else 0)
     count = pairs_of_beads(case) if walkers is None else walkers
-    second_a_step = (_STEP_MICROSECONDS + _WALKER_MICROSECONDS * count) * 1e-6
     if case.loose:
-        speed = _BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1))
-        second_a_step = case.count / speed
-    return START_UP_SECONDS * segments + steps * second_a_step
+        seconds_a_step = case.count / (_BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1)))
+    else:
+        seconds_a_step = (_STEP_MICROSECONDS + _WALKER_MICROSECONDS * count) * 1e-6
+    return START_UP_SECONDS * segments + steps * seconds_a_step
 
 
 def pairs_of_beads(case: Case) -> int:

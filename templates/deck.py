@@ -271,9 +271,6 @@ def compose(plan: Plan) -> Deck:
         amplitude=[first.amplitude * component for component in first.direction],
         peak_velocity=[first.peak_velocity * component for component in first.direction],
         films=_films(case, scene),
-        prescribed=plan.prescribed,
-        ranks=plan.ranks,
-        checkpoint=plan.checkpoint,
         pair_bridge_terms=_terms("pair_bridges", layout.pair_bridge_columns, " ".join(PAIR_BRIDGES).split()),
         wall_bridge_terms=_terms("wall_bridges", layout.wall_bridge_columns, " ".join(WALL_BRIDGES).split()),
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
@@ -341,10 +338,8 @@ def fastest_of(case: Case, scene: Scene) -> float:
     Of cases that share a deck any one will do: they have the drive in common, and it is a bound far from anything real.
     """
     liquid, sizes = case.liquid, sorted(bead.radius for bead in scene.beads)
-    mass, volume = (
-        4.0 / 3.0 * pi * sizes[0] ** 3 * case.density,
-        bridge_volume_at_wall(sizes[-1], liquid.volume_fraction),
-    )
+    mass = 4.0 / 3.0 * pi * sizes[0] ** 3 * case.density
+    volume = bridge_volume_at_wall(sizes[-1], liquid.volume_fraction)
     pull = capillary_force_at_wall(liquid.surface_tension, sizes[-1], volume, liquid.contact_angle)
     work = pull * rupture_distance(volume, liquid.contact_angle)
     deep = hop_height(case) if case.boundary.tilt == 0.0 else reach(case)
