@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 from walkers.inputs.arrangements import ARRANGEMENTS, Pairs, Places, touching
 from walkers.inputs.boundary import LOOSE, Boundary
-from walkers.inputs.loads import ContactLoads, contact_loads
+from walkers.inputs.loads import contact_loads
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
@@ -90,6 +90,11 @@ class Walkers:
     meet: bool = False
     arrangement: str = "chain"
     places: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def count(self) -> int:
+        """How many beads there are."""
+        return len(self.radii) * self.replicates
 
     @property
     def all_radii(self) -> list[float]:
@@ -198,10 +203,6 @@ class Walkers:
 
         return ARRANGEMENTS[self.arrangement].places(self.radii, apart)
 
-    def loads(self, case: Case) -> ContactLoads:
-        """The loads of a walker's contacts at rest."""
-        return contact_loads(case, self)
-
 
 @lru_cache(maxsize=4096)
 def _draws(seed: int, number: int) -> tuple[float, float]:
@@ -209,6 +210,11 @@ def _draws(seed: int, number: int) -> tuple[float, float]:
 
     turn, press = default_rng([seed, number]).uniform(-1.0, 1.0, size=2)
     return float(turn), float(press)
+
+
+def _beside(one: float, other: float) -> list[tuple[float, list[float]]]:
+    """`Walkers.bridged` of two beads, radii in m."""
+    return [(one, [other]), (other, [one])]
 
 
 @dataclass(frozen=True)
@@ -244,8 +250,7 @@ class Mixture:
         Beads of a pile have more neighbours, and its viscous limit is lower; ``auto``'s share of the limit allows for
         it: a glycerol pile at 0.4 of it is agitated as at a quarter of that step, within 0.1 %, and at 0.8 it heats up.
         """
-        large, small = max(self.large), min(self.small)
-        return [(large, [small]), (small, [large])]
+        return _beside(max(self.large), min(self.small))
 
     @property
     def all_radii(self) -> list[float]:
@@ -283,6 +288,11 @@ class Placed:
     beads: tuple[tuple[float, float, float, float], ...]
 
     @property
+    def count(self) -> int:
+        """How many beads there are."""
+        return len(self.beads)
+
+    @property
     def all_radii(self) -> list[float]:
         """Radius of every bead, m."""
         return [bead[3] for bead in self.beads]
@@ -295,8 +305,7 @@ class Placed:
     @property
     def bridged(self) -> list[tuple[float, list[float]]]:
         """The largest bead beside the smallest."""
-        large, small = self.radii[-1], self.radii[0]
-        return [(large, [small]), (small, [large])]
+        return _beside(self.radii[-1], self.radii[0])
 
     def stand(self, case: Case, first: int) -> list[Standing]:
         """As they are placed."""

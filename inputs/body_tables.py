@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 from math import dist, pi
 from typing import Literal
 
@@ -166,7 +167,7 @@ def check_bodies(case: Case, file: CaseFile) -> None:
         _check_pour(case.mixture, boundary, case.tops_of_others(case.mixture))
     if case.placed is not None:
         _check_places(case.placed, boundary)
-    if case.walkers and (boundary.walls != ("floor",) or case.placed is not None):
+    if case.walkers and (not boundary.bare or case.placed is not None):
         _check_walkers(case, file)
 
 
@@ -175,14 +176,12 @@ def _check_walkers(case: Case, file: CaseFile) -> None:
     keys = [key for number, one in enumerate(case.walkers) for key in [_key_of(file, number)] * one.replicates]
     grid = case.boundary.grid(len(keys), max(walkers.spacing for walkers in case.walkers))
     standing: list[Standing] = []
-    for number, walkers in enumerate(case.walkers):
-        try:
-            standing += walkers.stand(case, len(standing))
-        except ValueError as error:
-            raise UnusableKeyError(f"{_key_of(file, number)}.radii", str(error)) from error
-    if case.boundary.inner_width / 2.0 < (1.0 - _OVERLAP) * max(
-        radius for walkers in case.walkers for radius in walkers.radii
-    ):
+    try:
+        standing.extend(one for _, one in islice(case.standing(), len(keys)))
+    except ValueError as error:
+        raise UnusableKeyError(f"{keys[len(standing)]}.radii", str(error)) from error
+    largest = max(radius for walkers in case.walkers for radius in walkers.radii)
+    if case.boundary.inner_width / 2.0 < (1.0 - _OVERLAP) * largest:
         raise UnusableKeyError("boundary.width", "expected more than a bead's diameter")
     others = case.placed.beads if case.placed is not None else ()
     for key, (x, y), walker in zip(keys, grid, standing, strict=True):

@@ -125,6 +125,11 @@ class Boundary:
         """Names of the walls: the floor first, if there is one, then the sides."""
         return tuple(dict.fromkeys(face.wall for face in self.faces()))
 
+    @property
+    def bare(self) -> bool:
+        """Whether it is a floor without any side walls."""
+        return self.walls == (FLOOR,)
+
     @abstractmethod
     def room(self, span: Span, ranks: int) -> Room:
         """The simulation box for beads that need so much, on so many MPI processes."""
@@ -154,7 +159,8 @@ class Boundary:
 
     def layer(self, largest: float) -> Layer:
         """Places from which beads up to a radius (m) are poured."""
-        raise ValueError(f"nothing can be poured into {type(self).__name__}, {largest}")
+        del largest
+        raise ValueError(f"nothing can be poured into a {type(self).__name__}")
 
     @property
     def cross_section(self) -> float:

@@ -5,6 +5,7 @@ This is what the deck is rendered from, what a run directory stores as ``case.js
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from math import cos, hypot, inf, sin
@@ -12,7 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from walkers.inputs.bodies import Body, Mixture, Placed, Walkers
+from walkers.inputs.bodies import Body, Mixture, Placed, Standing, Walkers
 from walkers.inputs.boundary import Shape
 from walkers.inputs.drive import AXES, Drive, Vector
 from walkers.physics.matter import Contact, Liquid
@@ -119,7 +120,7 @@ class Case:
     @property
     def count(self) -> int:
         """How many beads there are."""
-        return len(self.all_radii)
+        return sum(body.count for body in self.bodies)
 
     @property
     def radii(self) -> list[float]:
@@ -141,6 +142,20 @@ class Case:
         large = [size for size in sizes if size > middle]
         return (max(size for size in sizes if size <= middle) + large[0]) / 2.0 if large else inf
 
+    def standing(self) -> Iterator[tuple[int, Standing]]:
+        """What stands at the start, each with the number of its body; walkers come first and are numbered through.
+
+        Raises
+        ------
+        ValueError
+            If the beads of a walker cannot stand so.
+        """
+        first = 0
+        for number, body in enumerate(self.bodies):
+            stood = body.stand(self, first)
+            yield from ((number, one) for one in stood)
+            first += len(stood)
+
     def tops_of_others(self, body: Body) -> float:
         """Height up to which the other bodies reach at the start, m."""
         walkers = [2.0 * max(one.radii) for one in self.walkers if one is not body]
@@ -155,7 +170,7 @@ class Case:
     @property
     def independent(self) -> bool:
         """Whether its walkers are so wherever they stand, so that others' may stand beside them in a deck."""
-        return self.apart and self.run.in_one and self.boundary.walls == ("floor",)
+        return self.apart and self.run.in_one and self.boundary.bare
 
     @property
     def meets(self) -> bool:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from walkers.inputs.case import Case
 from walkers.postprocess.motion import Bridges, Motion, read_motion
 from walkers.postprocess.tables import intact, write_table
-from walkers.runner.directory import CASE_NAME
+from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
 
 RESULT_NAME = "result.json"
@@ -179,7 +179,7 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     directory = Path(directory)
     try:
         result = read_result(directory)
-        wanted = analyses_of(Case.from_dict(read_json(directory / CASE_NAME)))
+        wanted = analyses_of(case_of(directory))
         tables = [name for one in wanted for name in one.tables]
         known = result.get("analyses") == {one.name: one.version for one in wanted} and intact(directory, tables)
         if known and all(one.can_show(result) for one in wanted):
@@ -229,5 +229,5 @@ def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
     """
     destination = destination or directory
     destination.mkdir(parents=True, exist_ok=True)
-    case = Case.from_dict(read_json(directory / CASE_NAME))
+    case = case_of(directory)
     return [path for one in analyses_of(case) for path in one.plot(directory, destination)]

@@ -82,12 +82,12 @@ class Track:
         return self.members[self.frames.index(frame)] if frame in self.frames else frozenset()
 
 
-def components(count: int, bridges: Bridges) -> IntArray:
-    """Number of the connected component of each bead, shape (count,)."""
+def connected(count: int, pairs: IntArray) -> IntArray:
+    """Number of the connected component of each of so many, shape (count,), given joined pairs, shape (K, 2)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    first, second = bridges.beads[:, 0], bridges.beads[:, 1]
+    first, second = pairs[:, 0], pairs[:, 1]
     graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(count, count))
     labels: IntArray = connected_components(graph, directed=False)[1].astype(np.int64)
     return labels

@@ -9,6 +9,7 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
+from walkers.postprocess.clusters import connected
 from walkers.postprocess.motion import Motion, read_bridges
 
 Pair = tuple[int, int]
@@ -71,12 +72,7 @@ class Meetings(Analysis):
 
 def groups_of(joined: frozenset[Pair], count: int) -> list[list[int]]:
     """Connected components of so many walkers, given which pairs are joined."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    first, second = ([pair[place] for pair in joined] for place in (0, 1))
-    graph = coo_array((np.ones(len(joined), dtype=np.int8), (first, second)), shape=(count, count))
-    labels = connected_components(graph, directed=False)[1]
+    labels = connected(count, np.array(sorted(joined), dtype=np.int64).reshape(-1, 2))
     return [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
 
 

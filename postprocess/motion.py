@@ -16,9 +16,8 @@ from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive
 from walkers.postprocess.dump import BinaryDump, DumpError, FloatArray
 from walkers.postprocess.local_dump import local_frames
-from walkers.runner.directory import CASE_NAME, SEGMENT_NAME, segment_directories
+from walkers.runner.directory import SEGMENT_NAME, case_of, layout_of, segment_directories
 from walkers.runner.files import read_json
-from walkers.templates.deck import LAYOUT_NAME
 from walkers.templates.layout import Layout, PlacedWalker
 
 IntArray = npt.NDArray[np.int64]
@@ -215,7 +214,7 @@ def gathered(motion: Motion) -> Motion:
     across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
     shift = np.array([-number * lane * across - [*one.origin, 0.0] for number, one in enumerate(motion.walkers)])
     moved = replace(motion, position=motion.position + shift[motion.walker_of])
-    if case.boundary.walls == ("floor",):
+    if case.boundary.bare:
         return moved
     count = len(motion.walkers[0].beads)
     arrays = {name: getattr(moved, name)[:, :count] for name in ("position", "velocity", "spin")}
@@ -246,7 +245,7 @@ def read_motion(directory: str | Path) -> Motion:
     (1201, 6, 3)
     """
     directory = Path(directory)
-    case = Case.from_dict(read_json(directory / CASE_NAME))
+    case = case_of(directory)
     segments = segment_directories(directory)
     if not segments:
         raise DumpError(f"{directory}: no segment of the run is finished yet")
@@ -321,7 +320,7 @@ def _segment(directory: Path) -> dict[str, Any]:
 
 def _dump_of(segment: Path) -> tuple[Layout, BinaryDump]:
     try:
-        layout = Layout.from_dict(read_json(segment / LAYOUT_NAME))
+        layout = layout_of(segment)
         return layout, BinaryDump(segment / layout.bead_dump, layout.bead_columns)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DumpError(f"{segment}: cannot be read ({error})") from error
@@ -378,21 +377,32 @@ def read_bridges(motion: Motion) -> Iterator[Bridges]:
         If a dump cannot be read, or ends early.
     """
     stride = motion.case.run.samples_per_bridge_sample
+    names, faces = motion.case.boundary.walls, motion.case.boundary.faces()
+    normals, walls_of = np.array([one.normal for one in faces]), np.array([names.index(one.wall) for one in faces])
     wanted = {place: frame for frame, place in enumerate(motion.frames)}
     for segment in dict.fromkeys(segment for segment, _ in motion.frames):
-        layout = Layout.from_dict(read_json(segment / LAYOUT_NAME))
+        layout = layout_of(segment)
         pairs = local_frames(segment / layout.pair_bridge_dump, layout.pair_bridge_columns)
         walls = local_frames(segment / layout.wall_bridge_dump, layout.wall_bridge_columns)
         number = -1
         for number, ((_, between), (_, against)) in enumerate(zip(pairs, walls, strict=False)):
             frame = wanted.get((segment, stride * number))
             if frame is not None:
-                yield _bridges(motion, frame, between, against, layout)
+                yield _bridges(motion, frame, between, against, layout, normals, walls_of)
         if number + 1 != layout.bridge_frames:
             raise DumpError(f"{segment}: its bridges hold {number + 1} of {layout.bridge_frames} frames")
 
 
-def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: Layout) -> Bridges:
+def _bridges(
+    motion: Motion,
+    frame: int,
+    between: FloatArray,
+    against: FloatArray,
+    layout: Layout,
+    normals: FloatArray,
+    walls_of: IntArray,
+) -> Bridges:
+    """The bridges of a frame, given the rows of its dumps, and the normal and the wall of each face."""
     place = motion.position[frame]
     pair, wall = layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
     # Neighbours without a bridge are reported too, with no force.
@@ -401,13 +411,10 @@ def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArra
     ids = between[:, [pair("id1"), pair("id2")]].astype(np.int64) - motion.first_id
     arm = place[ids[:, 1]] - place[ids[:, 0]]
     force = between[:, pair("fx") : pair("fx") + 3]
-    faces = motion.case.boundary.faces()
-    names = motion.case.boundary.walls
     beads = against[:, wall("id")].astype(np.int64) - motion.first_id
     face = against[:, wall("triangle")].astype(np.int64)
-    normal = np.array([one.normal for one in faces])[face]
-    pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normal)
-    keys = np.stack([beads, np.array([names.index(one.wall) for one in faces])[face]], axis=1)
+    pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals[face])
+    keys = np.stack([beads, walls_of[face]], axis=1)
     held, which = np.unique(keys, axis=0, return_inverse=True)
     which, held = which.reshape(-1), held.reshape(-1, 2)
     gap = np.full(len(held), np.inf)

@@ -23,7 +23,7 @@ from walkers.postprocess.clusters import (
     Track,
     bulk_of,
     classify,
-    components,
+    connected,
     follow,
     held_clusters,
 )
@@ -90,7 +90,7 @@ def analyse(run: str | Path | Motion, definition: ClimbCriteria | None = None) -
     beds: list[Bed] = []
     liquid, bulks, held = [], [], []
     for bridges in read_bridges(motion):
-        labels = components(len(motion.radius), bridges)
+        labels = connected(len(motion.radius), bridges.beads)
         bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
         liquid.append(liquid_of_beads(motion.radius, case.liquid.volume_fraction, bridges))
         beds.append(bed_of(motion, bridges.frame, bulks[-1], bridges, liquid[-1]))
@@ -186,7 +186,7 @@ class Pile(Analysis):
                 if members := list(one.members_at(bridges.frame)):
                     track[members] = number
                     climber[members] = int(climb.climbed)
-            component, liquid = components(count, bridges), found.liquid[bridges.frame].copy()
+            component, liquid = connected(count, bridges.beads), found.liquid[bridges.frame].copy()
             return {"component": component, "liquid": liquid, "track": track, "is_climber": climber}
 
         return of_frame

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.case import Case
-from walkers.inputs.loads import dimer_of
+from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, gait, settled_samples, walk
@@ -79,22 +79,20 @@ class Walking(Analysis):
             "bridges": bridge_columns(motion),
         }
         case = motion.case
-        turned = np.concatenate([np.abs(group.orientation).max(axis=0) > np.pi / 2.0 for group in groups])
-        of_first = _summary(rows[0], turned[: len(groups[0].walkers)])
+        turned = [np.abs(group.orientation).max(axis=0) > np.pi / 2.0 for group in groups]
+        makes = [_summary(*one) for one in zip(rows, turned, strict=True)]
         summary = {
-            **_summary(walkers, turned),
+            **_summary(walkers, np.concatenate(turned)),
             # A contact's number means another one in another make: these are of the first.
-            **{name: of_first[name] for name in ("rotation", "sliding", "open")},
+            **{name: makes[0][name] for name in ("rotation", "sliding", "open")},
             "walkers_met": walkers_met(groups),
             "meet": case.meets,
             "contacts": _contact_names(groups[0]),
             **_of_dimer(case),
         }
         if len(groups) > 1:
-            makes = [walkers["make"] == number for number in range(len(groups))]
             summary["makes"] = [
-                {"radii": list(group.make.radii), **_summary(one, turned[of_make])}
-                for group, one, of_make in zip(groups, rows, makes, strict=True)
+                {"radii": list(group.make.radii), **one} for group, one in zip(groups, makes, strict=True)
             ]
         return Measured(tables, summary)
 
@@ -207,7 +205,7 @@ def _trajectory_columns(group: Group, motion: Gait) -> Columns:
 def _walker_columns(group: Group, motion: Gait, walked: Walk) -> Columns:
     samples, beads = settled_samples(group), len(group.radii)
     between = motion.gap[samples, :, beads:]
-    reach = np.array(group.make.loads(group.case).rupture[beads:])
+    reach = np.array(contact_loads(group.case, group.make).rupture[beads:])
     return {
         "walker": np.array([walker.walker for walker in group.walkers], dtype=np.int64),
         "make": np.array([walker.make for walker in group.walkers], dtype=np.int64),

@@ -28,7 +28,7 @@ from walkers.runner.binary import Engine
 from walkers.runner.failures import DiskFull
 from walkers.runner.files import fsync_path, read_json, settle, write_json
 from walkers.runner.launch import EngineReport
-from walkers.templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck
+from walkers.templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck, Segment
 from walkers.templates.layout import Layout
 
 MANIFEST_NAME = "manifest.json"
@@ -77,7 +77,7 @@ class FinishedRun:
     @property
     def case(self) -> Case:
         """The resolved case."""
-        return Case.from_dict(read_json(self.directory / CASE_NAME))
+        return case_of(self.directory)
 
     @property
     def segments(self) -> list[Path]:
@@ -87,7 +87,38 @@ class FinishedRun:
     @property
     def layout(self) -> Layout:
         """What the dumps of the first segment hold."""
-        return Layout.from_dict(read_json(self.directory / FIRST_SEGMENT / LAYOUT_NAME))
+        return layout_of(self.directory / FIRST_SEGMENT)
+
+
+def case_of(directory: Path) -> Case:
+    """The resolved case of a run directory.
+
+    Raises
+    ------
+    OSError, ValueError
+        If its ``case.json`` cannot be read.
+    """
+    return Case.from_dict(read_json(directory / CASE_NAME))
+
+
+def layout_of(segment: Path) -> Layout:
+    """What the dumps of a segment hold.
+
+    Raises
+    ------
+    OSError, ValueError, KeyError, TypeError
+        If its ``layout.json`` cannot be read.
+    """
+    return Layout.from_dict(read_json(segment / LAYOUT_NAME))
+
+
+def write_segment_record(
+    directory: Path, segment: Segment, report: EngineReport, rms_velocity: float | None = None
+) -> dict[str, Any]:
+    """Write what a segment is and what it took into its directory, and return it."""
+    record = {**vars(segment), **vars(report), "root_mean_square_velocity": rms_velocity}
+    write_json(directory / SEGMENT_NAME, record)
+    return record
 
 
 def segment_directories(directory: Path) -> list[Path]:

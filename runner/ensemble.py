@@ -22,7 +22,6 @@ from walkers.runner.directory import (
     FIRST_SEGMENT,
     MANIFEST_NAME,
     REPLACED,
-    SEGMENT_NAME,
     UNFINISHED,
     FinishedRun,
     manifest,
@@ -31,6 +30,7 @@ from walkers.runner.directory import (
     room_on_disk,
     unfinished,
     write_deck,
+    write_segment_record,
 )
 from walkers.runner.files import write_json
 from walkers.runner.launch import EngineReport, check_room
@@ -73,8 +73,7 @@ class OpenEnsemble:
     def record(self, report: EngineReport) -> None:
         """Say in each run what its segment is."""
         for name, case in self.cases.items():
-            segment = {**vars(first_segment(case)), **vars(report), "root_mean_square_velocity": None}
-            write_json(self.run_directory(name) / FIRST_SEGMENT / SEGMENT_NAME, segment)
+            write_segment_record(self.run_directory(name) / FIRST_SEGMENT, first_segment(case), report)
 
     def finish(self, report: EngineReport) -> dict[str, FinishedRun]:
         """Write the manifests and move the ensemble to its place; its runs by name."""

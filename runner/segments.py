@@ -34,6 +34,7 @@ from walkers.runner.directory import (
     segment_directories,
     unfinished,
     write_deck,
+    write_segment_record,
 )
 from walkers.runner.failures import RunBusy
 from walkers.runner.files import fsync_path, read_json, settle, write_json
@@ -149,10 +150,9 @@ class OpenRun:
                 shutil.copyfile(new.with_name(f"{number - 1:04d}") / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
             report = launch(deck, new, self.engine, on_progress=tell, time_limit=time_limit, keep_open=self.locks)
             (new / PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
-            record = {**vars(segment), **vars(report), "root_mean_square_velocity": _rms_velocity(new)}
             if not self.case.run.in_one:
                 _check_restart(new / RESTART_NAME, deck)
-            write_json(new / SEGMENT_NAME, record)
+            record = write_segment_record(new, segment, report, _rms_velocity(new))
             settle(new)
             new.rename(place)
             fsync_path(place.parent)
@@ -183,17 +183,16 @@ def _teller(
     """What turns the progress of a segment into that of its run."""
 
     def advance(progress: Progress) -> None:
-        step = max(progress.step, segment.begin)
-        resting = segment.drive_from is None
+        step, start = max(progress.step, segment.begin), segment.drive_from
         tell(
             replace(
                 progress,
-                step=0 if segment.drive_from is None else step - segment.drive_from,
+                step=0 if start is None else step - start,
                 steps=case.run.steps,
                 made=made + step - segment.begin,
                 simulated=step * case.run.time_step,
                 elapsed=time.perf_counter() - begun,
-                resting=resting,
+                resting=start is None,
             )
         )
 

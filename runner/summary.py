@@ -8,7 +8,7 @@ from typing import Any
 from walkers.inputs import library
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
-from walkers.inputs.loads import dimer_of
+from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics.capillary import capillary_force_limit_at_wall
@@ -70,7 +70,7 @@ def summarise(case: Case) -> dict[str, Any]:
 
 def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
     """What the contacts of a walker carry at rest."""
-    loads, radii = walkers.loads(case), walkers.radii
+    loads, radii = contact_loads(case, walkers), walkers.radii
     names = [f"bead {bead} on substrate" for bead in range(1, len(radii) + 1)]
     names += [f"bead {other + 1} on bead {one + 1}" for one, other in walkers.pairs]
     planes = [capillary_force_limit_at_wall(case.liquid.surface_tension, radius) for radius in radii]

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.axes import flatten
 from walkers.inputs.errors import InputError, Problem
 from walkers.postprocess.clusters import Climb, ClimbCriteria
 from walkers.postprocess.piles import Pile, analyse, classified
@@ -58,22 +57,15 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
     return groups
 
 
-def _conditions(case: Mapping[str, Any]) -> dict[str, Any]:
+def _conditions(value: Any, key: str = "") -> dict[str, Any]:
     """Dotted keys of a resolved case, entries of lists of tables one by one."""
-
-    def tables(value: Any) -> Any:
-        if isinstance(value, Mapping):
-            entries = {
-                f"{key}[{number}]": one
-                for key, many in value.items()
-                if isinstance(many, list) and many and isinstance(many[0], Mapping)
-                for number, one in enumerate(many)
-            }
-            rest = {key: one for key, one in value.items() if f"{key}[0]" not in entries}
-            return {key: tables(one) for key, one in {**rest, **entries}.items()}
-        return value
-
-    return flatten(tables(case), lambda _: False)
+    if isinstance(value, Mapping):
+        parts = {f"{key}.{name}" if key else name: one for name, one in value.items()}
+    elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+        parts = {f"{key}[{number}]": one for number, one in enumerate(value)}
+    else:
+        return {key: value}
+    return {name: one for part, within in parts.items() for name, one in _conditions(within, part).items()}
 
 
 def _short(value: Any) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 
-from walkers.inputs.bodies import Standing
 from walkers.inputs.boundary import Span
 from walkers.inputs.case import Case
 from walkers.inputs.loads import hop_height, reach
@@ -21,11 +20,11 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
     Each walker draws its start from its own random stream (seed, number of the walker in its case), so that walker k is
     the same whoever shares the deck.
     """
-    standing = [(case, make, one) for case in cases for make, one in _standing(case)]
-    walking = [(case, make, one) for case, make, one in standing if one.walks]
+    standing = [(case, make, one) for case in cases for make, one in case.standing()]
+    walking = sum(one.walks for _, _, one in standing)
     spacing = max((walkers.spacing for case in cases for walkers in case.walkers), default=0.0)
     boundary = cases[0].boundary
-    grid = boundary.grid(len(walking), spacing) if walking else []
+    grid = boundary.grid(walking, spacing) if walking else []
     room = boundary.room(_span(cases, grid, spacing), cases[0].run.ranks)
     surfaces = surfaces_of(cases)
     walkers: list[PlacedWalker] = []
@@ -42,14 +41,6 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
             ids = tuple(range(first, first + len(one.beads)))
             walkers.append(PlacedWalker(len(walkers), make, ids, one.facing, one.angle, origin))
     return Scene(tuple(beads), boundary.faces(), room.carriers, room.lower, room.upper), tuple(walkers)
-
-
-def _standing(case: Case) -> list[tuple[int, Standing]]:
-    """What stands in a case, each with the number of its body."""
-    standing: list[tuple[int, Standing]] = []
-    for make, body in enumerate(case.bodies):
-        standing += [(make, one) for one in body.stand(case, len(standing))]
-    return standing
 
 
 def _span(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> Span:

@@ -15,7 +15,7 @@ from walkers.postprocess.clusters import (
     Track,
     bulk_of,
     classify,
-    components,
+    connected,
     follow,
     held_clusters,
 )
@@ -71,7 +71,7 @@ class Scene:
         clusters = []
         for pairs, walls in zip(self.pairs, self.walls, strict=True):
             bridges = frame(pairs, walls)
-            labels = components(24, bridges)
+            labels = connected(24, bridges.beads)
             self.bulks.append(bulk_of(labels, bridges))
             clusters.append(list(held_clusters(labels, bridges, self.bulks[-1])))
         tracks = follow(TIME, clusters, rule)
@@ -249,7 +249,7 @@ def test_a_fall_ends_a_climb_at_its_top() -> None:
 
 
 def test_the_bulk_is_the_component_of_most_beads() -> None:
-    labels = components(24, frame([(20, 21)], {}))
+    labels = connected(24, frame([(20, 21)], {}).beads)
     assert np.flatnonzero(bulk_of(labels, frame([(20, 21)], {}))).tolist() == BULK
     floor = frame([(20, 21)], {20: 0})
     assert np.flatnonzero(bulk_of(labels, floor)).tolist() == [*BULK, 20, 21]

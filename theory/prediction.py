@@ -73,7 +73,7 @@ def _check(*cases: Case) -> None:
     for case in cases:
         if len(case.walkers) != 1 or len(case.walkers[0].radii) != 2 or case.loose:
             raise ValueError("bodies: the theory is one of dimers")
-        if case.boundary.walls != ("floor",):
+        if not case.boundary.bare:
             raise ValueError("boundary.shape: the theory is one of planes")
         if not case.drive.is_plain or case.drive.direction[2] != 0.0:
             raise ValueError("drive: the theory is one of a single harmonic along the plane, without a phase")

@@ -39,11 +39,9 @@ class Run:
     @property
     def case(self) -> Case:
         """The resolved case."""
-        from walkers.inputs.case import Case
-        from walkers.runner.directory import CASE_NAME
-        from walkers.runner.files import read_json
+        from walkers.runner.directory import case_of
 
-        return Case.from_dict(read_json(self.directory / CASE_NAME))
+        return case_of(self.directory)
 
     @property
     def result(self) -> dict[str, Any]:
@@ -218,10 +216,7 @@ def _place_of(case: Path, out: Path) -> Path | None:
 def _readable(directory: Path) -> Run:
     """The run, if its description can be read; its tables are made anew if need be."""
     from walkers.postprocess.analysis import current_result
-    from walkers.runner.directory import FinishedRun
-    from walkers.runner.files import read_json
-    from walkers.templates.deck import LAYOUT_NAME
-    from walkers.templates.layout import Layout
+    from walkers.runner.directory import FinishedRun, layout_of
 
     run = FinishedRun(directory)
     for name in ("manifest", "case", "layout"):
@@ -231,7 +226,7 @@ def _readable(directory: Path) -> Run:
             problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
             raise InputError(str(directory), [problem]) from error
     for segment in run.segments:
-        layout = Layout.from_dict(read_json(segment / LAYOUT_NAME))
+        layout = layout_of(segment)
         dump = segment / layout.bead_dump
         if not dump.is_file():
             raise InputError(str(directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
