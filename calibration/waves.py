@@ -13,6 +13,7 @@ import numpy.typing as npt
 from walkers.calibration.space import Space
 from walkers.inputs.calibration import Calibration, Observation
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.schema import ALTERNATIVES
 from walkers.inputs.sweep import Sweep, expand
 from walkers.paper.sensitivity import misalignment
 from walkers.postprocess.steady_state import steady_walkers, together
@@ -76,7 +77,9 @@ def wave_sweep(
     columns: dict[str, list[Any]] = {}
     for row in np.atleast_2d(values):
         for label, keys in calibration.experiments.items():
-            point = {**keys, **(extra or {}).get(label, {})}
+            more = (extra or {}).get(label, {})
+            replaced = {other for key in more for other in ALTERNATIVES.get(key, ())}
+            point = {**{key: value for key, value in keys.items() if key not in replaced}, **more}
             for parameter, value in zip(calibration.parameters, row, strict=True):
                 if label in parameter.experiments:
                     digits = f"{value:.{_DIGITS}g}"

@@ -19,6 +19,11 @@ from walkers.inputs.drive import AXES, Drive, Vector
 from walkers.physics.matter import Contact, Liquid
 
 
+def settling_of(cycles: int) -> int:
+    """Cycles that walkers are given to settle, of so many, where a case does not say: a third, at most 20."""
+    return min(20, cycles // 3)
+
+
 @dataclass(frozen=True)
 class Run:
     """How long, how fine and in which segments; a cycle is a whole multiple of the sampling interval.
@@ -30,9 +35,12 @@ class Run:
     steps_per_cycle
         Of the drive.
     cycles
-        Driven.
+        Driven, or at most so many if the run is driven until its walkers are steady.
     settling_cycles
         Of these, before velocities are measured.
+    until_steady
+        Whether the run ends with the segment after which its walkers are steady
+        (`walkers.postprocess.steady_state.are_steady`).
     samples_per_cycle, cycles_per_sample
         Beads are recorded this often a cycle, or once in so many cycles; one of them is 1.
     samples_per_bridge_sample
@@ -50,6 +58,7 @@ class Run:
     steps_per_cycle: int
     cycles: int
     settling_cycles: int
+    until_steady: bool
     samples_per_cycle: int
     cycles_per_sample: int
     samples_per_bridge_sample: int
@@ -72,6 +81,10 @@ class Run:
     def settled_strobes(self) -> int:
         """Stroboscopic samples, one a cycle or rarer, before velocities are measured."""
         return -(-self.settling_cycles // self.cycles_per_sample)
+
+    def ended_after(self, cycles: int) -> Run:
+        """The same of a run that ended after so many cycles, for its walkers were steady."""
+        return replace(self, cycles=cycles, settling_cycles=settling_of(cycles))
 
     @property
     def rests(self) -> bool:
@@ -170,7 +183,7 @@ class Case:
     @property
     def independent(self) -> bool:
         """Whether its walkers are so wherever they stand, so that others' may stand beside them in a deck."""
-        return self.apart and self.run.in_one and self.boundary.bare
+        return self.apart and (self.run.in_one or self.run.until_steady) and self.boundary.bare
 
     @property
     def meets(self) -> bool:

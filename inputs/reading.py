@@ -10,14 +10,13 @@ import stat
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, UnusableKeyError
 from walkers.inputs.library import suggestion
-from walkers.inputs.messages import quoted, validated
-from walkers.inputs.resolving import resolve
-from walkers.inputs.schema import CaseFile
+
+if TYPE_CHECKING:
+    from walkers.inputs.case import Case
 
 _SHIPPED = Path(__file__).parent / "cases"
 _MOST_BYTES = 16 << 20
@@ -117,6 +116,11 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     InputError
         If anything in it cannot be used.
     """
+    # Not above: that there is no such file is told before all that a case may say is built.
+    from walkers.inputs.messages import quoted, validated
+    from walkers.inputs.resolving import resolve
+    from walkers.inputs.schema import CaseFile
+
     _refuse_old_words(document, source)
     file = validated(CaseFile, document, source)
     try:
@@ -149,6 +153,8 @@ _OLD_WORDS = {
 
 def _refuse_old_words(document: Mapping[str, Any], source: str) -> None:
     """Say what the words of older case files are called now."""
+    from walkers.inputs.messages import quoted
+
     problems = []
     for key, told in _OLD_WORDS.items():
         table, _, name = key.rpartition(".")

@@ -55,7 +55,7 @@ def resolve(file: CaseFile, name: str) -> Case:
         liquid=liquid,
         contact=contact,
         seed=file.run.seed,
-        run=Run(0.0, 1, 1, 0, 1, 1, 1, 1, 0.0, 0.0, 1),  # its step follows from the rest
+        run=Run(0.0, 1, 1, 0, False, 1, 1, 1, 1, 0.0, 0.0, 1),  # its step follows from the rest
     )
     case = replace(case, run=resolve_run(file.run, case))
     along, across, _ = case.drive_axis

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import ceil
 
-from walkers.inputs.case import Case, Run
+from walkers.inputs.bodies import Walkers
+from walkers.inputs.case import Case, Run, settling_of
 from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector, waveform
 from walkers.inputs.errors import UnusableKeyError
 from walkers.inputs.schema import DriveTable, HarmonicTable, RunTable
@@ -14,6 +14,13 @@ from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_
 
 MOST_STEPS = 2**31 - 1
 _SEGMENT_SECONDS = 0.5
+_MOST_CYCLES = 60
+_CYCLES_BETWEEN = 12
+"""Cycles after which, and again after which, it is asked whether walkers are steady."""
+_NEARLY_SYMMETRIC = 0.08
+"""sin δ of dimers below which speeds of steady walkers still creep …"""
+_ASLANT = 0.1
+"""… and start angle (rad) from which walkers turn for longer than a few cycles: both run in full."""
 _LONGEST_SETTLING = 0.5
 _FRAMES_PER_SECOND = 60.0
 
@@ -50,8 +57,6 @@ def resolve_drive(table: DriveTable, axis: str, dimer: Dimer | None) -> Drive:
     except ValueError as error:
         raise UnusableKeyError("drive.harmonics", f"expected frequencies with a common period: {error}") from error
     drive = Drive(harmonics, table.frame or "container")
-    if table.frame is None and axis == "x" and drive.is_plain:
-        return replace(drive, frame="lab")
     if table.frame == "lab" and not drive.is_plain:
         told = "several harmonics, or one with a phase, are driven in the container's frame"
         raise UnusableKeyError("drive.frame", f'expected "container": {told}')
@@ -87,13 +92,14 @@ def limits_of(case: Case) -> TimeStepLimits:
 def resolve_run(table: RunTable, case: Case) -> Run:
     """The time step, the length and the sampling of a run, given the rest of the case."""
     frequency = case.drive.frequency
-    largest = largest_time_step(table.time_step, limits_of(case), allow_unstable=table.allow_unstable)
+    largest = largest_time_step(table.time_step, limits_of(case), loose=case.loose, allow_unstable=table.allow_unstable)
     samples, cycles_per_sample = _sampling(table, case)
     time_step, steps = fit_into_cycle(largest, frequency, samples)
     cycles = _cycles(table, case, cycles_per_sample)
+    until_steady = _until_steady(table, case, cycles_per_sample)
     settling = table.settling_cycles
     if settling is None:
-        settling = min(20, cycles // 3) if case.walkers else 0
+        settling = settling_of(cycles) if case.walkers else 0
     if cycles < 2:
         key = "run.duration" if table.duration is not None else "run.cycles"
         raise UnusableKeyError(key, f"expected at least two cycles of the drive, {2.0 / frequency:.4g} s")
@@ -114,13 +120,16 @@ def resolve_run(table: RunTable, case: Case) -> Run:
     # Segments end with a sample, so that each begins where the last one ended.
     segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if case.loose else None
     per_segment = (
-        cycles if segment is None else max(1, round(segment * frequency / cycles_per_sample)) * cycles_per_sample
+        _CYCLES_BETWEEN
+        if until_steady
+        else (cycles if segment is None else max(1, round(segment * frequency / cycles_per_sample)) * cycles_per_sample)
     )
     return Run(
         time_step=time_step,
         steps_per_cycle=steps,
         cycles=cycles,
         settling_cycles=settling,
+        until_steady=until_steady,
         samples_per_cycle=samples,
         cycles_per_sample=cycles_per_sample,
         samples_per_bridge_sample=_bridge_sampling(table, case, samples),
@@ -162,10 +171,48 @@ def _cycles(table: RunTable, case: Case, cycles_per_sample: int) -> int:
         return ceil(table.duration * case.drive.frequency / cycles_per_sample * (1.0 - 1e-12)) * cycles_per_sample
     if table.cycles is None and case.loose:
         raise UnusableKeyError("run.duration", 'missing; expected such as "4 s"')
-    return ceil((table.cycles or 60) / cycles_per_sample) * cycles_per_sample
+    cycles = table.cycles or table.most_cycles or _MOST_CYCLES
+    return ceil(cycles / cycles_per_sample) * cycles_per_sample
 
 
-def largest_time_step(given: float | None, limits: TimeStepLimits, *, allow_unstable: bool) -> float:
+_LENGTHS = ("cycles", "duration", "settling_cycles", "segment")
+"""Keys by which a case says itself how long it is and in which parts: it is run so."""
+
+
+def _until_steady(table: RunTable, case: Case, cycles_per_sample: int) -> bool:
+    """Whether a run may end when its walkers are steady.
+
+    Raises
+    ------
+    UnusableKeyError
+        If a case asks for what cannot be, or for its contrary as well.
+    """
+    asked = ["cycles"] if "cycles" in table.model_fields_set and table.cycles is None else []
+    asked += ["most_cycles"] if table.most_cycles is not None else []
+    given = [key for key in _LENGTHS if getattr(table, key) is not None]
+    if given:
+        if asked:
+            raise UnusableKeyError(
+                f"run.{given[0]}", f"expected none where run.{asked[0]} lets walkers run until steady"
+            )
+        return False
+    if not case.apart:
+        if asked:
+            raise UnusableKeyError(f"run.{asked[0]}", "expected run.duration: only walkers apart can be steady")
+        return False
+    return table.ranks == 1 and cycles_per_sample == 1 and all(_settles_soon(walkers) for walkers in case.walkers)
+
+
+def _settles_soon(walkers: Walkers) -> bool:
+    """Whether a few cycles may show how walkers walk: asymmetric dimers that start near the axis."""
+    if len(walkers.radii) != 2:
+        return False
+    first, second = walkers.radii
+    asymmetry = abs(first - second) / (first + second)
+    return asymmetry >= _NEARLY_SYMMETRIC and abs(walkers.angle) + walkers.angle_spread < _ASLANT
+
+
+def largest_time_step(given: float | None, limits: TimeStepLimits, *, loose: bool, allow_unstable: bool) -> float:
     """The step that a case gives, or the one that ``"auto"`` takes, s.
 
     Raises
@@ -174,7 +221,7 @@ def largest_time_step(given: float | None, limits: TimeStepLimits, *, allow_unst
         If a given one is beyond a limit and the case does not insist.
     """
     if given is None:
-        return limits.recommended()
+        return limits.recommended(loose=loose)
     exceeded = limits.exceeded_by(given)
     if exceeded and not allow_unstable:
         allowed = min(limits.as_dict().values())

@@ -59,10 +59,12 @@ ALTERNATIVES: dict[str, tuple[str, ...]] = {
     "dimers.radii": ("dimers.mean_radius", "dimers.sin_delta"),
     "dimers.mean_radius": ("dimers.radii",),
     "dimers.sin_delta": ("dimers.radii",),
+    "run.cycles": ("run.duration", "run.most_cycles"),
+    "run.most_cycles": ("run.cycles", "run.duration"),
+    "run.duration": ("run.cycles", "run.most_cycles"),
     **{
         key: (other,)
         for pair in (
-            ("run.cycles", "run.duration"),
             ("run.samples_per_cycle", "run.frames_per_second"),
             ("mixture.count", "mixture.fill_height"),
         )
@@ -238,7 +240,8 @@ class DriveTable(Table):
     """``[drive]``: one harmonic by its keys, or several as ``[[drive.harmonics]]``.
 
     The ``waveform`` is that of the acceleration. ``axis``, left out, is x on a plane, the vertical z in containers.
-    ``frame``, left out, is the laboratory's for one harmonic without a phase on a plane, else the container's.
+    In the ``frame`` of the container, as is usual, the beads feel the inertial force; in that of the laboratory the
+    walls move, which they can for one harmonic without a phase.
     """
 
     axis: Axis | None = None
@@ -255,14 +258,15 @@ class RunTable(Table):
     """``[run]``: the time step, the length of the run and what is recorded.
 
     The length is given by ``cycles`` or as a ``duration``, the sampling by ``samples_per_cycle`` or
-    ``frames_per_second``. Left out, walkers run for 60 cycles of 20 samples, the first 20 of them to settle; loose
-    beads have a duration, are recorded 60 times a second, and rest before the drive (``settled_below``,
-    ``longest_settling``).
+    ``frames_per_second``. Left out, or ``cycles = "auto"``, walkers run until they are steady, for 60 cycles
+    (``most_cycles``) of 20 samples at most, a third of them, at most 20, to settle; loose beads have a duration, are
+    recorded 60 times a second, and rest before the drive (``settled_below``, ``longest_settling``).
     """
 
     time_step: Annotated[Time | None, AUTO] = None
     allow_unstable: bool = False
-    cycles: Annotated[Whole, Field(ge=2, le=1_000_000)] | None = None
+    cycles: Annotated[Annotated[Whole, Field(ge=2, le=1_000_000)] | None, AUTO] = None
+    most_cycles: Annotated[Whole, Field(ge=2, le=1_000_000)] | None = None
     duration: Duration | None = None
     settling_cycles: Annotated[Whole, Field(ge=0, le=1_000_000)] | None = None
     samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] | None = None

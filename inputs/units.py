@@ -8,8 +8,10 @@ numbers, so that "500 rad/s" would pass for 500 Hz.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from math import pi
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator
@@ -25,6 +27,22 @@ ACCELERATION_OF_ONE_G = 9.8
 _NUMBER_AND_UNIT = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s%,;][^%,;]*)")
 _GRAM_SYMBOL = re.compile(r"(?<![A-Za-z_])g(?![A-Za-z_0-9])")
 _ANGLE_UNITS = frozenset({"degree", "radian", "milliradian", "arcminute", "arcsecond"})
+
+
+_USUAL: Mapping[str, tuple[str, float]] = {
+    **{"m": ("m", 1.0), "cm": ("m", 1e-2), "mm": ("m", 1e-3), "um": ("m", 1e-6), "µm": ("m", 1e-6), "nm": ("m", 1e-9)},
+    **{"mHz": ("Hz", 1e-3), "Hz": ("Hz", 1.0), "kHz": ("Hz", 1e3)},
+    **{"g": ("m/s^2", ACCELERATION_OF_ONE_G), "m/s^2": ("m/s^2", 1.0), "m/s²": ("m/s^2", 1.0)},
+    **{"m/s": ("m/s", 1.0), "mm/s": ("m/s", 1e-3), "um/s": ("m/s", 1e-6), "µm/s": ("m/s", 1e-6), "nm/s": ("m/s", 1e-9)},
+    **{"s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6), "µs": ("s", 1e-6), "ns": ("s", 1e-9)},
+    **{"rad": ("rad", 1.0), "mrad": ("rad", 1e-3), "deg": ("rad", pi / 180.0)},
+    **{"kg/m^3": ("kg/m^3", 1.0), "kg/m³": ("kg/m^3", 1.0), "g/cm^3": ("kg/m^3", 1e3), "g/cm³": ("kg/m^3", 1e3)},
+    **{"N/m": ("N/m", 1.0), "mN/m": ("N/m", 1e-3)},
+    **{"m^2/s": ("m^2/s", 1.0), "m²/s": ("m^2/s", 1.0), "mm^2/s": ("m^2/s", 1e-6), "mm²/s": ("m^2/s", 1e-6)},
+    **{"Pa*s": ("Pa*s", 1.0), "mPa*s": ("Pa*s", 1e-3)},
+    **{"Pa": ("Pa", 1.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9)},
+}
+"""What the usual units are in SI units, as pint has them too: a case that has no others need not wait for pint."""
 
 
 @dataclass(frozen=True)
@@ -91,9 +109,26 @@ def parse_quantity(text: str, kind: Kind) -> float:
     return value
 
 
-@lru_cache(maxsize=1024)  # a sweep reads thousands of quantities in the same few units
 def _si_units_in(symbol: str, kind: Kind) -> float:
     """How many of the kind's SI unit a unit is."""
+    usual = _USUAL.get(symbol)
+    if usual is None:
+        return si_units_by_pint(symbol, kind)
+    unit, factor = usual
+    if unit != kind.unit:
+        raise ValueError(kind.expectation)
+    return factor
+
+
+@lru_cache(maxsize=1024)  # a sweep reads thousands of quantities in the same few units
+def si_units_by_pint(symbol: str, kind: Kind) -> float:
+    """How many of the kind's SI unit a unit is, whatever unit it is.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or one of something else.
+    """
     units = registry()
     try:
         unit = units.parse_units(_GRAM_SYMBOL.sub("gee", symbol) if kind is ACCELERATION else symbol)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.paper.alignment import fig_alignment
-from walkers.paper.comparison import as_dict, as_markdown, compare, count
+from walkers.paper.comparison import Row, as_dict, as_markdown, compare, count
 from walkers.paper.modes import fig_modes
 from walkers.paper.rotation import fig4
 from walkers.paper.sensitivity import fig_sensitivity
@@ -22,6 +24,9 @@ from walkers.runner.files import write_text
 from walkers.sweeps.scheduler import Failure, Options
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+    from joblib.externals.loky import ProcessPoolExecutor
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg")
@@ -116,27 +121,57 @@ def make_figures(
         if folder.exists() and not folder.is_dir():
             raise InputError(option, [Problem("", None, f"expected a folder, {folder} is a file")])
     needed = {name: FIGURES[name].sweeps if name in FIGURES else _COMPARED for name in chosen}
-    sweeps = dict.fromkeys(sweep for names in needed.values() for sweep in names)
-    sources, failures = make_sources(
-        sweeps, out, options, engine=engine, allow_failed_audit=allow_failed_audit, progress_of=progress_of
-    )
-    files: list[Path] = []
-    left_out: dict[str, str] = {}
-    for name in chosen:
-        if name in FIGURES:
-            drawing = FIGURES[name]
-            try:
-                runs = sources.runs(*drawing.sweeps)
-                files += save_figure(drawing.draw(sources), to / name, runs, FORMATS, drawing.title)
-            except NothingFinishedError as missing:
-                left_out[name] = str(missing)
+    failures: dict[str, list[Failure]] = {}
+    drawn: dict[str, Future[list[Path] | str]] = {}
+    rows: Future[list[Row]] | None = None
+    with _drawers(options.workers) as drawers:
+        for sweep in dict.fromkeys(sweep for names in needed.values() for sweep in names):
+            failures |= make_sources(
+                [sweep], out, options, engine=engine, allow_failed_audit=allow_failed_audit, progress_of=progress_of
+            )[1]
+            for name in [name for name in chosen if name not in drawn and failures.keys() >= set(needed[name])]:
+                if name in FIGURES:
+                    drawn[name] = drawers.submit(draw_figure, name, out, to)
+                elif rows is None:
+                    rows = drawers.submit(_compared, out)
+        outcomes = {name: drawn[name].result() for name in chosen if name in drawn}
+        compared = rows.result() if rows else []
+    files = [path for outcome in outcomes.values() if isinstance(outcome, list) for path in outcome]
+    left_out = {name: outcome for name, outcome in outcomes.items() if isinstance(outcome, str)}
     failed = {name: points for name, points in failures.items() if points}
     if COMPARISON not in chosen:
         return Made(files, failed, left_out)
-    rows = compare(sources)
     to.mkdir(parents=True, exist_ok=True)
-    texts = {".md": as_markdown(rows), ".json": json.dumps(as_dict(rows), indent=2, ensure_ascii=False) + "\n"}
+    texts = {".md": as_markdown(compared), ".json": json.dumps(as_dict(compared), indent=2, ensure_ascii=False) + "\n"}
     for suffix, text in texts.items():
         files.append((to / COMPARISON).with_suffix(suffix))
         write_text(files[-1], text)
-    return Made(files, failed, left_out, *count(rows, measured=True))
+    return Made(files, failed, left_out, *count(compared, measured=True))
+
+
+@contextmanager
+def _drawers(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes that draw while engines run; unlike those of `multiprocessing` they do not import the caller's script."""
+    from joblib.externals.loky import ProcessPoolExecutor
+
+    drawers = ProcessPoolExecutor(workers, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))
+    try:
+        yield drawers
+    except BaseException:
+        drawers.shutdown(kill_workers=True)
+        raise
+    drawers.shutdown()
+
+
+def draw_figure(name: str, out: Path, to: Path) -> list[Path] | str:
+    """Draw one of `FIGURES` from finished sweeps; the files, or why nothing could be drawn."""
+    drawing, sources = FIGURES[name], Sources(out)
+    try:
+        runs = sources.runs(*drawing.sweeps)
+        return save_figure(drawing.draw(sources), to / name, runs, FORMATS, drawing.title)
+    except NothingFinishedError as missing:
+        return str(missing)
+
+
+def _compared(out: Path) -> list[Row]:
+    return compare(Sources(out))

@@ -23,8 +23,13 @@ from walkers.physics.lubrication import normal_drag, normal_drag_at_wall
 from walkers.physics.matter import Contact, Liquid
 
 AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
-"""Share of each limit that ``"auto"`` stays under: at 0.2 of Rayleigh (2 µs at 50 MPa) the walker's speed, and at
-0.4 of the viscous limit (2 µs for glycerol) the climber's and the pile's, were converged."""
+"""Share of each limit that ``"auto"`` stays under where beads are loose: at 0.4 of the viscous limit (2 µs for
+glycerol) the climber and the pile were converged."""
+WALKER_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.4, "hertz": 0.2, "viscous": 0.4}
+"""The same where there are walkers alone, which do not heat each other: at 0.4 of Rayleigh their speeds are within
+0.25 % of those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of it they go wrong."""
+LONGEST_WALKER_STEP = 4e-6
+"""s; longest step of walkers, however soft they are."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +44,11 @@ class TimeStepLimits:
         """Name to limit in s."""
         return {"rayleigh": self.rayleigh, "hertz": self.hertz, "viscous": self.viscous}
 
-    def recommended(self) -> float:
-        """Largest step, in s, that respects every limit with margin."""
-        return min(AUTO_FRACTIONS[name] * limit for name, limit in self.as_dict().items())
+    def recommended(self, *, loose: bool) -> float:
+        """Largest step, in s, that respects every limit with margin, of beads that are loose or of walkers."""
+        shares = AUTO_FRACTIONS if loose else WALKER_FRACTIONS
+        longest = inf if loose else LONGEST_WALKER_STEP
+        return min(longest, *(shares[name] * limit for name, limit in self.as_dict().items()))
 
     def exceeded_by(self, time_step: float) -> list[str]:
         """Names of the limits below ``time_step`` (s)."""

@@ -11,18 +11,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar
-
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from walkers.inputs.case import Case
-from walkers.postprocess.motion import Bridges, Motion, read_motion
-from walkers.postprocess.tables import intact, write_table
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
 
+if TYPE_CHECKING:  # how far a sweep is can be told without numpy
+    import numpy.typing as npt
+
+    from walkers.postprocess.motion import Bridges, Motion
+
 RESULT_NAME = "result.json"
-Columns = dict[str, npt.NDArray[Any]]
+Columns: TypeAlias = "dict[str, npt.NDArray[Any]]"
 Described = Mapping[str, tuple[str, str]]
 """From the names of columns to their units and meanings."""
 
@@ -147,6 +148,9 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
     postprocess.dump.DumpError
         If a dump cannot be read.
     """
+    from walkers.postprocess.motion import read_motion
+    from walkers.postprocess.tables import write_table
+
     directory = Path(directory)
     motion = read_motion(directory)
     case = motion.case
@@ -176,6 +180,8 @@ def read_result(directory: str | Path) -> dict[str, Any]:
 
 def current_result(directory: str | Path) -> dict[str, Any]:
     """The result of a finished run; tabulated anew if it or a table is gone or damaged, or of an earlier method."""
+    from walkers.postprocess.tables import intact
+
     directory = Path(directory)
     try:
         result = read_result(directory)

@@ -27,12 +27,12 @@ class DumpError(WalkersError):
 
 @dataclass(frozen=True)
 class _Frame:
-    start: int
     step: int
     rows: int
     columns: int
     blocks: tuple[tuple[int, int], ...]
     """Offset in bytes and number of values of each process's part."""
+    end: int
 
 
 class BinaryDump:
@@ -65,26 +65,40 @@ class BinaryDump:
         self._bytes: npt.NDArray[np.uint8] = (
             np.memmap(path, dtype=np.uint8, mode="r") if size else np.empty(0, dtype=np.uint8)
         )
-        self._frames: list[_Frame] = []
-        self.truncated = False
-        offset = 0
-        while offset < size:
-            read = self._read_header(offset, size)
-            if read is None:
-                self.truncated = True
-                break
-            frame, offset = read
-            self._frames.append(frame)
-        self.steps = np.array([frame.step for frame in self._frames], dtype=np.int64)
+        self._starts = self._starts_of_alike(size)
+        """Offsets of the complete frames, bytes."""
+        self._alike = len(self._starts) > 0
+        """Whether they are all of one process and as long as each other."""
+        offset = int(self._starts[-1]) + self._stride if self._alike else 0
+        starts = []
+        while offset < size and (frame := self._read_header(offset, size)) is not None:
+            starts.append(offset)
+            offset = frame.end
+            self._alike = False
+        self._starts = np.concatenate([self._starts, np.array(starts, dtype=np.int64)])
+        self.truncated = offset < size
+        steps = self._bytes[self._starts[:, None] + np.arange(8)] if len(self._starts) else np.empty((0, 8), np.uint8)
+        self.steps = np.ascontiguousarray(steps).view(np.int64)[:, 0]
 
     def __len__(self) -> int:
-        return len(self._frames)
+        return len(self._starts)
 
-    def _read_header(self, offset: int, size: int) -> tuple[_Frame, int] | None:
+    def _starts_of_alike(self, size: int) -> npt.NDArray[np.int64]:
+        """Offsets of the frames from the first one on that are as that; none if that has several parts."""
+        first = self._read_header(0, size) if size else None
+        if first is None or len(first.blocks) > 1:
+            return np.empty(0, dtype=np.int64)
+        self._stride = first.end
+        heads = self._bytes[: size // first.end * first.end].reshape(-1, first.end)[:, 8 : first.blocks[0][0]]
+        differs = np.flatnonzero((heads != heads[0]).any(axis=1))
+        return np.arange(differs[0] if len(differs) else len(heads), dtype=np.int64) * first.end
+
+    def _read_header(self, offset: int, size: int) -> _Frame | None:
+        """The frame that begins at an offset; None if the file ends within it."""
         if offset + _HEADER.size > size:
             return None
         values = _HEADER.unpack(self._bytes[offset : offset + _HEADER.size].tobytes())
-        start, step = offset, values[0]
+        step = values[0]
         rows, columns, processes = values[1], values[15], values[16]
         if columns != len(self.columns) or rows < 0 or not 1 <= processes < 1_000_000 or step < 0:
             raise DumpError(f"{self.path}: no dump of {len(self.columns)} columns (byte {offset})")
@@ -101,7 +115,12 @@ class BinaryDump:
             offset += 8 * count
         if sum(count for _, count in blocks) != rows * columns:
             raise DumpError(f"{self.path}: the parts of the frame of step {step} do not add up")
-        return _Frame(start, step, rows, columns, tuple(blocks)), offset
+        return _Frame(step, rows, columns, tuple(blocks), offset)
+
+    def _frame(self, number: int) -> _Frame:
+        frame = self._read_header(int(self._starts[number]), len(self._bytes))
+        assert frame is not None
+        return frame
 
     def frame(self, number: int) -> FloatArray:
         """One frame, shape (rows, columns).
@@ -111,7 +130,7 @@ class BinaryDump:
         DumpError
             If it holds a NaN or an infinity: the engine goes on with them and says nothing.
         """
-        frame = self._frames[number]
+        frame = self._frame(number)
         parts = [self._bytes[start : start + 8 * count].view(np.float64) for start, count in frame.blocks]
         values = np.concatenate(parts).reshape(frame.rows, frame.columns)
         if not np.isfinite(values).all():
@@ -127,11 +146,19 @@ class BinaryDump:
         DumpError
             If the number of rows changes, or a number is none.
         """
-        if not self._frames:
+        if not len(self):
             return np.empty((0, 0, len(self.columns)))
-        if len({frame.rows for frame in self._frames}) > 1:
-            raise DumpError(f"{self.path}: the number of beads changes")
-        return np.stack([self.frame(number) for number in range(len(self))])
+        if not self._alike:
+            frames = [self.frame(number) for number in range(len(self))]
+            if len({len(frame) for frame in frames}) > 1:
+                raise DumpError(f"{self.path}: the number of beads changes")
+            return np.stack(frames)
+        first = self._frame(0)
+        whole = self._bytes[: len(self) * first.end].reshape(len(self), first.end)
+        data = np.ascontiguousarray(whole[:, first.blocks[0][0] :]).view(np.float64)
+        if not np.isfinite(data).all():
+            self.frame(int(np.flatnonzero(~np.isfinite(data).all(axis=1))[0]))  # which says where
+        return data.reshape(len(self), first.rows, first.columns)
 
     def write_like(self, data: FloatArray, path: Path) -> None:
         """Write a dump with the frames' heads of this one and other rows.
@@ -144,8 +171,8 @@ class BinaryDump:
         """
         count = data.shape[1] * data.shape[2]
         heads = []
-        for frame in self._frames:
-            head = list(_HEADER.unpack(self._bytes[frame.start : frame.start + _HEADER.size].tobytes()))
+        for start in self._starts:
+            head = list(_HEADER.unpack(self._bytes[start : start + _HEADER.size].tobytes()))
             head[1], head[-1] = data.shape[1], 1
             heads.append(np.frombuffer(_HEADER.pack(*head) + _COUNT.pack(count), dtype=np.uint8))
         body = np.ascontiguousarray(data).reshape(len(data), -1).view(np.uint8)

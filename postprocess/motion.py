@@ -32,7 +32,7 @@ class Motion:
     Attributes
     ----------
     case
-        Of the run.
+        Of the run; if it was driven until its walkers were steady, with the cycles that it took.
     time : ndarray, shape (F,)
         s, from the begin of the drive; negative while the beads come to rest.
     position, velocity : ndarray, shape (F, N, 3)
@@ -50,6 +50,8 @@ class Motion:
         Segment and number of each frame within it, for the bridges.
     truncated : bool
         Whether the dump ends within a frame.
+    ended_early : bool
+        Whether the run ended before the most cycles that it may take, for its walkers were steady.
     """
 
     case: Case
@@ -64,6 +66,7 @@ class Motion:
     first_id: int
     frames: list[tuple[Path, int]]
     truncated: bool
+    ended_early: bool = False
 
     def __repr__(self) -> str:
         return f"<Motion of {self.case.name}: {len(self.time)} frames of {len(self.radius)} beads>"
@@ -271,7 +274,7 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
         layout, dump = _dump_of(segment)
         data = dump.stack()
         whole = len(data) and not dump.truncated and dump.steps[-1] == record["end"]
-        if not whole and not case.run.in_one:
+        if not whole and (len(segments) > 1 or case.run.rests):
             raise DumpError(f"{segment}: its dump is incomplete")
         if len(data) < 2:
             raise DumpError(f"{dump.path}: {len(data)} complete frames, too few for a motion")
@@ -283,6 +286,10 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
         steps += [int(step) for step in dump.steps[begin:]]
         frames += [(segment, number) for number in range(begin, len(data))]
     data = np.concatenate(parts) if len(parts) > 1 else parts[0]
+    ended_early = False
+    if case.run.until_steady:
+        cycles = records[-1]["end"] // case.run.steps_per_cycle
+        ended_early, case = cycles < case.run.cycles, replace(case, run=case.run.ended_after(cycles))
     # Before the drive has begun it is as if it would with the next frame.
     zero = start if start is not None else steps[-1] + case.run.steps_per_sample
     time = (np.array(steps, dtype=np.float64) - zero) * case.run.time_step
@@ -307,6 +314,7 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
         first_id=first + 1,
         frames=frames,
         truncated=truncated,
+        ended_early=ended_early,
     )
 
 

@@ -38,7 +38,7 @@ class Walking(Analysis):
     """How walkers walk."""
 
     name = "walking"
-    version = 2
+    version = 3
     tables = ("trajectory", "walkers", "bridges")
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
@@ -61,6 +61,8 @@ class Walking(Analysis):
         "walkers": ("", "replicates"),
         "steady": ("", "how many of them are steady"),
         "turned_round": ("", "how many of them turned by more than 90 degrees"),
+        "cycles": ("", "driven, those to settle among them"),
+        "ended_early": ("", "whether that was less than it might have been, for the walkers were steady"),
         "walkers_met": ("", "whether two of them came near each other"),
     }
 
@@ -88,6 +90,9 @@ class Walking(Analysis):
             "walkers_met": walkers_met(groups),
             "meet": case.meets,
             "contacts": _contact_names(groups[0]),
+            "cycles": case.run.cycles,
+            "settling_cycles": case.run.settling_cycles,
+            "ended_early": motion.ended_early,
             **_of_dimer(case),
         }
         if len(groups) > 1:
@@ -118,7 +123,10 @@ class Walking(Analysis):
             **{name: nan if value is None else value for name, value in {**beads, **contacts}.items()},
             **{
                 name: result[name]
-                for name in ("separated_fraction", "walkers", "steady", "turned_round", "walkers_met")
+                for name in (
+                    *("separated_fraction", "walkers", "steady", "turned_round", "walkers_met"),
+                    *("cycles", "ended_early"),
+                )
             },
         }
 
@@ -410,7 +418,8 @@ def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
 
 
 def _steady(result: Mapping[str, Any]) -> str:
-    return f"{result['steady']} of {result['walkers']} steady"
+    cycles = f" after {result['cycles']} cycles" if result.get("ended_early") else ""
+    return f"{result['steady']} of {result['walkers']} steady{cycles}"
 
 
 def _speed(value: float | None) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import ceil
+
 from walkers.inputs.case import Case
 from walkers.templates.deck import settling_steps
 
-START_UP_SECONDS = 0.33
+START_UP_SECONDS = 0.1
 _STEP_MICROSECONDS = 2.2
 _WALKER_MICROSECONDS = 0.54
 """2.7 µs a step for one walker, 5.5 for 6, 15 for 24, 53 for 96, in either frame."""
@@ -13,6 +15,8 @@ _BEAD_STEPS_PER_SECOND = 2.6e6
 """Of loose beads: 13,100 steps a second with 200 of them."""
 _GAIN_PER_RANK = 0.9
 _RESTING_SEGMENTS = 3
+_UNSTEADY_SHARE = 0.15
+"""Of the walkers of a run that ends when they are steady: how many go on after the first cycles."""
 
 
 def predicted_seconds(case: Case, walkers: int | None = None) -> float:
@@ -26,8 +30,12 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
         Beads' pairs in the deck, those of clusters by their beads; the case's own if left out.
     """
     run = case.run
-    segments = -(-run.cycles // run.cycles_per_segment) + (_RESTING_SEGMENTS if run.rests else 0)
-    steps = run.steps + (_RESTING_SEGMENTS * settling_steps(case) if run.rests else 0)
+    cycles = float(run.cycles)
+    if run.until_steady:
+        first = min(run.cycles_per_segment, run.cycles)
+        cycles = first + _UNSTEADY_SHARE * (run.cycles - first)
+    segments = ceil(cycles / run.cycles_per_segment) + (_RESTING_SEGMENTS if run.rests else 0)
+    steps = cycles * run.steps_per_cycle + (_RESTING_SEGMENTS * settling_steps(case) if run.rests else 0)
     count = pairs_of_beads(case) if walkers is None else walkers
     if case.loose:
         seconds_a_step = case.count / (_BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1)))

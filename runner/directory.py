@@ -117,7 +117,7 @@ def write_segment_record(
 ) -> dict[str, Any]:
     """Write what a segment is and what it took into its directory, and return it."""
     record = {**vars(segment), **vars(report), "root_mean_square_velocity": rms_velocity}
-    write_json(directory / SEGMENT_NAME, record)
+    write_json(directory / SEGMENT_NAME, record, at_once=False)
     return record
 
 
@@ -180,7 +180,7 @@ def write_deck(deck: Deck, directory: Path) -> None:
     """Write a deck, its files and its layout into a directory."""
     for name, text in {DECK_NAME: deck.text, **deck.files}.items():
         (directory / name).write_text(text, encoding="utf-8", errors="surrogateescape")
-    write_json(directory / LAYOUT_NAME, deck.layout.as_dict())
+    write_json(directory / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
 
 
 def record_failure(incomplete: Path, failure: Exception) -> None:

@@ -47,6 +47,7 @@ from walkers.templates.deck import (
     Deck,
     Segment,
     first_segment,
+    next_segment,
     render_deck,
     settling_steps,
 )
@@ -89,6 +90,7 @@ class OpenRun:
         on_progress: Callable[[Progress], None] | None = None,
         time_limit: float | None = None,
         render: Callable[[Case, Segment], Deck] = render_deck,
+        is_steady: Callable[[Path], bool] = lambda _: False,
     ) -> None:
         """Make the segments that are missing.
 
@@ -100,6 +102,8 @@ class OpenRun:
             Wall time in s for each segment.
         render
             What makes their decks.
+        is_steady
+            Of a run that is driven until its walkers are steady: whether they are, as its directory shows.
 
         Raises
         ------
@@ -108,22 +112,20 @@ class OpenRun:
         """
         begun, made = time.perf_counter(), 0
         while (segment := self.next_segment()) is not None:
+            if self.case.run.until_steady and self.done and is_steady(self.directory):
+                return
             tell = _teller(self.case, segment, on_progress, begun, made) if on_progress else None
             self._make(segment, render(self.case, segment), tell, time_limit)
             made += segment.end - segment.begin
 
     def next_segment(self) -> Segment | None:
         """The segment that is to be made next; None after the last one."""
-        run = self.case.run
         if not self.done:
             return first_segment(self.case)
         begin, start = int(self.done[-1]["end"]), self._drive_from()
         if start is None:
             return Segment(begin, begin + settling_steps(self.case), None)
-        end = start + run.steps
-        if begin >= end:
-            return None
-        return Segment(begin, min(begin + run.cycles_per_segment * run.steps_per_cycle, end), start)
+        return next_segment(self.case, Segment(begin, begin, start))
 
     def _drive_from(self) -> int | None:
         """Step at which the drive begins: the end of the first segment that leaves the beads at rest, or the last."""
@@ -172,7 +174,7 @@ class OpenRun:
         record["seconds"]["total"] = max(record["seconds"]["total"], seconds[0])  # of all calls that it took
         rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
         settling = {"drive_from": start, "settled": rest[-1] if rest else None, "segments": len(self.done)}
-        write_json(self.directory / MANIFEST_NAME, {**record, **settling})
+        write_json(self.directory / MANIFEST_NAME, {**record, **settling}, at_once=False)
         move_into_place(self.directory, self.place)
         return FinishedRun(self.place)
 
@@ -245,7 +247,7 @@ def open_locked(
         with room_on_disk(directory):
             (directory / SEGMENTS).mkdir(parents=True, exist_ok=True)
             _clear(directory)
-            write_json(directory / CASE_NAME, case.as_dict())
+            write_json(directory / CASE_NAME, case.as_dict(), at_once=False)
             done = [_read_segment(path) for path in segment_directories(directory)]
             yield OpenRun(case, engine, directory, place, locks, done)
     except Stopped:

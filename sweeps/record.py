@@ -10,18 +10,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.axes import plain
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, WalkersError
-from walkers.inputs.sweep import Descent, Sweep
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, run_place, unfinished
 from walkers.runner.ensemble import FOLDER, finished_places
 from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import is_locked
 from walkers.sweeps.columns import analyses_of_all, derived_columns, derived_of, result_columns, velocity_in
+
+if TYPE_CHECKING:
+    from walkers.inputs.sweep import Descent, Sweep
 
 RECORD_NAME = "sweep.json"
 _FORMAT = 2
@@ -139,7 +141,7 @@ def read_record(directory: str | Path) -> SweepRecord:
             values=[point["values"] for point in points],
             derived=[point["derived"] for point in points],
             runs=[point["run"] for point in points],
-            descent=Descent(**contents["descent"]) if contents["descent"] else None,
+            descent=_descent(contents["descent"]),
             analyses=contents["analyses"],
         )
     except FileNotFoundError as error:
@@ -147,6 +149,14 @@ def read_record(directory: str | Path) -> SweepRecord:
         raise InputError(str(given), [Problem("", None, told)]) from error
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(str(given), [Problem("", None, f"{RECORD_NAME} cannot be read ({error})")]) from error
+
+
+def _descent(known: Mapping[str, Any] | None) -> Descent | None:
+    if not known:
+        return None
+    from walkers.inputs.sweep import Descent
+
+    return Descent(**known)
 
 
 @dataclass(frozen=True)

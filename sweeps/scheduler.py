@@ -17,9 +17,10 @@ from uuid import uuid4
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.runner.binary import Engine
+from walkers.runner.cost import pairs_of_beads
 from walkers.runner.ensemble import remove_remains
 from walkers.runner.locks import is_locked
-from walkers.sweeps.packing import LONGEST_SECONDS, PlannedDeck, halves, pack, unfinished_parts
+from walkers.sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, PlannedDeck, halves, pack, unfinished_parts
 from walkers.sweeps.record import PointState, SweepRecord, chains, states, velocity_of
 from walkers.sweeps.site import Site, pilots, threads
 from walkers.sweeps.worker import STOPS, Report, SweepStopped, Task, work
@@ -237,7 +238,8 @@ def batches(
     -------
     list of generators
         Each yields batches of points; the next is to be asked for when the last is settled. A sweep without a descent
-        is one batch. Descents go down side by side where their points can share a deck.
+        is one batch. Descents go down side by side where their points can share a deck, and so many steps at once as
+        fill one: those below where a descent ends are made in vain, but cost less than decks that are nearly empty.
     """
     if record.descent is None:
         return [(numbers for numbers in [list(range(len(cases)))])]
@@ -246,13 +248,21 @@ def batches(
         together.setdefault(sharing_key(cases[chain[0]]), []).append(chain)
 
     def descend(descents: list[list[int]]) -> Generator[list[int], None, None]:
-        for step in range(len(descents[0])):
-            yield [chain[step] for chain in descents]
-            descents = [chain for chain in descents if not stopped(chain[step])]
-            if not descents:
-                return
+        step = 0
+        while descents and step < len(descents[0]):
+            after = step + _steps_at_once([[cases[point] for point in chain[step:]] for chain in descents])
+            yield [point for chain in descents for point in chain[step:after]]
+            descents = [chain for chain in descents if not any(map(stopped, chain[step:after]))]
+            step = after
 
     return [descend(group) for group in together.values()]
+
+
+def _steps_at_once(descents: Sequence[Sequence[Case]]) -> int:
+    """How many steps of descents can share a deck."""
+    if len({sharing_key(case) for chain in descents for case in chain}) > 1:
+        return 1
+    return max(1, MOST_WALKERS // sum(pairs_of_beads(chain[0]) for chain in descents))
 
 
 def final_failures(record: SweepRecord, found: Sequence[PointState], options: Options) -> list[Failure]:

@@ -10,13 +10,13 @@ from pathlib import Path
 from walkers.inputs.case import Case
 from walkers.runner.audits import read_audit
 from walkers.runner.binary import Engine
-from walkers.runner.directory import FIRST_SEGMENT, FinishedRun, finished_run, recover, run_place
+from walkers.runner.directory import SEGMENTS, FinishedRun, finished_run, recover, run_place
 from walkers.runner.ensemble import finished_place, make_ensemble
 from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
-from walkers.runner.launch import Progress, launch
+from walkers.runner.launch import Progress
 from walkers.runner.locks import locked
 from walkers.runner.segments import open_locked
-from walkers.templates.deck import render_shared_deck
+from walkers.templates.deck import Deck, first_segment, next_segment
 
 
 @dataclass(frozen=True)
@@ -103,22 +103,33 @@ def _make(
     if len(missing) == 1:
         ((place, case),) = missing.items()
         with open_locked(case, engine, place, locks, anew=anew) as run:
-            run.make(on_progress=on_progress, time_limit=time_limit)
+            run.make(on_progress=on_progress, time_limit=time_limit, is_steady=_are_steady)
             _tabulate([run.directory])
             return {place.name: run.finish()}
     named = {place.name: case for place, case in missing.items()}
-    with make_ensemble(named, render_shared_deck(list(named.values())), engine, out, locks) as ensemble:
-        report = launch(
-            ensemble.deck, ensemble.directory, engine, on_progress=on_progress, time_limit=time_limit, keep_open=locks
-        )
-        from walkers.postprocess.splitting import split_output
+    with make_ensemble(named, engine, out, locks) as ensemble:
+        left, segment = list(named), first_segment(next(iter(named.values())))
+        while left:
+            directory, deck = ensemble.make(left, segment, on_progress, time_limit)
+            _split(directory, deck, {ensemble.run_directory(name): named[name] for name in left})
+            following = next_segment(named[left[0]], segment)
+            if following is None:
+                break
+            left, segment = [name for name in left if not _are_steady(ensemble.run_directory(name))], following
+        _tabulate(ensemble.run_directory(name) for name in named)
+        return ensemble.finish()
 
-        directories = {ensemble.run_directory(name): case for name, case in named.items()}
-        ensemble.record(report)
-        dumps = {directory / FIRST_SEGMENT: case for directory, case in directories.items()}
-        split_output(ensemble.directory, ensemble.deck.layout, dumps)
-        _tabulate(directories)
-        return ensemble.finish(report)
+
+def _split(directory: Path, deck: Deck, runs: Mapping[Path, Case]) -> None:
+    from walkers.postprocess.splitting import split_output
+
+    split_output(directory, deck.layout, {run / SEGMENTS / directory.name: case for run, case in runs.items()})
+
+
+def _are_steady(directory: Path) -> bool:
+    from walkers.postprocess.steady_state import are_steady
+
+    return are_steady(directory)
 
 
 def _tabulate(directories: Iterable[Path]) -> None:

@@ -25,14 +25,15 @@ from walkers.templates.layout import (
 )
 from walkers.templates.placement import place
 from walkers.templates.scene import Scene, without_carriers
-from walkers.templates.sharing import check_sharing, surfaces_of
+from walkers.templates.sharing import Loading, check_sharing, loading_of, loadings_of, surfaces_of
 
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
 WALL_NAME = "walls.stl"
+FILM_NAME = "film.txt"
 STATUS_LINES_PER_CYCLE = 4
-CONTENT_VERSION = 2
+CONTENT_VERSION = 3
 """Of what decks compute: to be raised where the same case gives another deck, comments aside. Runs are named by it."""
 
 RESTART_NAME = "state.restart"
@@ -126,8 +127,13 @@ class Plan:
         Number of MPI processes; the scene must have carriers for each.
     checkpoint
         Restart file to write or to go on from.
-    surfaces
-        How the beads' surfaces touch, by `walkers.templates.scene.Bead.surface`; the case's own contact if left out.
+    surfaces, loadings
+        How the beads' surfaces touch and what loads them, by `walkers.templates.scene.Bead.surface` and
+        ``Bead.loading``; the case's own if left out.
+    gone
+        Ids of beads that are in the restart file and not in the scene.
+    fastest
+        Speed that no bead can reach, m/s; if left out, what `fastest_of` says of the case.
     drive_from
         Step at which the drive begins; None for a segment before it.
     skin
@@ -144,6 +150,9 @@ class Plan:
     ranks: int = 1
     checkpoint: Checkpoint = NO_CHECKPOINT
     surfaces: tuple[Contact, ...] = ()
+    loadings: tuple[Loading, ...] = ()
+    gone: tuple[int, ...] = ()
+    fastest: float | None = None
     drive_from: int | None = 0
     skin: float | None = None
 
@@ -151,6 +160,11 @@ class Plan:
     def shaken(self) -> bool:
         """Whether the drive is on in the deck."""
         return self.drive_from is not None
+
+    @property
+    def several(self) -> bool:
+        """Whether not all beads have the same gravity and drive."""
+        return len({(one.gravity, one.harmonics) for one in self.loadings}) > 1
 
     @property
     def begins_to_shake(self) -> bool:
@@ -164,6 +178,13 @@ def first_segment(case: Case) -> Segment:
     if run.rests:
         return Segment(0, settling_steps(case), None)
     return Segment(0, min(run.cycles_per_segment, run.cycles) * run.steps_per_cycle, 0)
+
+
+def next_segment(case: Case, segment: Segment) -> Segment | None:
+    """The segment of the drive after one of the drive; None after the last one."""
+    run, start = case.run, segment.drive_from or 0
+    end = min(segment.end + run.cycles_per_segment * run.steps_per_cycle, start + run.steps)
+    return Segment(segment.end, end, start) if end > segment.end else None
 
 
 def settling_steps(case: Case) -> int:
@@ -192,23 +213,48 @@ def render_deck(case: Case, segment: Segment | None = None, workarounds: Workaro
     return compose(plan_of(case, segment=segment, workarounds=workarounds))
 
 
-def render_shared_deck(cases: Sequence[Case]) -> Deck:
+def render_shared_deck(
+    cases: Sequence[Case], segment: Segment | None = None, among: Sequence[Case] | None = None
+) -> Deck:
     """Render one deck for the walkers of several cases, in their order.
+
+    Parameters
+    ----------
+    cases
+        The cases.
+    segment
+        Of their runs; the first one if left out.
+    among
+        The cases whose walkers are in the restart file that it goes on from; these, if left out.
 
     Raises
     ------
     ValueError
         If they cannot share a deck (see `walkers.templates.sharing.sharing_key`).
     """
-    return compose(plan_of(*cases))
+    return compose(plan_of(*(among or cases), segment=segment, only=cases if among else None))
 
 
-def plan_of(*cases: Case, segment: Segment | None = None, workarounds: Workarounds = ALL_WORKAROUNDS) -> Plan:
-    """The plan of a segment of cases that share a deck: their bodies on one boundary, recorded as the cases say."""
+def plan_of(
+    *cases: Case,
+    segment: Segment | None = None,
+    workarounds: Workarounds = ALL_WORKAROUNDS,
+    only: Sequence[Case] | None = None,
+) -> Plan:
+    """The plan of a segment of cases that share a deck: their bodies on one boundary, recorded as the cases say.
+
+    With ``only``, a deck that goes on from one of all cases with the walkers of these.
+    """
     check_sharing(cases)
     case, run = cases[0], cases[0].run
     segment = segment or first_segment(case)
     scene, walkers = place(cases)
+    gone: tuple[int, ...] = ()
+    if only is not None:
+        walkers = _walkers_of(cases, walkers, only)
+        kept = {bead for one in walkers for bead in one.beads}
+        gone = tuple(bead.id for bead in scene.beads if bead.id not in kept)
+        scene = replace(scene, beads=tuple(bead for bead in scene.beads if bead.id in kept))
     recording = Recording(
         steps=segment.end,
         sample_every=run.steps_per_sample,
@@ -228,9 +274,21 @@ def plan_of(*cases: Case, segment: Segment | None = None, workarounds: Workaroun
         ranks=run.ranks,
         checkpoint=checkpoint,
         surfaces=surfaces_of(cases),
+        loadings=loadings_of(cases),
+        gone=gone,
+        fastest=max(fastest_of(one, scene) for one in cases),
         drive_from=segment.drive_from,
         skin=_SKIN if case.loose else None,
     )
+
+
+def _walkers_of(
+    cases: Sequence[Case], walkers: Sequence[PlacedWalker], only: Sequence[Case]
+) -> tuple[PlacedWalker, ...]:
+    """The walkers of some of the cases of a deck."""
+    each, wanted = iter(walkers), set(only)
+    own = [[next(each) for make in case.walkers for _ in range(make.replicates)] for case in cases]
+    return tuple(one for case, walking in zip(cases, own, strict=True) if case in wanted for one in walking)
 
 
 def compose(plan: Plan) -> Deck:
@@ -245,6 +303,7 @@ def compose(plan: Plan) -> Deck:
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
     angle = case.liquid.contact_angle
     surfaces = plan.surfaces or (case.contact,)
+    forces, film = _forces(plan, scene), _film(plan, scene)
     text = rendered(
         "walkers.templates",
         "walker.lig.j2",
@@ -270,7 +329,9 @@ def compose(plan: Plan) -> Deck:
         # Of a drive that moves the walls; it has one harmonic.
         amplitude=[first.amplitude * component for component in first.direction],
         peak_velocity=[first.peak_velocity * component for component in first.direction],
-        films=_films(case, scene),
+        forces=forces,
+        film=film,
+        loaded=[axis for axis in "xyz" if film or any(one.axis == axis for one in forces)],
         pair_bridge_terms=_terms("pair_bridges", layout.pair_bridge_columns, " ".join(PAIR_BRIDGES).split()),
         wall_bridge_terms=_terms("wall_bridges", layout.wall_bridge_columns, " ".join(WALL_BRIDGES).split()),
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
@@ -279,25 +340,55 @@ def compose(plan: Plan) -> Deck:
         bin_size=None if plan.skin else _bin_size(scene),
     )  # fmt: skip
     files = {WALL_NAME: wall_mesh(scene.faces, max(scene.upper))}
-    return Deck(text, files, layout, (scene.lower, scene.upper), fastest_of(case, scene))
+    files |= {one.file: _atom_file(one.shares) for one in forces}
+    files |= {FILM_NAME: _atom_file(film)} if film else {}
+    return Deck(text, files, layout, (scene.lower, scene.upper), plan.fastest or fastest_of(case, scene))
 
 
 @dataclass(frozen=True)
-class _Film:
-    """Atoms of one radius and how strongly the film on the substrate drags each of them, N s/m."""
+class _Force:
+    """A force of which each bead has its own share, along an axis, N: its weight, or the amplitude of a harmonic's."""
 
-    number: int
-    atoms: tuple[int, ...]
-    coefficient: float
+    axis: str
+    shares: Mapping[int, float]
+    harmonic: int = 0
+
+    @property
+    def name(self) -> str:
+        """Of the engine's variable."""
+        return f"drive_{self.harmonic}_{self.axis}" if self.harmonic else f"weight_{self.axis}"
+
+    @property
+    def file(self) -> str:
+        """From which the engine reads the shares."""
+        return f"{self.name}.txt"
 
 
-def _films(case: Case, scene: Scene) -> list[_Film]:
-    viscosity = case.liquid.film_viscosity
-    radii = dict.fromkeys(bead.radius for bead in scene.beads) if viscosity else ()
-    return [
-        _Film(number, tuple(bead.id for bead in scene.beads if bead.radius == radius), film_drag(viscosity, radius))
-        for number, radius in enumerate(radii, 1)
-    ]
+def _forces(plan: Plan, scene: Scene) -> list[_Force]:
+    """The forces on beads that do not all have the same gravity and drive; without those that are zero for all."""
+    if not plan.several:
+        return []
+    loads = [(bead, 4.0 / 3.0 * pi * bead.radius**3 * plan.case.density) for bead in scene.beads]
+    forces = []
+    for component, axis in enumerate("xyz"):
+        weights = {bead.id: mass * plan.loadings[bead.loading].gravity[component] for bead, mass in loads}
+        forces.append(_Force(axis, weights))
+        for number in range(len(plan.case.drive.harmonics)):
+            shares = {bead.id: mass * plan.loadings[bead.loading].harmonics[number][component] for bead, mass in loads}
+            forces.append(_Force(axis, shares, number + 1))
+    return [one for one in forces if any(one.shares.values())]
+
+
+def _film(plan: Plan, scene: Scene) -> dict[int, float]:
+    """How strongly the film on the substrate drags each bead, N s/m; empty where there is none."""
+    loadings = plan.loadings or (loading_of(plan.case),)
+    drags = {bead.id: film_drag(loadings[bead.loading].film_viscosity, bead.radius) for bead in scene.beads}
+    return drags if any(drags.values()) else {}
+
+
+def _atom_file(shares: Mapping[int, float]) -> str:
+    """A number for each bead, by its id, as the engine reads it."""
+    return f"{len(shares)}\n" + "".join(f"{bead} {share!r}\n" for bead, share in shares.items())
 
 
 def _terms(compute: str, columns: Sequence[str], all_columns: Sequence[str]) -> list[str]:
@@ -333,10 +424,7 @@ def _bin_size(scene: Scene) -> float:
 
 
 def fastest_of(case: Case, scene: Scene) -> float:
-    """Ten times the boundary's peak velocity (20 in a pile), plus the deepest fall, plus what a bridge can give, m/s.
-
-    Of cases that share a deck any one will do: they have the drive in common, and it is a bound far from anything real.
-    """
+    """Ten times the boundary's peak velocity (20 in a pile), plus the deepest fall, plus what a bridge can give, m/s."""
     liquid, sizes = case.liquid, sorted(bead.radius for bead in scene.beads)
     mass = 4.0 / 3.0 * pi * sizes[0] ** 3 * case.density
     volume = bridge_volume_at_wall(sizes[-1], liquid.volume_fraction)

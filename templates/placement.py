@@ -10,7 +10,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import hop_height, reach
 from walkers.templates.layout import PlacedWalker
 from walkers.templates.scene import Bead, Scene
-from walkers.templates.sharing import surfaces_of
+from walkers.templates.sharing import loading_of, loadings_of, surfaces_of
 
 
 @lru_cache(maxsize=4)  # the segments of a run begin with the same scene
@@ -26,17 +26,16 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
     boundary = cases[0].boundary
     grid = boundary.grid(walking, spacing) if walking else []
     room = boundary.room(_span(cases, grid, spacing), cases[0].run.ranks)
-    surfaces = surfaces_of(cases)
+    surfaces, loadings = surfaces_of(cases), loadings_of(cases)
     walkers: list[PlacedWalker] = []
     beads: list[Bead] = []
     for case, make, one in standing:
         origin = grid[len(walkers)] if one.walks else (0.0, 0.0)
         first = len(room.carriers) + 1 + len(beads)
-        surface = 1 + surfaces.index(case.contact)
-        beads += [
-            Bead(first + number, (origin[0] + bead.x, origin[1] + bead.y, bead.z), bead.radius, surface=surface)
-            for number, bead in enumerate(one.beads)
-        ]
+        surface, loading = 1 + surfaces.index(case.contact), loadings.index(loading_of(case))
+        for number, bead in enumerate(one.beads, first):
+            centre = (origin[0] + bead.x, origin[1] + bead.y, bead.z)
+            beads.append(Bead(number, centre, bead.radius, surface=surface, loading=loading))
         if one.walks:
             ids = tuple(range(first, first + len(one.beads)))
             walkers.append(PlacedWalker(len(walkers), make, ids, one.facing, one.angle, origin))
@@ -46,7 +45,7 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
 def _span(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> Span:
     far = max(spacing / 2.0, *(reach(case) for case in cases))
     largest = max(max(case.radii) for case in cases)
-    amplitude = cases[0].drive.amplitude
+    amplitude = max(case.drive.amplitude for case in cases)
     placed = [bead for case in cases if case.placed is not None for bead in case.placed.beads]
     return Span(
         half_x=max([x for x, _ in grid] + [abs(x) for x, *_ in placed], default=0.0) + far,

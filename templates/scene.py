@@ -10,7 +10,17 @@ from walkers.inputs.drive import Vector
 
 @dataclass(frozen=True)
 class Bead:
-    """A bead at the start: id, centre (m), radius (m), velocity (m/s), angular velocity (rad/s), surface (from 1)."""
+    """A bead at the start.
+
+    Attributes
+    ----------
+    id, centre, radius, velocity, spin
+        m, m/s, rad/s.
+    surface
+        Which of the deck's ways to touch is its, from 1.
+    loading
+        Which of the deck's loadings it feels, from 0 (`walkers.templates.sharing.Loading`).
+    """
 
     id: int
     centre: Vector
@@ -18,6 +28,7 @@ class Bead:
     velocity: Vector = (0.0, 0.0, 0.0)
     spin: Vector = (0.0, 0.0, 0.0)
     surface: int = 1
+    loading: int = 0
 
 
 @dataclass(frozen=True)

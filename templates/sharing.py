@@ -1,15 +1,18 @@
 """Which cases may share a deck, and what tells their beads apart there.
 
-An engine deck has one substrate, drive, liquid and time step. What may differ from walker to walker are the beads'
-radii, how they start, and their surfaces (frictions and restitution), which become atom types.
+An engine deck has one liquid, time step and shape of boundary, and walls that do not move where walkers of several
+cases stand on them. What may differ from walker to walker are the beads' radii, how they start, their surfaces (frictions and
+restitution), which become atom types, and what loads them: how the boundary leans, along what axes and how strongly it
+is shaken, the film. Only the frequencies and phases of the drive are the same for all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from walkers.inputs.case import Case
+from walkers.inputs.drive import Vector
 from walkers.inputs.loads import reach
 from walkers.physics.matter import Contact
 
@@ -17,6 +20,37 @@ from walkers.physics.matter import Contact
 def surfaces_of(cases: Sequence[Case]) -> tuple[Contact, ...]:
     """How the cases' beads touch each other and the walls, each way once, in the order of the cases."""
     return tuple(dict.fromkeys(case.contact for case in cases))
+
+
+@dataclass(frozen=True)
+class Loading:
+    """What acts on a bead besides its contacts, in the frame of the boundary.
+
+    Attributes
+    ----------
+    gravity
+        m/s².
+    harmonics
+        Amplitude of the inertial acceleration of each harmonic of the drive, m/s².
+    film_viscosity
+        Of the film that drags it, Pa s.
+    """
+
+    gravity: Vector
+    harmonics: tuple[Vector, ...]
+    film_viscosity: float
+
+
+def loading_of(case: Case) -> Loading:
+    """What the beads of a case feel."""
+    amplitudes = [(one.peak_acceleration, one.direction) for one in case.drive.harmonics]
+    inertia = tuple((a * x, a * y, a * z) for a, (x, y, z) in amplitudes)
+    return Loading(case.gravity_vector, inertia, case.liquid.film_viscosity)
+
+
+def loadings_of(cases: Sequence[Case]) -> tuple[Loading, ...]:
+    """What the cases' beads feel, each once, in the order of the cases."""
+    return tuple(dict.fromkeys(loading_of(case) for case in cases))
 
 
 def sharing_key(case: Case) -> Hashable:
@@ -37,9 +71,12 @@ def sharing_key(case: Case) -> Hashable:
         # The model of rolling friction is in the deck or not.
         rolling_friction=float(case.contact.rolling_friction > 0.0),
     )
-    liquid = replace(case.liquid, name=None, density=None)
-    boundary = replace(case.boundary, material="")
-    return (boundary, liquid, contact, case.drive, case.run, case.gravity, case.density, crowded)
+    liquid = replace(case.liquid, name=None, density=None, film_viscosity=0.0)
+    boundary = replace(case.boundary, material="", tilt=0.0, uphill=0.0)
+    if case.drive.frame == "lab":
+        return (boundary, liquid, contact, case.drive, loading_of(case), case.run, case.density, crowded)
+    times = tuple((one.frequency, one.phase) for one in case.drive.harmonics)
+    return (boundary, liquid, contact, times, case.run, case.density, crowded)
 
 
 def check_sharing(cases: Sequence[Case]) -> None:

@@ -1,5 +1,8 @@
 """Quantities: units of the field, and the two of pint's readings that would be wrong here."""
 
+import subprocess
+import sys
+
 import pytest
 
 from walkers.inputs import library, units
@@ -65,6 +68,36 @@ def test_g_is_the_acceleration_where_one_is_meant_and_the_gram_elsewhere() -> No
 def test_what_is_no_such_quantity(text: str, kind: units.Kind) -> None:
     with pytest.raises(ValueError, match=f"expected an? {kind.name} with its unit"):
         parse_quantity(text, kind)
+
+
+KINDS = [kind for kind in vars(units).values() if isinstance(kind, units.Kind)]
+
+
+@pytest.mark.parametrize("symbol", units._USUAL)
+def test_usual_units_are_read_as_pint_reads_them(symbol: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last digit, and refused with the same words."""
+    texts = [f"{number} {symbol}" for number in ("1", "0.3", "4.0", "19.2", "-7.125e-2", "123456789.012", "1e-5")]
+
+    def read(text: str, kind: units.Kind) -> float | str:
+        try:
+            return parse_quantity(text, kind)
+        except ValueError as error:
+            return str(error)
+
+    usual = [read(text, kind) for text in texts for kind in KINDS]
+    assert any(isinstance(value, float) for value in usual)
+    monkeypatch.setattr(units, "_USUAL", {})
+    assert usual == [read(text, kind) for text in texts for kind in KINDS]
+
+
+def test_shipped_cases_do_not_wait_for_pint() -> None:
+    script = """
+import sys
+from walkers.inputs import load_case, shipped_cases
+print([load_case(name).name for name in shipped_cases()] and "pint" in sys.modules)
+"""
+    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == "False"
 
 
 @pytest.mark.parametrize("table", ["materials", "liquids"])

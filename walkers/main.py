@@ -7,57 +7,18 @@ import signal
 import sys
 import warnings
 from contextlib import suppress
+from importlib import import_module
 from io import TextIOBase, TextIOWrapper
 from types import FrameType
 from typing import Any, NoReturn, TextIO
 
 import typer
 
-from walkers.commands import (
-    audit,
-    calibrate,
-    climb,
-    deck,
-    figures,
-    model_terms,
-    plot,
-    render,
-    result,
-    run,
-    show,
-    status,
-    sweep,
-    table,
-    theory,
-    vtk,
+COMMANDS = (
+    *("show", "deck", "run", "result", "plot", "vtk", "render", "theory"),
+    *("sweep", "status", "table", "climb", "figures", "model-terms", "calibrate", "audit"),
 )
-
-app = typer.Typer(
-    name="walkers",
-    help="Wet granular walkers, simulated with LIGGGHTS.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
-for command in (
-    show,
-    deck,
-    run,
-    result,
-    plot,
-    vtk,
-    render,
-    theory,
-    sweep,
-    status,
-    table,
-    climb,
-    figures,
-    model_terms,
-    calibrate,
-    audit,
-):
-    app.command(name=command.__name__.rsplit(".", 1)[-1].replace("_", "-"))(command.command)
+"""Each the function ``command`` of a module of `walkers.commands`, in the order of ``walkers --help``."""
 
 
 INTERRUPTED = 130
@@ -149,13 +110,30 @@ def _show_warning(
 def _status(arguments: list[str] | None) -> int:
     """Run the program: its exit status. What is not known to happen is raised."""
     try:
-        outcome: Any = app(arguments, standalone_mode=False)
+        outcome: Any = _program(sys.argv[1:] if arguments is None else arguments)(arguments, standalone_mode=False)
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
         return _told(stop)
     if outcome == INTERRUPTED:  # typer turns Ctrl-C into a status
         return _tell("interrupted", INTERRUPTED)
     return outcome if isinstance(outcome, int) else 0
+
+
+def _program(arguments: list[str]) -> typer.Typer:
+    """The program with the command that is asked for, which need not wait for the others; else with all of them."""
+    program = typer.Typer(
+        name="walkers",
+        help="Wet granular walkers, simulated with LIGGGHTS.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,  # rich takes longer to load than all that most commands need
+    )
+    program.callback()(lambda: None)  # else a single command would have no name
+    for name in set(arguments[:1]).intersection(COMMANDS) or COMMANDS:
+        command = import_module(f"walkers.commands.{name.replace('-', '_')}").command
+        program.command(name=name, short_help=command.__doc__)(command)
+    return program
 
 
 def _told(stop: BaseException) -> int:
