@@ -72,6 +72,10 @@ docs-figures: setup ## Write the figures and the comparison that docs/ shows
 bench: setup ## Measure what docs/performance.md states
 	.venv/bin/python tests/benchmark.py
 
+.PHONY: bench-accuracy
+bench-accuracy: setup ## The comparison's numbers against decks of one point, 2 µs and 60 cycles (a quarter of an hour)
+	.venv/bin/python -m tests.benchmark_accuracy $(OUT)
+
 .PHONY: bench-starts
 bench-starts: setup ## Start 5,000 engines, eight at a time, and count those that never started
 	.venv/bin/python -m tests.benchmark_starts

@@ -51,7 +51,7 @@ FIGURES = {
     "sensitivity": Drawing(fig_sensitivity, ("sensitivity",), "What the disagreements depend on"),
 }
 COMPARISON = "comparison"
-_COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
+COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def make_figures(
     for option, folder in (("--out", out), ("--to", to)):
         if folder.exists() and not folder.is_dir():
             raise InputError(option, [Problem("", None, f"expected a folder, {folder} is a file")])
-    needed = {name: FIGURES[name].sweeps if name in FIGURES else _COMPARED for name in chosen}
+    needed = {name: FIGURES[name].sweeps if name in FIGURES else COMPARED for name in chosen}
     failures: dict[str, list[Failure]] = {}
     drawn: dict[str, Future[list[Path] | str]] = {}
     rows: Future[list[Row]] | None = None
@@ -151,7 +151,7 @@ def make_figures(
 
 @contextmanager
 def _drawers(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes that draw while engines run; unlike those of `multiprocessing` they do not import the caller's script."""
+    """Processes that draw while engines run; they do not import the caller's script, as `multiprocessing`'s do."""
     from joblib.externals.loky import ProcessPoolExecutor
 
     drawers = ProcessPoolExecutor(workers, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))

@@ -424,7 +424,7 @@ def _bin_size(scene: Scene) -> float:
 
 
 def fastest_of(case: Case, scene: Scene) -> float:
-    """Ten times the boundary's peak velocity (20 in a pile), plus the deepest fall, plus what a bridge can give, m/s."""
+    """Ten times the boundary's peak velocity (20 in a pile), the deepest fall, and what a bridge can give, m/s."""
     liquid, sizes = case.liquid, sorted(bead.radius for bead in scene.beads)
     mass = 4.0 / 3.0 * pi * sizes[0] ** 3 * case.density
     volume = bridge_volume_at_wall(sizes[-1], liquid.volume_fraction)

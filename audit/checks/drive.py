@@ -97,7 +97,7 @@ def wall_motion(bench: Bench) -> Iterator[Line]:
 
 def frames(bench: Bench) -> Iterator[Line]:
     """The walker in the laboratory and in the container frame, with a fine step."""
-    case = reference_walker(run={"cycles": 30, "settling_cycles": 10, "time_step": "0.5 us"})
+    case = reference_walker(drive={"frame": "lab"}, run={"cycles": 18, "settling_cycles": 8, "time_step": "0.5 us"})
     laboratory = walking_speed(bench, case)
     container = walking_speed(bench, replace(case, drive=replace(case.drive, frame="container")))
     yield Line(

@@ -108,7 +108,7 @@ def _friction_power(
 
 def balance(bench: Bench) -> Iterator[Line]:
     """The reference walker, recorded every step, its last cycle balanced."""
-    case = reference_walker(run={"cycles": _CYCLES, "settling_cycles": 2, "time_step": "auto"})
+    case = reference_walker(drive={"frame": "lab"}, run={"cycles": _CYCLES, "settling_cycles": 2, "time_step": "auto"})
     cycle = case.run.steps_per_cycle
     plan = bench_plan(case, bench.workarounds)
     every_step = replace(plan.recording, sample_every=1, bridge_every=cycle, status_every=cycle)

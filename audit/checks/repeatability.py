@@ -15,6 +15,7 @@ from walkers.audit.checks.drive import reference_walker
 from walkers.audit.checks.viscous import box_errors, box_lines, run_box, viscous_case
 from walkers.audit.laws import largest_error
 from walkers.inputs.case import Case
+from walkers.inputs.drive import AXES
 from walkers.templates.deck import Checkpoint, plan_of
 
 _RESTART_FILE = "half.restart"
@@ -39,8 +40,34 @@ def independence(bench: Bench) -> Iterator[Line]:
     yield Line(
         "a walker among four against the same one alone", "independent replicates", 0.0, error, "rel.", 1e-6, error
     )
+    error = _among_others(bench)
+    yield Line(
+        "a walker among those of other drives, axes and slopes against the same one alone",
+        "independent replicates",
+        0.0,
+        error,
+        "rel.",
+        1e-6,
+        error,
+    )
     dumps = [(series.directory / "beads.bin").read_bytes() for series in (together, again)]
     yield Line("bytes of the dump that differ in a rerun", "deterministic", 0.0, float(dumps[0] != dumps[1]), "", 0.0)
+
+
+def _among_others(bench: Bench) -> float:
+    """How far a walker strays from its way alone when those beside it feel other forces, over the way gone."""
+    alone = _ensemble(1, "container")
+    others = [
+        replace(alone, drive=alone.drive.with_peak(2.0 * alone.drive.peak_acceleration)),
+        replace(alone, drive=replace(alone.drive, harmonics=(replace(alone.drive.largest, direction=AXES["y"]),))),
+        replace(alone, boundary=replace(alone.boundary, tilt=0.5)),
+    ]
+    single = bench.run(plan_of(alone, workarounds=bench.workarounds))
+    shared = bench.run(plan_of(others[0], alone, *others[1:], workarounds=bench.workarounds))
+    first = single.position[:, single.row(FIRST_BEAD)]
+    same = shared.position[:, shared.row(FIRST_BEAD + 2)]
+    ways = [track - track[0] for track in (first, same)]
+    return float(np.abs(ways[0] - ways[1]).max() / np.abs(ways[0]).max())
 
 
 def restart(bench: Bench) -> Iterator[Line]:
