@@ -40,7 +40,7 @@ class Motion:
     spin : ndarray, shape (F, N, 3)
         Angular velocity, rad/s.
     substrate, substrate_velocity : ndarray, shape (F, 3)
-        Displacement and velocity of the boundary in the frame of the run, m and m/s.
+        Displacement and velocity of the boundary in the laboratory, whichever frame the run was made in, m and m/s.
     radius : ndarray, shape (N,)
     walkers
         Which beads are whose.
@@ -301,14 +301,16 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
     position, velocity, first = vectors("x"), vectors("vx"), layout.carriers
     # In the laboratory frame the carriers move with the walls, in the container's they rest.
     shift, speed = (position[:, 0] - position[:1, 0], velocity[:, 0]) if first else prescribed_motion(case.drive, time)
+    lab = case.drive.frame == "lab"
+    substrate, substrate_velocity = (shift, speed) if lab else boundary_motion(case.drive, time)
     return Motion(
         case=case,
         time=time,
         position=position[:, first:] - shift[:, None],
         velocity=velocity[:, first:] - speed[:, None],
         spin=vectors("omegax")[:, first:],
-        substrate=shift,
-        substrate_velocity=speed,
+        substrate=substrate,
+        substrate_velocity=substrate_velocity,
         radius=data[0, first:, dump.column("radius")],
         walkers=layout.walkers,
         first_id=first + 1,
@@ -336,11 +338,19 @@ def _dump_of(segment: Path) -> tuple[Layout, BinaryDump]:
 
 def prescribed_motion(drive: Drive, time: npt.NDArray[np.floating[Any]]) -> tuple[FloatArray, FloatArray]:
     """Displacement and velocity of the walls in the frame of the run, m and m/s, each of shape (F, 3)."""
+    if drive.frame == "lab":
+        return boundary_motion(drive, time)
+    return np.zeros((len(time), 3)), np.zeros((len(time), 3))
+
+
+def boundary_motion(drive: Drive, time: npt.NDArray[np.floating[Any]]) -> tuple[FloatArray, FloatArray]:
+    """Displacement and velocity of the boundary in the laboratory, m and m/s, each of shape (F, 3); before 0 s none."""
     displacement, velocity = np.zeros((len(time), 3)), np.zeros((len(time), 3))
-    for one in drive.harmonics if drive.frame == "lab" else ():
+    driven = time >= 0.0
+    for one in drive.harmonics:
         phase = one.angular_frequency * time + one.phase
-        displacement += np.outer(one.amplitude * np.sin(phase), one.direction)
-        velocity += np.outer(one.peak_velocity * np.cos(phase), one.direction)
+        displacement += np.outer(one.amplitude * np.sin(phase) * driven, one.direction)
+        velocity += np.outer(one.peak_velocity * np.cos(phase) * driven, one.direction)
     return displacement, velocity
 
 

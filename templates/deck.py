@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import degrees, pi, sqrt
+from math import ceil, degrees, pi, sqrt
 
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
@@ -337,6 +337,7 @@ def compose(plan: Plan) -> Deck:
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
         wall_bridge_options=" ".join(WALL_BRIDGES.values()),
         skin=plan.skin or min(bead.radius for bead in scene.beads),
+        most_neighbours=_most_neighbours(scene, plan.skin),
         bin_size=None if plan.skin else _bin_size(scene),
     )  # fmt: skip
     files = {WALL_NAME: wall_mesh(scene.faces, max(scene.upper))}
@@ -421,6 +422,17 @@ def _bin_size(scene: Scene) -> float:
     """At most some ten thousand bins, none smaller than two beads (m)."""
     width, depth, height = (high - low for low, high in zip(scene.lower, scene.upper, strict=True))
     return float(max(4.0 * max(bead.radius for bead in scene.beads), (width * depth * height / 2e4) ** (1.0 / 3.0)))
+
+
+_LEAST_NEIGHBOURS = 100
+
+
+def _most_neighbours(scene: Scene, skin: float | None) -> int:
+    """How many of the smallest beads there is room for within sight of the largest one, and some more."""
+    radii = [bead.radius for bead in scene.beads]
+    small, large = min(radii), max(radii)
+    sight = large + 2.0 * small + (skin or small)
+    return max(_LEAST_NEIGHBOURS, ceil((sight**3 - large**3) / small**3))
 
 
 def fastest_of(case: Case, scene: Scene) -> float:

@@ -146,6 +146,13 @@ DEFECTS = (
         "`mesh n_meshes N meshes m1 m2 ...` lists all of them.",
     ),
     Defect(
+        "A page is cleared in every step",
+        "Each mesh sets a whole page of `neigh_modify page` bytes to zero in every step, 100,000 by default: for few "
+        "walkers that takes a sixth of the time, or more.",
+        "The page is small: room for ten beads with as many neighbours as there is place for. Too small a one is an "
+        "ERROR.",
+    ),
+    Defect(
         "An abort swallows its message",
         "when the output is a file, for the buffer is not flushed. `-screen none` crashes as soon as a mesh is read.",
         "The engine is run through `stdbuf -oL`, its output redirected.",

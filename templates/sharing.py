@@ -2,8 +2,8 @@
 
 An engine deck has one liquid, time step and shape of boundary, and walls that do not move where walkers of several
 cases stand on them. What may differ from walker to walker are the beads' radii, how they start, their surfaces
-(frictions and restitution), which become atom types, and what loads them: how the boundary leans, along what axes and how
-strongly it is shaken, the film. Only the frequencies and phases of the drive are the same for all.
+(frictions and restitution), which become atom types, and what loads them: how the boundary leans, along what axes and
+how strongly it is shaken, the film. Only the frequencies and phases of the drive are the same for all.
 """
 
 from __future__ import annotations
