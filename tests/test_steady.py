@@ -1,0 +1,198 @@
+"""Runs that end when their walkers are steady: what they give, when they go on, and that company does not matter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.conftest import REFERENCE, call, document, make_case, to_toml
+from walkers import run as run_case
+from walkers.inputs import load_case, resolve_case
+from walkers.inputs.case import Case
+from walkers.inputs.drive import AXES
+from walkers.inputs.errors import InputError, Stopped
+from walkers.postprocess.gait import walk
+from walkers.postprocess.motion import read_motion
+from walkers.postprocess.steady_state import are_steady
+from walkers.postprocess.tables import read_table
+from walkers.runner import find_engine
+from walkers.runner.directory import FIRST_SEGMENT
+from walkers.runner.launch import Progress
+from walkers.sweeps.shared_deck import make_runs
+from walkers.templates.sharing import sharing_key
+
+
+def _until_steady(**changes: Any) -> Case:
+    """The reference walker with `document`'s changes, driven until it is steady."""
+    tables = {**document(**changes), "run": {**changes.get("run", {})}}
+    return resolve_case(tables, name="test")
+
+
+def _shipped(angle: float = 0.0, **drive: Any) -> Case:
+    """The shipped walker alone, started at an angle in degrees."""
+    tables: dict[str, Any] = {
+        "beads": {"material": "ruby"},
+        "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1, "angle": f"{angle} deg", "spacing": "80 mm"},
+        "liquid": {"name": "Si AK5"},
+        "boundary": {"material": "chromium-coated glass"},
+        "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g", **drive},
+    }
+    return resolve_case(tables, name="shipped")
+
+
+def _turning() -> Case:
+    """A walker that still turns to the axis after 12 cycles, and less and less after 24."""
+    return _shipped(4.0, peak_acceleration="8 g")
+
+
+def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(runs_folder: Path) -> None:
+    short = run_case(load_case("fig1b"), runs_folder)
+    case = load_case("fig1b")
+    full = replace(case, run=replace(case.run, until_steady=False, cycles_per_segment=case.run.cycles))
+    long = run_case(full, runs_folder)
+    assert (short.result["cycles"], short.result["settling_cycles"], short.result["ended_early"]) == (12, 4, True)
+    assert (long.result["cycles"], long.result["settling_cycles"], long.result["ended_early"]) == (60, 20, False)
+    assert "6 of 6 steady after 12 cycles" in short.describe()
+    speeds = [one.result["velocity"]["mean"] for one in (short, long)]
+    assert speeds[0] == pytest.approx(speeds[1], rel=0.005)
+    # Until then the two are the same run.
+    ways = [one.motion.position[:241] for one in (short, long)]
+    np.testing.assert_array_equal(ways[0], ways[1])
+
+
+def test_a_restless_walker_goes_on_as_if_it_had_not_been_asked(tmp_path: Path) -> None:
+    case = _turning()
+    asked = run_case(case, tmp_path)
+    assert asked.result["cycles"] == 24
+    assert len(list((asked.directory / "segments").iterdir())) == 2
+    run = replace(case.run, until_steady=False, cycles=24, settling_cycles=8, cycles_per_segment=24)
+    at_once = run_case(replace(case, run=run), tmp_path)
+    ways = [one.motion.groups[0].mass_centre for one in (asked, at_once)]
+    # With every run command the engine takes sliding contacts for sticking once: a slip of some 0.1 um.
+    assert np.abs(ways[0] - ways[1]).max() < 2e-7
+    speeds = [one.result["velocity"]["mean"] for one in (asked, at_once)]
+    assert speeds[0] == pytest.approx(speeds[1], rel=5e-4)
+
+
+def test_a_walker_that_turns_ever_faster_is_not_steady_however_even_its_speed(tmp_path: Path) -> None:
+    """Sin δ = 0.25 at 14.25 g: after 12 cycles its speed is even to 0.2 %, but 1.6 % from where it ends."""
+    tables: dict[str, Any] = {
+        "dimers": {"mean_radius": "0.25 mm", "sin_delta": 0.25, "replicates": 2},
+        "beads": {"material": "ruby"},
+        "liquid": {"name": "Si AK5"},
+        "boundary": {"material": "chromium-coated glass"},
+        "drive": {"frequency": "80 Hz", "gamma0": 1.14},
+        "run": {"cycles": 12, "settling_cycles": 4},
+    }
+    directory = run_case(resolve_case(tables, name="turning"), tmp_path).directory
+    (group,) = read_motion(directory).groups
+    found = walk(group)
+    assert np.abs(found.first_half - found.second_half).max() < 0.002 * np.abs(found.velocity).max()
+    assert not are_steady(directory)
+
+
+def test_what_settles_slowly_runs_in_full_and_numbers_are_obeyed() -> None:
+    def run_of(**changes: Any) -> tuple[bool, int, int]:
+        run = _until_steady(**changes).run
+        return run.until_steady, run.cycles, run.settling_cycles
+
+    assert run_of() == (True, 60, 20)
+    assert run_of(run={"cycles": "auto", "most_cycles": 24}) == (True, 24, 8)
+    assert run_of(dimers={"radii": ["0.25 mm", "0.22 mm"]}) == (False, 60, 20)
+    assert run_of(dimers={"angle": "30 deg"}) == (False, 60, 20)
+    assert run_of(run={"cycles": 30}) == (False, 30, 10)
+    assert run_of(run={"duration": "0.5 s"}) == (False, 40, 13)
+    assert run_of(run={"settling_cycles": 30}) == (False, 60, 30)
+
+
+@pytest.mark.parametrize(
+    ("key", "run", "expected"),
+    [
+        ("run.cycles", {"cycles": 30, "most_cycles": 60}, "expected none where run.most_cycles"),
+        ("run.settling_cycles", {"cycles": "auto", "settling_cycles": 5}, "expected none where run.cycles"),
+        ("run.segment", {"most_cycles": 60, "segment": "0.1 s"}, "expected none where run.most_cycles"),
+    ],
+)
+def test_a_length_said_twice_is_refused(key: str, run: dict[str, Any], expected: str) -> None:
+    with pytest.raises(InputError) as refused:
+        _until_steady(run=run)
+    assert key in str(refused.value)
+    assert expected in str(refused.value)
+
+
+def test_the_program_refuses_it_with_one_line(in_folder: Path) -> None:
+    Path("twice.toml").write_text(to_toml({**REFERENCE, "run": {"cycles": "auto", "settling_cycles": 5}}))
+    done = call("run", "twice.toml")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+
+
+def _companions() -> list[Case]:
+    """Walkers that feel other forces each, one of which goes on when the others are done."""
+    case = _shipped()
+    drive = case.drive
+    return [
+        case.renamed("one"),
+        _turning().renamed("turning"),
+        replace(case, drive=drive.with_peak(0.5 * drive.peak_acceleration)).renamed("weak"),
+        replace(case, drive=replace(drive, harmonics=(replace(drive.largest, direction=AXES["y"]),))).renamed("across"),
+        replace(case, boundary=replace(case.boundary, tilt=0.3)).renamed("uphill"),
+        replace(case, gravity=5.0).renamed("light"),
+        replace(case, contact=replace(case.contact, friction_bead_wall=0.2)).renamed("rough"),
+        replace(case, liquid=replace(case.liquid, film_viscosity=2e-3)).renamed("film"),
+    ]
+
+
+def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> None:
+    cases, engine = _companions(), find_engine()
+    assert len({sharing_key(case) for case in cases}) == 1
+    together = make_runs(cases, tmp_path / "together", engine)
+    assert len({run.directory.parent for run in together.runs.values()}) == 1
+    cycles = {}
+    for case in cases:
+        alone = make_runs([case], tmp_path / "alone", engine)
+        ((name, run),) = alone.runs.items()
+        tables = [read_table(one.directory, "walkers") for one in (together.runs[name], run)]
+        motions = [read_motion(one.directory) for one in (together.runs[name], run)]
+        ways = [one.position - one.position[0] for one in motions]
+        assert ways[0].shape == ways[1].shape
+        assert np.abs(ways[0] - ways[1]).max() < 1e-6 * np.abs(ways[1]).max(), case.name
+        assert tables[0]["velocity"][0] == pytest.approx(tables[1]["velocity"][0], rel=1e-6, abs=1e-12), case.name
+        cycles[case.name] = motions[0].case.run.cycles
+    assert cycles["turning"] == 24
+    assert cycles["one"] == 12
+
+
+def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
+    case, engine = _turning(), find_engine()
+
+    def stop(progress: Progress) -> None:
+        if progress.step > 13 * case.run.steps_per_cycle:
+            raise Stopped("enough")
+
+    with pytest.raises(Stopped):
+        make_runs([case], tmp_path / "stopped", engine, on_progress=stop)
+    dumps = []
+    for folder in ("stopped", "at-a-stretch"):
+        ((_, run),) = make_runs([case], tmp_path / folder, engine).runs.items()
+        dumps.append([(path / "beads.bin").read_bytes() for path in run.segments])
+    assert len(dumps[0]) == 2
+    assert dumps[0] == dumps[1]
+
+
+def test_several_drives_have_a_force_each_in_one_deck(tmp_path: Path) -> None:
+    """Of one gravity and drive a deck is as anybody would write it; of several it reads amplitudes bead by bead."""
+    first = make_case(dimers={"spacing": "80 mm"})
+    second = replace(first, drive=first.drive.with_peak(20.0))
+    engine = find_engine()
+    single = next(iter(make_runs([first], tmp_path / "single", engine).runs.values())).directory / FIRST_SEGMENT
+    assert "fix             gravity" in (single / "walker.lig").read_text()
+    shared = next(iter(make_runs([first, second], tmp_path / "shared", engine).runs.values())).directory.parent
+    amplitudes = (shared / FIRST_SEGMENT / "drive_1_x.txt").read_text().split("\n")
+    mass = 4.0 / 3.0 * np.pi * 0.3e-3**3 * first.density
+    assert amplitudes[0] == "4"
+    assert float(amplitudes[1].split()[1]) == pytest.approx(mass * first.drive.peak_acceleration, rel=1e-12)
+    assert float(amplitudes[3].split()[1]) == pytest.approx(mass * 20.0, rel=1e-12)
