@@ -110,8 +110,8 @@ DEFECTS = (
     Defect(
         "A restart moves on a little differently",
         "A run that goes on from `read_restart`, or with a second `run` command, is not bit for bit the uninterrupted "
-        "one: at its begin forces are evaluated once more, and a contact that slides may pass for one that sticks (as in "
-        "reported forces). Half a step of a damping force that never acted made a walker slip by 0.08 µm.",
+        "one: at its begin forces are evaluated once more, and a contact that slides may pass for one that sticks (as "
+        "in reported forces). Half a step of a damping force that never acted made a walker slip by 0.08 µm.",
         "Piles are restarted for their statistics; walkers that are not steady go on so after every 12 cycles, which "
         "changes their speed by 1e-4 at most.",
         ("restart",),
