@@ -32,6 +32,11 @@ LONGEST_WALKER_STEP = 4e-6
 """s; longest step of walkers, however soft they are."""
 
 
+def auto_fractions(*, loose: bool) -> Mapping[str, float]:
+    """Share of each limit that ``"auto"`` stays under, of beads that are loose or of walkers."""
+    return AUTO_FRACTIONS if loose else WALKER_FRACTIONS
+
+
 @dataclass(frozen=True)
 class TimeStepLimits:
     """The limits in s; a limit that does not apply is infinite."""
@@ -46,8 +51,7 @@ class TimeStepLimits:
 
     def recommended(self, *, loose: bool) -> float:
         """Largest step, in s, that respects every limit with margin, of beads that are loose or of walkers."""
-        shares = AUTO_FRACTIONS if loose else WALKER_FRACTIONS
-        longest = inf if loose else LONGEST_WALKER_STEP
+        shares, longest = auto_fractions(loose=loose), inf if loose else LONGEST_WALKER_STEP
         return min(longest, *(shares[name] * limit for name, limit in self.as_dict().items()))
 
     def exceeded_by(self, time_step: float) -> list[str]:

@@ -12,7 +12,7 @@ from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics.capillary import capillary_force_limit_at_wall
-from walkers.physics.time_step import AUTO_FRACTIONS, TimeStepLimits
+from walkers.physics.time_step import TimeStepLimits, auto_fractions
 from walkers.runner.cost import predicted_seconds
 
 
@@ -45,12 +45,13 @@ def summarise(case: Case) -> dict[str, Any]:
             "stiffness_ratio": _stiffness_ratio(case),
         },
         "contacts": [contact for walkers in case.walkers for contact in _contacts(case, walkers)],
-        "time_step": _step_against(run.time_step, limits_of(case)),
+        "time_step": _step_against(run.time_step, limits_of(case), loose=case.loose),
         "run": {
             "steps_per_cycle": run.steps_per_cycle,
             "steps": run.steps,
             "simulated_seconds": run.steps * run.time_step,
             "samples": run.steps // run.steps_per_sample + 1,
+            "until_steady": run.until_steady,
             "segments": -(-run.cycles // run.cycles_per_segment),
             "predicted_seconds": predicted_seconds(case),
         },
@@ -87,13 +88,14 @@ def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
     ]
 
 
-def _step_against(time_step: float, limits: TimeStepLimits) -> dict[str, Any]:
-    """A time step (s) with the limits, None where one does not apply, and its share of each."""
+def _step_against(time_step: float, limits: TimeStepLimits, *, loose: bool) -> dict[str, Any]:
+    """A time step (s) with the limits, None where one does not apply, its share of each, and that of ``"auto"``."""
     known = limits.as_dict()
     return {
         "step": time_step,
         "limits": {name: limit if isfinite(limit) else None for name, limit in known.items()},
         "share": {name: time_step / limit for name, limit in known.items()},
+        "auto": dict(auto_fractions(loose=loose)),
     }
 
 
@@ -182,13 +184,14 @@ def _text_of_step(summary: dict[str, Any]) -> str:
     lines = [f"time step  {step['step'] * 1e6:.5g} µs, {run['steps_per_cycle']} a cycle"]
     for name, limit in step["limits"].items():
         shown = f"{limit * 1e6:.4g} µs" if limit is not None else "none"
-        share = f"{step['share'][name]:.3f} of it (auto: up to {AUTO_FRACTIONS[name]:g})"
+        share = f"{step['share'][name]:.3f} of it (auto: up to {step['auto'][name]:g})"
         lines.append(f"  {name:10} limit {shown:>10}, the step is {share}")
     seconds = run["predicted_seconds"]
     cost = f"{seconds:.1f} s" if seconds < 120.0 else f"{seconds / 60.0:.1f} min"
     segments = f" in {run['segments']} segments" if run["segments"] > 1 else ""
+    most = "until steady, at most " if run["until_steady"] else ""
     lines.append(
-        f"run        {run['steps']} steps, {run['simulated_seconds']:.4g} s simulated{segments}, "
+        f"run        {most}{run['steps']} steps, {run['simulated_seconds']:.4g} s simulated{segments}, "
         f"{run['samples']} samples, about {cost}"
     )
     return "\n".join(lines)

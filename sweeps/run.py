@@ -32,7 +32,7 @@ class SweepPlan:
     engine
         The binary.
     decks
-        Those that are missing. Of a sweep with a descent all down to its bottom, one a point: it may end earlier.
+        Those that are missing. Of a sweep with a descent all down to its bottom: it may end earlier.
     statuses
         Of the points, see `walkers.sweeps.record.PointState`.
     workers
@@ -115,11 +115,9 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     final = final_failures(record, found, options)
     given_up = {failure.point for failure in final}
     numbered = dict(enumerate(cases))
-    # The points of a descent come one after the other, so that few of them can share a deck.
-    packed = [deck for point in numbered for deck in pack({point: cases[point]}, 1)] if record.descent else None
     decks = [
         part
-        for deck in packed or pack(numbered, options.decks_at_once, options.longest_seconds)
+        for deck in pack(numbered, options.decks_at_once, options.longest_seconds)
         for part in unfinished_parts(
             deck.points, numbered, lambda point: statuses[point] in _SETTLED or point in given_up
         )
