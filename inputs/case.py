@@ -18,6 +18,9 @@ from walkers.inputs.boundary import Shape
 from walkers.inputs.drive import AXES, Drive, Vector
 from walkers.physics.matter import Contact, Liquid
 
+FIRST_ATTEMPTS = (12, 24)
+"""Cycles after which it is asked whether walkers are steady. After 36 hardly any are that were not after 24."""
+
 
 def settling_of(cycles: int) -> int:
     """Cycles that walkers are given to settle, of so many, where a case does not say: a third, at most 20."""
@@ -39,8 +42,7 @@ class Run:
     settling_cycles
         Of these, before velocities are measured.
     until_steady
-        Whether the run ends with the segment after which its walkers are steady
-        (`walkers.postprocess.steady_state.are_steady`).
+        Whether fewer cycles do if the walkers are steady after them (`walkers.postprocess.steady_state.are_steady`).
     samples_per_cycle, cycles_per_sample
         Beads are recorded this often a cycle, or once in so many cycles; one of them is 1.
     samples_per_bridge_sample
@@ -82,9 +84,18 @@ class Run:
         """Stroboscopic samples, one a cycle or rarer, before velocities are measured."""
         return -(-self.settling_cycles // self.cycles_per_sample)
 
-    def ended_after(self, cycles: int) -> Run:
-        """The same of a run that ended after so many cycles, for its walkers were steady."""
-        return replace(self, cycles=cycles, settling_cycles=settling_of(cycles))
+    @property
+    def attempts(self) -> tuple[int, ...]:
+        """Cycles for which the run is made, and made again from its begin if its walkers are not steady after them."""
+        fewer = FIRST_ATTEMPTS if self.until_steady else ()
+        return (*(cycles for cycles in fewer if cycles < self.cycles), self.cycles)
+
+    def for_cycles(self, cycles: int) -> Run:
+        """The same for so many cycles at a stretch, of a run that ends when its walkers are steady."""
+        if not self.until_steady:
+            return self
+        settling = settling_of(cycles)
+        return replace(self, cycles=cycles, settling_cycles=settling, until_steady=False, cycles_per_segment=cycles)
 
     @property
     def rests(self) -> bool:
@@ -119,6 +130,10 @@ class Case:
     contact: Contact
     seed: int
     run: Run
+
+    def for_cycles(self, cycles: int) -> Case:
+        """The same for so many cycles at a stretch, of a case whose run ends when its walkers are steady."""
+        return replace(self, run=self.run.for_cycles(cycles))
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -183,7 +198,7 @@ class Case:
     @property
     def independent(self) -> bool:
         """Whether its walkers are so wherever they stand, so that others' may stand beside them in a deck."""
-        return self.apart and (self.run.in_one or self.run.until_steady) and self.boundary.bare
+        return self.apart and self.run.in_one and self.boundary.bare
 
     @property
     def meets(self) -> bool:

@@ -15,8 +15,6 @@ from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_
 MOST_STEPS = 2**31 - 1
 _SEGMENT_SECONDS = 0.5
 _MOST_CYCLES = 60
-_CYCLES_BETWEEN = 12
-"""Cycles after which, and again after which, it is asked whether walkers are steady."""
 _NEARLY_SYMMETRIC = 0.08
 """sin δ of dimers below which speeds of steady walkers still creep …"""
 _ASLANT = 0.1
@@ -120,9 +118,7 @@ def resolve_run(table: RunTable, case: Case) -> Run:
     # Segments end with a sample, so that each begins where the last one ended.
     segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if case.loose else None
     per_segment = (
-        _CYCLES_BETWEEN
-        if until_steady
-        else (cycles if segment is None else max(1, round(segment * frequency / cycles_per_sample)) * cycles_per_sample)
+        cycles if segment is None else max(1, round(segment * frequency / cycles_per_sample)) * cycles_per_sample
     )
     return Run(
         time_step=time_step,

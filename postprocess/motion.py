@@ -242,10 +242,10 @@ def read_motion(directory: str | Path) -> Motion:
     Examples
     --------
     >>> motion = read_motion(walkers.run("fig1b", tmp).directory)
-    >>> motion.position.shape  # 60 cycles of 20 samples, six walkers of two beads
-    (1201, 12, 3)
+    >>> motion.position.shape  # 12 cycles of 20 samples, six walkers of two beads
+    (241, 12, 3)
     >>> motion.groups[0].heading.shape
-    (1201, 6, 3)
+    (241, 6, 3)
     """
     directory = Path(directory)
     case = case_of(directory)
@@ -289,7 +289,7 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
     ended_early = False
     if case.run.until_steady:
         cycles = records[-1]["end"] // case.run.steps_per_cycle
-        ended_early, case = cycles < case.run.cycles, replace(case, run=case.run.ended_after(cycles))
+        ended_early, case = cycles < case.run.cycles, case.for_cycles(cycles)
     # Before the drive has begun it is as if it would with the next frame.
     zero = start if start is not None else steps[-1] + case.run.steps_per_sample
     time = (np.array(steps, dtype=np.float64) - zero) * case.run.time_step

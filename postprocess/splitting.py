@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.inputs.case import Case
 from walkers.postprocess.dump import BinaryDump, FloatArray
@@ -42,28 +41,25 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
     """
     dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
     frames = dump.stack()
-    ids = frames[0, :, dump.column("id")].astype(np.int64)  # those of beads that have left are missing
-    row_of = np.zeros(ids[-1] + 1, dtype=np.int64)
-    row_of[ids] = np.arange(len(ids))
-    _check_apart(frames, row_of, layout, cases, directory)
-    owner, renumbered = (np.zeros(len(row_of), dtype=np.int64) for _ in range(2))
+    _check_apart(frames, layout, cases, directory)
+    owner, renumbered = (np.zeros(layout.atoms + 1, dtype=np.int64) for _ in range(2))
     walkers = iter(layout.walkers)
     for number, (place, case) in enumerate(cases.items()):
         own = [next(walkers) for make in case.walkers for _ in range(make.replicates)]
         old = np.array([layout.carrier, *(bead for walker in own for bead in walker.beads)])
         new = np.arange(1, len(old) + 1)
         owner[old], renumbered[old] = number, new
-        own_frames = frames[:, row_of[old]]
+        own_frames = frames[:, old - 1]
         own_frames[..., dump.column("id")] = new
         own_frames[..., dump.column("type")] = 1
         dump.write_like(own_frames, place / layout.bead_dump)
         write_json(place / LAYOUT_NAME, _own_layout(layout, own).as_dict(), at_once=False)
-    for name, columns, holders in (
+    for name, columns, ids in (
         (layout.pair_bridge_dump, layout.pair_bridge_columns, ("id1", "id2")),
         (layout.wall_bridge_dump, layout.wall_bridge_columns, ("id",)),
     ):
         bridges = list(local_frames(directory / name, columns))
-        held = [columns.index(one) for one in holders]
+        held = [columns.index(one) for one in ids]
         for number, place in enumerate(cases):
             parts = []
             for step, rows in bridges:
@@ -84,15 +80,9 @@ def _own_layout(layout: Layout, walkers: list[PlacedWalker]) -> Layout:
     return replace(layout, atoms=bead - 1, walkers=tuple(renumbered), ranks=1)
 
 
-def _check_apart(
-    frames: FloatArray,
-    row_of: npt.NDArray[np.int64],
-    layout: Layout,
-    cases: Mapping[Path, Case],
-    directory: Path,
-) -> None:
+def _check_apart(frames: FloatArray, layout: Layout, cases: Mapping[Path, Case], directory: Path) -> None:
     x, sampled = layout.bead_columns.index("x"), frames[:: next(iter(cases.values())).run.samples_per_cycle]
-    rows = [row_of[np.array(walker.beads)] for walker in layout.walkers]
+    rows = [np.array(walker.beads) - 1 for walker in layout.walkers]
     centre = np.stack([sampled[:, beads, x : x + 2].mean(axis=1) for beads in rows], axis=1)
     if came_near(centre, NEAR * max(make.length for case in cases.values() for make in case.walkers)):
         raise WalkersMet(directory)

@@ -15,8 +15,8 @@ _BEAD_STEPS_PER_SECOND = 2.6e6
 """Of loose beads: 13,100 steps a second with 200 of them."""
 _GAIN_PER_RANK = 0.9
 _RESTING_SEGMENTS = 3
-_UNSTEADY_SHARE = 0.15
-"""Of the walkers of a run that ends when they are steady: how many go on after the first cycles."""
+_TRIED_AGAIN = (1.0, 0.17, 0.08)
+"""Share of the runs that end when their walkers are steady that are made a first, a second and a third time."""
 
 
 def predicted_seconds(case: Case, walkers: int | None = None) -> float:
@@ -30,11 +30,8 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
         Beads' pairs in the deck, those of clusters by their beads; the case's own if left out.
     """
     run = case.run
-    cycles = float(run.cycles)
-    if run.until_steady:
-        first = min(run.cycles_per_segment, run.cycles)
-        cycles = first + _UNSTEADY_SHARE * (run.cycles - first)
-    segments = ceil(cycles / run.cycles_per_segment) + (_RESTING_SEGMENTS if run.rests else 0)
+    cycles = sum(share * cycles for share, cycles in zip(_TRIED_AGAIN, run.attempts, strict=False))
+    segments = ceil(run.cycles / run.cycles_per_segment) + (_RESTING_SEGMENTS if run.rests else 0)
     steps = cycles * run.steps_per_cycle + (_RESTING_SEGMENTS * settling_steps(case) if run.rests else 0)
     count = pairs_of_beads(case) if walkers is None else walkers
     if case.loose:

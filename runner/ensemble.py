@@ -1,7 +1,5 @@
 """Ensembles: the runs of several cases made by one deck, each a run directory of its own within the ensemble's.
 
-Where runs end when their walkers are steady, a deck of the others goes on from the restart file of the one before.
-
 An ensemble is made in ``ensembles/<name>-<hash>.incomplete`` and renamed at the end, which finishes all of its runs.
 """
 
@@ -11,9 +9,9 @@ import hashlib
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -21,9 +19,9 @@ from walkers.inputs.case import Case
 from walkers.runner.binary import Engine
 from walkers.runner.directory import (
     CASE_NAME,
+    FIRST_SEGMENT,
     MANIFEST_NAME,
     REPLACED,
-    SEGMENTS,
     UNFINISHED,
     FinishedRun,
     manifest,
@@ -35,28 +33,22 @@ from walkers.runner.directory import (
     write_segment_record,
 )
 from walkers.runner.files import write_json
-from walkers.runner.launch import EngineReport, Progress, check_room, launch
+from walkers.runner.launch import EngineReport, check_room
 from walkers.runner.locks import locked
-from walkers.templates.deck import (
-    PREVIOUS_RESTART_NAME,
-    RESTART_NAME,
-    Deck,
-    Segment,
-    render_shared_deck,
-)
+from walkers.templates.deck import Deck, Segment
 
 FOLDER = "ensembles"
 
 
 @dataclass
 class OpenEnsemble:
-    """Runs that are being made by one deck, segment by segment; those that are done leave it.
+    """Runs that are being made by one deck.
 
     Attributes
     ----------
     cases
         From the name of each run to its case, in the order of the deck.
-    engine
+    deck, engine
         What makes them.
     directory, place
         Where the ensemble is made and where it belongs.
@@ -64,76 +56,41 @@ class OpenEnsemble:
         Descriptors of the lock files of the runs.
     started
         Seconds since the epoch.
-    segments
-        What the segments took that are made, with the names of their runs.
     """
 
     cases: Mapping[str, Case]
+    deck: Deck
     engine: Engine
     directory: Path
     place: Path
     locks: Sequence[int]
     started: float
-    segments: list[tuple[EngineReport, list[str]]] = field(default_factory=list)
 
     def run_directory(self, name: str) -> Path:
         """Where a run of the ensemble is made."""
         return self.directory / name
 
-    def make(
-        self,
-        names: Sequence[str],
-        segment: Segment,
-        on_progress: Callable[[Progress], None] | None,
-        time_limit: float | None,
-    ) -> tuple[Path, Deck]:
-        """Make a segment of some of the runs: the first one of all of them, or one that goes on from the one before.
+    def record(self, report: EngineReport, segment: Segment) -> None:
+        """Say in each run what its segment is."""
+        for name in self.cases:
+            write_segment_record(self.run_directory(name) / FIRST_SEGMENT, segment, report)
 
-        Returns
-        -------
-        directory, deck
-            Where their common dumps are, and what wrote them.
+    def keep(self, names: Collection[str]) -> None:
+        """Leave out the runs that are not among these: they are to be made again, for longer."""
+        for name in self.cases.keys() - set(names):
+            shutil.rmtree(self.run_directory(name))
+        self.cases = {name: case for name, case in self.cases.items() if name in names}
 
-        Raises
-        ------
-        EngineFailure
-            If the engine fails.
-        """
-        everything = list(self.cases.values())
-        cases = [self.cases[name] for name in names]
-        deck = render_shared_deck(cases, segment, everything if segment.begin else None)
-        check_room(self.directory, 2 * deck.layout.bead_dump_bytes)  # the whole and its parts, side by side
-        directory = self._segment(len(self.segments))
-        directory.mkdir(parents=True)
-        write_deck(deck, directory)
-        if segment.begin:
-            (self._segment(len(self.segments) - 1) / RESTART_NAME).rename(directory / PREVIOUS_RESTART_NAME)
-        report = launch(
-            deck, directory, self.engine, on_progress=on_progress, time_limit=time_limit, keep_open=self.locks
-        )
-        (directory / PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
-        for name in names:
-            place = self.run_directory(name) / SEGMENTS / directory.name
-            place.mkdir(parents=True)
-            write_segment_record(place, segment, report)
-        self.segments.append((report, list(names)))
-        return directory, deck
-
-    def _segment(self, number: int) -> Path:
-        return self.directory / SEGMENTS / f"{number:04d}"
-
-    def finish(self) -> dict[str, FinishedRun]:
+    def finish(self, report: EngineReport) -> dict[str, FinishedRun]:
         """Write the manifests and move the ensemble to its place; its runs by name."""
-        walkers = sum(make.replicates for case in self.cases.values() for make in case.walkers)
+        walkers = len(self.deck.layout.walkers)  # those of runs that are made again among them
         shared = {"ensemble": self.place.name, "runs": len(self.cases), "walkers": walkers}
-        (self._segment(len(self.segments) - 1) / RESTART_NAME).unlink(missing_ok=True)
         for name, case in self.cases.items():
-            reports = [report for report, names in self.segments if name in names]
-            made, report = self.run_directory(name), _summed(reports)
+            made = self.run_directory(name)
             said = manifest(case, name, self.engine, report, started=self.started, directory=made)
-            own = {"drive_from": 0, "segments": len(reports), "shared_deck": shared}
+            own = {"drive_from": 0, "segments": 1, "shared_deck": shared}
             write_json(made / MANIFEST_NAME, {**said, **own}, at_once=False)
-        first, report = next(iter(self.cases.values())), _summed([report for report, _ in self.segments])
+        first = next(iter(self.cases.values()))
         said = manifest(first, self.place.name, self.engine, report, started=self.started, directory=self.directory)
         named = {**said, "shared_deck": {**shared, "names": list(self.cases)}}
         write_json(self.directory / MANIFEST_NAME, named, at_once=False)
@@ -143,15 +100,11 @@ class OpenEnsemble:
         return {name: FinishedRun(self.place / name) for name in self.cases}
 
 
-def _summed(reports: Sequence[EngineReport]) -> EngineReport:
-    """What several segments, one after the other, took together."""
-    wall, loop = sum(one.wall_seconds for one in reports), sum(one.loop_seconds for one in reports)
-    return EngineReport(reports[0].version, wall, loop, reports[-1].steps)
-
-
 @contextmanager
-def make_ensemble(cases: Mapping[str, Case], engine: Engine, out: Path, locks: Sequence[int]) -> Iterator[OpenEnsemble]:
-    """Make a fresh directory for an ensemble whose runs are locked, with the cases of its runs.
+def make_ensemble(
+    cases: Mapping[str, Case], deck: Deck, engine: Engine, out: Path, locks: Sequence[int]
+) -> Iterator[OpenEnsemble]:
+    """Make a fresh directory for an ensemble whose runs are locked, with its deck and the cases of its runs.
 
     Left without `OpenEnsemble.finish`, nothing stays: what fails together is to be made apart.
     """
@@ -160,13 +113,15 @@ def make_ensemble(cases: Mapping[str, Case], engine: Engine, out: Path, locks: S
     incomplete = unfinished(place)
     recover(place)
     shutil.rmtree(incomplete, ignore_errors=True)
-    ensemble = OpenEnsemble(cases, engine, incomplete, place, locks, time.time())
+    ensemble = OpenEnsemble(cases, deck, engine, incomplete, place, locks, time.time())
     try:
-        with room_on_disk(incomplete):
+        with room_on_disk(incomplete, deck.layout.bead_dump_bytes):
             place.parent.mkdir(exist_ok=True)
+            check_room(place.parent, 2 * deck.layout.bead_dump_bytes)  # the whole and its parts, side by side
             incomplete.mkdir()
+            write_deck(deck, incomplete)
             for name, case in cases.items():
-                ensemble.run_directory(name).mkdir()
+                (ensemble.run_directory(name) / FIRST_SEGMENT).mkdir(parents=True)
                 write_json(ensemble.run_directory(name) / CASE_NAME, case.as_dict(), at_once=False)
             yield ensemble
     finally:

@@ -111,21 +111,32 @@ class OpenRun:
             If the engine fails; the segments before stay.
         """
         begun, made = time.perf_counter(), 0
-        while (segment := self.next_segment()) is not None:
-            if self.case.run.until_steady and self.done and is_steady(self.directory):
+        for cycles in self.case.run.attempts:
+            case = self.case.for_cycles(cycles)
+            if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
+                self._forget()  # an attempt for fewer cycles
+            while (segment := self.next_segment(case)) is not None:
+                tell = _teller(case, segment, on_progress, begun, made) if on_progress else None
+                self._make(segment, render(case, segment), tell, time_limit)
+                made += segment.end - segment.begin
+            if cycles < self.case.run.cycles and is_steady(self.directory):
                 return
-            tell = _teller(self.case, segment, on_progress, begun, made) if on_progress else None
-            self._make(segment, render(self.case, segment), tell, time_limit)
-            made += segment.end - segment.begin
 
-    def next_segment(self) -> Segment | None:
-        """The segment that is to be made next; None after the last one."""
+    def _forget(self) -> None:
+        """Remove the segments that are there."""
+        for directory in segment_directories(self.directory):
+            shutil.rmtree(directory)
+        self.done.clear()
+
+    def next_segment(self, case: Case | None = None) -> Segment | None:
+        """The segment that is to be made next, of the run or an attempt at it; None after the last one."""
+        case = case or self.case
         if not self.done:
-            return first_segment(self.case)
+            return first_segment(case)
         begin, start = int(self.done[-1]["end"]), self._drive_from()
         if start is None:
-            return Segment(begin, begin + settling_steps(self.case), None)
-        return next_segment(self.case, Segment(begin, begin, start))
+            return Segment(begin, begin + settling_steps(case), None)
+        return next_segment(case, Segment(begin, begin, start))
 
     def _drive_from(self) -> int | None:
         """Step at which the drive begins: the end of the first segment that leaves the beads at rest, or the last."""

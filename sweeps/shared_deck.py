@@ -6,17 +6,18 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from walkers.inputs.case import Case
 from walkers.runner.audits import read_audit
 from walkers.runner.binary import Engine
-from walkers.runner.directory import SEGMENTS, FinishedRun, finished_run, recover, run_place
+from walkers.runner.directory import FIRST_SEGMENT, FinishedRun, finished_run, recover, run_place
 from walkers.runner.ensemble import finished_place, make_ensemble
 from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
-from walkers.runner.launch import Progress
+from walkers.runner.launch import Progress, launch
 from walkers.runner.locks import locked
 from walkers.runner.segments import open_locked
-from walkers.templates.deck import Deck, first_segment, next_segment
+from walkers.templates.deck import first_segment, render_shared_deck
 
 
 @dataclass(frozen=True)
@@ -106,24 +107,45 @@ def _make(
             run.make(on_progress=on_progress, time_limit=time_limit, is_steady=_are_steady)
             _tabulate([run.directory])
             return {place.name: run.finish()}
-    named = {place.name: case for place, case in missing.items()}
-    with make_ensemble(named, engine, out, locks) as ensemble:
-        left, segment = list(named), first_segment(next(iter(named.values())))
-        while left:
-            directory, deck = ensemble.make(left, segment, on_progress, time_limit)
-            _split(directory, deck, {ensemble.run_directory(name): named[name] for name in left})
-            following = next_segment(named[left[0]], segment)
-            if following is None:
-                break
-            left, segment = [name for name in left if not _are_steady(ensemble.run_directory(name))], following
-        _tabulate(ensemble.run_directory(name) for name in named)
-        return ensemble.finish()
+    runs: dict[str, FinishedRun] = {}
+    left = {place.name: case for place, case in missing.items()}
+    for attempt in next(iter(left.values())).run.attempts:
+        watched = {"on_progress": on_progress, "time_limit": time_limit}
+        made = _make_together(left, attempt, out, engine, locks, **watched)
+        runs |= made
+        left = {name: case for name, case in left.items() if name not in made}
+        if not left:
+            break
+    return runs
 
 
-def _split(directory: Path, deck: Deck, runs: Mapping[Path, Case]) -> None:
-    from walkers.postprocess.splitting import split_output
+def _make_together(
+    cases: Mapping[str, Case],
+    cycles: int,
+    out: Path,
+    engine: Engine,
+    locks: Sequence[int],
+    **watched: Any,
+) -> dict[str, FinishedRun]:
+    """Make runs of so many cycles by one deck; those finished whose walkers are steady, or that take no more cycles."""
+    tried = [case.for_cycles(cycles) for case in cases.values()]
+    with make_ensemble(cases, render_shared_deck(tried), engine, out, locks) as ensemble:
+        report = launch(ensemble.deck, ensemble.directory, engine, keep_open=locks, **watched)
+        from walkers.postprocess.splitting import split_output
 
-    split_output(directory, deck.layout, {run / SEGMENTS / directory.name: case for run, case in runs.items()})
+        ensemble.record(report, first_segment(tried[0]))
+        places = [ensemble.run_directory(name) / FIRST_SEGMENT for name in cases]
+        split_output(ensemble.directory, ensemble.deck.layout, dict(zip(places, tried, strict=True)))
+        done = [
+            name
+            for name, case in cases.items()
+            if cycles >= case.run.cycles or _are_steady(ensemble.run_directory(name))
+        ]
+        if not done:
+            return {}
+        ensemble.keep(done)
+        _tabulate(ensemble.run_directory(name) for name in done)
+        return ensemble.finish(report)
 
 
 def _are_steady(directory: Path) -> bool:

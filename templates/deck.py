@@ -130,8 +130,6 @@ class Plan:
     surfaces, loadings
         How the beads' surfaces touch and what loads them, by `walkers.templates.scene.Bead.surface` and
         ``Bead.loading``; the case's own if left out.
-    gone
-        Ids of beads that are in the restart file and not in the scene.
     fastest
         Speed that no bead can reach, m/s; if left out, what `fastest_of` says of the case.
     drive_from
@@ -151,7 +149,6 @@ class Plan:
     checkpoint: Checkpoint = NO_CHECKPOINT
     surfaces: tuple[Contact, ...] = ()
     loadings: tuple[Loading, ...] = ()
-    gone: tuple[int, ...] = ()
     fastest: float | None = None
     drive_from: int | None = 0
     skin: float | None = None
@@ -213,48 +210,23 @@ def render_deck(case: Case, segment: Segment | None = None, workarounds: Workaro
     return compose(plan_of(case, segment=segment, workarounds=workarounds))
 
 
-def render_shared_deck(
-    cases: Sequence[Case], segment: Segment | None = None, among: Sequence[Case] | None = None
-) -> Deck:
+def render_shared_deck(cases: Sequence[Case]) -> Deck:
     """Render one deck for the walkers of several cases, in their order.
-
-    Parameters
-    ----------
-    cases
-        The cases.
-    segment
-        Of their runs; the first one if left out.
-    among
-        The cases whose walkers are in the restart file that it goes on from; these, if left out.
 
     Raises
     ------
     ValueError
         If they cannot share a deck (see `walkers.templates.sharing.sharing_key`).
     """
-    return compose(plan_of(*(among or cases), segment=segment, only=cases if among else None))
+    return compose(plan_of(*cases))
 
 
-def plan_of(
-    *cases: Case,
-    segment: Segment | None = None,
-    workarounds: Workarounds = ALL_WORKAROUNDS,
-    only: Sequence[Case] | None = None,
-) -> Plan:
-    """The plan of a segment of cases that share a deck: their bodies on one boundary, recorded as the cases say.
-
-    With ``only``, a deck that goes on from one of all cases with the walkers of these.
-    """
+def plan_of(*cases: Case, segment: Segment | None = None, workarounds: Workarounds = ALL_WORKAROUNDS) -> Plan:
+    """The plan of a segment of cases that share a deck: their bodies on one boundary, recorded as the cases say."""
     check_sharing(cases)
     case, run = cases[0], cases[0].run
     segment = segment or first_segment(case)
     scene, walkers = place(cases)
-    gone: tuple[int, ...] = ()
-    if only is not None:
-        walkers = _walkers_of(cases, walkers, only)
-        kept = {bead for one in walkers for bead in one.beads}
-        gone = tuple(bead.id for bead in scene.beads if bead.id not in kept)
-        scene = replace(scene, beads=tuple(bead for bead in scene.beads if bead.id in kept))
     recording = Recording(
         steps=segment.end,
         sample_every=run.steps_per_sample,
@@ -275,20 +247,10 @@ def plan_of(
         checkpoint=checkpoint,
         surfaces=surfaces_of(cases),
         loadings=loadings_of(cases),
-        gone=gone,
         fastest=max(fastest_of(one, scene) for one in cases),
         drive_from=segment.drive_from,
         skin=_SKIN if case.loose else None,
     )
-
-
-def _walkers_of(
-    cases: Sequence[Case], walkers: Sequence[PlacedWalker], only: Sequence[Case]
-) -> tuple[PlacedWalker, ...]:
-    """The walkers of some of the cases of a deck."""
-    each, wanted = iter(walkers), set(only)
-    own = [[next(each) for make in case.walkers for _ in range(make.replicates)] for case in cases]
-    return tuple(one for case, walking in zip(cases, own, strict=True) if case in wanted for one in walking)
 
 
 def compose(plan: Plan) -> Deck:

@@ -15,6 +15,7 @@ from walkers.inputs import load_case, resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.drive import AXES
 from walkers.inputs.errors import InputError, Stopped
+from walkers.postprocess.analysis import current_result
 from walkers.postprocess.gait import walk
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.steady_state import are_steady
@@ -64,18 +65,41 @@ def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(runs_folder: Path
     np.testing.assert_array_equal(ways[0], ways[1])
 
 
-def test_a_restless_walker_goes_on_as_if_it_had_not_been_asked(tmp_path: Path) -> None:
+def test_a_restless_walker_is_driven_for_longer_at_a_stretch(tmp_path: Path) -> None:
+    """Nothing of a shorter attempt is left: a restart would perturb it, and bridges that are open may be lost."""
     case = _turning()
     asked = run_case(case, tmp_path)
-    assert asked.result["cycles"] == 24
-    assert len(list((asked.directory / "segments").iterdir())) == 2
-    run = replace(case.run, until_steady=False, cycles=24, settling_cycles=8, cycles_per_segment=24)
-    at_once = run_case(replace(case, run=run), tmp_path)
-    ways = [one.motion.groups[0].mass_centre for one in (asked, at_once)]
-    # With every run command the engine takes sliding contacts for sticking once: a slip of some 0.1 um.
-    assert np.abs(ways[0] - ways[1]).max() < 2e-7
-    speeds = [one.result["velocity"]["mean"] for one in (asked, at_once)]
-    assert speeds[0] == pytest.approx(speeds[1], rel=5e-4)
+    assert (asked.result["cycles"], asked.result["ended_early"]) == (24, True)
+    at_once = run_case(case.for_cycles(24), tmp_path)
+    assert at_once.directory != asked.directory
+    dumps = [(one.directory / FIRST_SEGMENT / "beads.bin").read_bytes() for one in (asked, at_once)]
+    assert dumps[0] == dumps[1]
+
+
+def test_walkers_whose_contacts_open_have_the_speeds_of_long_runs(tmp_path: Path) -> None:
+    """At the end of a cycle some bridges between their beads are open; they share decks and go on for longer."""
+    engine = find_engine()
+    cases = []
+    for gamma0 in (0.74, 0.94, 1.14):
+        tables: dict[str, Any] = {
+            "dimers": {"mean_radius": "0.25 mm", "sin_delta": 0.35, "replicates": 2, "spacing": "80 mm"},
+            "beads": {"material": "ruby"},
+            "liquid": {"name": "Si AK5"},
+            "boundary": {"material": "chromium-coated glass"},
+            "drive": {"frequency": "80 Hz", "gamma0": gamma0},
+        }
+        cases.append(resolve_case(tables, name="open"))
+    assert len({sharing_key(case) for case in cases}) == 1
+    made = make_runs(cases, tmp_path, engine)
+    long = make_runs([replace(case, run=replace(case.run, until_steady=False)) for case in cases], tmp_path, engine)
+    results = [[current_result(run.directory) for run in one.runs.values()] for one in (made, long)]
+    opened = 0
+    for one, other in zip(*results, strict=True):
+        assert one["velocity"]["smallest"] == pytest.approx(other["velocity"]["smallest"], rel=0.005)
+        assert one["velocity"]["largest"] == pytest.approx(other["velocity"]["largest"], rel=0.005)
+        opened += one["open"]["contact_3"] > 0.01
+    assert opened
+    assert len({one["cycles"] for one in results[0]}) > 1
 
 
 def test_a_walker_that_turns_ever_faster_is_not_steady_however_even_its_speed(tmp_path: Path) -> None:
@@ -150,7 +174,7 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
     cases, engine = _companions(), find_engine()
     assert len({sharing_key(case) for case in cases}) == 1
     together = make_runs(cases, tmp_path / "together", engine)
-    assert len({run.directory.parent for run in together.runs.values()}) == 1
+    assert len({run.directory.parent for run in together.runs.values()}) == 2  # the second has one that went on
     cycles = {}
     for case in cases:
         alone = make_runs([case], tmp_path / "alone", engine)
@@ -170,7 +194,7 @@ def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     case, engine = _turning(), find_engine()
 
     def stop(progress: Progress) -> None:
-        if progress.step > 13 * case.run.steps_per_cycle:
+        if progress.made > 13 * case.run.steps_per_cycle:
             raise Stopped("enough")
 
     with pytest.raises(Stopped):
@@ -179,7 +203,7 @@ def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     for folder in ("stopped", "at-a-stretch"):
         ((_, run),) = make_runs([case], tmp_path / folder, engine).runs.items()
         dumps.append([(path / "beads.bin").read_bytes() for path in run.segments])
-    assert len(dumps[0]) == 2
+    assert len(dumps[0]) == 1
     assert dumps[0] == dumps[1]
 
 
@@ -191,7 +215,7 @@ def test_several_drives_have_a_force_each_in_one_deck(tmp_path: Path) -> None:
     single = next(iter(make_runs([first], tmp_path / "single", engine).runs.values())).directory / FIRST_SEGMENT
     assert "fix             gravity" in (single / "walker.lig").read_text()
     shared = next(iter(make_runs([first, second], tmp_path / "shared", engine).runs.values())).directory.parent
-    amplitudes = (shared / FIRST_SEGMENT / "drive_1_x.txt").read_text().split("\n")
+    amplitudes = (shared / "drive_1_x.txt").read_text().split("\n")
     mass = 4.0 / 3.0 * np.pi * 0.3e-3**3 * first.density
     assert amplitudes[0] == "4"
     assert float(amplitudes[1].split()[1]) == pytest.approx(mass * first.drive.peak_acceleration, rel=1e-12)
