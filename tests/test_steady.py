@@ -82,7 +82,7 @@ def test_walkers_whose_contacts_open_have_the_speeds_of_long_runs(tmp_path: Path
     cases = []
     for gamma0 in (0.74, 0.94, 1.14):
         tables: dict[str, Any] = {
-            "dimers": {"mean_radius": "0.25 mm", "sin_delta": 0.35, "replicates": 2, "spacing": "80 mm"},
+            "dimers": {"mean_radius": "0.25 mm", "sin_delta": 0.35, "replicates": 2, "spacing": "120 mm"},
             "beads": {"material": "ruby"},
             "liquid": {"name": "Si AK5"},
             "boundary": {"material": "chromium-coated glass"},
