@@ -64,7 +64,9 @@ def fig2(sources: Sources) -> Figure:
     engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction, bridges and film")
     engine.plot([], [], color="0.45", lw=2.2, marker="*", ms=9, label="paper's fit, κ = 0.033 s/mm")
     engine.set_ylabel("velocity (mm/s)")
-    engine.legend(loc="lower left", title="symbols: engine, mean and range of 6; inset: of 2", fontsize=7, title_fontsize=7)
+    engine.legend(
+        loc="lower left", title="symbols: engine, mean and range of 6; inset: of 2", fontsize=7, title_fontsize=7
+    )
     dry.legend(loc="lower left", title="Coulomb friction, dry", fontsize=7, title_fontsize=7)
     _threshold_inset(engine.inset_axes((0.13, 0.67, 0.36, 0.31)), sources)
     figure.suptitle(f"{_beads(dimer.radii)}, {case.liquid.name}", fontsize=10)

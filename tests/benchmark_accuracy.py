@@ -25,7 +25,7 @@ from walkers.sweeps.shared_deck import make_runs
 
 _WORKERS = 2
 _FULL = {"drive.frame": "lab", "run.time_step": "2 us", "run.cycles": 60, "run.settling_cycles": 20}
-_SMALL = {"deg": 0.1, "mm/s": 0.01}
+_SMALL = {"°": 0.1, "mm/s": 0.01}
 """Differences that are none, by unit: a sliding velocity of a bead that rolls is all but zero."""
 
 
