@@ -101,7 +101,8 @@ def _threshold_inset(inset: Axes, sources: Sources) -> None:
     case = dimers.shipped()
     predicted = [threshold(one) for f in MARKERS for one in dimers.driven(case, f, [case.drive.peak_acceleration])]
     inset.plot(list(MARKERS), predicted, "--", color="0.2", lw=0.9)
-    inset.set(ylim=(0.0, 1.3 * float(ends["gamma0_moving"].max())), xlim=(55.0, 95.0))
+    known = np.array([*ends["gamma0_moving"], *ends["gamma0_at_rest"], *predicted], dtype=float)
+    inset.set(ylim=(0.0, 1.3 * float(np.nanmax(known))), xlim=(55.0, 95.0))
     inset.tick_params(labelsize=6)
     inset.set_xlabel("f (Hz)", fontsize=7, labelpad=1)
     inset.set_ylabel(r"$\Gamma_\mathrm{c}$", fontsize=7, labelpad=1)

@@ -2,7 +2,6 @@
 
 import copy
 import json
-import subprocess
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from tests.conftest import PROGRAM, call, to_toml
+from tests.conftest import call, to_toml
 from walkers.calibration.calibrate import FINAL, calibrate, first_wave, next_wave, ranking, sobol_indices
 from walkers.calibration.emulator import fit_emulators
 from walkers.calibration.posterior import log_likelihood, sample_posterior
@@ -127,12 +126,12 @@ def test_later_waves_look_around_the_best_sets(tmp_path: Path) -> None:
 def test_a_posterior_is_the_known_one(known: tuple[Any, list[Observation]]) -> None:
     """With little discrepancy the truth is found; without a group its observation is predicted wider."""
     emulators, _ = known
-    posterior = sample_posterior(emulators, SPACE, 1500, 1)
+    posterior = sample_posterior(emulators, SPACE, 800, 1)
     assert np.abs(posterior.best - TRUTH[0]).max() < 0.06
     low, high = np.percentile(posterior.unit, (5.0, 95.0), axis=0)
     assert (low < TRUTH[0]).all()
     assert (high > TRUTH[0]).all()
-    without = sample_posterior(emulators, SPACE, 1500, 1, {"other"})
+    without = sample_posterior(emulators, SPACE, 800, 1, {"other"})
     assert without.groups == ("all",)
     seen, unseen = (emulators[1].value(one.unit)[0].std() for one in (posterior, without))
     assert unseen > 1.5 * seen
@@ -182,7 +181,7 @@ def test_an_impossible_observation_is_a_discrepancy() -> None:
         *(observation(name, value, 0.05) for name, value in zip("pqxy", values, strict=True)),
         observation("never", 0.0, 0.05, "other"),
     ]
-    posterior = sample_posterior(fit_emulators(design, outcome, observations, 1), SPACE, 1500, 1)
+    posterior = sample_posterior(fit_emulators(design, outcome, observations, 1), SPACE, 800, 1)
     middle = np.median(posterior.discrepancy, axis=0)
     assert middle[posterior.groups.index("other")] > 20.0
     assert middle[posterior.groups.index("all")] < 2.0
@@ -207,7 +206,7 @@ REDUCED: dict[str, Any] = {
     "case": "fig1b",
     "set": {
         "dimers": {"replicates": 1},
-        "run": {"cycles": 10, "settling_cycles": 6, "samples_per_cycle": 10, "time_step": "4.5 us"},
+        "run": {"cycles": 10, "settling_cycles": 6, "samples_per_cycle": 10},
     },
     "parameters": {
         "friction": {
@@ -375,8 +374,7 @@ def test_the_example_of_the_docs_can_be_read(tmp_path: Path) -> None:
 def test_a_file_is_no_folder_to_write_into(command: str, tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.touch()
-    arguments = [PROGRAM, *command.split(), str(file)]
-    told = subprocess.run(arguments, capture_output=True, text=True, check=False, cwd=tmp_path)
+    told = call(*command.split(), str(file), folder=tmp_path)
     assert (told.returncode, told.stdout) == (2, "")
     assert told.stderr == f"walkers: {command.rsplit(maxsplit=1)[-1]}: expected a folder, {file} is a file\n"
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

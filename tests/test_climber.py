@@ -1,5 +1,6 @@
 """A dimer on a wall, shaken along it, against gravity."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from walkers.inputs.reading import read_toml, shipped_cases
 from walkers.postprocess.analysis import describe_result, read_result
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
+from walkers.runner.ensemble import finished_places
 from walkers.sweeps.shared_deck import make_runs
 from walkers.theory.prediction import motion_of, predict
 
@@ -20,25 +22,28 @@ FRICTIONS = {0.1: -2.2e-3, 0.2: 1.8e-3, 0.3: 5.9e-3}
 """Climbing speeds in m/s, from a prototype deck of the same dimer."""
 
 
+# Its speed is that of 120 cycles of 2 µs, 40 of them to settle, to three digits.
+RUN = {"time_step": "4 us", "cycles": 24, "settling_cycles": 12}
+
+
 def climber(friction: float = 0.3, **start: Any) -> Case:
-    case = load_case("climber")
+    case = resolve_case({**read_toml(shipped_cases()["climber"]), "run": RUN}, name="climber")
     contact = replace(case.contact, friction_bead_wall=friction, friction_bead_bead=friction)
     begin = {"replicates": 1, "angle_spread": 0.0, "gap_spread": 0.0, "spacing": 0.1, **start}
     return replace(case, contact=contact, walkers=(replace(case.walkers[0], **begin),))
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def runs(once: Callable[..., Path]) -> dict[str, Path]:
     """Climbers of several kinds, side by side in as few decks as may be."""
-    case = climber()
+    case, engine = climber(), find_engine(None)
     symmetric = replace(case, walkers=(replace(case.walkers[0], radii=(0.42625e-3, 0.42625e-3)),))
     cases = {str(friction): climber(friction) for friction in FRICTIONS}
     cases |= {f"below {friction}": climber(friction, facing="left") for friction in (0.2, 0.3)}
     cases["symmetric"] = symmetric
-    out = tmp_path_factory.mktemp("climbers")
-    engine = find_engine(None)
-    made = make_runs(list(cases.values()), out, engine)
-    return {name: made.runs[run_place(case, engine, out).name].directory for name, case in cases.items()}
+    out = once("climbers", lambda folder: make_runs(list(cases.values()), folder, engine))
+    places = finished_places(out)
+    return {name: places[run_place(case, engine, out).name] for name, case in cases.items()}
 
 
 def test_a_climber_is_a_dimer_on_a_plane_at_90_degrees() -> None:

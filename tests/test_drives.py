@@ -25,7 +25,7 @@ def shipped(**changes: Any) -> Any:
     """The shipped walker of Fig. 1b, one of it, briefly."""
     case = load_case("fig1b")
     walkers = replace(case.walkers[0], replicates=1, facing="right", angle_spread=0.0, gap_spread=0.0)
-    run = replace(case.run, cycles=20, settling_cycles=8)
+    run = replace(case.run, cycles=20, settling_cycles=8, until_steady=False, cycles_per_segment=20)
     return replace(case, walkers=(walkers,), run=run, **changes)
 
 

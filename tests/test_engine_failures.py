@@ -159,7 +159,7 @@ def test_lost_beads(tmp_path: Path) -> None:
 def test_too_large_a_time_step_blows_up(tmp_path: Path) -> None:
     case = make_case(
         liquid={"name": "glycerol 87 %"},
-        run={"time_step": "40 us", "allow_unstable": True, "samples_per_cycle": 1, "cycles": 60, "settling_cycles": 2},
+        run={"time_step": "30 us", "allow_unstable": True, "samples_per_cycle": 1, "cycles": 60, "settling_cycles": 2},
     )
     with pytest.raises(BlowUp, match="time step"):
         _launch(case, tmp_path)
@@ -265,7 +265,7 @@ def test_a_failed_run_is_reported_and_the_next_one_goes_on(in_folder: Path) -> N
         to_toml(
             document(
                 liquid={"name": "glycerol 87 %"},
-                run={"time_step": "40 us", "allow_unstable": True, "samples_per_cycle": 1, "cycles": 60},
+                run={"time_step": "30 us", "allow_unstable": True, "samples_per_cycle": 1, "cycles": 60},
             )
         )
     )

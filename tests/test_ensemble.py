@@ -22,7 +22,7 @@ from walkers.templates import render_deck
 def ensemble() -> Case:
     """The shipped walker of Fig. 1b, six replicates, ten cycles."""
     case = load_case("fig1b")
-    return replace(case, run=replace(case.run, cycles=10, settling_cycles=4))
+    return replace(case, run=replace(case.run, cycles=10, settling_cycles=4, until_steady=False))
 
 
 def _started(case: Case, **changes: Any) -> Case:

@@ -19,7 +19,7 @@ from walkers.physics.capillary import (
 )
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.dimer import Dimer
-from walkers.physics.time_step import AUTO_FRACTIONS, fit_into_cycle
+from walkers.physics.time_step import AUTO_FRACTIONS, LONGEST_WALKER_STEP, WALKER_FRACTIONS, fit_into_cycle
 
 GAMMA = 0.0192
 
@@ -105,12 +105,19 @@ def test_viscous_limit_rules_in_glycerol() -> None:
     assert case.run.time_step < 2.1e-6
 
 
-@pytest.mark.parametrize("name", ["fig1b", "fig4a", "fig4b", "symmetric"])
+@pytest.mark.parametrize("name", ["fig1b", "fig4a", "symmetric", "pile-small"])
 def test_auto_respects_every_limit_with_margin(name: str) -> None:
+    """And is no shorter than that asks for: loose beads by their own shares, walkers at most 4 µs."""
     case = load_case(name)
     limits = limits_of(case).as_dict()
-    for limit, share in AUTO_FRACTIONS.items():
-        assert case.run.time_step <= share * limits[limit]
+    shares = AUTO_FRACTIONS if case.loose else WALKER_FRACTIONS
+    assert shares.keys() == limits.keys()
+    assert all(0.0 < share <= 0.5 for share in shares.values())
+    allowed = min(share * limits[limit] for limit, share in shares.items())
+    longest = allowed if case.loose else min(allowed, LONGEST_WALKER_STEP)
+    assert LONGEST_WALKER_STEP == 4e-6
+    # A cycle is so many whole samples of whole steps: a little less than what is allowed.
+    assert 0.97 * longest < case.run.time_step <= longest
 
 
 def test_a_step_that_divides_the_cycle_is_taken_as_it_is() -> None:

@@ -26,19 +26,31 @@ def test_what_may_differ_within_a_deck() -> None:
         make_case(run=STEP, dimers={"radii": ["0.35 mm", "0.2 mm"]}),
         make_case(run=STEP, contact={"friction": {"bead_bead": 0.2, "bead_wall": 0.05}}),
         make_case(run=STEP, contact={"restitution": 0.6}),
+        make_case(run=STEP, drive={"peak_acceleration": "5 g"}),
+        make_case(run=STEP, drive={"axis": "y"}),
+        make_case(run=STEP, boundary={"tilt": "20 deg"}),
+        make_case(run=STEP, environment={"gravity": "0 m/s^2"}),
+        make_case(run=STEP, liquid={"film_drag_ratio": 0.5}),
     ]
     assert len({sharing_key(case) for case in same}) == 1
+    render_shared_deck(same)
     others = [
         make_case(run=STEP, drive={"frequency": "60 Hz"}),
-        make_case(run=STEP, drive={"peak_acceleration": "5 g"}),
+        make_case(run=STEP, drive={"phase": "90 deg"}),
         make_case(run=STEP, liquid={"volume_fraction": 0.02}),
         make_case(run=STEP, contact={"rolling_friction": 0.003}),
         make_case(run=STEP, contact={"youngs_modulus": "40 MPa"}),
         make_case(run=STEP, beads={"density": "3.9 g/cm^3"}),
+        make_case(run={**STEP, "cycles": 30}),
         make_case(run={"time_step": "1 us"}),
-        make_case(run=STEP, environment={"gravity": "0 m/s^2"}),
+        # Walls that move do so for all.
+        make_case(run=STEP, drive={"frame": "lab"}),
+        make_case(run=STEP, drive={"frame": "lab", "peak_acceleration": "5 g"}),
+        make_case(run=STEP, drive={"frame": "lab"}, environment={"gravity": "0 m/s^2"}),
     ]
-    assert len({sharing_key(case) for case in [same[0], *others]}) == 9
+    assert len({sharing_key(case) for case in [same[0], *others]}) == 1 + len(others)
+    rough = [make_case(run=STEP, contact={"rolling_friction": value}) for value in (0.003, 0.006)]
+    assert len({sharing_key(case) for case in rough}) == 1
     with pytest.raises(ValueError, match="cannot share"):
         render_shared_deck([same[0], others[0]])
 

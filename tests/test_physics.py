@@ -72,9 +72,10 @@ def test_exchanged_beads_walk_the_other_way_at_the_same_speed(walked: Walked) ->
 
 @pytest.mark.parametrize("acceleration", ["2 g", "4 g", "6 g"])
 def test_laboratory_and_container_frame_agree(walked: Walked, acceleration: str) -> None:
-    drive = {"peak_acceleration": acceleration}
-    laboratory = walked(drive=drive).velocity[0]
-    assert walked(drive={**drive, "frame": "container"}).velocity[0] == pytest.approx(laboratory, rel=1e-3)
+    """At 1 µs; at auto's step they differ by up to 0.2 %, as speeds of one frame do from those of a finer step."""
+    drive, run = {"peak_acceleration": acceleration}, {"cycles": 12, "settling_cycles": 4, "time_step": "1 us"}
+    laboratory, container = (walked(drive={**drive, "frame": frame}, run=run) for frame in ("lab", "container"))
+    assert container.velocity[0] == pytest.approx(laboratory.velocity[0], rel=1e-3)
 
 
 @pytest.mark.parametrize("frame", ["lab", "container"])
@@ -95,8 +96,8 @@ def test_a_film_drags_beads_that_nothing_else_holds(trajectory: Moved, frame: st
 
 
 def test_velocity_does_not_depend_on_the_time_step(walked: Walked) -> None:
-    run = {"cycles": 16, "settling_cycles": 6}
-    speeds = [walked(run={**run, "time_step": step}).velocity[0] for step in ("0.5 us", "1 us", "2 us")]
+    run = {"cycles": 12, "settling_cycles": 4}
+    speeds = [walked(run={**run, "time_step": step}).velocity[0] for step in ("0.5 us", "2 us", "auto")]
     assert max(speeds) - min(speeds) < 0.005 * speeds[0]
 
 
@@ -111,10 +112,11 @@ def test_a_cycle_is_a_whole_multiple_of_the_sampling_interval(frequency: str, st
         assert case.run.time_step <= float(step.split(maxsplit=1)[0]) * 1e-6 * (1 + 1e-12)
 
 
+@pytest.mark.parametrize("frame", ["lab", "container"])
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
-def test_substrate_moves_as_prescribed(trajectory: Moved, axis: str) -> None:
-    """The carrier carries the substrate's motion: A sin ωt along the axis, zero across."""
-    moved = trajectory(drive={"axis": axis}, run={"cycles": 4, "settling_cycles": 1})
+def test_substrate_moves_as_prescribed(trajectory: Moved, axis: str, frame: str) -> None:
+    """A sin ωt along the axis, zero across: of the carrier that moves with the walls, and of walls held in thought."""
+    moved = trajectory(drive={"axis": axis, "frame": frame}, run={"cycles": 4, "settling_cycles": 1})
     drive = moved.case.drive
     along = "xyz".index(axis)
     expected = drive.amplitude * np.sin(drive.angular_frequency * moved.time)
@@ -127,9 +129,8 @@ def test_walkers_start_at_rest_on_the_substrate(trajectory: Moved, frame: str) -
     moved = trajectory(drive={"frame": frame}, run={"cycles": 4, "settling_cycles": 1})
     assert np.abs(moved.velocity[0]).max() < 1e-12
     expected = moved.case.drive.peak_velocity * np.cos(moved.case.drive.angular_frequency * moved.time)
-    if frame == "lab":
-        dumped = moved.motion.substrate_velocity[:, 0]
-        np.testing.assert_allclose(dumped, expected, atol=1e-9 * moved.case.drive.peak_velocity)
+    told = moved.motion.substrate_velocity[:, 0]
+    np.testing.assert_allclose(told, expected, atol=1e-9 * moved.case.drive.peak_velocity)
 
 
 def test_bead_on_a_still_substrate_stays_where_it_is(trajectory: Moved) -> None:
@@ -157,7 +158,7 @@ def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(
         "minimum_separation_ratio": 1.0,
     }
     liquid = {"dynamic_viscosity": "100 mPa*s"}
-    common = {"contact": contact, "liquid": liquid, "run": {"cycles": 120, "settling_cycles": 20}}
+    common = {"contact": contact, "liquid": liquid, "run": {"cycles": 40, "settling_cycles": 20}}
     asymmetric = trajectory(dimers={"angle": "5 deg"}, **common).orientation[-1, 0]
     symmetric = trajectory(dimers={"radii": ["0.25 mm", "0.25 mm"], "angle": "5 deg"}, **common).orientation[-1, 0]
     assert abs(sin(asymmetric)) < 0.5 * sin(np.radians(5.0))

@@ -8,6 +8,7 @@ import meshio
 import numpy as np
 import pytest
 import pyvista as pv
+from PIL import Image
 
 from walkers.inputs import InputError
 from walkers.postprocess import Group, read_motion, read_table
@@ -139,8 +140,7 @@ def test_figures_are_pictures(directory: Path, tmp_path: Path) -> None:
     paths = plot_run(directory, tmp_path)
     assert [path.name for path in paths] == ["walk.png", "gait.png"]
     for path in paths:
-        picture = np.asarray(pv.read(path).point_data.active_scalars)
-        assert len(np.unique(picture, axis=0)) > 20
+        assert len(Image.open(path).convert("RGB").getcolors(maxcolors=1 << 24)) > 20
 
 
 def test_a_strobed_run_has_no_gait(run_directory: Callable[..., Path], tmp_path: Path) -> None:

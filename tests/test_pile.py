@@ -2,19 +2,20 @@
 
 import json
 import os
+import resource
 import shutil
 import signal
 import subprocess
+import threading
 import tomllib
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import imageio_ffmpeg
 import numpy as np
 import pytest
-import pyvista as pv
 
 import walkers
 from tests.conftest import PROGRAM, call, engines_in, to_toml, wait_for
@@ -26,7 +27,7 @@ from walkers.postprocess.piles import Pile
 from walkers.postprocess.tables import TABLES
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
-from walkers.runner.failures import EngineError, RunBusy
+from walkers.runner.failures import EngineError, EngineKilled, RunBusy
 from walkers.runner.segments import open_run
 from walkers.sweeps.climbing import describe_climbs, piles_in, summarise_climbs
 from walkers.sweeps.record import states
@@ -48,57 +49,100 @@ def small(**changes: dict[str, Any]) -> Case:
     return resolve_case(document(**changes), name="pile-ci")
 
 
+Once = Callable[[str, Callable[[Path], object]], Path]
+# Half as long as it ships, in as many segments.
+HALF = {"duration": "0.1 s", "segment": "0.05 s"}
+# Two thirds of the steps of "auto"; the beads are shaken as soon as they have come down.
+QUICK = {"time_step": "3 us", "longest_settling": "0.05 s"}
+# Three segments of the drive, each as short as it can be and still have frames.
+BRIEF = {"duration": "0.045 s", "segment": "0.015 s", **QUICK}
+
+
 @pytest.fixture(scope="session")
-def run(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+def run(once: Once) -> Path:
     """The shipped pile of 60 beads."""
 
     def make(out: Path) -> None:
-        assert not walkers.run("pile-ci", out).cached
+        assert not walkers.run(small(run=HALF), out).cached
 
     (directory,) = once("piles", make).glob("pile-ci-*")
     return directory
-
-
-# Three segments of the drive, each as short as it can be and still have frames.
-BRIEF = {"duration": "0.045 s", "segment": "0.015 s"}
-
-
-@pytest.fixture
-def halting(tmp_path: Path) -> Callable[..., str]:
-    """An engine that stops in the midst of some segments when it makes them for the first time."""
-
-    def engine(*segments: int) -> str:
-        front = tmp_path / "front"
-        halts = "|".join(f"{segment:04d}.new" for segment in segments)
-        front.write_text(
-            f"""#!/bin/sh
-            segment=$(basename "$PWD")
-            mark={tmp_path}/halted-${{segment%.new}}
-            case $segment in {halts})
-                [ -e $mark ] || (while ! [ -e beads.bin ]; do sleep 0.02; done; kill -STOP $$; touch $mark) &
-            esac
-            exec liggghts "$@"
-            """
-        )
-        front.chmod(0o755)
-        return str(front)
-
-    return engine
-
-
-def start_brief(folder: Path, engine: str) -> subprocess.Popen[bytes]:
-    """A brief pile in a process of its own, by a given engine, in the folder ``out``."""
-    (folder / "brief.toml").write_text(to_toml(document(run=BRIEF)))
-    command = [PROGRAM, "run", str(folder / "brief.toml"), "--out", str(folder / "out"), "--engine", engine]
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def brief() -> Case:
     return resolve_case(document(run=BRIEF), name="brief")
 
 
+@dataclass(frozen=True)
+class Killed:
+    """A brief pile whose program was killed within its second segment.
+
+    Attributes
+    ----------
+    out
+        Of the runs. Where it has a file such as ``halt-0002``, the engine stops in the midst of that segment, once,
+        and the file is ``halted-0002`` then.
+    engine
+        That does so.
+    """
+
+    out: Path
+    engine: str
+
+    @property
+    def place(self) -> Path:
+        """Where the run is to be."""
+        return run_place(brief(), find_engine(self.engine), self.out)
+
+    @property
+    def unfinished(self) -> Path:
+        """Where it is."""
+        return self.place.with_name(self.place.name + ".incomplete")
+
+    def copied(self, out: Path) -> "Killed":
+        """The same in a folder that may be changed."""
+        shutil.copytree(self.out, out)
+        return replace(self, out=out)
+
+
+HALTING = """#!/bin/sh
+segment=$(basename "$PWD" .new)
+halt=../../../halt-$segment
+[ -e $halt ] && (while ! [ -e beads.bin ]; do sleep 0.02; done; kill -STOP $$; mv $halt ../../../halted-$segment) &
+exec liggghts "$@"
+"""
+
+
+@pytest.fixture(scope="session")
+def killed(once: Once) -> Killed:
+    """Somebody else calls before the kill: there is a file ``refused`` if that was refused."""
+
+    def make(folder: Path) -> None:
+        front, out = folder / "front", folder / "out"
+        front.write_text(HALTING)
+        front.chmod(0o755)
+        out.mkdir()
+        (out / "halt-0001").touch()
+        (folder / "brief.toml").write_text(to_toml(document(run=BRIEF)))
+        command = [PROGRAM, "run", str(folder / "brief.toml"), "--out", str(out), "--engine", str(front)]
+        program = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            wait_for((out / "halted-0001").exists)
+            try:
+                walkers.run(brief(), out, engine=str(front))
+            except RunBusy:
+                (out / "refused").touch()
+        finally:
+            program.kill()
+            program.wait()
+        wait_for(lambda: not engines_in(out))
+
+    folder = once("killed-pile", make)
+    return Killed(folder / "out", str(folder / "front"))
+
+
 def test_a_pile_settles_is_shaken_and_is_whole(run: Path) -> None:
-    case, motion = load_case("pile-ci"), read_motion(run)
+    case, motion = small(run=HALF), read_motion(run)
     assert case.mixture is not None
     manifest = json.loads((run / "manifest.json").read_text())
     assert manifest["settled"] < case.run.settled_below
@@ -155,25 +199,27 @@ def test_tables_of_a_pile(run: Path) -> None:
     assert held == pytest.approx(bed["liquid_in_bridges"][driven].mean(), rel=1e-6)
 
 
-def test_an_interrupted_pile_goes_on_bit_for_bit(halting: Callable[..., str], tmp_path: Path) -> None:
+def test_an_interrupted_pile_goes_on_bit_for_bit(killed: Killed, tmp_path: Path) -> None:
     """Killed while it makes its second segment, and the engine alone while it makes the third."""
     run = walkers.run(brief(), tmp_path).directory
-    engine = halting(1, 2)
-    place = run_place(brief(), find_engine(engine), tmp_path / "out")
-    unfinished = place.with_name(place.name + ".incomplete")
-    for segment in (1, 2):
-        program = start_brief(tmp_path, engine)
-        wait_for((tmp_path / f"halted-{segment:04d}").exists)
-        assert len(segment_directories(unfinished)) == segment
-        if segment == 1:
-            program.kill()
-        else:
-            for process in engines_in(unfinished):
-                os.kill(process, signal.SIGKILL)
-        assert program.wait() != 0
-        wait_for(lambda: not engines_in(unfinished))
+    begun = killed.copied(tmp_path / "out")
+    place, unfinished = begun.place, begun.unfinished
+    assert len(segment_directories(unfinished)) == 1
+    (begun.out / "halt-0002").touch()
+
+    def kill_the_engine() -> None:
+        wait_for((begun.out / "halted-0002").exists)
+        for process in engines_in(unfinished):
+            os.kill(process, signal.SIGKILL)
+
+    killer = threading.Thread(target=kill_the_engine, daemon=True)
+    killer.start()
+    with pytest.raises(EngineKilled):
+        walkers.run(brief(), begun.out, engine=begun.engine)
+    killer.join()
+    assert len(segment_directories(unfinished)) == 2
     assert not place.exists()
-    assert start_brief(tmp_path, engine).wait() == 0
+    walkers.run(brief(), begun.out, engine=begun.engine)
     assert len(segment_directories(run)) == 4
     assert [path.name for path in segment_directories(place)] == [path.name for path in segment_directories(run)]
     for here, there in zip(segment_directories(place), segment_directories(run), strict=True):
@@ -188,51 +234,37 @@ def test_restart_files_are_kept_for_the_last_two_parts_only(run: Path) -> None:
     assert kept == [path.name for path in segment_directories(run)][-2:]
 
 
-def test_a_pile_is_run_once_at_a_time(halting: Callable[..., str], tmp_path: Path) -> None:
-    engine = halting(1)
-    program = start_brief(tmp_path, engine)
-    try:
-        wait_for((tmp_path / "halted-0001").exists)
-        with pytest.raises(RunBusy):
-            walkers.run(brief(), tmp_path / "out", engine=engine)
-    finally:
-        program.kill()
-        program.wait()
+def test_a_pile_is_run_once_at_a_time(killed: Killed) -> None:
+    assert (killed.out / "refused").exists()
 
 
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
 def test_two_ranks_make_the_same_kind_of_pile(run: Path, tmp_path: Path) -> None:
-    finished = walkers.run(small(run={"ranks": 2, "duration": "0.02 s"}), tmp_path)
+    finished = walkers.run(small(run={"ranks": 2, "duration": "0.015 s", **QUICK}), tmp_path)
     one, two = current_result(run), finished.result
     assert two["surface"]["start"] == pytest.approx(one["surface"]["start"], rel=0.05)
     assert two["beads"] == one["beads"]
 
 
-def test_both_frames_shake_alike(run: Path, tmp_path: Path) -> None:
-    """Chaotic trajectories part, their agitation does not."""
-    case = small(drive={"frame": "lab"})
-    finished = walkers.run(case, tmp_path)
-
-    def agitation(directory: Path) -> float:
-        motion = read_motion(directory)
-        return float((motion.velocity[motion.time > 0.03] ** 2).sum(axis=2).mean())
-
-    assert agitation(finished.directory) == pytest.approx(agitation(run), rel=0.3)
-    assert finished.motion.position[..., 2].min() > 2.9e-4
-
-
-def test_the_laboratory_frame_is_taken_off_at_any_phase(tmp_path: Path) -> None:
-    """The lowest beads lie on the floor throughout the cycle."""
-    case = small(drive={"frame": "lab"}, run={"duration": "0.03 s", "frames_per_second": 680.0})
-    finished = walkers.run(case, tmp_path)
-    motion = finished.motion
-    assert case.run.samples_per_cycle == 4
-    lowest = (motion.position[..., 2] - motion.radius).min(axis=1)
-    assert np.abs(lowest).max() < 0.2 * case.drive.amplitude
+def test_both_frames_shake_alike(tmp_path: Path) -> None:
+    """Until chaotic trajectories part; in the laboratory the container's motion is taken off at any phase."""
+    run = {"duration": "0.03 s", "frames_per_second": 680.0, **QUICK}
+    cases = [small(drive={"frame": frame}, run=run) for frame in ("container", "lab")]
+    amplitude = cases[1].drive.amplitude
+    motions = [walkers.run(case, tmp_path).motion for case in cases]
+    here, there = ([array[motion.first_driven :] for array in (motion.position, motion.velocity)] for motion in motions)
+    assert cases[1].run.samples_per_cycle == 4
+    apart = np.sqrt(((here[0] - there[0]) ** 2).sum(axis=2).mean(axis=1))
+    assert apart[:12].max() < 0.05 * amplitude
+    agitation = [float((velocity**2).sum(axis=2).mean()) for _, velocity in (here, there)]
+    assert agitation[0] == pytest.approx(agitation[1], rel=0.1)
+    # The lowest beads lie on the floor throughout the cycle.
+    lowest = (motions[1].position[..., 2] - motions[1].radius).min(axis=1)
+    assert np.abs(lowest).max() < 0.2 * amplitude
 
 
 def test_settling_ends_at_last(tmp_path: Path) -> None:
-    case = small(run={"settled_below": "1 nm/s", "longest_settling": "0.05 s", "duration": "0.01 s"})
+    case = small(run={"settled_below": "1 nm/s", "longest_settling": "0.05 s", "duration": "0.015 s", **QUICK})
     finished = walkers.run(case, tmp_path)
     manifest = json.loads((finished.directory / "manifest.json").read_text())
     assert manifest["settled"] > case.run.settled_below
@@ -260,17 +292,11 @@ def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
             assert len(done.stderr.splitlines()) == 1, done.stderr
 
 
-def test_looking_before_the_end_leaves_nothing_stale(halting: Callable[..., str], tmp_path: Path) -> None:
-    case, engine = brief(), find_engine(halting(1))
-    place = run_place(case, engine, tmp_path / "out")
-    unfinished = place.with_name(place.name + ".incomplete")
-    program = start_brief(tmp_path, str(engine.path))
-    wait_for((tmp_path / "halted-0001").exists)
-    program.kill()
-    program.wait()
-    (unfinished / "failure.json").write_text("{}")
-    assert tabulate(unfinished)["driven"] == 0.0
-    finished = walkers.run(case, tmp_path / "out", engine=str(engine.path))
+def test_looking_before_the_end_leaves_nothing_stale(killed: Killed, tmp_path: Path) -> None:
+    begun = killed.copied(tmp_path / "out")
+    (begun.unfinished / "failure.json").write_text("{}")
+    assert tabulate(begun.unfinished)["driven"] == 0.0
+    finished = walkers.run(brief(), begun.out, engine=begun.engine)
     assert finished.result["driven"] > 0.04
     assert not (finished.directory / "failure.json").exists()
 
@@ -281,7 +307,7 @@ def written(run: Path) -> dict[str, int]:
 
 
 def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path) -> None:
-    case, engine = brief(), find_engine(None)
+    case, engine = small(run={**BRIEF, "duration": "0.015 s"}), find_engine(None)
     place = run_place(case, engine, tmp_path)
 
     def broken(case: Case, segment: Segment) -> Deck:
@@ -346,13 +372,16 @@ def test_shares_by_mass_and_by_number() -> None:
 
 
 def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
+    import imageio_ffmpeg
+    import pyvista as pv
+
     def told(*command: str) -> str:
         return call(*command, check=True).stdout
 
     assert "climbs  " in told("result", str(run))
     assert told("plot", str(run), "--to", "here").strip() == "here/climb.png"
     assert told("render", str(run), "--to", "here/box.png", "--images", "2").strip() == "here/box.png"
-    assert told("render", str(run), "--to", "here/row.png", "--interval", "0.05 s").strip() == "here/row.png"
+    assert told("render", str(run), "--to", "here/row.png", "--interval", "0.1 s").strip() == "here/row.png"
     film = in_folder / told("render", str(run), "--film", "--to", "here/box.mp4").strip()
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(film))
     assert frames == (read_motion(run).time >= 0.0).sum()
@@ -374,7 +403,8 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     box = pv.read(in_folder / "here" / "vtk" / f"boundary_{driven[1]:06d}.vtp")
     assert box.n_cells == 5
     np.testing.assert_allclose(box.bounds, [-2e-3, 2e-3, -2e-3, 2e-3, 0.0, 20e-3], atol=1e-9)
-    assert "60 beads" in told("run", "pile-ci", "--out", str(run.parent))
+    (in_folder / "pile-ci.toml").write_text(to_toml(document(run=HALF)))
+    assert "60 beads" in told("run", "pile-ci.toml", "--out", str(run.parent))
     mixture = small().mixture
     assert mixture is not None
     assert f"{mixture.counts[0]} small and {mixture.counts[1]} large, " in told("show", "pile-ci")
@@ -400,12 +430,12 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
 
 
 def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
-    """Two starts and an interruption; the table has a pile's columns."""
-    tables = document(run={"duration": "0.03 s"})
+    """Two starts; the table has a pile's columns."""
+    tables = document(run={"duration": "0.02 s", **QUICK})
     (tmp_path / "base.toml").write_text(to_toml(tables))
     sweep = expand({"case": "base.toml", "axes": {"run.seed": [1, 2]}}, source="test", name="test", folder=tmp_path)
     out = tmp_path / "runs"
-    record, failures = run_sweep(sweep, out, Options(2))
+    record, failures = run_sweep(sweep, out, Options(1))
     assert not failures
     assert [state.status for state in states(record)] == ["finished", "finished"]
     frame = load(record.directory)
@@ -413,7 +443,7 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     assert (frame["climbs"] == 0).all()
     assert frame["surface_end"].between(1e-3, 9e-3).all()
     assert frame["run"].nunique() == 2
-    again, _ = run_sweep(sweep, out, Options(2))
+    again, _ = run_sweep(sweep, out, Options(1))
     assert [state.status for state in states(again)] == ["finished", "finished"]
     ((label, runs),) = piles_in(record.directory).items()
     assert label == ""
@@ -428,7 +458,7 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     apart = piles_in(out)
     assert sorted(len(runs) for runs in apart.values()) == [1, 2]
     assert all("drive.harmonics[0].peak_acceleration = " in label for label in apart)
-    told = subprocess.run([PROGRAM, "climb", str(out)], capture_output=True, text=True, check=True).stdout
+    told = call("climb", str(out), check=True).stdout
     assert told.count("runs climbed") == 2
     with pytest.raises(InputError, match="descend"):
         sweep = expand(
@@ -451,32 +481,25 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
         expand({"case": "base.toml", "axes": {"boundary.depth": [1]}}, source="test", name="no", folder=tmp_path)
 
 
-def cluster(friction: float, beads: list[tuple[float, float]], seconds: float = 0.3) -> Case:
-    """Beads in a row on a wall: radii and heights, mm."""
+def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tmp_path: Path) -> None:
+    """The same dimer as `tests.test_climber`'s, by the other way: a box, the pile's recording, clusters, climbs.
+
+    On the wall across from it is one led by its small bead.
+    """
     tables = tomllib.loads(shipped_cases()["cluster"].read_text())
+    large, small = 0.545, 0.3075
     tables["placed"] = [
-        {"radius": f"{radius} mm", "at": [f"{2.5001 - radius} mm", "0 mm", f"{height} mm"]} for radius, height in beads
+        {"radius": f"{radius} mm", "at": [f"{side * (2.5001 - radius)} mm", "0 mm", f"{height} mm"]}
+        for side, beads in ((1, (large, small)), (-1, (small, large)))
+        for radius, height in zip(beads, (8.0, 7.18135), strict=True)
     ]
-    tables["contact"]["friction"] = {"bead_bead": friction, "bead_wall": friction}
-    tables["run"]["duration"] = f"{seconds} s"
-    return resolve_case(tables, name="cluster")
-
-
-def test_a_placed_dimer_climbs_like_the_climber(tmp_path: Path) -> None:
-    """The same dimer as `tests.test_climber`'s, by the other way: a box, the pile's recording, clusters, climbs."""
-    case = cluster(0.3, [(0.545, 8.0), (0.3075, 7.18135)], seconds=0.5)
-    finished = walkers.run(case, tmp_path)
+    tables["run"]["duration"] = "0.5 s"
+    finished = walkers.run(resolve_case(tables, name="cluster"), tmp_path)
     (climb,) = finished.result["climbs"]
     assert climb["speed"] * 1e3 == pytest.approx(5.9, rel=0.03)
     assert (climb["size"], climb["large"], climb["leader_large"], climb["walls"]) == (2, 1, True, ["+x"])
     assert climb["begin"] == pytest.approx(0.0, abs=0.05)
-
-
-def test_a_cluster_led_by_a_small_bead_does_not_climb(tmp_path: Path) -> None:
-    case = cluster(0.3, [(0.3075, 8.0), (0.545, 7.18135)])
-    finished = walkers.run(case, tmp_path)
-    assert finished.result["climbs"] == []
-    assert finished.motion.position[-1, :, 2].mean() < 7.2e-3
+    assert finished.motion.position[-1, 2:, 2].max() < 7e-3
 
 
 PLACED: dict[str, tuple[dict[str, Any], str]] = {
@@ -522,11 +545,21 @@ def test_placed_beads_reach_the_faces_of_a_cylinders_prism() -> None:
             resolve_case(tables, name="cylinder")
 
 
+@contextmanager
+def files_of_at_most(size: int) -> Iterator[None]:
+    """A limit on the size of files, ours and those of whom we start, which stands for a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
 def test_a_film_that_does_not_fit_on_the_disk_is_refused(run: Path, tmp_path: Path) -> None:
-    """A limit on the size of files stands for a full disk."""
-    command = f"ulimit -f 4; exec {PROGRAM} render {run} --film --to {tmp_path / 'box.mp4'}"
-    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
-    assert done.returncode != 0
+    with files_of_at_most(4096):
+        done = call("render", str(run), "--film", "--to", str(tmp_path / "box.mp4"))
+    assert (done.returncode, "is the disk full?" in done.stderr) == (1, True)
     assert not list(tmp_path.iterdir())
 
 
@@ -542,14 +575,17 @@ def test_ranks_take_cores_of_this_machine_and_of_a_cluster() -> None:
 
 
 def test_a_cylinder_holds_its_beads(tmp_path: Path) -> None:
-    case = small(boundary={"shape": "cylinder", "width": "5 mm"}, run={"duration": "0.05 s"})
-    finished = walkers.run(case, tmp_path)
-    motion = finished.motion
+    run = {"duration": "0.03 s", "frames_per_second": 680.0, **QUICK}
+    case = small(boundary={"shape": "cylinder", "width": "5 mm"}, run=run)
+    motion = walkers.run(case, tmp_path).motion
     out = np.linalg.norm(motion.position[..., :2], axis=2) + motion.radius
     # The faces of the prism touch the cylinder; its edges are 0.9 % farther out.
     assert 0.95 * 2.5e-3 < out[motion.time >= 0.0].max() < 1.009 * 2.5e-3 + 1e-5
-    bridges = list(read_bridges(motion))[-1]
     # The faces of the prism are one wall, which a bead is held to once.
-    held = bridges.wall_beads[bridges.walls != FLOOR]
-    assert set(bridges.walls.tolist()) == {FLOOR, 1}
-    assert len(held) == len(set(held.tolist())) > 5
+    number = 0
+    for bridges in read_bridges(motion):
+        held = bridges.wall_beads[bridges.walls != FLOOR]
+        assert set(bridges.walls.tolist()) <= {FLOOR, 1}
+        assert len(held) == len(set(held.tolist()))
+        number += len(held)
+    assert number > 5

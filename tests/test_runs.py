@@ -131,7 +131,7 @@ def test_the_name_depends_on_what_determines_the_run() -> None:
         _name(run={"seed": 2}),
         _name(contact={"rolling_friction": 0.001}),
         _name(run={"cycles": 61}),
-        _name(drive={"frame": "container"}),
+        _name(drive={"frame": "lab"}),
     }
     assert len(names) == 6
     assert _name(title="another title") == _name()
