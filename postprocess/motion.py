@@ -432,9 +432,8 @@ def _bridges(
     beads = against[:, wall("id")].astype(np.int64) - motion.first_id
     face = against[:, wall("triangle")].astype(np.int64)
     pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals[face])
-    keys = np.stack([beads, walls_of[face]], axis=1)
-    held, which = np.unique(keys, axis=0, return_inverse=True)
-    which, held = which.reshape(-1), held.reshape(-1, 2)
+    count = int(walls_of.max()) + 1  # bead and wall as one number: rows are compared ten times more slowly
+    held, which = np.unique(beads * count + walls_of[face], return_inverse=True)
     gap = np.full(len(held), np.inf)
     np.minimum.at(gap, which, -against[:, wall("overlap")])
     return Bridges(
@@ -442,8 +441,8 @@ def _bridges(
         beads=ids,
         force=np.einsum("kx,kx->k", force, arm) / np.linalg.norm(arm, axis=1),
         gap=-between[:, pair("overlap")],
-        wall_beads=held[:, 0],
-        walls=held[:, 1],
+        wall_beads=held // count,
+        walls=held % count,
         wall_force=np.bincount(which, weights=pull, minlength=len(held)).astype(np.float64),
         wall_gap=gap,
     )

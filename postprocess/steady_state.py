@@ -29,7 +29,7 @@ _LEAST_SPEED = 2e-6
 """m/s; what velocities may differ by however slow the walkers are."""
 _LITTLE = 0.005
 """rad; a steady walker turns by less in a cycle, or by less and less: by no more than …"""
-_FADING = 0.8
+_FADING = 0.9
 """… so much of what it did before."""
 _NO_MORE = 1e-4
 """rad; what turns by little must not turn by so much more than before."""
