@@ -48,7 +48,7 @@ def test_speeds_are_those_of_the_theory_beside_the_engine() -> None:
 
 def test_the_papers_law_alone_gives_its_figures_and_with_inertia_less_at_the_largest_asymmetry() -> None:
     """Quasi-static 1.11, 1.47, 2.20, 3.42, 4.88 mm/s; of Fig. 4a's 2.3 and of the plateau it gives nothing."""
-    found = fit((KAPPA,), targets(), fixed=NOTHING_ELSE, generations=6)
+    found = fit((KAPPA,), targets(), fixed=NOTHING_ELSE, generations=3)
     values = {name: None if value is None else value * 1e3 for name, value in found.values.items()}
     assert found.parameters.keys() == {"log10_kappa"}
     for name, expected in {"Fig. 2, 4 g": 1.24, "Fig. 2, 6 g": 3.07, "Fig. 3, 0.3/0.2 mm": 2.24}.items():

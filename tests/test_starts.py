@@ -23,8 +23,8 @@ def test_of_two_hundred_engines_eight_at_a_time_all_start(tmp_path: Path) -> Non
     assert failed_starts(200, tmp_path) == []
 
 
-def test_of_forty_engines_eight_at_a_time_all_start(tmp_path: Path) -> None:
-    assert failed_starts(40, tmp_path) == []
+def test_of_sixteen_engines_eight_at_a_time_all_start(tmp_path: Path) -> None:
+    assert failed_starts(16, tmp_path) == []
 
 
 @pytest.fixture
