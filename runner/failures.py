@@ -109,6 +109,8 @@ class BlowUp(EngineFailure):
 
     def __init__(self, speed: float, fastest: float, step: int, directory: Path) -> None:
         seen = f"moves at {speed:.3g} m/s" if isfinite(speed) else "has a speed or position that is no number"
+        if speed <= fastest:
+            seen = "left the box at a time step beyond its limits"
         super().__init__(
             f"blow-up: a bead {seen} after step {step}, "
             f"the drive cannot give more than {fastest:.3g} m/s; most often the time step is too large",

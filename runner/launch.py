@@ -317,6 +317,8 @@ class _Watch:
         lost = self.deck.layout.atoms - status.atoms
         if lost <= 0:
             return None
+        if self.deck.beyond_limits:
+            return BlowUp(0.0, fastest, status.step, self.directory)
         if self.status is not None:
             # A bead that has left the box since the last line was at least this fast.
             seconds = (status.step - self.status.step) * self.deck.layout.time_step

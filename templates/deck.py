@@ -9,6 +9,7 @@ from math import ceil, degrees, pi, sqrt
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import hop_height, reach
+from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import rendered
 from walkers.physics.capillary import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
 from walkers.physics.film import film_drag
@@ -60,6 +61,8 @@ class Deck:
         Lower and upper corner of the simulation box, m.
     fastest
         A speed that no bead can reach by the drive, gravity and the capillary forces alone, m/s.
+    beyond_limits
+        Whether the time step is beyond a limit, as a case may insist.
     """
 
     text: str
@@ -67,6 +70,7 @@ class Deck:
     layout: Layout
     box: tuple[Vector, Vector]
     fastest: float
+    beyond_limits: bool = False
 
 
 @dataclass(frozen=True)
@@ -305,7 +309,9 @@ def compose(plan: Plan) -> Deck:
     files = {WALL_NAME: wall_mesh(scene.faces, max(scene.upper))}
     files |= {one.file: _atom_file(one.shares) for one in forces}
     files |= {FILM_NAME: _atom_file(film)} if film else {}
-    return Deck(text, files, layout, (scene.lower, scene.upper), plan.fastest or fastest_of(case, scene))
+    fastest = plan.fastest or fastest_of(case, scene)
+    beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
+    return Deck(text, files, layout, (scene.lower, scene.upper), fastest, beyond)
 
 
 @dataclass(frozen=True)

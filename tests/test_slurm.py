@@ -25,13 +25,13 @@ address             = "127.0.0.1"
 heartbeat_period    = 1
 heartbeat_threshold = 5
 """
-# Twelve drives; at the fifth the time step is far beyond the viscous limit of glycerol.
+# Twelve frequencies, a deck each; at the fifth the time step is far beyond the viscous limit of glycerol.
 SWEEP = """
 case = "base.toml"
 [set]
 run.allow_unstable = true
 [[zip]]
-drive.peak_acceleration = { linspace = ["1 g", "6.5 g", 12] }
+drive.frequency = { linspace = ["60 Hz", "71 Hz", 12] }
 run.time_step = ["2 us", "2 us", "2 us", "2 us", "40 us", "2 us", "2 us", "2 us", "2 us", "2 us", "2 us", "2 us"]
 """
 RUN = {"cycles": 40, "settling_cycles": 2, "samples_per_cycle": 5}
