@@ -28,8 +28,10 @@ sweep: setup ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.tom
 	  [ $$status -gt 1 ] || $(WALKERS) table $(OUT)/$(basename $(notdir $(SWEEP))); exit $$status
 
 .PHONY: pile
-pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures; goes on where it was interrupted
+pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures, a film; goes on where it was interrupted
 	@$(MAKE) --no-print-directory walker CASE=$(PILE) OUT=$(OUT)
+	@echo "film:"
+	@$(WALKERS) render $(PILE) --film --out $(OUT) | sed 's/^/  /'
 
 .PHONY: figures
 figures: setup ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)

@@ -31,12 +31,9 @@ def resolve(file: CaseFile, name: str) -> Case:
     placed = Placed(tuple((*bead.at, bead.radius) for bead in file.placed)) if file.placed else None
     if not (walkers or mixture or placed):
         raise UnusableKeyError("dimers", "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
-    loose = mixture is not None or placed is not None
     pair = library.surface_pair(beads.material, boundary.material) or {}
-    if loose and file.liquid.film_drag_ratio:
-        raise UnusableKeyError("liquid.film_drag_ratio", "expected 0: most beads of a pile touch no wall's film")
     density = density_of(beads.material, beads.density, file.contact)
-    liquid = resolve_liquid(file.liquid, {**pair, "film_drag_ratio": 0.0} if loose else pair)
+    liquid = resolve_liquid(file.liquid, pair)
     contact = resolve_contact(file.contact, beads.material, "boundary.material", boundary.material)
     first = walkers[0].radii if walkers else ()
     dimer = Dimer((first[0], first[1]), density, liquid.surface_tension) if len(first) == 2 else None

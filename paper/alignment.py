@@ -103,7 +103,7 @@ def paper_drives() -> dict[str, Alignment]:
 
 def climber(large_bead_below: bool) -> Alignment:
     """U and V of the shipped climber, shaken and pulled along its wall."""
-    case = load_case("climber")
+    case = load_case("climber-dimer")
     weight = case.axial_gravity if large_bead_below else -case.axial_gravity
     return alignment(dimer_of(case), case.drive.frequency, case.drive.peak_acceleration, weight)
 

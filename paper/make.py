@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.paper.alignment import fig_alignment
+from walkers.paper.climbing import fig_climbing, fig_zoo
 from walkers.paper.comparison import Row, as_dict, as_markdown, compare, count
 from walkers.paper.modes import fig_modes
 from walkers.paper.rotation import fig4
@@ -34,11 +35,12 @@ FORMATS = ("png", "svg")
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure: how it is drawn, from which sweeps, and what it is."""
+    """A figure: how it is drawn, from which sweeps, and what it is; and whether only if it is asked for by name."""
 
     draw: Callable[[Sources], Figure]
     sweeps: tuple[str, ...]
     title: str
+    only_asked: bool = False
 
 
 FIGURES = {
@@ -49,6 +51,8 @@ FIGURES = {
     "alignment": Drawing(fig_alignment, ("alignment",), "Alignment with the shaking axis and across it"),
     "modes": Drawing(fig_modes, ("modes",), "Modes of motion"),
     "sensitivity": Drawing(fig_sensitivity, ("sensitivity",), "What the disagreements depend on"),
+    "climbing": Drawing(fig_climbing, ("climb-film", "climb-tilt"), "What stands on a wall and climbs it", True),
+    "zoo": Drawing(fig_zoo, ("zoo", "zoo-corner"), "Clusters on a wall and in a corner", True),
 }
 COMPARISON = "comparison"
 COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
@@ -98,7 +102,7 @@ def make_figures(
     options, engine, allow_failed_audit
         As for `walkers.sweeps.run.run_sweep`.
     only
-        Names of `FIGURES`, or ``comparison``; all if empty.
+        Names of `FIGURES`, or ``comparison``; if empty, all but those that are drawn only if asked for.
     progress_of
         As for `walkers.paper.sources.make_sources`.
 
@@ -113,7 +117,8 @@ def make_figures(
     runner.EngineFailure
         If there is no engine, or its audit failed.
     """
-    chosen = list(only) or [*FIGURES, COMPARISON]
+    usual = [name for name, drawing in FIGURES.items() if not drawing.only_asked]
+    chosen = list(only) or [*usual, COMPARISON]
     for name in chosen:
         if name not in (*FIGURES, COMPARISON):
             raise InputError("--only", [Problem("", name, f"expected one of {', '.join((*FIGURES, COMPARISON))}")])

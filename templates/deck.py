@@ -12,9 +12,9 @@ from walkers.inputs.loads import hop_height, reach
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import rendered
 from walkers.physics.capillary import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
-from walkers.physics.film import film_drag
 from walkers.physics.matter import Contact
 from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds, contact_angle_setting, separation_cap, wall_mesh
+from walkers.templates.film import Film, film_of
 from walkers.templates.layout import (
     BEAD_COLUMNS,
     PAIR_BRIDGE_COLUMNS,
@@ -32,9 +32,8 @@ DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
 WALL_NAME = "walls.stl"
-FILM_NAME = "film.txt"
 STATUS_LINES_PER_CYCLE = 4
-CONTENT_VERSION = 3
+CONTENT_VERSION = 4
 """Of what decks compute: to be raised where the same case gives another deck, comments aside. Runs are named by it."""
 
 RESTART_NAME = "state.restart"
@@ -297,7 +296,8 @@ def compose(plan: Plan) -> Deck:
         peak_velocity=[first.peak_velocity * component for component in first.direction],
         forces=forces,
         film=film,
-        loaded=[axis for axis in "xyz" if film or any(one.axis == axis for one in forces)],
+        loaded=[axis for axis in "xyz" if (film and axis in film.speeds) or any(one.axis == axis for one in forces)],
+        moving=_moving(plan),
         pair_bridge_terms=_terms("pair_bridges", layout.pair_bridge_columns, " ".join(PAIR_BRIDGES).split()),
         wall_bridge_terms=_terms("wall_bridges", layout.wall_bridge_columns, " ".join(WALL_BRIDGES).split()),
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
@@ -308,7 +308,8 @@ def compose(plan: Plan) -> Deck:
     )  # fmt: skip
     files = {WALL_NAME: wall_mesh(scene.faces, max(scene.upper))}
     files |= {one.file: _atom_file(one.shares) for one in forces}
-    files |= {FILM_NAME: _atom_file(film)} if film else {}
+    if film is not None:
+        files |= {"film_drag.txt": _atom_file(film.drags), "film_reach.txt": _atom_file(film.reaches)}
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, beyond)
@@ -348,11 +349,19 @@ def _forces(plan: Plan, scene: Scene) -> list[_Force]:
     return [one for one in forces if any(one.shares.values())]
 
 
-def _film(plan: Plan, scene: Scene) -> dict[int, float]:
-    """How strongly the film on the substrate drags each bead, N s/m; empty where there is none."""
+def _film(plan: Plan, scene: Scene) -> Film | None:
+    """The film on the walls, if there is one."""
     loadings = plan.loadings or (loading_of(plan.case),)
-    drags = {bead.id: film_drag(loadings[bead.loading].film_viscosity, bead.radius) for bead in scene.beads}
-    return drags if any(drags.values()) else {}
+    viscosities = [one.film_viscosity for one in loadings]
+    return film_of(scene.beads, viscosities, plan.case.liquid, scene.faces, _moving(plan))
+
+
+def _moving(plan: Plan) -> str:
+    """The axes along which the walls move in a deck."""
+    drive = plan.case.drive
+    if drive.frame != "lab" or not plan.shaken:
+        return ""
+    return "".join(axis for axis, part in zip("xyz", drive.harmonics[0].direction, strict=True) if part)
 
 
 def _atom_file(shares: Mapping[int, float]) -> str:

@@ -1,17 +1,22 @@
-"""A dimer on a wall, shaken along it, against gravity."""
+"""Clusters and dimers on a wall, shaken along it, against gravity."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.conftest import document
+from walkers import run as run_case
 from walkers.inputs import InputError, load_case, resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.reading import read_toml, shipped_cases
 from walkers.postprocess.analysis import describe_result, read_result
+from walkers.postprocess.motion import read_motion
+from walkers.postprocess.posture import postures, turned_over_at
+from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runner.ensemble import finished_places
@@ -27,7 +32,7 @@ RUN = {"time_step": "4 us", "cycles": 24, "settling_cycles": 12}
 
 
 def climber(friction: float = 0.3, **start: Any) -> Case:
-    case = resolve_case({**read_toml(shipped_cases()["climber"]), "run": RUN}, name="climber")
+    case = resolve_case({**read_toml(shipped_cases()["climber-dimer"]), "run": RUN}, name="climber-dimer")
     contact = replace(case.contact, friction_bead_wall=friction, friction_bead_bead=friction)
     begin = {"replicates": 1, "angle_spread": 0.0, "gap_spread": 0.0, "spacing": 0.1, **start}
     return replace(case, contact=contact, walkers=(replace(case.walkers[0], **begin),))
@@ -46,16 +51,16 @@ def runs(once: Callable[..., Path]) -> dict[str, Path]:
     return {name: places[run_place(case, engine, out).name] for name, case in cases.items()}
 
 
-def test_a_climber_is_a_dimer_on_a_plane_at_90_degrees() -> None:
+def test_a_dimer_on_a_wall_is_one_on_a_plane_at_90_degrees() -> None:
     """Facing right is facing up there: the same case, hence the same run."""
-    tables = read_toml(shipped_cases()["climber"])
+    tables = read_toml(shipped_cases()["climber-dimer"])
     assert tables["boundary"]["tilt"] == "90 deg"
     tables["dimers"]["facing"] = "right"
-    assert resolve_case(tables).determinants() == load_case("climber").determinants()
+    assert resolve_case(tables).determinants() == load_case("climber-dimer").determinants()
 
 
 @pytest.mark.parametrize("friction", list(FRICTIONS))
-def test_a_climber_climbs_if_friction_suffices(runs: dict[str, Path], friction: float) -> None:
+def test_a_dimer_on_the_axis_climbs_if_friction_suffices(runs: dict[str, Path], friction: float) -> None:
     velocity = read_result(runs[str(friction)])["velocity"]["mean"]
     assert velocity == pytest.approx(FRICTIONS[friction], rel=0.03)
     assert float(motion_of(climber(friction)).velocity[0]) == pytest.approx(velocity, rel=0.08)
@@ -84,3 +89,46 @@ def test_a_climbers_weight_pulls_along_the_axis() -> None:
         resolve_case(document(boundary={"uphill": "90 deg", "tilt": "90 deg"}, dimers={"facing": "up"}))
     with pytest.raises(InputError, match=r"dimers\.facing"):
         resolve_case(document(dimers={"facing": "up"}))
+
+
+@pytest.fixture(scope="module")
+def upright(once: Callable[..., Path]) -> Path:
+    """The shipped climber, with its spread of starts, for a fifth of its time."""
+    run = {"time_step": "2 us", "cycles": 36, "settling_cycles": 24, "samples_per_cycle": 1}
+    tables = {**read_toml(shipped_cases()["climber"]), "run": run}
+    case, engine = resolve_case(tables, name="climber"), find_engine(None)
+    out = once("upright", lambda folder: make_runs([case], folder, engine))
+    return finished_places(out)[run_place(case, engine, out).name]
+
+
+def test_the_shipped_climber_comes_upright_and_climbs(upright: Path) -> None:
+    result, walkers = read_result(upright), read_table(upright, "walkers")
+    assert np.degrees(walkers["start_angle"].abs().max()) > 9.0
+    assert np.degrees(walkers["orientation_end"].abs().max()) < 0.3
+    assert result["posture"]["upright"] == result["walkers"] == 6
+    assert result["velocity"]["mean"] == pytest.approx(1.41e-3, rel=0.03)
+    lines = describe_result(upright, result).splitlines()
+    assert lines[0].startswith("climber: upright to the end, within 0.")
+
+
+def test_posture_is_that_of_the_whole_run(upright: Path) -> None:
+    """Of the same motion, turned: leaning from 15° on, turned over from 90°, whatever comes after."""
+    group = read_motion(upright).groups[0]
+    assert postures(group) == ["upright"] * 6
+    assert np.isnan(turned_over_at(group)).all()
+    tilting = np.linspace(0.0, np.radians(20.0), len(group.time))[:, None]
+    over = np.where(group.time == group.time[9], np.radians(100.0), 0.0)[:, None]
+    for turn, expected in ((tilting, "leaning"), (0.5 * tilting, "leaning"), (over, "turned over")):
+        turned = replace(group)
+        turned.__dict__["orientation"] = np.broadcast_to(turn, group.orientation.shape)
+        assert postures(turned) == [expected] * 6
+    turned.__dict__["orientation"] = np.broadcast_to(over, group.orientation.shape)
+    assert turned_over_at(turned) == pytest.approx(group.time[9])
+
+
+@pytest.mark.slow
+def test_the_shipped_climber_as_it_ships(tmp_path: Path) -> None:
+    result = run_case(load_case("climber"), tmp_path).result
+    assert result["posture"]["upright"] == 6
+    assert result["posture"]["ends_within"] < np.radians(0.01)
+    assert result["velocity"]["mean"] == pytest.approx(1.412e-3, rel=0.005)

@@ -151,6 +151,6 @@ def test_a_walker_walks_up_a_slope_until_it_is_too_steep(tilt: float, run_direct
 def test_downhill_it_is_faster_and_across_the_slope_it_slides(run_directory: Callable[..., Path]) -> None:
     down = shipped(boundary=Plane(material="chromium-coated glass", tilt=radians(5.0), uphill=pi))
     assert read_result(run_directory(down))["velocity"]["mean"] > 1.5e-3
-    climber = load_case("climber")
+    climber = load_case("climber-dimer")
     assert climber.boundary.tilt == pytest.approx(pi / 2.0)
     assert (climber.pressing_gravity, climber.axial_gravity) == (0.0, climber.gravity)

@@ -382,14 +382,18 @@ def test_figures_leave_the_settings_of_whoever_calls(tmp_path: Path) -> None:
 
 
 def test_walkers_that_turned_over_are_told_first(run_directory: Callable[..., Path]) -> None:
-    """The shipped climber: all six hang with the large bead below before the run ends."""
+    """The dimer on a wall: all six hang with the large bead below before the run ends."""
     run = {"time_step": "4 us", "cycles": 80, "settling_cycles": 40}
-    directory = run_directory(resolve_case({**read_toml(shipped_cases()["climber"]), "run": run}, name="climber"))
+    tables = {**read_toml(shipped_cases()["climber-dimer"]), "run": run}
+    directory = run_directory(resolve_case(tables, name="climber-dimer"))
     result = read_result(directory)
     lines = describe_result(directory, result).splitlines()
     assert result["turned_round"] == 6
     assert result["kept_heading"]["n"] == 0
-    assert lines[0] == f"climber: 6 of 6 turned over, axial velocity {result['axial_velocity']['mean'] * 1e3:.3f} mm/s"
+    assert result["posture"]["turned over"] == 6
+    first, last = result["posture"]["turned_at"]
+    assert 0.1 < first < last < 0.4
+    assert lines[0] == f"climber-dimer: turned over after {first:.2f} to {last:.2f} s"
     assert result["axial_velocity"]["mean"] < -5e-3
     assert "none: no walker kept its heading" in describe_result(directory, result)
     assert f"{result['velocity']['mean'] * 1e3:.3f}" not in describe_result(directory, result)

@@ -1,8 +1,9 @@
-"""Group 4: viscous forces, between beads and at six faces of a box at rest and moving, with and without carriers."""
+"""Group 4: viscous forces: between beads, at six faces of a box at rest and moving, without carriers, in a film."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 from typing import Literal
 
@@ -15,6 +16,7 @@ from walkers.inputs.boundary import AxisName, Face
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.physics.capillary import bridge_volume_at_wall, rupture_distance
+from walkers.physics.film import film_drag, film_thickness
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import prescribed_motion
 from walkers.templates.deck import Plan
@@ -31,6 +33,7 @@ _ALONG: Vector = (0.03, -0.02, 0.025)
 _SPIN: Vector = (60.0, -80.0, 40.0)
 _NASE = "6πηR* v_n/max(ε, h/R*), Nase et al. in Shi, McCarthy 2008, Eqs. 40, 41"
 _NEEDS = frozenset({"carriers", "walls"})
+_IN_FILM = "the same and 6πηR v along the wall for each wall nearer than a bridge reaches"
 
 
 def viscous_case(frame: str = "container", acceleration: str = "0 g", axis: str = "x") -> Case:
@@ -42,10 +45,18 @@ def viscous_case(frame: str = "container", acceleration: str = "0 g", axis: str 
 
 
 def box_scene(radius: float, ranks: int = 1) -> Scene:
-    """26 beads at the faces, edges and corners of a cube, six carriers outside it for every rank (split along x)."""
+    """26 beads at the faces, edges and corners of a cube, six carriers outside it for every rank (split along x).
+
+    One more, last, moves where no wall is near.
+    """
     sides: tuple[Literal[1], Literal[-1]] = (1, -1)
     faces = [
-        Face(axis, side, (-side * HALF * (axis == "x"), -side * HALF * (axis == "y"), -side * HALF * (axis == "z")))
+        Face(
+            axis,
+            side,
+            (-side * HALF * (axis == "x"), -side * HALF * (axis == "y"), -side * HALF * (axis == "z")),
+            wall=f"{side}{axis}",
+        )
         for axis in AXES
         for side in sides
     ]
@@ -67,6 +78,7 @@ def box_scene(radius: float, ranks: int = 1) -> Scene:
                 _SPIN,
             )
         )
+    beads.append(Bead(len(carriers) + 1 + len(beads), (5e-4, 4e-4, 3e-4), radius, _ALONG, _SPIN))
     edge = HALF + 2.0 * _OUTSIDE
     return Scene(tuple(beads), tuple(faces), tuple(carriers), (-edge,) * 3, (edge,) * 3)
 
@@ -78,9 +90,9 @@ def box_errors(case: Case, scene: Scene, series: Measured) -> dict[int, FloatArr
     displacement, speed = prescribed_motion(case.drive, series.steps * case.run.time_step)
     # The first frame of moving walls is left out: they move from the first step on.
     judged = slice(int(case.drive.frame == "lab"), None)
-    for bead in scene.beads:
+    for bead in scene.beads[:-1]:
         row = series.row(bead.id)
-        exerted = []
+        exerted, film = [], np.zeros_like(displacement)
         for axis in range(3):
             if abs(bead.centre[axis]) < HALF - 2.0 * radius:
                 continue
@@ -91,10 +103,11 @@ def box_errors(case: Case, scene: Scene, series: Measured) -> dict[int, FloatArr
             velocity = series.velocity[:, row] - speed
             partner = Partner(radius, wall=True)
             exerted.append(bridge_law(case, radius, partner, normal, gap, velocity, series.spin[:, row]))
+            film += _film_law(case, radius, gap, velocity * (np.arange(3) != axis))
         viscous = series.force[:, row] - sum(one.steady for one in exerted)
         found = np.array(
             [
-                frame_by_frame_error(viscous[judged], np.sum([one.viscous for one in exerted], axis=0)[judged]),
+                frame_by_frame_error(viscous[judged], (film + sum(one.viscous for one in exerted))[judged]),
                 frame_by_frame_error(
                     series.torque[judged, row], np.sum([one.torque for one in exerted], axis=0)[judged]
                 ),
@@ -102,6 +115,12 @@ def box_errors(case: Case, scene: Scene, series: Measured) -> dict[int, FloatArr
         )
         errors[len(exerted)] = np.maximum(errors.get(len(exerted), np.zeros(2)), found)
     return errors
+
+
+def _film_law(case: Case, radius: float, gap: FloatArray, velocity: FloatArray) -> FloatArray:
+    """Drag of the film of a wall on a bead, N, shape (F, 3), given the gap (m) and the velocity along the wall."""
+    within = gap < film_thickness(radius, case.liquid.volume_fraction, case.liquid.contact_angle)
+    return -film_drag(case.liquid.film_viscosity, radius) * within[:, None] * velocity
 
 
 def run_box(bench: Bench, case: Case, workarounds: Workarounds, ranks: int = 1) -> tuple[Scene, Measured]:
@@ -163,6 +182,21 @@ def at_walls(bench: Bench) -> Iterator[Line]:
         yield from box_lines(f"walls moving along {axis}", errors, _NEEDS)
 
 
+def in_film(bench: Bench) -> Iterator[Line]:
+    """Beads in the films of one, two and three walls, at rest and moving, until they leave them; and one in none."""
+    for frame, axis in (("container", "x"), ("lab", "x"), ("lab", "z")):
+        bare = viscous_case(frame, "0.25 g" if frame == "lab" else "0 g", axis)
+        case = replace(bare, liquid=replace(bare.liquid, film_viscosity=10.0 * bare.liquid.dynamic_viscosity))
+        scene, series = run_box(bench, case, bench.workarounds)
+        errors = box_errors(case, scene, series)
+        where = f"walls moving along {axis}" if frame == "lab" else "walls at rest"
+        for walls, name in ((1, "one wall"), (2, "two walls"), (3, "three walls")):
+            error = float(errors[walls][0])
+            yield Line(f"force in the film of {name}, {where}", _IN_FILM, 0.0, error, "rel.", 1e-3, error, _NEEDS)
+        largest = float(np.abs(series.force[:, series.row(scene.beads[-1].id)]).max())
+        yield Line(f"no drag on a bead that is near no wall, {where}", "films live on walls", 0.0, largest, "N", 0.0)
+
+
 def without_carriers(bench: Bench) -> Iterator[Line]:
     """The raw engine's forces of open wall bridges."""
     case = viscous_case()
@@ -177,5 +211,6 @@ def without_carriers(bench: Bench) -> Iterator[Line]:
 CHECKS = (
     Check("viscous-beads", 4, "viscous force between beads", True, between_beads),
     Check("viscous-walls", 4, "viscous force at faces, edges and corners, at rest and moving", True, at_walls),
+    Check("film-walls", 4, "a film on one, two and three walls, at rest and moving", True, in_film),
     Check("viscous-carriers", 4, "the same without carriers", True, without_carriers),
 )

@@ -1,0 +1,119 @@
+"""What stands on a wall and climbs it: maps of postures over friction, film and tilt, and the clusters themselves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from walkers.paper.sources import Sources
+from walkers.postprocess.drawing import new_figure, styled
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PathCollection
+    from matplotlib.figure import Figure
+
+    from walkers.postprocess.motion import Group
+
+FloatArray = npt.NDArray[np.float64]
+KINDS = ("climbs upright", "slides down upright", "leans", "turns over")
+_MARKERS = ("^", "v", "D", "X")
+_SHAPES = "clusters[0].radii"
+_FRICTION, _TILT, _FILM = "contact.friction.bead_wall", "boundary.tilt", "liquid.film_drag_ratio"
+_COLUMNS = 5
+"""Clusters side by side."""
+
+
+def kinds(table: pd.DataFrame) -> npt.NDArray[np.int64]:
+    """What the walkers of each point of a sweep do, a place in `KINDS`.
+
+    Turns over if any of them does; leans if any does not end upright; else it climbs or slides down.
+    """
+    turned, leaning = table["turned_round"] > 0, table["upright"] < table["walkers"]
+    found: npt.NDArray[np.int64] = np.select([turned, leaning, table["axial_velocity"] < 0.0], [3, 2, 1], 0)
+    return found
+
+
+@styled
+def fig_climbing(sources: Sources) -> Figure:
+    """Dimer, fan and diamond: the film against friction on a wall, and against tilt."""
+    figure, rows = new_figure(9.0, 5.6, nrows=2, ncols=3, sharey=True)
+    drawn = None
+    for axes, (sweep, key, label) in zip(
+        rows,
+        (
+            ("climb-film", _FRICTION, "friction, on a wall"),
+            ("climb-tilt", _TILT, "tilt (°), friction 0.5"),
+        ),
+        strict=True,
+    ):
+        table = sources.finished(sweep)
+        for place, (one, (radii, part)) in enumerate(zip(axes, table.groupby(_SHAPES, sort=False), strict=False)):
+            drawn = _map(one, part, key) or drawn
+            one.set_xlabel(label)
+            if sweep == "climb-film":
+                one.set_title(_name(str(radii)))
+            if place == 0:
+                one.set_ylabel("drag of the film over Stokes's")
+    if drawn is not None:
+        figure.colorbar(drawn, ax=rows, label="up the slope (mm/s)", shrink=0.6)
+    handles, labels = rows[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _name(radii: str) -> str:
+    return {2: "dimer", 3: "large, two small beside each other", 4: "large, two small, one small"}[radii.count("mm")]
+
+
+def _map(axes: Axes, table: pd.DataFrame, key: str) -> PathCollection | None:
+    found, speed = kinds(table), table["axial_velocity"].to_numpy() * 1e3
+    drawn = None
+    for kind, (name, marker) in enumerate(zip(KINDS, _MARKERS, strict=True)):
+        here = found == kind
+        drawn = axes.scatter(
+            table[key].to_numpy()[here], table[_FILM].to_numpy()[here], c=speed[here], marker=marker, label=name,
+            s=44, cmap="RdBu", vmin=-8.0, vmax=8.0, ec="0.2", lw=0.5,
+        )  # fmt: skip
+    return drawn
+
+
+@styled
+def fig_zoo(sources: Sources) -> Figure:
+    """Each cluster as it is after a second, above its speed and what it does."""
+    entries = [(run, row, False) for run, row in _points(sources, "zoo")]
+    entries += [(run, row, True) for run, row in _points(sources, "zoo-corner")]
+    rows = -(-len(entries) // _COLUMNS)
+    figure, axes = new_figure(9.0, 2.3 * rows, nrows=rows, ncols=_COLUMNS, squeeze=False)
+    for one in axes.flat:
+        one.set_axis_off()
+    for one, (group, row, corner) in zip(axes.flat, entries, strict=False):
+        _draw_cluster(one, group, corner=corner)
+        kind, speed = KINDS[int(kinds(row)[0])], float(row["axial_velocity"].iloc[0]) * 1e3
+        where = "corner: " if corner else ""
+        one.set_title(f"{where}{kind}\n{speed:.2f} mm/s", fontsize=8)
+    return figure
+
+
+def _points(sources: Sources, sweep: str) -> list[tuple[Group, pd.DataFrame]]:
+    table = sources.finished(sweep)
+    return [(sources.trajectory(run), table.iloc[[number]]) for number, run in enumerate(table["run"])]
+
+
+def _draw_cluster(axes: Axes, group: Group, *, corner: bool) -> None:
+    """The first walker's beads seen against the wall, uphill is up; dotted where it began."""
+    from matplotlib.patches import Circle
+
+    for frame, style in ((0, {"ls": ":", "fc": "none", "ec": "0.6"}), (-1, {"fc": "#c9d2d8", "ec": "0.2"})):
+        place = group.position[frame, 0] * 1e3
+        place = place - place.mean(axis=0)
+        for (x, y, _), radius in zip(place, group.radii * 1e3, strict=True):
+            large = radius > group.case.border * 1e3
+            look = {**style, "fc": "#e0566c"} if large and frame else style
+            axes.add_patch(Circle((-y, x), radius, lw=0.8, **look))
+    if corner:
+        axes.axvline(0.0, color="0.8", lw=0.8, zorder=0)
+    axes.set(xlim=(-1.6, 1.6), ylim=(-2.3, 1.9), aspect="equal")

@@ -1,0 +1,128 @@
+"""The film on the walls: where it is, and what the deck says of it. Its forces are measured by the audit."""
+
+from collections.abc import Callable
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+
+from tests.conftest import make_case
+from walkers.inputs import load_case
+from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Groove, Plane
+from walkers.physics.film import film_drag, film_thickness
+from walkers.templates import render_deck
+from walkers.templates.film import film_of, film_walls
+from walkers.templates.scene import Bead
+
+PLACES = np.random.default_rng(1).uniform(-1e-3, 1e-3, (50, 3))
+"""m; in all of the boundaries."""
+
+
+def nearest_first(boundary: Boundary, place: tuple[float, float, float], **moved: float) -> list[float]:
+    """What the engine's formulas give, m."""
+    names = dict(zip("xyz", place, strict=True)) | {"sqrt": sqrt, "abs": abs} | moved
+    walls = film_walls(boundary.faces(), "".join(name[-1] for name in moved))
+    return sorted(eval(wall.distance, {}, names) for wall in walls)
+
+
+def across(boundary: Boundary) -> Callable[[float, float, float], list[float]]:
+    """The same from the boundary's own geometry: the floor, and the nearest wall of each pair."""
+    half = boundary.inner_width / 2.0
+    known: dict[type[Boundary], Callable[[float, float, float], list[float]]] = {
+        Plane: lambda x, y, z: [z],
+        Channel: lambda x, y, z: [z, half - abs(y)],
+        Box: lambda x, y, z: [z, half - abs(x), half - abs(y)],
+        Cylinder: lambda x, y, z: [z, half - np.hypot(x, y)],
+    }
+    return known[type(boundary)]
+
+
+@pytest.mark.parametrize(
+    "boundary",
+    [
+        Plane(material="glass"),
+        Channel(material="glass", width=5e-3),
+        Box(material="glass", width=5e-3, height=0.02),
+        Cylinder(material="glass", width=5e-3, height=0.02),
+    ],
+    ids=lambda one: one.shape,
+)
+def test_the_engines_formulas_are_distances_from_the_walls(boundary: Boundary) -> None:
+    for x, y, z in PLACES:
+        assert nearest_first(boundary, (x, y, z)) == pytest.approx(sorted(across(boundary)(x, y, z)), abs=1e-12)
+
+
+def test_in_a_groove_they_are_those_from_its_two_walls() -> None:
+    groove = Groove(material="glass", opening=pi / 2.0)
+    for x, y, z in PLACES:
+        expected = sorted([(z + y) / sqrt(2.0), (z - y) / sqrt(2.0)])
+        assert nearest_first(groove, (x, y, z)) == pytest.approx(expected, abs=1e-9)
+
+
+def test_walls_that_move_are_followed() -> None:
+    box = Box(material="glass", width=5e-3, height=0.02)
+    at = (1e-3, 2e-4, 5e-3)
+    assert nearest_first(box, at, v_wall_z=1e-4) == pytest.approx([1.5e-3, 2.3e-3, 4.9e-3])
+
+
+def test_a_film_is_as_thick_as_a_bridge_reaches() -> None:
+    case = make_case(liquid={"film_drag_ratio": 2.0, "volume_fraction": 0.02})
+    files, liquid = render_deck(case).files, case.liquid
+    number, *lines = files["film_reach.txt"].splitlines()
+    assert int(number) == case.count == len(lines)
+    reaches = [float(line.split()[1]) for line in lines]
+    drags = [float(line.split()[1]) for line in files["film_drag.txt"].splitlines()[1:]]
+    for radius, reach, drag in zip(case.all_radii, reaches, drags, strict=True):
+        volume = 0.5 * 4.0 / 3.0 * pi * radius**3 * 0.02
+        assert reach == pytest.approx(radius + volume ** (1.0 / 3.0))
+        assert reach == pytest.approx(radius + film_thickness(radius, liquid.volume_fraction, liquid.contact_angle))
+        assert drag == pytest.approx(film_drag(2.0 * 5e-6 * 920.0, radius))
+
+
+def dragged(boundary: Boundary, place: tuple[float, float, float], velocity: tuple[float, float, float]) -> list[float]:
+    """The velocity that the engine's formulas drag of a bead with a radius of 0.3 mm, m/s."""
+    bead = Bead(1, place, 3e-4)
+    liquid = load_case("pile-small").liquid
+    film = film_of([bead], [0.1], liquid, boundary.faces())
+    assert film is not None
+    names = {"sqrt": sqrt, "abs": abs, "v_film_reach": film.reaches[1], "vx": velocity[0], "vy": velocity[1]}
+    names |= dict(zip("xyz", place, strict=True)) | {"vz": velocity[2]}
+    return [float(eval(film.speeds.get(axis, "0"), {}, names)) for axis in "xyz"]
+
+
+V = (0.03, -0.02, 0.05)
+
+
+def test_films_drag_along_their_walls() -> None:
+    box = Box(material="glass", width=5e-3, height=0.02)
+    assert dragged(box, (0.0, 0.0, 5e-3), V) == [0.0, 0.0, 0.0]
+    assert dragged(box, (0.0, 0.0, 3e-4), V) == pytest.approx([V[0], V[1], 0.0])
+    assert dragged(box, (-2.2e-3, 0.0, 5e-3), V) == pytest.approx([0.0, V[1], V[2]])
+    assert dragged(box, (2.2e-3, 2.2e-3, 5e-3), V) == pytest.approx([V[0], V[1], 2.0 * V[2]])
+    assert dragged(box, (2.2e-3, -2.2e-3, 3e-4), V) == pytest.approx([2.0 * V[0], 2.0 * V[1], 2.0 * V[2]])
+
+
+def test_in_a_cylinder_and_a_groove_what_is_normal_to_the_wall_is_left_out() -> None:
+    turn = 0.7
+    outward, along = np.array([np.cos(turn), np.sin(turn), 0.0]), np.array([-np.sin(turn), np.cos(turn), 0.0])
+    velocity = tuple(float(part) for part in 0.04 * outward + 0.03 * along + np.array([0.0, 0.0, 0.02]))
+    place = tuple(float(part) for part in 2.2e-3 * outward + np.array([0.0, 0.0, 5e-3]))
+    round_one = Cylinder(material="glass", width=5e-3, height=0.02)
+    expected = 0.03 * along + np.array([0.0, 0.0, 0.02])
+    assert dragged(round_one, place, velocity) == pytest.approx(expected.tolist())  # type: ignore[arg-type]
+    groove = Groove(material="glass", opening=pi / 2.0)
+    normal = np.array([0.0, 1.0, 1.0]) / sqrt(2.0)  # of the wall to the right; the other one is out of reach
+    at = (0.0, -1e-3, 1e-3 + 3.2e-4 * sqrt(2.0))
+    expected = np.array(V) - np.dot(V, normal) * normal
+    assert dragged(groove, at, V) == pytest.approx(expected.tolist())
+
+
+def test_piles_have_a_film_on_each_of_their_walls() -> None:
+    """The shipped ones: the floor drags what goes sideways, the walls also what climbs."""
+    deck = render_deck(load_case("pile-small")).text
+    loads = {line.split()[1]: line for line in deck.splitlines() if line.startswith("variable        load_")}
+    assert [loads[f"load_{axis}"].count("<v_film_reach") for axis in "xyz"] == [2, 2, 2]
+
+
+def test_without_a_film_the_deck_has_none() -> None:
+    assert "film" not in render_deck(make_case()).text
