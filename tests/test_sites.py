@@ -126,20 +126,28 @@ def _helpers(folder: Path) -> list[psutil.Process]:
     return found
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_a_sweep_of_pilots_leaves_nobody_behind(in_folder: Path, number: signal.Signals) -> None:
-    """Ctrl-C of a terminal reaches the whole group of processes, SIGKILL the program alone."""
-    (in_folder / "base.toml").write_text(to_toml(document(run=SLOW)))
-    (in_folder / "test.toml").write_text(SLOW_SWEEP)
-    (in_folder / "site.toml").write_text(LOCAL)
-    command = [PROGRAM, "sweep", "test.toml", "--site", "site.toml"]
-    program = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE, text=True)
-    wait_for_engines(in_folder, program, 2)
-    if number == signal.SIGINT:
-        os.killpg(program.pid, number)
-    else:
-        program.kill()
-    _, errors = program.communicate(timeout=PATIENCE)
-    assert "Traceback" not in errors
-    assert program.returncode == (130 if number == signal.SIGINT else -signal.SIGKILL)
-    wait_for(lambda: not engines_in(in_folder) and not _helpers(in_folder))
+def test_sweeps_of_pilots_leave_nobody_behind(in_folder: Path) -> None:
+    """Ctrl-C of a terminal reaches the whole group of processes, SIGKILL the program alone; two sweeps at a time."""
+    programs = {}
+    for number in (signal.SIGINT, signal.SIGKILL):
+        folder = in_folder / number.name
+        folder.mkdir()
+        (folder / "base.toml").write_text(to_toml(document(run=SLOW)))
+        (folder / "test.toml").write_text(SLOW_SWEEP)
+        (folder / "site.toml").write_text(LOCAL)
+        command = [PROGRAM, "sweep", "test.toml", "--site", "site.toml"]
+        programs[number] = subprocess.Popen(
+            command, cwd=folder, start_new_session=True, stderr=subprocess.PIPE, text=True
+        )
+    try:
+        for number, program in programs.items():
+            wait_for_engines(in_folder / number.name, program, 2)
+        os.killpg(programs[signal.SIGINT].pid, signal.SIGINT)
+        programs[signal.SIGKILL].kill()
+        for number, status in ((signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)):
+            _, errors = programs[number].communicate(timeout=PATIENCE)
+            assert (programs[number].returncode, "Traceback" in errors) == (status, False), errors
+            wait_for(lambda folder=in_folder / number.name: not engines_in(folder) and not _helpers(folder))  # type: ignore[misc]
+    finally:
+        for program in programs.values():
+            program.kill()
