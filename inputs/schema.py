@@ -155,7 +155,7 @@ class LiquidTable(Table):
     """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
 
     ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag;
-    ``film_drag_ratio`` a drag on the beads' translation over that of Stokes in the liquid, 6π η R v. The last four,
+    ``film_drag_ratio`` a drag on beads along near walls over that of Stokes in the liquid, 6π η R v. The last four,
     left out, are the library's for the surfaces, else as in `walkers.inputs.matter_tables`.
     """
 

@@ -21,8 +21,11 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 KINDS = ("climbs upright", "slides down upright", "leans", "turns over")
 _MARKERS = ("^", "v", "D", "X")
-_SHAPES = "clusters[0].radii"
+_SHAPE = "clusters[0].arrangement"
+_SHAPES = {"chain": "dimer", "fan": "fan: large, two small", "diamond": "diamond: large, two small, small"}
 _FRICTION, _TILT, _FILM = "contact.friction.bead_wall", "boundary.tilt", "liquid.film_drag_ratio"
+_STAYS = 5e-6
+"""m/s; what is slower stays where it is."""
 _COLUMNS = 5
 """Clusters side by side."""
 
@@ -51,22 +54,17 @@ def fig_climbing(sources: Sources) -> Figure:
         strict=True,
     ):
         table = sources.finished(sweep)
-        for place, (one, (radii, part)) in enumerate(zip(axes, table.groupby(_SHAPES, sort=False), strict=False)):
-            drawn = _map(one, part, key) or drawn
+        for one, (shape, name) in zip(axes, _SHAPES.items(), strict=True):
+            drawn = _map(one, table[table[_SHAPE] == shape], key) or drawn
             one.set_xlabel(label)
             if sweep == "climb-film":
-                one.set_title(_name(str(radii)))
-            if place == 0:
-                one.set_ylabel("drag of the film over Stokes's")
+                one.set_title(name)
+        axes[0].set_ylabel("drag of the film over Stokes's")
     if drawn is not None:
         figure.colorbar(drawn, ax=rows, label="up the slope (mm/s)", shrink=0.6)
     handles, labels = rows[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4)
     return figure
-
-
-def _name(radii: str) -> str:
-    return {2: "dimer", 3: "large, two small beside each other", 4: "large, two small, one small"}[radii.count("mm")]
 
 
 def _map(axes: Axes, table: pd.DataFrame, key: str) -> PathCollection | None:
@@ -92,9 +90,9 @@ def fig_zoo(sources: Sources) -> Figure:
         one.set_axis_off()
     for one, (group, row, corner) in zip(axes.flat, entries, strict=False):
         _draw_cluster(one, group, corner=corner)
-        kind, speed = KINDS[int(kinds(row)[0])], float(row["axial_velocity"].iloc[0]) * 1e3
-        where = "corner: " if corner else ""
-        one.set_title(f"{where}{kind}\n{speed:.2f} mm/s", fontsize=8)
+        speed = float(row["axial_velocity"].iloc[0])
+        told = f"{KINDS[int(kinds(row)[0])]}\n{speed * 1e3:.2f} mm/s" if abs(speed) > _STAYS else "stays where it is\n"
+        one.set_title(f"{'corner: ' if corner else ''}{told}", fontsize=8)
     return figure
 
 
@@ -116,4 +114,4 @@ def _draw_cluster(axes: Axes, group: Group, *, corner: bool) -> None:
             axes.add_patch(Circle((-y, x), radius, lw=0.8, **look))
     if corner:
         axes.axvline(0.0, color="0.8", lw=0.8, zorder=0)
-    axes.set(xlim=(-1.6, 1.6), ylim=(-2.3, 1.9), aspect="equal")
+    axes.set(xlim=(-1.6, 1.6), ylim=(-2.3, 2.3), aspect="equal")

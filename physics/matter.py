@@ -10,7 +10,7 @@ class Liquid:
     """Surface tension (N/m), dynamic viscosity (Pa s), density (kg/m³), effective contact angle (rad).
 
     The viscosity is that of the bridges: the liquid's, times the case's ``viscosity_ratio``. ``volume_fraction`` is the
-    liquid on a bead over the bead's volume. ``film_viscosity`` (Pa s) is that of the film on the substrate through
+    liquid on a bead over the bead's volume. ``film_viscosity`` (Pa s) is that of the film on the walls along
     which beads plough: 6π R times it drags a bead's centre in proportion to its velocity against the substrate.
     """
 

@@ -20,6 +20,7 @@ from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, gait, settled_samples, walk
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
+from walkers.postprocess.posture import describe_posture, posture_summary, postures, turned_over_at
 from walkers.postprocess.tables import WALKERS, described
 
 SEPARATED = 0.1
@@ -38,7 +39,7 @@ class Walking(Analysis):
     """How walkers walk."""
 
     name = "walking"
-    version = 3
+    version = 4
     tables = ("trajectory", "walkers", "bridges")
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
@@ -54,6 +55,7 @@ class Walking(Analysis):
         "standard_error": ("m/s", "of the velocity"),
         "right_facing": ("m/s", "mean velocity of the walkers that started facing right"),
         "left_facing": ("m/s", "mean velocity of the walkers that started facing left"),
+        "axial_velocity": ("m/s", "mean of the mass centres along the drive axis, on a slope up it"),
         # Means over the walkers of what the table of a run says of each.
         **{name: meaning for name, meaning in described("walkers", _DIMERS).items() if name in _DIMERS},
         "separated_fraction": WALKERS["separated_fraction"],
@@ -61,6 +63,7 @@ class Walking(Analysis):
         "walkers": ("", "replicates"),
         "steady": ("", "how many of them are steady"),
         "turned_round": ("", "how many of them turned by more than 90 degrees"),
+        "upright": ("", "on a slope: how many of them end as they were to face, and tilt no more"),
         "cycles": ("", "driven, those to settle among them"),
         "ended_early": ("", "whether that was less than it might have been, for the walkers were steady"),
         "walkers_met": ("", "whether two of them came near each other"),
@@ -81,7 +84,7 @@ class Walking(Analysis):
             "bridges": bridge_columns(motion),
         }
         case = motion.case
-        turned = [np.abs(group.orientation).max(axis=0) > np.pi / 2.0 for group in groups]
+        turned = [np.isfinite(row["turned_at"]) for row in rows]
         makes = [_summary(*one) for one in zip(rows, turned, strict=True)]
         summary = {
             **_summary(walkers, np.concatenate(turned)),
@@ -93,6 +96,7 @@ class Walking(Analysis):
             "cycles": case.run.cycles,
             "settling_cycles": case.run.settling_cycles,
             "ended_early": motion.ended_early,
+            "posture": _posture(groups, walkers) if case.goes_uphill else None,
             **_of_dimer(case),
         }
         if len(groups) > 1:
@@ -121,6 +125,8 @@ class Walking(Analysis):
             **{name: velocity[name] for name in ("smallest", "largest", "standard_error")},
             **{name: result[name]["mean"] for name in ("right_facing", "left_facing", "orientation_end")},
             **{name: nan if value is None else value for name, value in {**beads, **contacts}.items()},
+            "axial_velocity": result["axial_velocity"]["mean"],
+            "upright": nan if result["posture"] is None else result["posture"]["upright"],
             **{
                 name: result[name]
                 for name in (
@@ -228,6 +234,7 @@ def _walker_columns(group: Group, motion: Gait, walked: Walk) -> Columns:
         "lateral_velocity": walked.lateral,
         "orientation_mean": group.orientation[samples].mean(axis=0),
         "orientation_end": group.orientation[-1],
+        "turned_at": turned_over_at(group),
         "separated_fraction": (between > reach).any(axis=-1).mean(axis=0),
         **_numbered("rotation", motion.rotation[samples].mean(axis=0)),
         **_numbered("sliding", motion.sliding[samples].mean(axis=0)),
@@ -326,6 +333,11 @@ def _summary(walkers: Columns, turned: npt.NDArray[np.bool_]) -> dict[str, Any]:
     }
 
 
+def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
+    found = [posture for group in groups for posture in postures(group)]
+    return posture_summary(found, walkers["turned_at"], walkers["orientation_end"])
+
+
 def _mean(values: FloatArray) -> float | None:
     """Mean over those that have the number."""
     known = values[np.isfinite(values)]
@@ -393,22 +405,28 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
         # The mean over both is no walker's.
         headline = f"facing {ways[0]} {_speed(one)}, facing {ways[1]} {_speed(other)} mm/s, positive {toward}"
     return [
-        f"{result['case']}: {drive}",
+        *_headlines(result, drive),
         f"  velocity   {headline}",
         f"    smallest {_speed(velocity['smallest'])}, largest {_speed(velocity['largest'])}; {_steady(result)}",
         f"    started facing {ways[0]} {_side(result['right_facing'])}, {ways[1]} {_side(result['left_facing'])}",
     ]
 
 
+def _headlines(result: Mapping[str, Any], drive: str) -> list[str]:
+    """The drive; before it, on a slope, whether walkers stay as they were to face."""
+    if result["posture"] is None:
+        return [f"{result['case']}: {drive}"]
+    return [f"{result['case']}: {describe_posture(result['posture'])}", f"  drive      {drive}"]
+
+
 def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
     """What became of walkers of which some turned by more than 90°: a velocity along their heading says nothing."""
     axial, kept = result["axial_velocity"], result["kept_heading"]
     tilted = result["goes_uphill"]
-    what, (first, second) = ("over", ("up", "down")) if tilted else ("round", ("right", "left"))
+    first, second = ("up", "down") if tilted else ("right", "left")
+    told = f"{result['turned_round']} of {result['walkers']} turned round, axial velocity {_speed(axial['mean'])} mm/s"
     return [
-        f"{result['case']}: {result['turned_round']} of {result['walkers']} turned {what}, "
-        f"axial velocity {_speed(axial['mean'])} mm/s",
-        f"  drive      {drive}",
+        *(_headlines(result, drive) if tilted else [f"{result['case']}: {told}", f"  drive      {drive}"]),
         f"  axial velocity, positive {'up' if tilted else 'to the right'}: started facing {first} "
         f"{_speed(axial['right_facing'])}, {second} {_speed(axial['left_facing'])} mm/s; {_steady(result)}",
         f"  velocity   {_speed(kept['mean'])} mm/s along the heading, of the {kept['n']} that kept it"

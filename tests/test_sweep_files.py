@@ -127,7 +127,8 @@ def test_shipped_sweeps_are_the_papers() -> None:
         "fig3",
         "fig4",
         "modes",
-        *("pile-around", "pile-climb", "pile-paper", "pile-seeds", "pile-softness", "pile-step"),
+        *("climb-film", "climb-liquids", "climb-start", "climb-tilt", "zoo", "zoo-corner"),
+        *("pile-liquids", "pile-paper", "pile-seeds", "pile-softness", "pile-step"),
         "sensitivity",
     }
     assert set(shipped_sweeps()) == expected
