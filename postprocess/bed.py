@@ -28,8 +28,8 @@ class Bed:
     mean_square_velocity : float
         m²/s², relative to the container, at the phase at which frames are taken (at 0 several times below the mean over
         a cycle).
-    coordination : float
-        Bridges between beads, touching or open, twice, over beads.
+    contacts, bridges : float
+        A bead, between beads alone: those bridges that touch, and all of them, touching or open, twice, over beads.
     touching, opened : int
         Bridges between beads that touch and that do not.
     mean_force : float
@@ -46,7 +46,8 @@ class Bed:
     brazil_nut: float
     brazil_nut_of_bulk: float
     mean_square_velocity: float
-    coordination: float
+    contacts: float
+    bridges: float
     touching: int
     opened: int
     mean_force: float
@@ -81,13 +82,44 @@ def bed_of(motion: Motion, frame: int, bulk: npt.NDArray[np.bool_], bridges: Bri
         brazil_nut=segregation(position[:, 2], large),
         brazil_nut_of_bulk=segregation(position[bulk, 2], large[bulk]),
         mean_square_velocity=float(np.mean(np.sum(motion.velocity[frame] ** 2, axis=1))),
-        coordination=2.0 * len(bridges.beads) / len(position),
+        contacts=2.0 * touching / len(position),
+        bridges=2.0 * len(bridges.beads) / len(position),
         touching=touching,
         opened=len(bridges.gap) - touching,
         mean_force=float(bridges.force.mean()) if len(bridges.force) else 0.0,
         liquid_in_bridges=float(liquid.sum()),
         bulk=int(bulk.sum()),
     )
+
+
+def coordination_of_inner(bridges: Bridges, count: int) -> dict[str, float | None]:
+    """Contacts and bridges, to other beads, of the beads that are bridged to no wall and not to the floor.
+
+    Beads at a wall have fewer neighbours among the beads than those within, which a small pile has few of.
+
+    Parameters
+    ----------
+    bridges
+        Of a frame.
+    count
+        Number of beads.
+
+    Returns
+    -------
+    dict
+        ``beads``, how many they are, ``contacts`` and ``bridges``, the means of these beads; None where there is none.
+    """
+    inner = np.ones(count, dtype=bool)
+    inner[bridges.wall_beads] = False
+    beads = int(inner.sum())
+    ends = inner[bridges.beads]
+    if not beads:
+        return {"beads": 0, "contacts": None, "bridges": None}
+    return {
+        "beads": beads,
+        "contacts": float(ends[bridges.gap <= 0.0].sum() / beads),
+        "bridges": float(ends.sum() / beads),
+    }
 
 
 def liquid_of_beads(radius: FloatArray, volume_fraction: float, bridges: Bridges) -> FloatArray:

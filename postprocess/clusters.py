@@ -184,6 +184,9 @@ class Climb:
     ----------
     begin, end : float
         Of the greatest gain of height, s.
+    qualified : float
+        When the track first counted as a climb, s: in the first frame up to which it is one; NaN if it never did. What
+        comes later does not change it, so that a longer record has no other climbs up to a time than a shorter one.
     gain : float
         m.
     speed, standard_error : float
@@ -200,11 +203,12 @@ class Climb:
     walls : tuple of int
         Side walls that held it at the end.
     climbed : bool
-        Whether it counts as a climb.
+        Whether it counts as a climb: once it has, whatever comes later.
     """
 
     begin: float
     end: float
+    qualified: float
     gain: float
     speed: float
     standard_error: float
@@ -240,6 +244,7 @@ def classify(
         raise ValueError("a track without a frame")
     gained, seconds = _gained(track, time, height)
     risen = gained - np.minimum.accumulate(gained)
+    first = _qualified(gained, definition.min_rise)
     end = int(np.argmax(risen))
     begin = int(np.argmin(gained[: end + 1]))
     span = range(begin, end + 1)
@@ -250,6 +255,7 @@ def classify(
     return Climb(
         begin=float(time[track.frames[begin]]),
         end=float(time[last]),
+        qualified=float("nan") if first is None else float(time[track.frames[first]]),
         gain=float(risen[end]),
         speed=speed,
         standard_error=error,
@@ -258,8 +264,22 @@ def classify(
         size=len(members),
         large=int(large[list(members)].sum()),
         walls=tuple(sorted(track.walls[end])),
-        climbed=bool(risen[end] >= definition.min_rise and len(span) >= _FEWEST_FRAMES),
+        climbed=first is not None,
     )
+
+
+def _qualified(gained: FloatArray, min_rise: float) -> int | None:
+    """The first place of a track up to which it is a climb, given the height that it gained since its begin, m.
+
+    There it is farther above its lowest than ever before, by enough, and that took frames enough: a hop between two
+    frames is none.
+    """
+    places, least = np.arange(len(gained)), np.minimum.accumulate(gained)
+    risen = gained - least
+    lowest = np.maximum.accumulate(np.where(np.diff(least, prepend=np.inf) < 0.0, places, 0))
+    farthest = risen == np.maximum.accumulate(risen)
+    found = np.flatnonzero(farthest & (risen >= min_rise) & (places - lowest + 1 >= _FEWEST_FRAMES))
+    return int(found[0]) if len(found) else None
 
 
 def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:

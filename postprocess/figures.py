@@ -144,20 +144,25 @@ def plot_pile(directory: Path, destination: Path) -> list[Path]:
     -------
     list of Path
         ``climb.png``: heights of the clusters' leaders over the pile's surface against time with the events in their
-        lives, the Brazil-nut index, the mean square velocity.
+        lives, the Brazil-nut index, contacts and bridges a bead, the mean square velocity.
     """
     return save_figure(_climb_figure(analyse(directory)), destination / CLIMB_NAME, [directory.name])
 
 
 @styled
 def _climb_figure(found: PileAnalysis) -> Figure:
-    figure, axes = new_figure(7.6, 6.4, mosaic=[["height"], ["height"], ["index"], ["agitation"]], sharex=True)
+    rows = [["height"], ["height"], ["index"], ["bridges"], ["agitation"]]
+    figure, axes = new_figure(7.6, 7.8, mosaic=rows, sharex=True)
     time, case = found.motion.time, found.motion.case
     _heights(axes["height"], found)
     axes["index"].plot(time, [bed.brazil_nut for bed in found.beds], color="C0", label="all beads")
     axes["index"].plot(time, [bed.brazil_nut_of_bulk for bed in found.beds], "--", color="C2", label="bulk alone")
     axes["index"].set_ylabel("Brazil-nut\nindex")
     axes["index"].legend(fontsize=7)
+    axes["bridges"].plot(time, [bed.bridges for bed in found.beds], color="C0", label="bridges")
+    axes["bridges"].plot(time, [bed.contacts for bed in found.beds], "--", color="C2", label="contacts")
+    axes["bridges"].set(ylabel="how many a bead,\nto other beads", ylim=(0.0, None))
+    axes["bridges"].legend(fontsize=7, loc="lower right", ncols=2)
     axes["agitation"].semilogy(time, [max(bed.mean_square_velocity, 1e-12) for bed in found.beds], color="C0")
     axes["agitation"].set(
         xlabel="time from the begin of the drive (s)", ylabel="mean square\nvelocity, strobed\n(m²/s²)"

@@ -27,6 +27,8 @@ from walkers.runner.files import beside
 
 if TYPE_CHECKING:
     import pyvista as pv
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 PICTURE_NAME = "walker.png"
 SERIES_NAME = "series.png"
@@ -35,7 +37,6 @@ _RUBY = ("#b0203c", "#e0566c")
 _GLASS = ("#8c9aa5", "#c9d2d8")
 """Large and small beads, of those that are pointed out and of the others."""
 _FLOOR = "#c9d2d8"
-_MOST_PIXELS = 4000
 _FEW, _MANY = 100, 500
 """Beads from which on spheres are drawn coarser."""
 _SHOWN = 6
@@ -45,15 +46,23 @@ _TOLERANCE = 0.1
 _MOST_PICTURES = 60.0
 """A second, in a film."""
 _PIXELS = 40.0
-"""To a millimetre of a picture."""
-_SCREEN = 1600
-"""Pixels: as high as a screen at most."""
-_LEAST_PIXELS = 600
-"""Of the longer side of a picture."""
-_MARGIN = 64
-"""Pixels for the scale beside a film."""
-_LEAST_WIDTH = 200
+"""To a millimetre of a picture, at least, where the screen has room for it."""
+_TALL, _TALLEST, _WIDEST = 1000, 1600, 1900
+"""Pixels of a view: so high, higher for boxes that are much higher than wide, lower for what is much wider."""
+_LETTERS = 28
+"""Pixels, of the letters in a film."""
+_ABOVE, _BELOW, _LEFT, _RIGHT = 52, 28, 136, 12
+"""Pixels about the view in a film: for the time, for half of the lowest label, for the scale, for a wall."""
+_LEAST_WIDTH = 320
 """Pixels; on less the time has no room."""
+_TICKS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+"""Millimetres between marks of a scale."""
+_PAGE = (20.0, 12.0)
+"""Inches of a time series, across and up, at most."""
+_PANEL = (1.4, 5.0)
+"""Inches of a picture in it, across and up: as large as one of the two says, if the page has room."""
+_BESIDE, _BENEATH, _EDGES = 0.3, 0.8, (0.9, 0.1)
+"""Inches between pictures: for what sticks out of tick labels, for time, ticks and label; and about all of them."""
 
 
 def render_run(directory: Path, destination: Path | None = None, *, images: int = _SHOWN) -> list[Path]:
@@ -180,8 +189,6 @@ class View:
     ----------
     motion
         Of the run.
-    most_high
-        Pixels of its height, at most. It has 40 to a millimetre, more where it would be small, fewer where too large.
 
     Attributes
     ----------
@@ -191,7 +198,7 @@ class View:
         What they are called.
     """
 
-    def __init__(self, motion: Motion, most_high: int = _MOST_PIXELS) -> None:
+    def __init__(self, motion: Motion) -> None:
         import pyvista as pv
 
         self._motion = motion
@@ -199,11 +206,12 @@ class View:
         self.axes = ("x", "height" if sideways else "y")
         self.low, self.high = _corners(motion, sideways)
         extents = self.high - self.low
-        longest, tall = 1e3 * float(extents.max()), 1e3 * float(extents[1])
-        pixels = min(max(_PIXELS, _LEAST_PIXELS / longest), _MOST_PIXELS / longest, most_high / tall)
-        size = [2 * max(1, round(extent * pixels * 1e3 / 2.0)) for extent in extents]
+        wide, tall = 1e3 * extents
+        pixels = min(max(_TALL / tall, min(_PIXELS, _TALLEST / tall)), _WIDEST / wide)
+        # The codec of films takes even numbers only.
+        size = [2 * max(1, round(extent * pixels / 2.0)) for extent in (wide, tall)]
         self._plotter = _plotter(size, "white")
-        rounds = 36 if len(motion.radius) < _FEW else 18 if len(motion.radius) < _MANY else 10
+        rounds = 28 if len(motion.radius) < _FEW else 18 if len(motion.radius) < _MANY else 10
         ball = pv.Sphere(radius=1.0, theta_resolution=rounds, phi_resolution=rounds)
         self._around = (motion.radius[:, None, None] * ball.points * 1e3).astype(np.float32)
         first = np.arange(len(motion.radius), dtype=np.int64) * ball.n_points
@@ -214,7 +222,9 @@ class View:
         self._mesh.point_data["Normals"] = np.tile(ball.points, (len(motion.radius), 1)).astype(np.float32)
         self._mesh.point_data.active_normals_name = "Normals"
         self._mesh.point_data["colour"] = np.zeros((self._mesh.n_points, 3), dtype=np.uint8)
-        self._plotter.add_mesh(self._mesh, scalars="colour", rgb=True, specular=0.4, smooth_shading=False)
+        beads = self._plotter.add_mesh(self._mesh, scalars="colour", rgb=True, specular=0.4, smooth_shading=False)
+        beads.prop.culling = "back"  # the far halves of spheres, half of the work, are never seen
+        beads.prop.interpolation = "Phong"  # by these normals, where pyvista would compute others
         x, up = (self.low + self.high) / 2.0 * 1e3
         middle = (x, 0.0, up) if sideways else (x, up, 0.0)
         camera = (x, -1e2, up) if sideways else (x, up, 1e2)
@@ -260,7 +270,7 @@ def _corners(motion: Motion, sideways: bool) -> tuple[FloatArray, FloatArray]:
 def render_series(
     directory: Path, destination: Path | None = None, *, images: int = _SHOWN, apart: float | None = None
 ) -> list[Path]:
-    """Views of a run beside each other, walkers and climbers coloured, with times and scales.
+    """Views of a run beside each other, in rows, walkers and climbers coloured, with times and scales.
 
     Parameters
     ----------
@@ -284,24 +294,50 @@ def render_series(
     frames = _frames_evenly(motion, images) if apart is None else _frames_apart(motion, images, apart, directory)
     pointed_out = _pointed_out(motion)
     view = View(motion)
-    low, high = view.low * 1e3, view.high * 1e3
-    wide, tall = high - low
-    across = max(0.8, 4.0 * wide / tall + 0.3)  # inches a picture, which is four inches high
-    scale = min(1.0, 20.0 / (across * len(frames)))  # a page holds so many
-    size = (1.0 + max(scale * across, 0.8) * len(frames), 1.2 + 4.0 * scale)
-    figure, axes = new_figure(*size, ncols=len(frames), sharey=True)
-    aside = max(1, int(wide * 0.4))  # mm, whole ones within the picture
+    sides = (1e3 * view.low[0], 1e3 * view.high[0], 1e3 * view.low[1], 1e3 * view.high[1])
     decimals = 2 if apart is None or apart >= 0.1 else 4
-    for panel, frame in zip(np.atleast_1d(axes), frames, strict=True):
-        picture = view.picture(frame, pointed_out(frame))
-        panel.imshow(picture, extent=(low[0], high[0], low[1], high[1]), interpolation="bilinear")
-        panel.set(title=f"{motion.time[frame]:.{decimals}f} s", xlabel=f"{view.axes[0]} (mm)")
-        panel.title.set_fontsize(8)
-        panel.set_xticks([-aside, 0, aside])
+    figure, panels = _panels(len(frames), sides[1] - sides[0], sides[3] - sides[2])
+    for panel, frame in zip(panels, frames, strict=True):
+        panel.imshow(view.picture(frame, pointed_out(frame)), extent=sides, interpolation="antialiased")
+        panel.set_title(f"{motion.time[frame]:.{decimals}f} s", fontsize=10)
+        panel.set_xlabel(f"{view.axes[0]} (mm)")
+        panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])
+        panel.spines["right"].set_visible(motion.case.boundary.closed)  # as the left one, a wall
         panel.grid(visible=False)
+        foremost = panel.get_position().x0 == panels[0].get_position().x0
+        panel.tick_params(labelleft=foremost)
+        panel.set_ylabel(f"{view.axes[1]} (mm)" if foremost else "")
     view.close()
-    np.atleast_1d(axes)[0].set_ylabel(f"{view.axes[1]} (mm)")
     return save_figure(figure, path, [directory.name])
+
+
+def _panels(count: int, wide: float, tall: float) -> tuple[Figure, list[Axes]]:
+    """A figure with so many axes of one shape, given in mm, in as many rows as make them largest.
+
+    Their places are reckoned here: no layout of matplotlib's knows how large axes of a fixed aspect will be.
+    """
+    aspired = max(_PANEL[0] / wide, _PANEL[1] / tall)
+
+    def inches(rows: int) -> float:
+        """To a millimetre."""
+        across, up = ((whole - edge) for whole, edge in zip(_PAGE, _EDGES, strict=True))
+        return min(aspired, (across / ceil(count / rows) - _BESIDE) / wide, (up / rows - _BENEATH) / tall)
+
+    rows = max(range(1, count + 1), key=lambda rows: (inches(rows), -rows))
+    columns = ceil(count / rows)
+    across, up = inches(rows) * wide + _BESIDE, inches(rows) * tall + _BENEATH
+    size = (_EDGES[0] + columns * across, _EDGES[1] + rows * up)
+    figure, axes = new_figure(*size, nrows=rows, ncols=columns, squeeze=False)
+    figure.set_layout_engine("none")
+    for number, panel in enumerate(axes.flat):
+        if number >= count:
+            panel.remove()
+            continue
+        row, column = divmod(number, columns)
+        left, bottom = _EDGES[0] + column * across, (rows - 1 - row) * up + 0.6 * _BENEATH
+        corner = (left / size[0], bottom / size[1])
+        panel.set_position((*corner, (across - _BESIDE) / size[0], (up - _BENEATH) / size[1]))
+    return figure, list(axes.flat)[:count]
 
 
 def render_film(directory: Path, destination: Path | None = None, *, slowdown: float = 1.0) -> Path:
@@ -369,28 +405,34 @@ def _film(motion: Motion, frames: Sequence[int]) -> Generator[npt.NDArray[np.uin
     """The pictures of a film, each with a scale on its left and the time above."""
     from PIL import Image, ImageDraw, ImageFont
 
-    view = View(motion, _SCREEN)
-    tall = float(view.high[1] - view.low[1])
-    pointed_out, font = _pointed_out(motion), ImageFont.load_default(16)
+    view = View(motion)
+    pointed_out, font = _pointed_out(motion), ImageFont.load_default(_LETTERS)
     try:
         for frame in frames:
             box = Image.fromarray(view.picture(frame, pointed_out(frame)))
-            wide = 2 * (max(_MARGIN + box.width + 8, _LEAST_WIDTH) // 2)
-            page = Image.new("RGB", (wide, box.height + 48), "white")
-            page.paste(box, (_MARGIN, 32))
-            draw = ImageDraw.Draw(page)
-            floor, left = 32 + box.height, _MARGIN - 2
-            draw.line(
-                [(left, 32), (left, floor), (_MARGIN + box.width + 1, floor), (_MARGIN + box.width + 1, 32)], "black"
+            page = Image.new(
+                "RGB", (max(_LEFT + box.width + _RIGHT, _LEAST_WIDTH), _ABOVE + box.height + _BELOW), "white"
             )
-            draw.text((_MARGIN, 6), f"{motion.time[frame]:.3f} s", "black", font)
-            for height in range(0, int(tall * 1e3) + 1, 5):
-                level = floor - height * box.height / (tall * 1e3)
-                draw.line([(left - 6, level), (left, level)], "black")
-                draw.text((left - 10, level), f"{height} mm" if height else "0", "black", font, anchor="rm")
+            page.paste(box, (_LEFT, _ABOVE))
+            draw = ImageDraw.Draw(page)
+            floor, left, right = _ABOVE + box.height, _LEFT - 2, _LEFT + box.width + 1
+            outline = [(left, _ABOVE), (left, floor), (right, floor), (right, _ABOVE)]
+            draw.line(outline if motion.case.boundary.closed else outline[:2], "black", 2)
+            draw.text((_LEFT, _ABOVE // 2), f"{motion.time[frame]:.3f} s", "black", font, anchor="lm")
+            for told, share in _scale(1e3 * float(view.high[1] - view.low[1])):
+                level = floor - share * box.height
+                draw.line([(left - 10, level), (left, level)], "black", 2)
+                draw.text((left - 14, level), told, "black", font, anchor="rm")
             yield np.asarray(page)
     finally:
         view.close()
+
+
+def _scale(tall: float) -> list[tuple[str, float]]:
+    """What a scale of so many mm says and at which shares of its length, at three places or more above its foot."""
+    step = max((step for step in _TICKS if 3.0 * step <= tall), default=_TICKS[0])
+    marks = [number * step for number in range(int(tall / step) + 1)]
+    return [(f"{mark:g} mm" if mark else "0", mark / tall) for mark in marks]
 
 
 def _frames_evenly(motion: Motion, images: int) -> list[int]:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
-from walkers.postprocess.bed import Bed, bed_of, liquid_of_beads, packing_profile
+from walkers.postprocess.bed import Bed, bed_of, coordination_of_inner, liquid_of_beads, packing_profile
 from walkers.postprocess.clusters import (
     Climb,
     ClimbCriteria,
@@ -48,6 +48,8 @@ class PileAnalysis:
         One a frame.
     liquid : ndarray, shape (F, N)
         In the bridges of each bead, m³.
+    inner
+        Contacts and bridges of the beads at no wall (`coordination_of_inner`) at rest, just before the drive.
     bulks, held
         Of each frame, which beads were of the bulk, and the clusters that were free and held (none before the drive).
     tracks, climbs
@@ -61,6 +63,7 @@ class PileAnalysis:
     motion: Motion
     beds: list[Bed]
     liquid: FloatArray
+    inner: dict[str, float | None]
     bulks: list[npt.NDArray[np.bool_]]
     held: list[list[Cluster]]
     tracks: list[Track]
@@ -89,15 +92,23 @@ def analyse(run: str | Path | Motion, definition: ClimbCriteria | None = None) -
     case = motion.case
     beds: list[Bed] = []
     liquid, bulks, held = [], [], []
+    inner: dict[str, float | None] = {}
     for bridges in read_bridges(motion):
         labels = connected(len(motion.radius), bridges.beads)
         bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
         liquid.append(liquid_of_beads(motion.radius, case.liquid.volume_fraction, bridges))
         beds.append(bed_of(motion, bridges.frame, bulks[-1], bridges, liquid[-1]))
+        if bridges.frame == _at_rest(motion):
+            inner = coordination_of_inner(bridges, len(motion.radius))
         # While the pile falls and settles, most of it is free of the rest.
         driven = motion.time[bridges.frame] >= 0.0
         held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
-    return classified(PileAnalysis(motion, beds, np.stack(liquid), bulks, held, [], [], [], rule), rule)
+    return classified(PileAnalysis(motion, beds, np.stack(liquid), inner, bulks, held, [], [], [], rule), rule)
+
+
+def _at_rest(motion: Motion) -> int:
+    """Number of the last frame before the beads are shaken, at the begin of the drive."""
+    return max(int(np.searchsorted(motion.time, 0.0, side="right")) - 1, 0)
 
 
 def classified(found: PileAnalysis, definition: ClimbCriteria) -> PileAnalysis:
@@ -113,7 +124,7 @@ class Pile(Analysis):
     """What loose beads in a container do: the bed, and the clusters that climb."""
 
     name = "pile"
-    version = 3
+    version = 4
     tables = ("bed", "clusters", "events", "profile")
     derived: ClassVar[Described] = {
         "beads": ("", "number of beads"),
@@ -229,7 +240,7 @@ def _cluster_columns(found: PileAnalysis) -> Columns:
     columns["wall_names"] = np.array(
         [names_of_walls(climb.walls, found.motion.case.boundary) for climb in climbs], dtype=np.str_
     )
-    for name in ("begin", "end", "gain", "speed", "standard_error", "height"):
+    for name in ("begin", "end", "qualified", "gain", "speed", "standard_error", "height"):
         columns[name] = column([getattr(climb, name) for climb in climbs], np.float64)
     for name in ("leader", "size", "large"):
         columns[name] = column([getattr(climb, name) for climb in climbs], np.int64)
@@ -248,11 +259,29 @@ def _event_columns(events: list[Event]) -> Columns:
 
 def _profile_columns(found: PileAnalysis) -> Columns:
     motion = found.motion
-    driven = motion.time >= min(motion.time[motion.first_driven :].mean(), motion.time[-1])
+    driven = _in_second_half(motion)
     layer = _LAYERS * 2.0 * float(motion.radius.max())
     names = ("height", "packing_fraction", "liquid_fraction")
     profile = packing_profile(motion.position[driven], motion.radius, found.liquid[driven], motion.case.boundary, layer)
     return dict(zip(names, profile, strict=True))
+
+
+def _in_second_half(motion: Motion) -> npt.NDArray[np.bool_]:
+    """Which frames are those of the second half of the drive; the last one where it has not begun."""
+    late: npt.NDArray[np.bool_] = motion.time >= min(motion.time[motion.first_driven :].mean(), motion.time[-1])
+    return late
+
+
+def _coordination(found: PileAnalysis) -> dict[str, Any]:
+    """Contacts and bridges a bead: at rest, then those of the inner beads, and in the second half of the drive."""
+    motion, rest = found.motion, found.beds[_at_rest(found.motion)]
+    late = [bed for bed, one in zip(found.beds, _in_second_half(motion), strict=True) if one]
+    shaken = {name: float(np.mean([getattr(bed, name) for bed in late])) for name in ("contacts", "bridges")}
+    return {
+        "rest": {"contacts": rest.contacts, "bridges": rest.bridges},
+        "rest_inner": found.inner,
+        "shaken": shaken if motion.time[-1] > 0.0 else None,
+    }
 
 
 def _result(found: PileAnalysis) -> dict[str, Any]:
@@ -266,12 +295,14 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
         "settling": float(min(motion.time[-1], 0.0) - motion.time[0]),
         "surface": {"start": beds[start].surface, "end": beds[-1].surface},
         "brazil_nut": {"start": beds[start].brazil_nut, "end": beds[-1].brazil_nut},
+        "coordination": _coordination(found),
         "clusters": len(found.tracks),
         "events": dict(Counter(event.kind for event in found.events)),
         "climbs": [
             {
                 "begin": climb.begin,
                 "end": climb.end,
+                "qualified": climb.qualified,
                 "gain": climb.gain,
                 "speed": climb.speed if np.isfinite(climb.speed) else None,
                 "standard_error": climb.standard_error if np.isfinite(climb.standard_error) else None,
@@ -300,6 +331,7 @@ def _lines(result: Mapping[str, Any]) -> list[str]:
         f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling",
         f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
         f"  segregation (z of large - z of small)/sum: {nuts['start']:.3f} at the start, {nuts['end']:.3f} at the end",
+        *_told_coordination(result["coordination"]),
         f"  clusters   {result['clusters']} were free of the pile and held to a wall for a while"
         + "".join(f", {count} {kind}" for kind, count in result["events"].items()),
         f"  climbs     {len(result['climbs']) or 'none'}",
@@ -315,3 +347,17 @@ def _lines(result: Mapping[str, Any]) -> list[str]:
             f"{climb['size']} beads ({climb['large']} large)"
         )
     return lines
+
+
+def _told_coordination(found: Mapping[str, Any]) -> list[str]:
+    rest, inner, shaken = found["rest"], found["rest_inner"], found["shaken"]
+    told = [
+        f"  bridges    between beads, at rest: {rest['bridges']:.2f} a bead, {rest['contacts']:.2f} of them contacts"
+    ]
+    if inner["beads"]:
+        told[0] += f"; {inner['beads']} beads at no wall have {inner['bridges']:.2f} and {inner['contacts']:.2f}"
+    if shaken:
+        told.append(
+            f"             while shaken: {shaken['bridges']:.2f} a bead, {shaken['contacts']:.2f} of them contacts"
+        )
+    return told

@@ -1,7 +1,14 @@
-"""How often, how soon, how fast and led by whom: climbs over the runs of piles."""
+"""How often, how soon, how fast and led by whom: climbs over the runs of piles.
+
+A run tells of its pile's first climb until it ends and of nothing after that: it is *right-censored*. The share of the
+piles that have climbed by a time is estimated from runs of any lengths by their survival (Kaplan and Meier 1958). A
+pile has climbed once a cluster has gained enough, not when that begins: counted by its begin, a climb shortly before
+the time would be one in a run that is long enough to show what became of it, and none in a shorter run.
+"""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,9 +24,13 @@ from walkers.runner.directory import CASE_NAME, MANIFEST_NAME, finished_run
 from walkers.runner.files import read_json
 from walkers.sweeps.record import RECORD_NAME, read_record, result_in, states
 
+FloatArray = npt.NDArray[np.float64]
+
 _CONFIDENCE = 0.95
-_NO_CONDITION = ("name", "title", "seed")
-"""Keys of a case that are none of a condition under which a pile is shaken."""
+_NO_CONDITION = ("name", "title", "seed", "run.cycles", "run.cycles_per_segment")
+"""Keys of a case that are none of a condition under which a pile is shaken: how long it was, is none."""
+_ALIKE = 1e-6
+"""Lengths of runs that differ by less, relatively, are the same."""
 
 
 def piles_in(directory: Path) -> dict[str, list[Path]]:
@@ -28,7 +39,8 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
     Returns
     -------
     dict
-        From what distinguishes them, the seed aside, to the runs; each run once, whatever names it has.
+        From what distinguishes them, seeds and lengths aside, to the runs; each run once, whatever names it has, and
+        of those that begin alike and were shaken for different times the longest alone: it shows what the others show.
 
     Raises
     ------
@@ -51,10 +63,13 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
         raise InputError(str(directory), [Problem("", None, "expected a finished run of a pile, or a folder or sweep")])
     keys = dict.fromkeys(key for case in cases.values() for key in case if key not in _NO_CONDITION)
     differ = [key for key in keys if len({str(case.get(key)) for case in cases.values()}) > 1]
-    groups: dict[str, list[Path]] = {}
+    groups: dict[str, dict[Any, Path]] = {}
     for path, case in cases.items():
-        groups.setdefault(", ".join(f"{key} = {_short(case.get(key))}" for key in differ), []).append(path)
-    return groups
+        starts = groups.setdefault(", ".join(f"{key} = {_short(case.get(key))}" for key in differ), {})
+        before = starts.setdefault(case.get("seed"), path)
+        if case.get("run.cycles", 0) > cases[before].get("run.cycles", 0):
+            starts[case.get("seed")] = path
+    return {label: list(starts.values()) for label, starts in groups.items()}
 
 
 def _conditions(value: Any, key: str = "") -> dict[str, Any]:
@@ -73,45 +88,97 @@ def _short(value: Any) -> str:
 
 
 def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
-    """Climbs over several runs that differ by their seeds alone.
+    """Climbs over several runs that differ by their seeds and lengths alone.
 
     Parameters
     ----------
     runs
         Run directories of piles.
     within
-        Seconds of drive; climbs that begin later do not count, and runs that are shorter are left out.
+        Seconds of drive by which a pile has climbed or not, and after which no run counts any more; if left out the
+        length of the shortest run, the longest time at which all of them still count.
 
     Returns
     -------
     dict
-        ``runs``, ``climbed`` (runs with a climb), ``probability`` with its binomial ``interval`` (95 %, Clopper and
-        Pearson 1934), ``climbs``, ``onsets`` (s, of the first climb of each run), ``speeds`` (m/s), ``sizes``,
-        ``led_by_large``, ``in_corners``.
-    """
-    from scipy.stats import binomtest
+        ``within`` (s) and ``runs``; ``climbed`` (runs that had climbed by then), ``ended`` (runs that ended before and
+        had not), ``probability`` of having climbed by then with its ``interval`` (95 %), both None where no run is so
+        long; ``median`` (s, the time by which half have climbed, None where that is not reached), ``censored`` (runs
+        that ended, or were cut off at a given ``within``, without a climb).
 
+        Of the climbs that had qualified by ``within``: ``climbs``, ``times`` (s, when the first climb of each run
+        qualified), ``onsets`` (s, when it had begun), ``speeds`` (m/s), ``sizes``, ``led_by_large``, ``in_corners``.
+    """
     results = [result_in(run) for run in runs]
-    seconds = within if within is not None else min(result["driven"] for result in results)
-    results = [result for result in results if result["driven"] >= seconds * (1.0 - 1e-6)]
-    counted = [[climb for climb in result["climbs"] if climb["begin"] <= seconds] for result in results]
-    climbed = sum(bool(climbs) for climbs in counted)
+    driven = np.array([result["driven"] for result in results])
+    first = np.array([min((climb["qualified"] for climb in result["climbs"]), default=np.inf) for result in results])
+    at, cut = (float(driven.min()), np.inf) if within is None else (within, within)
+    chances = survival(first, np.minimum(driven, cut), at)
+    counted = [[climb for climb in result["climbs"] if climb["qualified"] <= at] for result in results]
+    firsts = [min(climbs, key=lambda climb: climb["qualified"]) for climbs in counted if climbs]
     every = [climb for climbs in counted for climb in climbs]
-    chance = binomtest(climbed, len(results)) if results else None
-    interval = chance.proportion_ci(_CONFIDENCE) if chance else None
     return {
-        "within": seconds,
+        "within": at,
         "runs": len(results),
-        "climbed": climbed,
-        "probability": climbed / len(results) if results else None,
-        "interval": [float(interval.low), float(interval.high)] if interval else None,
+        **chances,
         "climbs": len(every),
-        "onsets": [min(climb["begin"] for climb in climbs) for climbs in counted if climbs],
+        "times": [climb["qualified"] for climb in firsts],
+        "onsets": [climb["begin"] for climb in firsts],
         "speeds": [climb["speed"] for climb in every if climb["speed"] is not None],
         "in_corners": sum(len(climb["walls"]) > 1 for climb in every),
         "sizes": [climb["size"] for climb in every],
         "led_by_large": sum(climb["leader_large"] for climb in every),
     }
+
+
+def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any]:
+    """The probability that what happens once has happened by a time, from records that end at different times.
+
+    Parameters
+    ----------
+    first : ndarray, shape (N,)
+        When it happened in each record, s; infinite where it did not. What comes after the record's end is ignored.
+    watched : ndarray, shape (N,)
+        Length of each record, s.
+    at
+        The time, s.
+
+    Returns
+    -------
+    dict
+        ``climbed``, ``ended``, ``censored``, ``probability``, ``interval`` and ``median`` of `summarise_climbs`. The
+        interval is that of Greenwood's variance of log(-log) of the survival, where it exists; where none or all have
+        climbed, the binomial one (Clopper and Pearson 1934) of the records that are so long.
+    """
+    from scipy.stats import CensoredData, ecdf
+
+    censored = first > watched
+    longest = watched >= at * (1.0 - _ALIKE)
+    share = ecdf(CensoredData.right_censored(np.minimum(first, watched), censored)).cdf
+    half = np.flatnonzero(share.probabilities >= 0.5)
+    probability = float(share.evaluate(at)) if longest.any() else None
+    return {
+        "climbed": int((~censored & (first <= at)).sum()),
+        "ended": int((censored & ~longest).sum()),
+        "censored": int(censored.sum()),
+        "probability": probability,
+        "interval": None if probability is None else _interval(share, at, int(longest.sum())),
+        "median": float(share.quantiles[half[0]]) if len(half) else None,
+    }
+
+
+def _interval(share: Any, at: float, followed: int) -> list[float]:
+    """That of a share of scipy's ``ecdf`` at a time that so many records reach."""
+    from scipy.stats import binomtest
+
+    probability = float(share.evaluate(at))
+    if 0.0 < probability < 1.0:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
+            ends = share.confidence_interval(_CONFIDENCE, method="log-log")
+        return [float(ends.low.evaluate(at)), float(ends.high.evaluate(at))]
+    exact = binomtest(round(probability) * followed, followed).proportion_ci(_CONFIDENCE)
+    return [float(exact.low), float(exact.high)]
 
 
 VARIATIONS = {
@@ -179,22 +246,30 @@ def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def describe_climbs(found: dict[str, Any]) -> str:
-    """`summarise_climbs` as text; mm/s."""
-    if not found["runs"]:
+    """`summarise_climbs` as text; s, mm/s."""
+    if found["probability"] is None:
         return f"no run is as long as {found['within']:g} s"
     low, high = found["interval"]
+    half = "not reached" if found["median"] is None else f"{found['median']:.2f} s"
     lines = [
-        f"{found['climbed']} of {found['runs']} runs climbed within {found['within']:.3g} s: probability "
-        f"{found['probability']:.2f} ({low:.2f} to {high:.2f} with {_CONFIDENCE:.0%} confidence)"
+        f"{found['climbed']} of {found['runs']} runs climbed within {found['within']:.3g} s"
+        + (f", {found['ended']} ended before and had not" if found["ended"] else "")
+        + f": probability {found['probability']:.2f} ({low:.2f} to {high:.2f} with {_CONFIDENCE:.0%} confidence)",
+        f"  to climb   median {half}; {found['censored']} of {found['runs']} runs ended without a climb",
     ]
     if found["climbs"]:
-        speeds, onsets = np.array(found["speeds"]) * 1e3, np.array(found["onsets"])
         sizes = ", ".join(f"{size}: {found['sizes'].count(size)}" for size in sorted(set(found["sizes"])))
         lines += [
             f"  climbs     {found['climbs']}, led by a large bead {found['led_by_large']}, "
             f"in a corner {found['in_corners']}",
-            f"  onset      {onsets.min():.2f} to {onsets.max():.2f} s, median {np.median(onsets):.2f} s",
-            f"  speed      {speeds.min():.2f} to {speeds.max():.2f} mm/s, median {np.median(speeds):.2f} mm/s",
+            f"  first one  counted after {_range(found['times'])} s, begun after {_range(found['onsets'])} s",
             f"  clusters   beads: how many   {sizes}",
         ]
+    if found["speeds"]:
+        speeds = np.array(found["speeds"]) * 1e3
+        lines.append(f"  speed      {_range(speeds)} mm/s, median {np.median(speeds):.2f} mm/s")
     return "\n".join(lines)
+
+
+def _range(values: Sequence[float] | FloatArray) -> str:
+    return f"{min(values):.2f} to {max(values):.2f}"

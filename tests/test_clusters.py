@@ -8,7 +8,7 @@ import pytest
 
 from walkers.inputs.boundary import Box
 from walkers.physics.capillary import bridge_volume_between_beads
-from walkers.postprocess.bed import liquid_of_beads, packing_profile, segregation
+from walkers.postprocess.bed import coordination_of_inner, liquid_of_beads, packing_profile, segregation
 from walkers.postprocess.clusters import (
     Climb,
     ClimbCriteria,
@@ -238,6 +238,42 @@ def test_a_cluster_without_a_wall_in_the_last_frames_may_still_go_on() -> None:
     assert scene.events == []
 
 
+def test_a_climb_qualifies_when_it_has_gained_enough() -> None:
+    scene = Scene()
+    scene.height[:, 20:22] += np.interp(TIME, [0.0, 1.0, 4.0], [1e-5, 0.0, 9e-3])[:, None]
+    _, (climb,) = scene.climbs()
+    assert climb.begin == pytest.approx(1.0, abs=0.02)
+    assert climb.qualified == pytest.approx(1.0 + 2.0 / 3.0, abs=0.02)
+    _, (lower,) = scene.climbs(ClimbCriteria(min_rise=1e-3))
+    assert lower.qualified == pytest.approx(1.0 + 1.0 / 3.0, abs=0.02)
+    _, (higher,) = scene.climbs(ClimbCriteria(min_rise=20e-3))
+    assert not higher.climbed
+    assert np.isnan(higher.qualified)
+
+
+def test_what_comes_later_does_not_change_when_a_climb_qualified() -> None:
+    """Up 2.4 mm, down, up twice as far, a hop: records of any length tell the same of the time that they share."""
+    scene = Scene()
+    up = np.interp(TIME, [0.0, 0.8, 1.6, 3.2, 3.5, 3.52], [0.0, 2.4e-3, 0.0, 4.8e-3, 0.0, 6e-3])
+    scene.height[:, 20:22] += up[:, None]
+    (track,), (whole,) = scene.climbs()
+    assert whole.qualified == pytest.approx(2.0 / 3.0, abs=0.02)
+    for frames in range(1, FRAMES):
+        shorter = Track(track.frames[:frames], track.members[:frames], track.walls[:frames])
+        climb = classify(shorter, TIME, scene.height, scene.large, ClimbCriteria())
+        assert climb.climbed == (TIME[frames - 1] >= whole.qualified)
+        if climb.climbed:
+            assert climb.qualified == whole.qualified
+
+
+def test_a_hop_between_two_frames_is_no_climb() -> None:
+    scene = Scene()
+    scene.height[100:, 20:22] += 4e-3
+    scene.height[:, 20:22] -= 1e-5 * TIME[:, None]
+    _, (climb,) = scene.climbs()
+    assert not climb.climbed
+
+
 def test_a_fall_ends_a_climb_at_its_top() -> None:
     scene = Scene()
     up = np.minimum(3e-3 * TIME, 6e-3 - 2e-3 * (TIME - 2.0))
@@ -294,6 +330,19 @@ def test_liquid_is_that_of_the_bridges() -> None:
     floor = 0.5 * fraction * 4.0 / 3.0 * np.pi * 3e-4**3
     expected = [floor + equal / 2.0, (equal + unequal) / 2.0, unequal / 2.0]
     np.testing.assert_allclose(liquid_of_beads(radius, fraction, bridges), expected)
+
+
+def test_inner_beads_are_those_at_no_wall() -> None:
+    """A chain of four, the first on the floor; the third and the fourth do not touch."""
+    bridges = bridges_of([(0, 1), (1, 2), (2, 3)], {0: 0})
+    bridges.gap[2] = 1e-5
+    assert coordination_of_inner(bridges, 4) == {
+        "beads": 3,
+        "contacts": pytest.approx((2 + 1) / 3),
+        "bridges": pytest.approx((2 + 2 + 1) / 3),
+    }
+    held = bridges_of([(0, 1)], {0: 0, 1: SIDE})
+    assert coordination_of_inner(held, 2) == {"beads": 0, "contacts": None, "bridges": None}
 
 
 def test_the_brazil_nut_index_is_one_with_all_small_beads_on_the_floor() -> None:

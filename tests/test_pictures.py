@@ -13,8 +13,9 @@ from PIL import Image
 from walkers.inputs import InputError
 from walkers.postprocess import Group, read_motion, read_table
 from walkers.postprocess.analysis import plot_run
+from walkers.postprocess.drawing import styled
 from walkers.postprocess.paraview import write_vtk
-from walkers.postprocess.pictures import render_run
+from walkers.postprocess.pictures import _panels, _scale, render_run
 
 
 @pytest.fixture(scope="module")
@@ -155,3 +156,35 @@ def test_rendering_shows_ruby_beads_on_a_grey_floor(directory: Path, tmp_path: P
     grey = np.mean(np.ptp(pixels, axis=1) < 25)
     assert 0.02 < red < 0.5
     assert grey > 0.4
+
+
+@pytest.mark.parametrize(
+    ("count", "wide", "tall"),
+    [(6, 5.3, 15.6), (6, 5.3, 38.0), (6, 4.0, 4.0), (8, 10.0, 9.0), (5, 20.0, 3.0), (1, 4, 9)],
+)
+def test_no_picture_or_label_of_a_series_is_cut(count: int, wide: float, tall: float) -> None:
+    """All that is drawn lies on the page, beside and not upon each other, and nothing is smaller than need be."""
+    figure, panels = styled(_panels)(count, wide, tall)
+    for panel in panels:
+        panel.imshow(np.zeros((2, 2, 3)), extent=(-wide / 2.0, wide / 2.0, 0.0, tall))
+        panel.set_title("0.1234 s", fontsize=10)
+        panel.set(xlabel="x (mm)", ylabel="height (mm)" if panel is panels[0] else "")
+        panel.tick_params(labelleft=panel is panels[0])
+    width, height = figure.get_size_inches()
+    assert width <= 20.0 + 1e-9
+    assert height <= 12.0 + 1e-9
+    figure.draw_without_rendering()
+    boxes = [panel.get_tightbbox().transformed(figure.dpi_scale_trans.inverted()) for panel in panels]
+    for box in boxes:
+        assert min(box.x0, box.y0, width - box.x1, height - box.y1) >= 0.0
+    for number, box in enumerate(boxes):
+        assert box.count_overlaps(boxes[number + 1 :]) == 0
+    drawn = [panel.get_window_extent() for panel in panels]
+    np.testing.assert_allclose([box.width / box.height for box in drawn], wide / tall)
+    assert max(width / 20.0, height / 12.0) > 0.75 or drawn[0].height / figure.dpi >= 4.99
+
+
+def test_a_scale_has_three_marks_or_more() -> None:
+    assert _scale(15.6) == [("0", 0.0), *[(f"{mark} mm", pytest.approx(mark / 15.6)) for mark in (5, 10, 15)]]
+    for tall in (0.4, 1.0, 4.1, 9.9, 38.0):
+        assert 4 <= len(_scale(tall)) <= 10

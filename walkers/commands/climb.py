@@ -13,7 +13,10 @@ from walkers.commands.arguments import Json, refuse
 Directory = Annotated[
     Path, typer.Argument(metavar="DIR", help="A sweep of piles, a folder of runs, or one run (or its case).")
 ]
-Within = Annotated[float | None, typer.Option("--within", min=0.0, help="Seconds of drive; all of the shortest run.")]
+Within = Annotated[
+    float | None,
+    typer.Option("--within", min=0.0, help="Climbs until then, s of drive; if left out until the shortest run's end."),
+]
 Sensitivity = Annotated[
     bool, typer.Option("--sensitivity", help="Instead: how many climbs there are with other thresholds of what is one.")
 ]
