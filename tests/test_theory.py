@@ -10,17 +10,28 @@ import numpy as np
 import pytest
 
 from tests.conftest import call, document, make_case, to_toml
-from walkers.inputs import load_case
+from walkers.inputs import load_case, resolve_case
 from walkers.inputs.case import Case
+from walkers.inputs.loads import dimer_of
+from walkers.inputs.reading import read_toml, shipped_cases
 from walkers.physics.dimer import Dimer
+from walkers.postprocess import read_table
 from walkers.postprocess.analysis import read_result
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import thresholds
 from walkers.theory.friction import Friction
-from walkers.theory.mathieu import alignment, is_stable, largest_stable_v
+from walkers.theory.mathieu import (
+    Alignment,
+    alignment,
+    growth,
+    is_stable,
+    largest_stable_v,
+    settling_rate,
+    time_to_turn,
+)
 from walkers.theory.motion import Walker, walk
-from walkers.theory.prediction import motion_of, threshold
+from walkers.theory.prediction import alignment_of, describe_alignment, motion_of, threshold
 from walkers.theory.quasistatic import detachment, mean_velocity, mean_velocity_closed_form
 
 RUBY = Dimer((0.3e-3, 0.2e-3), 4000.0, 19.2e-3)
@@ -251,6 +262,60 @@ def test_stability_of_the_mathieu_equation_is_that_of_its_solutions() -> None:
     for u, v in ((0.0, 0.3), (0.0, 0.5), (0.5, 0.1), (-0.1, 0.3), (-0.5, 0.3), (1.0, 0.2), (2.5, 0.4)):
         growth = max(largest(start, u, v) for start in ((1.0, 0.0), (0.0, 1.0)))
         assert bool(is_stable(u, v)) == (growth < 1e3), (u, v)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.1, 0.5, 2.0])
+def test_the_damped_mathieu_equation_has_its_known_limits(damping: float) -> None:
+    """Without a drive the damped pendulum; under a fast one Kapitza's, whose border the damping shifts."""
+    assert growth(-0.0136, 0.0, damping) == pytest.approx(np.hypot(damping, np.sqrt(0.0136)) - damping, rel=1e-6)
+    border = -2.0 * 0.05**2 / (1.0 + damping**2)
+    assert growth(1.03 * border, 0.05, damping) > 1e-6
+    assert growth(0.97 * border, 0.05, damping) < 1e-6
+    assert Alignment(0.97 * border, 0.05, damping).stable
+    assert Alignment(border, 0.05, damping).averaged == pytest.approx(0.0, abs=1e-12)
+    assert (growth(0.0, 0.99 * largest_stable_v()) < 1e-6) & (growth(0.0, 1.01 * largest_stable_v()) > 1e-2)
+
+
+def climber(film: float, **drive: str) -> Case:
+    """A dimer on a wall that leads with its large bead, half a degree off the axis."""
+    tables: dict[str, Any] = read_toml(shipped_cases()["climber-dimer"])
+    tables["dimers"] |= {"replicates": 1, "angle": "0.5 deg", "angle_spread": "0 deg", "gap_spread": 0.0}
+    tables["liquid"] |= {"film_drag_ratio": film}
+    tables["contact"] |= {"friction": {"bead_bead": 0.5, "bead_wall": 0.5}, "rolling_friction": 0.0}
+    tables["drive"] |= {"frequency": "170 Hz", "peak_acceleration": "16.2 g", **drive}
+    tables["run"] = {"time_step": "4 us", "cycles": 20, "settling_cycles": 10, "samples_per_cycle": 1}
+    return resolve_case(tables, name="climber")
+
+
+def test_in_a_thick_film_a_dimer_turns_over_as_its_beads_settle() -> None:
+    case = climber(40.0, peak_acceleration="2 g")
+    settling = settling_rate(dimer_of(case), -case.axial_gravity, case.liquid.film_viscosity)
+    assert alignment_of(case)["rate"] == pytest.approx(-settling, rel=0.05)
+    assert alignment_of(case)["rolling_rate"] < 0.7 * -settling
+
+
+def test_a_film_slows_the_turning_over_and_a_stronger_drive_ends_it() -> None:
+    """From 31/s to 2.8/s; in a film of Stokes's drag dimers stand from 25.7 g on, without one not at 30 g."""
+    found = [alignment_of(climber(film))["rate"] for film in (0.0, 1.0, 3.0)]
+    assert found == pytest.approx([30.8, 6.39, 2.84], rel=0.01)
+    strong = alignment_of(climber(1.0, peak_acceleration="30 g"))
+    assert strong["rate"] == pytest.approx(-3.8, rel=0.02)
+    assert (strong["stands"], strong["turns_over_after"]) == (True, None)
+    assert "stands: small angles decay" in describe_alignment(strong)[1]
+    assert alignment_of(climber(0.0, peak_acceleration="30 g"))["rate"] > 20.0
+    weak = alignment_of(climber(1.0))
+    assert weak["turns_over_after"] == pytest.approx(time_to_turn(weak["rate"]))
+    assert "turns over after about 0.74 s" in describe_alignment(weak)[1]
+
+
+@pytest.mark.parametrize("film", [0.25, 1.0])
+def test_theory_and_engine_agree_on_how_fast_a_climber_turns_over(
+    run_directory: Callable[..., Path], film: float
+) -> None:
+    case = climber(film)
+    angles = np.abs(read_table(run_directory(case), "trajectory")["orientation"].to_numpy())
+    grown = np.log(angles[-1] / angles[8]) / (len(angles) - 9) * case.drive.frequency
+    assert grown == pytest.approx(alignment_of(case)["rate"], rel=0.03)
 
 
 def test_the_program_prints_theory_beside_the_engine(in_folder: Path) -> None:
