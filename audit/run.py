@@ -13,7 +13,7 @@ from typing import Any
 
 from walkers.audit.bench import Bench
 from walkers.audit.check import Check, Line, Verdict
-from walkers.audit.checks import capillary, contact, drive, energy, repeatability, timestep, viscous
+from walkers.audit.checks import capillary, contact, cylinder, drive, energy, repeatability, timestep, viscous
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.runner.audits import AuditRecord, write_audit
@@ -23,6 +23,7 @@ from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds
 CHECKS: tuple[Check, ...] = (
     *capillary.CHECKS,
     *viscous.CHECKS,
+    *cylinder.CHECKS,
     *contact.CHECKS,
     *drive.CHECKS,
     *repeatability.CHECKS,

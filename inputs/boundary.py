@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, cos, hypot, inf, pi, sin, sqrt
+from math import ceil, cos, hypot, inf, pi, sin, sqrt, tan
 from typing import ClassVar, Literal
 
 from walkers.inputs.drive import Vector
@@ -18,11 +18,27 @@ AxisName = Literal["x", "y", "z"]
 FLOOR = "floor"
 LOOSE = 1.03
 """Pitch of the places from which beads are poured, in diameters of the largest bead."""
-SIDES = 24
-"""Of the prism that stands for a cylinder in the engine; its edges lie 0.9 % of the radius beyond its faces."""
+SIDES = 64
+"""Of the prism that stands for a cylinder in the engine; its edges lie 0.12 % of the radius beyond its faces."""
+_SLENDER = 1.2e-3
+"""The least ratio of a triangle's width to its height in a round wall; the engine takes none below 0.001."""
 _LEAST = 1e-13
 _RIM = 2e-4
 """m; the simulation box of a container reaches this far beyond its walls."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """What the faces of a round wall have in common: its radius, its lower and upper end (m), its number of pieces."""
+
+    radius: float
+    bottom: float
+    top: float
+    pieces: int
+
+    def half_width(self, depth: float) -> float:
+        """Half the width of faces whose ends meet at a depth within the wall, m."""
+        return (self.radius - depth) * tan(pi / SIDES)
 
 
 @dataclass(frozen=True)
@@ -30,7 +46,7 @@ class Face:
     """A flat wall: the axis that it is normal to, the side to which its normal points, its centroid (m).
 
     ``turn`` (rad) turns an upright one about the vertical, ``lean`` a level one about the x axis; ``wall`` is the wall
-    that the face belongs to.
+    that the face belongs to, ``of`` the round one that it is a side of.
     """
 
     axis: AxisName
@@ -39,6 +55,7 @@ class Face:
     turn: float = 0.0
     wall: str = FLOOR
     lean: float = 0.0
+    of: Round | None = None
 
     @property
     def normal(self) -> Vector:
@@ -124,6 +141,11 @@ class Boundary:
     def walls(self) -> tuple[str, ...]:
         """Names of the walls: the floor first, if there is one, then the sides."""
         return tuple(dict.fromkeys(face.wall for face in self.faces()))
+
+    @property
+    def triangles_of_a_side(self) -> int:
+        """How many triangles each face after the first is made of in the engine; the first is always one."""
+        return 1
 
     @property
     def bare(self) -> bool:
@@ -350,11 +372,29 @@ class Cylinder(Container):
     shape: Literal["cylinder"] = "cylinder"
 
     def faces(self) -> tuple[Face, ...]:
-        """The floor and the prism's faces, which are one wall."""
+        """The floor and the prism's faces, which are one wall: every second face, then those between them.
+
+        In this order neither sense of rotation differs from the other: the engine treats a bead that comes to a face
+        from one of a higher number unlike one from a lower number (`walkers.templates.engine`).
+        """
         half, level = self.width / 2.0, self.height / 4.0
-        sides = [((half * cos(turn), half * sin(turn), level), turn) for turn in _turns()]
+        turns = _turns()
+        sides = [((half * cos(turn), half * sin(turn), level), turn) for turn in turns[::2] + turns[1::2]]
         floor = Face("z", 1, (0.0137 * self.width, 0.0, 0.0))
-        return (floor, *(Face("x", -1, place, turn, "side") for place, turn in sides))
+        wall = self._wall
+        return (floor, *(Face("x", -1, place, turn, "side", of=wall) for place, turn in sides))
+
+    @property
+    def _wall(self) -> Round:
+        """From below the floor to above the box, no triangle of it too slender for beads of a quarter of the width."""
+        bottom, top = -0.2 * self.height, 2.2 * self.height
+        narrowest = 2.0 * Round(self.width / 2.0, bottom, top, 1).half_width(self.width / 8.0)
+        return Round(self.width / 2.0, bottom, top, ceil(_SLENDER * (top - bottom) / narrowest))
+
+    @property
+    def triangles_of_a_side(self) -> int:
+        """Two for each piece of a face."""
+        return 2 * self._wall.pieces
 
     def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
         """Distance from the nearest of the prism's faces, m."""
@@ -383,14 +423,21 @@ def _turns() -> list[float]:
 
 
 def _room_above(boundary: Boundary, half: tuple[float, float], top: float, largest: float, ranks: int) -> Room:
-    """A box from far below the floor, where the carriers are: for each MPI rank one a face, in its own part."""
-    faces, below = len(boundary.faces()), 4.0 * largest
-    lower = (-half[0], -half[1], -(faces + 2) * below)
-    width = 2.0 * half[0] / ranks
+    """A box from far below the floor, where the carriers are: for each MPI rank one a triangle, in its own part."""
+    triangles, below = 1 + (len(boundary.faces()) - 1) * boundary.triangles_of_a_side, 4.0 * largest
+    width, depth = 2.0 * half[0] / ranks, 2.0 * half[1]
+    # Those of few faces stand in one column.
+    columns, rows = (max(1, int(size / below)) if boundary.triangles_of_a_side > 1 else 1 for size in (width, depth))
+    layers = ceil(triangles / (columns * rows))
+    lower = (-half[0], -half[1], -(layers + 2) * below)
+    places = [
+        ((column + 0.5) / columns, (row + 0.5) / rows * depth, -(layer + 1.5) * below)
+        for layer in range(layers)
+        for row in range(rows)
+        for column in range(columns)
+    ]
     carriers = tuple(
-        (lower[0] + (rank + 0.5) * width, 0.0, -(number + 1.5) * below)
-        for rank in range(ranks)
-        for number in range(faces)
+        (lower[0] + (rank + x) * width, lower[1] + y, z) for rank in range(ranks) for x, y, z in places[:triangles]
     )
     return Room(lower, (half[0], half[1], top), carriers)
 

@@ -430,7 +430,8 @@ def _bridges(
     arm = place[ids[:, 1]] - place[ids[:, 0]]
     force = between[:, pair("fx") : pair("fx") + 3]
     beads = against[:, wall("id")].astype(np.int64) - motion.first_id
-    face = against[:, wall("triangle")].astype(np.int64)
+    # The first face is one triangle, each of the others so many.
+    face = 1 + (against[:, wall("triangle")].astype(np.int64) - 1) // motion.case.boundary.triangles_of_a_side
     pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals[face])
     count = int(walls_of.max()) + 1  # bead and wall as one number: rows are compared ten times more slowly
     held, which = np.unique(beads * count + walls_of[face], return_inverse=True)

@@ -13,7 +13,7 @@ from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import rendered
 from walkers.physics.capillary import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
 from walkers.physics.matter import Contact
-from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds, contact_angle_setting, separation_cap, wall_mesh
+from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds, contact_angle_setting, separation_cap, wall_meshes
 from walkers.templates.film import Film, film_of
 from walkers.templates.layout import (
     BEAD_COLUMNS,
@@ -31,7 +31,6 @@ from walkers.templates.sharing import Loading, check_sharing, loading_of, loadin
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
-WALL_NAME = "walls.stl"
 STATUS_LINES_PER_CYCLE = 4
 CONTENT_VERSION = 4
 """Of what decks compute: to be raised where the same case gives another deck, comments aside. Runs are named by it."""
@@ -269,6 +268,8 @@ def compose(plan: Plan) -> Deck:
     angle = case.liquid.contact_angle
     surfaces = plan.surfaces or (case.contact,)
     forces, film = _forces(plan, scene), _film(plan, scene)
+    meshes = wall_meshes(scene.beads, scene.faces, max(scene.upper))
+    copies = [(f"{mesh.name}_{number}", mesh) for mesh in meshes for number in range(1, workarounds.wall_copies + 1)]
     text = rendered(
         "walkers.templates",
         "walker.lig.j2",
@@ -279,8 +280,10 @@ def compose(plan: Plan) -> Deck:
         deck_name=DECK_NAME,
         output_name=OUTPUT_NAME,
         layout_name=LAYOUT_NAME,
-        wall_file=WALL_NAME,
-        copies=[f"walls_{number}" for number in range(1, workarounds.wall_copies + 1)],
+        meshes=meshes,
+        wall_copies=workarounds.wall_copies,
+        copies=[name for name, _ in copies],
+        mesh_of=dict(copies),
         contact_model=_contact_model(case),
         types=len(surfaces) + 1,
         friction=_pairs([(surface.friction_bead_bead, surface.friction_bead_wall) for surface in surfaces]),
@@ -306,7 +309,7 @@ def compose(plan: Plan) -> Deck:
         most_neighbours=_most_neighbours(scene, plan.skin),
         bin_size=None if plan.skin else _bin_size(scene),
     )  # fmt: skip
-    files = {WALL_NAME: wall_mesh(scene.faces, max(scene.upper))}
+    files = {f"{mesh.name}.stl": mesh.text for mesh in meshes}
     files |= {one.file: _atom_file(one.shares) for one in forces}
     if film is not None:
         files |= {"film_drag.txt": _atom_file(film.drags), "film_reach.txt": _atom_file(film.reaches)}

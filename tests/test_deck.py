@@ -11,11 +11,12 @@ import pytest
 
 from tests.conftest import document, make_case
 from walkers.inputs import load_case, resolve_case, shipped_cases
-from walkers.inputs.boundary import Cylinder, Face
+from walkers.inputs.boundary import SIDES, Cylinder, Face
 from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
+from walkers.postprocess.dump import FloatArray
 from walkers.templates import render_deck
-from walkers.templates.deck import CONTENT_VERSION, WALL_NAME, Deck, Segment, render_shared_deck, settling_steps
-from walkers.templates.engine import contact_angle_setting, face_triangle, separation_cap
+from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_shared_deck, settling_steps
+from walkers.templates.engine import contact_angle_setting, face_triangle, separation_cap, strip
 from walkers.templates.placement import place
 
 
@@ -41,12 +42,12 @@ def test_the_substrate_stands_twice_as_one_triangle(deck: str) -> None:
     assert len(meshes) == 2
     (wall,) = [line for line in _lines(deck, "fix") if line[3] == "wall/gran"]
     assert wall[-5:] == ["n_meshes", "2", "meshes", *meshes]
-    assert render_deck(load_case("fig1b")).files[WALL_NAME].count("facet normal") == 1
+    assert render_deck(load_case("fig1b")).files["walls.stl"].count("facet normal") == 1
 
 
 def test_the_triangle_is_far_larger_than_the_box_and_its_centroid_in_it() -> None:
     case = load_case("fig4b")
-    stl = render_deck(case).files[WALL_NAME]
+    stl = render_deck(case).files["walls.stl"]
     corners = [tuple(map(float, match)) for match in re.findall(r"vertex (\S+) (\S+) (\S+)", stl)]
     scene, _ = place((case,))
     centroid = [sum(corner[axis] for corner in corners) / 3 for axis in range(3)]
@@ -107,6 +108,54 @@ def test_a_face_is_wound_about_its_normal(axis: Literal["x", "y", "z"], side: Li
     np.testing.assert_allclose(wound / np.linalg.norm(wound), face.normal, atol=1e-15)
 
 
+def _triangles(stl: str) -> FloatArray:
+    """Corners, shape (T, 3, 3)."""
+    return np.array([list(map(float, one)) for one in re.findall(r"vertex (\S+) (\S+) (\S+)", stl)]).reshape(-1, 3, 3)
+
+
+def test_a_round_wall_has_a_mesh_for_each_size_of_beads_whose_faces_are_shared_but_for_the_precision() -> None:
+    square = load_case("pile-ci").boundary
+    round_one = Cylinder(material=square.material, width=square.width, height=square.height)
+    case = replace(load_case("pile-ci"), boundary=round_one)
+    scene, _ = place((case,))
+    deck = render_deck(case)
+    meshes = [line for line in _lines(deck.text, "fix") if line[3] == "mesh/surface"]
+    groups = _lines(deck.text, "group           walls_")
+    assert sorted(int(one) for line in groups for one in line[3:]) == [bead.id for bead in scene.beads]
+    assert len({tuple(line[5:6]) for line in meshes}) == len(meshes) / 2 > 1
+    faces = round_one.faces()
+    assert len(scene.carriers) == 1 + (len(faces) - 1) * round_one.triangles_of_a_side
+    for line in meshes[::2]:
+        precision = float(line[line.index("precision") + 1])
+        ids = {int(one) for group in groups if group[1] == line[2] for one in group[3:]}
+        radii = [bead.radius for bead in scene.beads if bead.id in ids]
+        corners = _triangles(deck.files[line[5]])
+        assert len(corners) == len(scene.carriers)
+        wound = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = np.array(
+            [faces[0].normal, *(one.normal for one in faces[1:] for _ in range(round_one.triangles_of_a_side))]
+        )
+        np.testing.assert_allclose(wound / np.linalg.norm(wound, axis=1)[:, None], normals, atol=1e-12)
+        # Beads that touch the wall find their faces' ends meeting, never a gap between them.
+        half = np.linalg.norm(np.diff(corners[1:, :, :2], axis=1), axis=2).max() / 2.0
+        inner = (round_one.width / 2.0 - np.array(radii)) * np.tan(np.pi / SIDES)
+        assert np.all((half > inner) & (half < 1.03 * inner))
+        # The ends of adjacent faces are one for the engine, those of one face are two.
+        apart = 2.0 * (round_one.width / 2.0 * np.tan(np.pi / SIDES) - half)
+        assert apart < precision < np.sqrt(2.0) * half
+
+
+def test_a_high_cylinder_has_no_triangle_too_slender_for_the_engine() -> None:
+    wall = Cylinder(material="glass", width=5e-3, height=0.2).faces()[1]
+    assert wall.of is not None
+    half = wall.of.half_width(5e-3 / 8.0)
+    corners = _triangles(strip(wall, wall.of, half))
+    assert len(corners) == 2 * wall.of.pieces > 2
+    sides = corners - np.roll(corners, 1, axis=1)
+    lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
+    assert np.all(lengths[:, 0] / lengths[:, 2] >= 1e-3)
+
+
 def test_rolling_friction_is_left_out_where_there_is_none() -> None:
     assert "rolling" not in "\n".join(line for line in render_deck(make_case()).text.splitlines() if line[:1] != "#")
     assert render_deck(make_case(contact={"rolling_friction": 0.003})).text.count("rolling_friction cdt") == 2
@@ -134,7 +183,7 @@ def test_there_is_one_run_and_one_thermo_style(deck: str) -> None:
     assert len(_lines(deck, "thermo_style")) == 1
 
 
-CONTENT = {1: "7dc0566616dc45cc", 2: "c2be1211d5b6b532", 3: "e993195041abe10b"}
+CONTENT = {1: "7dc0566616dc45cc", 2: "c2be1211d5b6b532", 3: "e993195041abe10b", 4: "af5d7fbc1250a62c"}
 """Digest of all that the engine reads of some cases, by the version of the decks' content."""
 
 
@@ -172,4 +221,4 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
         end = settled + case.run.cycles_per_segment * case.run.steps_per_cycle
         decks += [render_deck(case, Segment(0, settled, None)), render_deck(case, Segment(settled, end, settled))]
     digest = sha256("\n".join(map(_reads, decks)).encode()).hexdigest()[:16]
-    assert digest == CONTENT.get(CONTENT_VERSION)
+    assert digest == CONTENT[CONTENT_VERSION]

@@ -648,7 +648,7 @@ def test_placed_beads_reach_the_faces_of_a_cylinders_prism() -> None:
         bead["at"] = ["0 mm", "0 mm", f"{8 - 2 * number} mm"]
     case = resolve_case(tables, name="cylinder")
     assert [radius > case.border for radius in case.all_radii] == [True, False, False]
-    half, turn = 2.5, np.pi / 24.0
+    half, turn = 2.5, np.pi / 64.0
     for beyond, refused in ((0.0, False), (0.02, True)):
         reach = half - 0.545 + beyond
         tables["placed"] = [
@@ -695,8 +695,8 @@ def test_a_cylinder_holds_its_beads(tmp_path: Path) -> None:
     case = small(boundary={"shape": "cylinder", "width": "5 mm"}, run=run)
     motion = walkers.run(case, tmp_path).motion
     out = np.linalg.norm(motion.position[..., :2], axis=2) + motion.radius
-    # The faces of the prism touch the cylinder; its edges are 0.9 % farther out.
-    assert 0.95 * 2.5e-3 < out[motion.time >= 0.0].max() < 1.009 * 2.5e-3 + 1e-5
+    # The faces of the prism touch the cylinder; its edges are 0.12 % farther out.
+    assert 0.95 * 2.5e-3 < out[motion.time >= 0.0].max() < 1.0013 * 2.5e-3 + 1e-5
     # The faces of the prism are one wall, which a bead is held to once.
     number = 0
     for bridges in read_bridges(motion):
@@ -704,4 +704,4 @@ def test_a_cylinder_holds_its_beads(tmp_path: Path) -> None:
         assert set(bridges.walls.tolist()) <= {FLOOR, 1}
         assert len(held) == len(set(held.tolist()))
         number += len(held)
-    assert number > 5
+    assert number > 2
