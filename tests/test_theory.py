@@ -21,18 +21,11 @@ from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import thresholds
 from walkers.theory.friction import Friction
-from walkers.theory.mathieu import (
-    Alignment,
-    alignment,
-    growth,
-    is_stable,
-    largest_stable_v,
-    settling_rate,
-    time_to_turn,
-)
+from walkers.theory.mathieu import Alignment, alignment, growth, is_stable, largest_stable_v
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import alignment_of, describe_alignment, motion_of, threshold
 from walkers.theory.quasistatic import detachment, mean_velocity, mean_velocity_closed_form
+from walkers.theory.sideways import settling_rate, time_to_turn
 
 RUBY = Dimer((0.3e-3, 0.2e-3), 4000.0, 19.2e-3)
 

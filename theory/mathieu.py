@@ -6,7 +6,11 @@ Energy and the work of the inertial force give, with ϑ = πft,
     d²ψ/dϑ² + [U - 4V cos 2ϑ] ψ = 0,    4V = (5/7) a0/(π² f²) (R1 - R2)/L (Σ m R)/(Σ m R²)
 
 and U = 0 on a level substrate. A steady acceleration along the axis, such as a climber's weight, gives U as the drive
-gives V.
+gives V. A film that drags the beads' centres by 6πηR v adds 2β dψ/dϑ with 2πfβ = (5/7) 6πη (Σ R³)/(Σ m R²). Where the
+drive is fast, U + 2V²/(1 + β²) takes the place of U - 4V cos 2ϑ (Kapitza's pendulum): a dimer on its head (U < 0)
+stands where that is positive.
+
+The equation takes the two beads for a cone, one rigid body. They are not: `walkers.theory.sideways` leaves them free.
 """
 
 from __future__ import annotations
@@ -19,25 +23,54 @@ import numpy.typing as npt
 from scipy.special import mathieu_a, mathieu_b
 
 from walkers.physics.dimer import Dimer
+from walkers.physics.film import film_drag
 
 FloatArray = npt.NDArray[np.float64]
+
+NEUTRAL = 1e-6
+"""A growth per unit of ϑ, or a multiplier less one, that is the error of what is zero."""
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """Parameters of the Mathieu equation of small angles to the axis, and whether these stay small."""
+    """Parameters of the Mathieu equation of small angles to the axis, and whether these stay small.
+
+    Attributes
+    ----------
+    u, v
+        U and V.
+    damping
+        β.
+    """
 
     u: float
     v: float
+    damping: float = 0.0
 
     @property
     def stable(self) -> bool:
-        """Whether small angles stay small (without friction; friction lets them decay)."""
-        return bool(is_stable(self.u, self.v))
+        """Whether small angles stay small (if nothing damps them; what does lets them decay)."""
+        return bool(is_stable(self.u, self.v)) if self.damping == 0.0 else self.growth <= NEUTRAL
+
+    @property
+    def growth(self) -> float:
+        """How fast small angles grow, per unit of ϑ; times πf per second."""
+        return growth(self.u, self.v, self.damping)
+
+    @property
+    def averaged(self) -> float:
+        """U + 2V²/(1 + β²), what is left of the pull when a fast drive is averaged over; upright where positive."""
+        return self.u + 2.0 * self.v**2 / (1.0 + self.damping**2)
 
 
-def alignment(dimer: Dimer, frequency: float, peak_acceleration: float, steady_acceleration: float = 0.0) -> Alignment:
-    """U and V of a dimer.
+def alignment(
+    dimer: Dimer,
+    frequency: float,
+    peak_acceleration: float,
+    steady_acceleration: float = 0.0,
+    film_viscosity: float = 0.0,
+) -> Alignment:
+    """U, V and β of a dimer.
 
     Parameters
     ----------
@@ -51,12 +84,48 @@ def alignment(dimer: Dimer, frequency: float, peak_acceleration: float, steady_a
         Acceleration that pulls the beads along the axis, m/s², positive from the small bead to the large one: the
         weight of a climber with its large bead below, which hangs as from a pivot (U > 0). A climber that leads with
         its large bead stands on its head (U < 0), and only the drive keeps it upright.
+    film_viscosity
+        η of a film on the substrate (`walkers.physics.film`), Pa s.
     """
     (first, second), masses = dimer.radii, dimer.masses
     lever = (first - second) / (2.0 * sqrt(first * second))
     inverse_radius = (masses[0] * first + masses[1] * second) / (masses[0] * first**2 + masses[1] * second**2)
     per_acceleration = 5.0 / 7.0 * lever * inverse_radius / (pi * frequency) ** 2
-    return Alignment(steady_acceleration * per_acceleration, peak_acceleration * per_acceleration / 4.0)
+    inertia = 7.0 / 5.0 * (masses[0] * first**2 + masses[1] * second**2)
+    rate = sum(film_drag(film_viscosity, radius) * radius**2 for radius in dimer.radii) / inertia
+    return Alignment(
+        steady_acceleration * per_acceleration,
+        peak_acceleration * per_acceleration / 4.0,
+        rate / (2.0 * pi * frequency),
+    )
+
+
+def growth(u: float, v: float, damping: float = 0.0, steps: int = 128) -> float:
+    """Largest growth rate of the solutions of d²ψ/dϑ² + 2β dψ/dϑ + [U - 4V cos 2ϑ] ψ = 0 (Floquet), per unit of ϑ.
+
+    Parameters
+    ----------
+    u, v, damping
+        U, V and β.
+    steps
+        In which a period of π is cut, U - 4V cos 2ϑ constant in each.
+    """
+    theta = pi * (np.arange(steps) + 0.5) / steps
+    slopes = np.zeros((steps, 2, 2))
+    slopes[:, 0, 1], slopes[:, 1, 1] = 1.0, -2.0 * damping
+    slopes[:, 1, 0] = 4.0 * v * np.cos(2.0 * theta) - u
+    return float(np.log(np.abs(multipliers(slopes, pi / steps)).max()) / pi)
+
+
+def multipliers(slopes: FloatArray, step: float) -> npt.NDArray[np.complex128]:
+    """By what dx/dt = A(t) x grows in a period (Floquet's multipliers); A in each step, shape (steps, n, n)."""
+    from scipy.linalg import expm
+
+    period = np.eye(slopes.shape[-1])
+    for one in expm(slopes * step):
+        period = one @ period
+    found: npt.NDArray[np.complex128] = np.linalg.eigvals(period).astype(np.complex128)
+    return found
 
 
 def is_stable(u: npt.ArrayLike, v: npt.ArrayLike, bands: int = 6) -> npt.NDArray[np.bool_]:

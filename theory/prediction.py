@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import hypot
+from math import hypot, pi
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,12 @@ from walkers.theory.friction import Friction
 from walkers.theory.mathieu import alignment, largest_stable_v
 from walkers.theory.motion import FloatArray, Motion, Walker, walk
 from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, detachment, mean_velocity
+from walkers.theory.sideways import axial_motion_of, time_to_turn, turning_rate
 
 MOVING = 1e-6
 """A walker faster than this, m/s, moves."""
+GROWS = 0.05
+"""A rate, 1/s, above which small angles to the axis grow: half as large again in ten seconds."""
 _TRIALS = 33
 _ROUNDS = 3
 
@@ -130,7 +133,6 @@ def predict(case: Case) -> dict[str, Any]:
     gamma0 = dimer.gamma0(case.drive.peak_acceleration)
     end = detachment(dimer.sin_delta)
     linear = float(mean_velocity(gamma0, dimer.sin_delta))
-    mathieu = alignment(dimer, case.drive.frequency, case.drive.peak_acceleration, -case.axial_gravity)
     models = {name: motion_of(case, viscous=viscous) for name, viscous in (("coulomb", False), ("viscous", True))}
     return {
         "gamma0": gamma0,
@@ -151,8 +153,52 @@ def predict(case: Case) -> dict[str, Any]:
             for name, motion in models.items()
         },
         "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},
-        "alignment": {"u": mathieu.u, "v": mathieu.v, "stable": mathieu.stable, "largest_stable_v": largest_stable_v()},
+        "alignment": alignment_of(case),
     }
+
+
+def alignment_of(case: Case) -> dict[str, Any]:
+    """Whether a case's dimer keeps to the axis, and if not how soon it has turned over.
+
+    Parameters
+    ----------
+    case
+        Driven along the substrate.
+
+    Returns
+    -------
+    dict
+        ``u``, ``v``, ``damping`` (β, by the film) of the Mathieu equation, whether small angles are ``stable`` by it
+        and the ``largest_stable_v`` on a level substrate; ``rolling_rate``, at which they grow by it, 1/s; ``rate``, at
+        which they grow or (negative) decay where contacts may slide and beads spin, 1/s (at 1° if there is rolling
+        friction), None where the axial motion does not repeat itself; whether the dimer ``stands``;
+        ``turns_over_after``, s from 1° to 90°.
+    """
+    drive = case.drive
+    film = case.liquid.film_viscosity
+    mathieu = alignment(dimer_of(case), drive.frequency, drive.peak_acceleration, -case.axial_gravity, film)
+    rate = _turning_rate(case) if drive.peak_acceleration > 0.0 else None
+    return {
+        "u": mathieu.u,
+        "v": mathieu.v,
+        "damping": mathieu.damping,
+        "stable": mathieu.stable,
+        "largest_stable_v": largest_stable_v(),
+        "rolling_rate": mathieu.growth * pi * drive.frequency,
+        "rate": rate,
+        "stands": None if rate is None else rate <= GROWS,
+        "turns_over_after": None if rate is None or rate <= GROWS else time_to_turn(rate),
+    }
+
+
+def _turning_rate(case: Case) -> float | None:
+    dimer, drive = dimer_of(case), (case.drive.frequency, case.drive.peak_acceleration)
+    walker, friction = _walker_of(case, viscous=True), friction_of(case, viscous=True)
+    axial = axial_motion_of(dimer, walker, friction, (*drive, case.axial_gravity))
+    if not axial.periodic:
+        return None
+    film, rolling = walker.film[:, 0], case.contact.rolling_friction
+    return turning_rate(axial, dimer, friction, drive, film=film, rolling_friction=rolling)
 
 
 def _number(value: float) -> float | None:
@@ -190,14 +236,33 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
         lines.append(f"  engine                         {_speed(found)}{_details(found)}")
     else:
         lines.append("  engine                         not run; do: walkers run CASE")
-    stays = "small angles stay small, if it rolls" if mathieu["stable"] else "small angles grow, if it rolls"
-    if mathieu["v"] == mathieu["u"] == 0.0:
-        stays = "no tendency to the axis"
     lines += [
         f"  detachment  {end['contact']}, from a steady force of Γ = {end['gamma']:.3g}",
-        f"  alignment   Mathieu V = {mathieu['v']:.3g}, stable up to {mathieu['largest_stable_v']:.3g}: {stays}",
+        *describe_alignment(mathieu),
     ]
     return "\n".join(lines)
+
+
+def describe_alignment(found: dict[str, Any]) -> list[str]:
+    """`alignment_of` as lines of text; a second one where something pulls along the axis."""
+    stays = "small angles stay small, if it rolls" if found["stable"] else "small angles grow, if it rolls"
+    if found["v"] == found["u"] == 0.0:
+        stays = "no tendency to the axis"
+    level = f"Mathieu V = {found['v']:.3g}, stable up to {found['largest_stable_v']:.3g}: {stays}"
+    if found["u"] == 0.0:
+        return [f"  alignment   {level}"]
+    steep = f"Mathieu U = {found['u']:.3g}, V = {found['v']:.3g}, β = {found['damping']:.3g}: {stays}"
+    rate = found["rate"]
+    if rate is None:
+        told = "not told, for the axial motion does not repeat itself"
+    elif not found["stands"]:
+        after = f"turns over after about {found['turns_over_after']:.2g} s"
+        told = f"{after} (from 1° to 90°; small angles grow by {rate:.3g}/s)"
+    elif rate < -GROWS:
+        told = f"stands: small angles decay by {-rate:.3g}/s"
+    else:
+        told = "stands: small angles stay small"
+    return [f"  alignment   {steep}", f"  beads free  {told}"]
 
 
 def _speed(model: dict[str, Any]) -> str:

@@ -1,0 +1,225 @@
+"""How fast a dimer on a substrate or a wall turns away from the drive, its two beads free.
+
+The Mathieu equation (`walkers.theory.mathieu`) takes the beads for one rigid cone. But each may spin about its own
+normal to the substrate, against which nothing holds it, and a contact that slides along the axis resists sideways
+sliding as a drag does only. `turning_rate` leaves all that to the beads: it is the Floquet exponent of ψ, both beads'
+sideways velocities and their spins about the drive and about the normal, linearised about the axial motion of
+`walkers.theory.motion`. The engine's dimers turn over at these rates within a per cent (docs/climbing.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import log, pi, radians, sqrt, tan
+
+import numpy as np
+import numpy.typing as npt
+
+from walkers.physics.dimer import Dimer
+from walkers.physics.film import film_drag
+from walkers.theory.friction import Friction
+from walkers.theory.mathieu import NEUTRAL, multipliers
+from walkers.theory.motion import Walker, walk
+from walkers.theory.quasistatic import inertia_matrix, normal_force_matrix, translation
+
+FloatArray = npt.NDArray[np.float64]
+
+_SLOWEST = 1e-4
+"""A contact that slides more slowly, m/s, resists sideways sliding as much as one that slides at this."""
+
+
+def settling_rate(dimer: Dimer, steady_acceleration: float, film_viscosity: float) -> float:
+    """How fast a dimer turns to the pull in a thick film, 1/s: by the difference of its beads' settling velocities.
+
+    (2/9)(ρ g/η)(R1² - R2²)/L. A sideways force between the beads would spin them about their normals to the substrate,
+    against which nothing holds them: where all is slow there is none, and each bead rolls down as it would alone. By
+    the weight alone, without the drive, ψ decays at this rate, or grows where it is negative.
+
+    Parameters
+    ----------
+    dimer
+        The beads, the large one first.
+    steady_acceleration, film_viscosity
+        As for `alignment`.
+    """
+    (first, second), masses = dimer.radii, dimer.masses
+    difference = masses[0] / film_drag(film_viscosity, first) - masses[1] / film_drag(film_viscosity, second)
+    return steady_acceleration * difference / (2.0 * sqrt(first * second))
+
+
+def time_to_turn(rate: float, start: float = 1.0, end: float = 90.0) -> float:
+    """Seconds from one angle (degrees) to another at dψ/dt = rate sin ψ, in 1/s: ln(tan(ψ2/2)/tan(ψ1/2))/rate."""
+    return log(tan(radians(end) / 2.0) / tan(radians(start) / 2.0)) / rate
+
+
+@dataclass(frozen=True)
+class AxialMotion:
+    """The axial motion of a dimer through a cycle, as its sideways motion needs it.
+
+    Attributes
+    ----------
+    sliding : ndarray, shape (3, steps)
+        Sliding velocities at the contacts, m/s.
+    spin : ndarray, shape (2, steps)
+        Angular velocity of each bead about the horizontal across the axis, rad/s.
+    normal : ndarray, shape (3, steps)
+        Normal forces, N.
+    push : ndarray, shape (steps,)
+        Force along the axis by which the second bead pushes the first, N.
+    torque : ndarray, shape (2, steps)
+        On each bead from the other, N m, in the sense of `spin`.
+    periodic
+        Whether the motion repeats itself.
+    """
+
+    sliding: FloatArray
+    spin: FloatArray
+    normal: FloatArray
+    push: FloatArray
+    torque: FloatArray
+    periodic: bool
+
+
+def axial_motion_of(
+    dimer: Dimer, walker: Walker, friction: Friction, drive: tuple[float, float, float], steps: int = 256
+) -> AxialMotion:
+    """The axial motion of a walker, and the forces that go with it.
+
+    Parameters
+    ----------
+    dimer, walker, friction
+        One and the same walker, as `walkers.theory.motion.walk` takes it.
+    drive
+        Frequency (Hz), peak acceleration and steady acceleration toward the small bead (m/s²).
+    steps
+        Of a cycle.
+    """
+    frequency, peak, steady = drive
+    motion = walk(walker, friction, frequency, peak, steady_acceleration=steady, steps_per_cycle=steps)
+    after = motion.series[:, 0]
+    before = np.roll(after, 1, axis=1)
+    sliding, slope = (before + after) / 2.0, (after - before) * frequency * steps
+    along, accelerated = translation(sliding), translation(slope)
+    pull = peak * np.cos(2.0 * pi * (np.arange(steps) + 0.5) / steps) + steady
+    force, scale = dimer.capillary_scale, float(walker.scale[0])
+    gains, film = inertia_matrix(walker.asymmetry)[0] * scale, walker.film[:, 0]
+    matrix = normal_force_matrix(walker.sin_delta, walker.asymmetry)[0]
+    lost = np.array([1.0, 1.0, 0.0])[:, None] * (pull + film.sum() / force * scale * along)
+    friction_forces = np.linalg.solve(gains, -slope - lost)
+    normal = walker.at_rest[:, :1] + matrix @ friction_forces + (matrix[:, :2] @ film / force)[:, None] * along
+    radii, masses = np.array(dimer.radii)[:, None], np.array(dimer.masses)[:, None]
+    inertia = 2.0 / 5.0 * masses * radii**2
+    on_wall = -friction_forces[:2] * force
+    return AxialMotion(
+        sliding=sliding,
+        spin=(along - sliding[:2]) / radii,
+        normal=np.maximum(normal, 0.0) * force,  # a contact that would open bears nothing
+        push=masses[0] * (accelerated + pull) + film[0] * along - on_wall[0],
+        torque=inertia * (accelerated - slope[:2]) / radii + radii * on_wall,
+        periodic=bool(motion.periodic[0] and motion.solved[0]),
+    )
+
+
+def turning_rate(
+    axial: AxialMotion,
+    dimer: Dimer,
+    friction: Friction,
+    drive: tuple[float, float],
+    *,
+    film: FloatArray | None = None,
+    rolling_friction: float = 0.0,
+    angle: float = radians(1.0),
+) -> float:
+    """How fast small angles to the axis grow, 1/s; negative where they decay.
+
+    Each contact resists sideways sliding by c = μF/|v| + its viscous drag, for friction is against the direction of
+    sliding, which is the axis but for a small angle. Rolling friction resists sideways rolling by μ F R/|ω| likewise.
+
+    Parameters
+    ----------
+    axial
+        The axial motion (`axial_motion_of`).
+    dimer
+        The beads, the large one first.
+    friction
+        The contacts; Coulomb's with or without the bridges' drag.
+    drive
+        Frequency (Hz) and peak acceleration (m/s²).
+    film : ndarray, shape (2,)
+        How strongly a film drags the beads' centres, N s/m; none if left out.
+    rolling_friction
+        Of the engine's model of constant torque; it is left out of the axial motion.
+    angle
+        The angle to the axis, rad, at which rolling friction is to act. It is the larger the smaller the angle, for
+        while a bead's rolling along the axis reverses, only its rolling sideways is left.
+    """
+    frequency, peak = drive
+    steps = axial.push.shape[0]
+    slopes = _sideways(axial, dimer, _sideways_drags(axial, friction), np.zeros(2) if film is None else film)
+    if rolling_friction:
+        speed = 5.0 / 7.0 * peak / (2.0 * pi * frequency) * angle / sqrt(2.0)
+        slopes += _rolling(axial, dimer, rolling_friction, speed)
+    found = multipliers(slopes, 1.0 / (frequency * steps))
+    # Beads that spin against each other about their vertical axes, as two wheels in mesh, do so for ever.
+    neutral = np.abs(found - 1.0).argmin()
+    if abs(found[neutral] - 1.0) < NEUTRAL:
+        found = np.delete(found, neutral)
+    return float(np.log(np.abs(found).max()) * frequency)
+
+
+def _sideways_drags(axial: AxialMotion, friction: Friction) -> FloatArray:
+    """Force over sideways sliding velocity at each contact, N s/m, shape (3, steps)."""
+    kinetic, viscous = (np.asarray(one, np.float64) for one in (friction.kinetic, friction.viscous))
+    columns = [np.broadcast_to(one.reshape(-1, 1) if one.ndim else one, (3, 1)) for one in (kinetic, viscous)]
+    drags: FloatArray = columns[0] * axial.normal / np.maximum(np.abs(axial.sliding), _SLOWEST) + columns[1]
+    return drags
+
+
+def _sideways(axial: AxialMotion, dimer: Dimer, drags: FloatArray, film: FloatArray) -> FloatArray:
+    """The linear equations of sideways motion, shape (steps, 7, 7).
+
+    Of ψ, then of each bead the velocity across the drive, then of each the spin about the drive, then about the
+    vertical. The push along the axis has a part across the drive, ψ times as large; so have the torque and the spin.
+    """
+    (first, second), masses = dimer.radii, dimer.masses
+    radii, sine = np.array(dimer.radii), dimer.sin_delta
+    cosine, length = sqrt(1.0 - sine**2), 2.0 * sqrt(first * second)
+    inertias = 2.0 / 5.0 * np.array(masses) * radii**2
+    slopes = np.zeros((axial.push.shape[0], 7, 7))
+    sliding = np.zeros((3, *slopes.shape[::2]))  # sideways, at each contact
+    sliding[0, :, 1], sliding[0, :, 3] = 1.0, first
+    sliding[1, :, 2], sliding[1, :, 4] = 1.0, second
+    sliding[2, :, 0] = sine * (radii @ axial.spin)
+    sliding[2, :, 1:] = [1.0, -1.0, first * sine, second * sine, -first * cosine, -second * cosine]
+    forces = -drags[:, :, None] * sliding
+    slopes[:, 0, 1], slopes[:, 0, 2] = 1.0 / length, -1.0 / length
+    for bead, side in enumerate((1.0, -1.0)):
+        velocity, roll, turn = 1 + bead, 3 + bead, 5 + bead
+        slopes[:, velocity] = (side * forces[2] + forces[bead]) / masses[bead]
+        slopes[:, velocity, 0] += side * axial.push / masses[bead]
+        slopes[:, velocity, velocity] -= film[bead] / masses[bead]
+        slopes[:, roll] = radii[bead] * (forces[bead] + sine * forces[2]) / inertias[bead]
+        slopes[:, roll, 0] -= axial.torque[bead] / inertias[bead]
+        slopes[:, turn] = -radii[bead] * cosine * forces[2] / inertias[bead]
+    return slopes
+
+
+def _rolling(axial: AxialMotion, dimer: Dimer, coefficient: float, speed: float) -> FloatArray:
+    """What rolling friction adds to `_sideways`, where beads roll sideways at a speed (m/s, root mean square)."""
+    radii, sine = np.array(dimer.radii), dimer.sin_delta
+    cosine = sqrt(1.0 - sine**2)
+    inertias = 2.0 / 5.0 * np.array(dimer.masses) * radii**2
+    slopes = np.zeros((axial.push.shape[0], 7, 7))
+    relative = axial.spin[0] - axial.spin[1]
+    between = coefficient * axial.normal[2] * dimer.reduced_radius
+    between = between / np.hypot(relative, speed / dimer.reduced_radius)
+    twist = np.zeros(slopes.shape[::2])  # relative spin about the line across the axis, in the plane of contact
+    twist[:, 0], twist[:, 3:] = -sine * relative, [-sine, sine, cosine, -cosine]
+    for bead, side in enumerate((1.0, -1.0)):
+        on_wall = coefficient * axial.normal[bead] * radii[bead] / np.hypot(axial.spin[bead], speed / radii[bead])
+        slopes[:, 3 + bead] = side * sine * between[:, None] * twist / inertias[bead]
+        slopes[:, 5 + bead] = -side * cosine * between[:, None] * twist / inertias[bead]
+        slopes[:, 3 + bead, 3 + bead] -= on_wall / inertias[bead]
+        # Against the spin across the drive it acts as well, which the other bead's torque must overcome.
+        slopes[:, 3 + bead, 0] -= on_wall * axial.spin[bead] / inertias[bead]
+    return slopes
