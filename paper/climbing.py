@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from walkers.postprocess.motion import Group
 
 FloatArray = npt.NDArray[np.float64]
-KINDS = ("climbs upright", "slides down upright", "leans", "turns over")
-_MARKERS = ("^", "v", "D", "X")
+KINDS = ("climbs upright", "stays, upright", "slides down upright", "leans", "turns over")
+_MARKERS = ("^", "o", "v", "D", "X")
 _SHAPE = "clusters[0].arrangement"
 _SHAPES = {"chain": "dimer", "fan": "fan: large, two small", "diamond": "diamond: large, two small, small"}
 _FRICTION, _TILT, _FILM = "contact.friction.bead_wall", "boundary.tilt", "liquid.film_drag_ratio"
-_STAYS = 5e-6
-"""m/s; what is slower stays where it is."""
+STAYS = 5e-5
+"""m/s; what is slower stays where it is: no more than a tenth of a radius in a second."""
 _COLUMNS = 5
 """Clusters side by side."""
 
@@ -33,10 +33,11 @@ _COLUMNS = 5
 def kinds(table: pd.DataFrame) -> npt.NDArray[np.int64]:
     """What the walkers of each point of a sweep do, a place in `KINDS`.
 
-    Turns over if any of them does; leans if any does not end upright; else it climbs or slides down.
+    Turns over if any of them does; leans if any does not end upright; else it climbs, slides down or is slower than
+    `STAYS`.
     """
-    turned, leaning = table["turned_round"] > 0, table["upright"] < table["walkers"]
-    found: npt.NDArray[np.int64] = np.select([turned, leaning, table["axial_velocity"] < 0.0], [3, 2, 1], 0)
+    turned, leaning, speed = table["turned_round"] > 0, table["upright"] < table["walkers"], table["axial_velocity"]
+    found: npt.NDArray[np.int64] = np.select([turned, leaning, speed < -STAYS, speed < STAYS], [4, 3, 2, 1], 0)
     return found
 
 
@@ -63,7 +64,7 @@ def fig_climbing(sources: Sources) -> Figure:
     if drawn is not None:
         figure.colorbar(drawn, ax=rows, label="up the slope (mm/s)", shrink=0.6)
     handles, labels = rows[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    figure.legend(handles, labels, loc="outside lower center", ncols=5)
     return figure
 
 
@@ -91,7 +92,7 @@ def fig_zoo(sources: Sources) -> Figure:
     for one, (group, row, corner) in zip(axes.flat, entries, strict=False):
         _draw_cluster(one, group, corner=corner)
         speed = float(row["axial_velocity"].iloc[0])
-        told = f"{KINDS[int(kinds(row)[0])]}\n{speed * 1e3:.2f} mm/s" if abs(speed) > _STAYS else "stays where it is\n"
+        told = f"{KINDS[int(kinds(row)[0])]}\n{speed * 1e3:.2f} mm/s"
         one.set_title(f"{'corner: ' if corner else ''}{told}", fontsize=8)
     return figure
 

@@ -11,7 +11,7 @@ class Liquid:
 
     The viscosity is that of the bridges: the liquid's, times the case's ``viscosity_ratio``. ``volume_fraction`` is the
     liquid on a bead over the bead's volume. ``film_viscosity`` (Pa s) is that of the film on the walls along
-    which beads plough: 6π R times it drags a bead's centre in proportion to its velocity against the substrate.
+    which beads plough: 6π R times it drags a bead's centre in proportion to its velocity there.
     """
 
     surface_tension: float

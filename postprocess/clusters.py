@@ -184,6 +184,9 @@ class Climb:
     ----------
     begin, end : float
         Of the greatest gain of height, s.
+    onset : float
+        When the gain began by which it qualified, s; NaN if it never did. Unlike `begin` it does not depend on what
+        comes later.
     qualified : float
         When the track first counted as a climb, s: in the first frame up to which it is one; NaN if it never did. What
         comes later does not change it, so that a longer record has no other climbs up to a time than a shorter one.
@@ -208,6 +211,7 @@ class Climb:
 
     begin: float
     end: float
+    onset: float
     qualified: float
     gain: float
     speed: float
@@ -244,7 +248,7 @@ def classify(
         raise ValueError("a track without a frame")
     gained, seconds = _gained(track, time, height)
     risen = gained - np.minimum.accumulate(gained)
-    first = _qualified(gained, definition.min_rise)
+    onset, first = _qualified(gained, definition.min_rise) or (None, None)
     end = int(np.argmax(risen))
     begin = int(np.argmin(gained[: end + 1]))
     span = range(begin, end + 1)
@@ -255,6 +259,7 @@ def classify(
     return Climb(
         begin=float(time[track.frames[begin]]),
         end=float(time[last]),
+        onset=float("nan") if onset is None else float(time[track.frames[onset]]),
         qualified=float("nan") if first is None else float(time[track.frames[first]]),
         gain=float(risen[end]),
         speed=speed,
@@ -268,8 +273,10 @@ def classify(
     )
 
 
-def _qualified(gained: FloatArray, min_rise: float) -> int | None:
-    """The first place of a track up to which it is a climb, given the height that it gained since its begin, m.
+def _qualified(gained: FloatArray, min_rise: float) -> tuple[int, int] | None:
+    """Where what makes a track a climb begins, and the first place up to which it is one; None if it never is.
+
+    Given the height that it gained since its begin, m.
 
     There it is farther above its lowest than ever before, by enough, and that took frames enough: a hop between two
     frames is none.
@@ -279,7 +286,7 @@ def _qualified(gained: FloatArray, min_rise: float) -> int | None:
     lowest = np.maximum.accumulate(np.where(np.diff(least, prepend=np.inf) < 0.0, places, 0))
     farthest = risen == np.maximum.accumulate(risen)
     found = np.flatnonzero(farthest & (risen >= min_rise) & (places - lowest + 1 >= _FEWEST_FRAMES))
-    return int(found[0]) if len(found) else None
+    return (int(lowest[found[0]]), int(found[0])) if len(found) else None
 
 
 def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:

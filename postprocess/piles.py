@@ -240,7 +240,7 @@ def _cluster_columns(found: PileAnalysis) -> Columns:
     columns["wall_names"] = np.array(
         [names_of_walls(climb.walls, found.motion.case.boundary) for climb in climbs], dtype=np.str_
     )
-    for name in ("begin", "end", "qualified", "gain", "speed", "standard_error", "height"):
+    for name in ("begin", "end", "onset", "qualified", "gain", "speed", "standard_error", "height"):
         columns[name] = column([getattr(climb, name) for climb in climbs], np.float64)
     for name in ("leader", "size", "large"):
         columns[name] = column([getattr(climb, name) for climb in climbs], np.int64)
@@ -302,6 +302,7 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
             {
                 "begin": climb.begin,
                 "end": climb.end,
+                "onset": climb.onset,
                 "qualified": climb.qualified,
                 "gain": climb.gain,
                 "speed": climb.speed if np.isfinite(climb.speed) else None,

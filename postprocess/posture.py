@@ -76,9 +76,11 @@ def describe_posture(summary: Mapping[str, Any]) -> str:
         "leaning": "leaning, and may turn over yet",
         "turned over": f"turned over{when}",
     }
-    parts = [
-        f"{told[name]}" if summary[name] == count else f"{summary[name]} of {count} {told[name]}"
-        for name in POSTURES
-        if summary[name]
-    ]
-    return "; ".join(parts) + within
+    there = [name for name in POSTURES if summary[name]]
+    last_kept = [name for name in there if name != "turned over"][-1:]
+    return "; ".join(
+        ("" if summary[name] == count else f"{summary[name]} of {count} ")
+        + told[name]
+        + (within if name in last_kept else "")
+        for name in there
+    )

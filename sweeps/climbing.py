@@ -123,7 +123,7 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
         **chances,
         "climbs": len(every),
         "times": [climb["qualified"] for climb in firsts],
-        "onsets": [climb["begin"] for climb in firsts],
+        "onsets": [climb["onset"] for climb in firsts],
         "speeds": [climb["speed"] for climb in every if climb["speed"] is not None],
         "in_corners": sum(len(climb["walls"]) > 1 for climb in every),
         "sizes": [climb["size"] for climb in every],

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from math import hypot
 
 from walkers.inputs.boundary import Face
 from walkers.physics.film import film_drag, film_thickness
@@ -45,7 +44,7 @@ class Film:
 class FilmWall:
     """A wall in the engine's formulas: the distance of a place ``x``, ``y``, ``z`` from it, and its normal.
 
-    Two upright walls that face each other across the origin are one of these, for no bead is in the films of both.
+    Two upright walls that face each other across the origin are one of these if no bead is in the films of both.
     """
 
     distance: str
@@ -77,25 +76,33 @@ def film_of(
         bead.id: bead.radius + film_thickness(bead.radius, liquid.volume_fraction, liquid.contact_angle)
         for bead in beads
     }
-    walls = film_walls(faces, moving)
+    walls = film_walls(faces, moving, max(reaches.values()))
     speeds = {axis: _dragged(walls, number, moving) for number, axis in enumerate(AXES)}
     return Film(drags, reaches, {axis: formula for axis, formula in speeds.items() if formula})
 
 
-def film_walls(faces: Sequence[Face], moving: str = "") -> list[FilmWall]:
-    """The walls that faces make up."""
+def film_walls(faces: Sequence[Face], moving: str = "", reach: float = 0.0) -> list[FilmWall]:
+    """The walls that faces make up.
+
+    Parameters
+    ----------
+    faces, moving
+        As for `film_of`.
+    reach
+        The farthest that a bead's film reaches, m: walls whose middle is nearer stay apart.
+    """
     place = _places(moving)
     walls = [list(group) for _, group in groupby(faces, key=lambda face: face.wall)]
-    flat = [wall[0] for wall in walls if len(wall) == 1]
+    flat = [wall[0] for wall in walls if wall[0].of is None]
     found = []
     for wall in walls:
-        if len(wall) > 1:  # the faces of a prism that stands for a cylinder: all as far from its axis
-            radius = hypot(*wall[0].centroid[:2])
+        if wall[0].of is not None:
+            radius = wall[0].of.radius
             square = f"{place['x']}*{place['x']}+{place['y']}*{place['y']}"
             found.append(FilmWall(f"{radius!r}-sqrt({square})", None))
             continue
         half = _half_of_pair(wall[0], flat)
-        if half is None:
+        if half is None or half < reach:
             found.append(FilmWall(_from_plane(wall[0], place), wall[0].normal))
         elif wall[0].side > 0:
             found.append(FilmWall(f"{half!r}-abs({place[wall[0].axis]})", wall[0].normal))
@@ -147,7 +154,8 @@ def _dragged(walls: Sequence[FilmWall], number: int, moving: str) -> str:
             along = _sum(zip(factors, speed.values(), strict=True))
         else:
             x, y = place["x"], place["y"]
-            outward = f"({x}*{speed['x']}+{y}*{speed['y']})/({x}*{x}+{y}*{y})"
+            # A bead on the axis is in no film of the wall, but the engine takes no division by zero for that.
+            outward = f"({x}*{speed['x']}+{y}*{speed['y']})/({x}*{x}+{y}*{y}+1e-30)"
             along = f"{speed[AXES[number]]}-{place[AXES[number]]}*{outward}" if number < 2 else speed["z"]
         if along:
             within.setdefault(along, []).append(f"({wall.distance}<v_film_reach)")

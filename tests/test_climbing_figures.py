@@ -62,10 +62,10 @@ def test_they_are_drawn_only_if_asked_for_and_say_what_they_were_made_from(
 def test_what_climbers_do_is_told_by_the_worst_of_them() -> None:
     table = pd.DataFrame(
         {
-            "turned_round": [0, 0, 0, 1],
-            "upright": [4, 4, 3, 3],
+            "turned_round": [0, 0, 0, 0, 1],
+            "upright": [4, 4, 4, 3, 3],
             "walkers": 4,
-            "axial_velocity": [1e-3, -1e-3, 1e-3, 1e-3],
+            "axial_velocity": [1e-3, 1e-5, -1e-3, 1e-3, 0.0],
         }
     )
     assert [KINDS[kind] for kind in kinds(table)] == list(KINDS)

@@ -252,18 +252,19 @@ def test_a_climb_qualifies_when_it_has_gained_enough() -> None:
 
 
 def test_what_comes_later_does_not_change_when_a_climb_qualified() -> None:
-    """Up 2.4 mm, down, up twice as far, a hop: records of any length tell the same of the time that they share."""
+    """Up 2.4 mm, down by more, up twice as far, a hop: records of any length tell the same of the time they share."""
     scene = Scene()
-    up = np.interp(TIME, [0.0, 0.8, 1.6, 3.2, 3.5, 3.52], [0.0, 2.4e-3, 0.0, 4.8e-3, 0.0, 6e-3])
+    up = np.interp(TIME, [0.0, 0.8, 1.6, 3.2, 3.5, 3.52], [0.0, 2.4e-3, -0.5e-3, 4.8e-3, 0.0, 6e-3])
     scene.height[:, 20:22] += up[:, None]
     (track,), (whole,) = scene.climbs()
     assert whole.qualified == pytest.approx(2.0 / 3.0, abs=0.02)
+    assert (whole.onset, whole.begin) == pytest.approx((0.0, 1.6), abs=0.02)
     for frames in range(1, FRAMES):
         shorter = Track(track.frames[:frames], track.members[:frames], track.walls[:frames])
         climb = classify(shorter, TIME, scene.height, scene.large, ClimbCriteria())
         assert climb.climbed == (TIME[frames - 1] >= whole.qualified)
         if climb.climbed:
-            assert climb.qualified == whole.qualified
+            assert (climb.onset, climb.qualified) == (whole.onset, whole.qualified)
 
 
 def test_a_hop_between_two_frames_is_no_climb() -> None:

@@ -1,13 +1,16 @@
 """The film on the walls: where it is, and what the deck says of it. Its forces are measured by the audit."""
 
+import tomllib
 from collections.abc import Callable
 from math import pi, sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import walkers
 from tests.conftest import make_case
-from walkers.inputs import load_case
+from walkers.inputs import load_case, resolve_case, shipped_cases
 from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Groove, Plane
 from walkers.physics.film import film_drag, film_thickness
 from walkers.templates import render_deck
@@ -100,6 +103,8 @@ def test_films_drag_along_their_walls() -> None:
     assert dragged(box, (-2.2e-3, 0.0, 5e-3), V) == pytest.approx([0.0, V[1], V[2]])
     assert dragged(box, (2.2e-3, 2.2e-3, 5e-3), V) == pytest.approx([V[0], V[1], 2.0 * V[2]])
     assert dragged(box, (2.2e-3, -2.2e-3, 3e-4), V) == pytest.approx([2.0 * V[0], 2.0 * V[1], 2.0 * V[2]])
+    narrow = Channel(material="glass", width=7e-4)
+    assert dragged(narrow, (0.0, 0.0, 5e-3), V) == pytest.approx([2.0 * V[0], 0.0, 2.0 * V[2]])
 
 
 def test_in_a_cylinder_and_a_groove_what_is_normal_to_the_wall_is_left_out() -> None:
@@ -110,6 +115,7 @@ def test_in_a_cylinder_and_a_groove_what_is_normal_to_the_wall_is_left_out() -> 
     round_one = Cylinder(material="glass", width=5e-3, height=0.02)
     expected = 0.03 * along + np.array([0.0, 0.0, 0.02])
     assert dragged(round_one, place, velocity) == pytest.approx(expected.tolist())  # type: ignore[arg-type]
+    assert dragged(round_one, (0.0, 0.0, 5e-3), V) == [0.0, 0.0, 0.0]
     groove = Groove(material="glass", opening=pi / 2.0)
     normal = np.array([0.0, 1.0, 1.0]) / sqrt(2.0)  # of the wall to the right; the other one is out of reach
     at = (0.0, -1e-3, 1e-3 + 3.2e-4 * sqrt(2.0))
@@ -126,3 +132,20 @@ def test_piles_have_a_film_on_each_of_their_walls() -> None:
 
 def test_without_a_film_the_deck_has_none() -> None:
     assert "film" not in render_deck(make_case()).text
+
+
+def test_the_film_goes_on_after_a_restart_and_slows_what_falls(tmp_path: Path) -> None:
+    """Three beads slide down a wall without friction, in one part, in several, and without a film."""
+
+    def end(film: float, segment: str) -> float:
+        tables = tomllib.loads(shipped_cases()["cluster"].read_text())
+        tables["liquid"] |= {"film_drag_ratio": film}
+        tables["contact"] = {"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": 0.0}
+        tables["drive"]["peak_acceleration"] = "1 g"
+        tables["run"] = {"duration": "0.12 s", "segment": segment, "longest_settling": "0.05 s"}
+        motion = walkers.run(resolve_case(tables, name="falling"), tmp_path).motion
+        return float(motion.position[-1, 0, 2] - motion.position[0, 0, 2])
+
+    whole, bare = end(3.0, "1 s"), end(0.0, "1 s")
+    assert end(3.0, "0.04 s") == pytest.approx(whole, abs=1e-7)
+    assert bare < 3.0 * whole < 0.0

@@ -517,7 +517,9 @@ def as_results(first: FloatArray, driven: FloatArray, takes: float) -> dict[Path
     return {
         Path(str(number)): {
             "driven": float(end),
-            "climbs": [climb | {"begin": begin, "qualified": begin + takes}] if begin + takes <= end else [],
+            "climbs": [climb | {"begin": begin, "onset": begin, "qualified": begin + takes}]
+            if begin + takes <= end
+            else [],
         }
         for number, (begin, end) in enumerate(zip(first.tolist(), driven.tolist(), strict=True))
     }

@@ -57,11 +57,6 @@ class Alignment:
         """How fast small angles grow, per unit of ϑ; times πf per second."""
         return growth(self.u, self.v, self.damping)
 
-    @property
-    def averaged(self) -> float:
-        """U + 2V²/(1 + β²), what is left of the pull when a fast drive is averaged over; upright where positive."""
-        return self.u + 2.0 * self.v**2 / (1.0 + self.damping**2)
-
 
 def alignment(
     dimer: Dimer,
@@ -85,7 +80,7 @@ def alignment(
         weight of a climber with its large bead below, which hangs as from a pivot (U > 0). A climber that leads with
         its large bead stands on its head (U < 0), and only the drive keeps it upright.
     film_viscosity
-        η of a film on the substrate (`walkers.physics.film`), Pa s.
+        η of a film on the wall (`walkers.physics.film`), Pa s.
     """
     (first, second), masses = dimer.radii, dimer.masses
     lever = (first - second) / (2.0 * sqrt(first * second))

@@ -2,7 +2,7 @@
 
     M dv/dt = -M a(t) (1, 1, 0) - G F∥,    F = F0 + D F∥,    F∥ = law(v, F)
 
-(symbols as in `walkers.theory.quasistatic`); a film on the substrate may drag the beads' centres besides. Coulomb's law
+(symbols as in `walkers.theory.quasistatic`); a film on the wall may drag the centres besides. Coulomb's law
 is set-valued: a contact that sticks is held by whatever force keeps it at rest. Each step is implicit
 (`walkers.theory.stepping`), its friction forces found by a semi-smooth Newton method: sticking needs no regularisation,
 and steps are short only where a contact begins to stick or to slip.
@@ -45,7 +45,7 @@ class Walker:
     at_rest : ndarray, shape (3, N)
         Normal forces at rest, in that unit.
     film : ndarray, shape (2, N)
-        How strongly a film on the substrate drags the beads' centres, N s/m.
+        How strongly a film on the wall drags the beads' centres, N s/m.
     """
 
     sin_delta: FloatArray

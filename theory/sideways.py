@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.physics.dimer import Dimer
-from walkers.physics.film import film_drag
 from walkers.theory.friction import Friction
 from walkers.theory.mathieu import NEUTRAL, multipliers
 from walkers.theory.motion import Walker, walk
@@ -26,25 +25,6 @@ FloatArray = npt.NDArray[np.float64]
 
 _SLOWEST = 1e-4
 """A contact that slides more slowly, m/s, resists sideways sliding as much as one that slides at this."""
-
-
-def settling_rate(dimer: Dimer, steady_acceleration: float, film_viscosity: float) -> float:
-    """How fast a dimer turns to the pull in a thick film, 1/s: by the difference of its beads' settling velocities.
-
-    (2/9)(ρ g/η)(R1² - R2²)/L. A sideways force between the beads would spin them about their normals to the substrate,
-    against which nothing holds them: where all is slow there is none, and each bead rolls down as it would alone. By
-    the weight alone, without the drive, ψ decays at this rate, or grows where it is negative.
-
-    Parameters
-    ----------
-    dimer
-        The beads, the large one first.
-    steady_acceleration, film_viscosity
-        As for `alignment`.
-    """
-    (first, second), masses = dimer.radii, dimer.masses
-    difference = masses[0] / film_drag(film_viscosity, first) - masses[1] / film_drag(film_viscosity, second)
-    return steady_acceleration * difference / (2.0 * sqrt(first * second))
 
 
 def time_to_turn(rate: float, start: float = 1.0, end: float = 90.0) -> float:
