@@ -124,7 +124,7 @@ class Pile(Analysis):
     """What loose beads in a container do: the bed, and the clusters that climb."""
 
     name = "pile"
-    version = 4
+    version = 5
     tables = ("bed", "clusters", "events", "profile")
     derived: ClassVar[Described] = {
         "beads": ("", "number of beads"),
