@@ -59,13 +59,14 @@ def _walk_figure(groups: list[Group]) -> Figure:
     top, middle, bottom = axes["strobe"], axes["walked"], axes["turned"]
     figure.suptitle(_title(groups[0].case), fontsize=10)
     _draw_strobe(top, groups[0])
-    run = groups[0].case.run
+    run, ways = groups[0].case.run, ("up", "down") if groups[0].case.goes_uphill else ("right", "left")
     for group in groups:
         time, distance = distance_walked(group)
         slope, _ = fit_slopes(time[run.settled_strobes :], distance[run.settled_strobes :])
         for place, walker in enumerate(group.walkers):
             number = walker.walker
-            label = f"{number}: {'right' if walker.facing > 0 else 'left'}, {slope[place] * 1e3:.3g} mm/s"
+            way = ways[int(walker.facing < 0)]
+            label = f"{number}: {way}, {slope[place] * 1e3:.3g} mm/s"
             middle.plot(time, distance[:, place] * 1e3, "o" if number % 2 == 0 else "s", mfc="none", label=label)
             bottom.plot(time, np.degrees(group.orientation[:: run.samples_per_cycle, place]))
     middle.axvspan(0.0, time[run.settled_strobes], color="0.93", zorder=0, label="settling")
