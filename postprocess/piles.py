@@ -209,6 +209,16 @@ class Pile(Analysis):
         return plot_pile(directory, destination)
 
 
+def out_of_pile(found: PileAnalysis, track: Track) -> bool:
+    """Whether most of the beads that a cluster began with were in the bulk before, while the pile was driven.
+
+    What was not has hung on a wall since the beads were poured.
+    """
+    before = found.bulks[found.motion.first_driven : track.frames[0]]
+    share = found.definition.min_overlap
+    return any(bulk[list(track.members[0])].mean() >= share for bulk in before)
+
+
 def _bed_columns(found: PileAnalysis) -> Columns:
     held = np.zeros(len(found.beds), dtype=np.int64)
     highest = np.array([bed.surface for bed in found.beds])
@@ -245,6 +255,7 @@ def _cluster_columns(found: PileAnalysis) -> Columns:
     for name in ("leader", "size", "large"):
         columns[name] = column([getattr(climb, name) for climb in climbs], np.int64)
     columns["climbed"] = column([climb.climbed for climb in climbs], np.bool_)
+    columns["out_of_pile"] = column([out_of_pile(found, track) for track in tracks], np.bool_)
     return columns
 
 
@@ -312,8 +323,9 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
                 "size": climb.size,
                 "large": climb.large,
                 "walls": names_of_walls(climb.walls, case.boundary).split(),
+                "out_of_pile": out_of_pile(found, track),
             }
-            for climb in found.climbs
+            for climb, track in zip(found.climbs, found.tracks, strict=True)
             if climb.climbed
         ],
         "definition": vars(found.definition),
@@ -346,6 +358,7 @@ def _lines(result: Mapping[str, Any]) -> list[str]:
             f"    {climb['begin']:.2f} to {climb['end']:.2f} s: {climb['gain'] * 1e3:.2f} mm up to "
             f"{climb['height'] * 1e3:.2f} mm {where} at {speed} mm/s, led by a {leader} bead, "
             f"{climb['size']} beads ({climb['large']} large)"
+            + ("" if climb["out_of_pile"] else "; it has hung on a wall since the pouring")
         )
     return lines
 

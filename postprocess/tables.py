@@ -111,6 +111,7 @@ CLUSTERS = {
     "last": ("s", "when it was so last"),
     "begin": ("s", "of its greatest gain of height"),
     "end": ("s", "of that gain"),
+    "out_of_pile": ("", "whether most of its first beads were in the bulk before; else it hung there from the start"),
     "onset": ("s", "when the gain began by which it first counted as a climb; NaN if it never did"),
     "qualified": ("s", "when it first counted as a climb, its gain having reached what counts; NaN if it never did"),
     "gain": ("m", "greatest gain of height, of the mean of its beads"),

@@ -87,7 +87,7 @@ def _short(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
+def summarise_climbs(runs: Sequence[Path], within: float | None = None, *, out_of_pile: bool = False) -> dict[str, Any]:
     """Climbs over several runs that differ by their seeds and lengths alone.
 
     Parameters
@@ -97,6 +97,8 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
     within
         Seconds of drive by which a pile has climbed or not, and after which no run counts any more; if left out the
         length of the shortest run, the longest time at which all of them still count.
+    out_of_pile
+        Whether climbs count only of clusters that came out of the pile; others have hung on a wall since the pouring.
 
     Returns
     -------
@@ -111,10 +113,11 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
     """
     results = [result_in(run) for run in runs]
     driven = np.array([result["driven"] for result in results])
-    first = np.array([min((climb["qualified"] for climb in result["climbs"]), default=np.inf) for result in results])
+    told = [[climb for climb in result["climbs"] if climb["out_of_pile"] or not out_of_pile] for result in results]
+    first = np.array([min((climb["qualified"] for climb in climbs), default=np.inf) for climbs in told])
     at, cut = (float(driven.min()), np.inf) if within is None else (within, within)
     chances = survival(first, np.minimum(driven, cut), at)
-    counted = [[climb for climb in result["climbs"] if climb["qualified"] <= at] for result in results]
+    counted = [[climb for climb in climbs if climb["qualified"] <= at] for climbs in told]
     firsts = [min(climbs, key=lambda climb: climb["qualified"]) for climbs in counted if climbs]
     every = [climb for climbs in counted for climb in climbs]
     return {

@@ -513,7 +513,7 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
 
 def as_results(first: FloatArray, driven: FloatArray, takes: float) -> dict[Path, dict[str, Any]]:
     """Results of runs whose first climbs began so and take so long to gain enough, where the run shows that, s."""
-    climb = {"speed": 2e-3, "size": 2, "leader_large": True, "walls": ["+x"]}
+    climb = {"speed": 2e-3, "size": 2, "leader_large": True, "walls": ["+x"], "out_of_pile": True}
     return {
         Path(str(number)): {
             "driven": float(end),
@@ -537,6 +537,17 @@ def test_a_longer_run_does_not_make_climbs_likelier(monkeypatch: pytest.MonkeyPa
     assert short["climbed"] == (begins <= 1.0).sum() < (begins <= 2.0).sum()
     for key in ("climbed", "probability", "interval", "climbs", "onsets"):
         assert short[key] == long[key], key
+
+
+def test_climbs_of_what_hung_on_a_wall_since_the_pouring_can_be_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    begins = np.array([0.5, 1.0, 1.5, 2.0])
+    results = as_results(begins, np.full(4, 8.0), takes=1.0)
+    for number in ("0", "2"):
+        results[Path(number)]["climbs"][0] |= {"out_of_pile": False}
+    monkeypatch.setattr("walkers.sweeps.climbing.result_in", results.__getitem__)
+    assert summarise_climbs(list(results))["climbed"] == 4
+    kept = summarise_climbs(list(results), out_of_pile=True)
+    assert (kept["climbed"], kept["onsets"]) == (2, [1.0, 2.0])
 
 
 def test_runs_of_different_lengths_tell_one_probability(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -36,9 +36,18 @@ def command(
         text = [line for label, rows in tried.items() for line in (label, describe_sensitivity(rows)) if line]
         print(json.dumps(tried, indent=2, ensure_ascii=False) if as_json else "\n".join(text))
         return
-    found = {label: summarise_climbs(runs, within) for label, runs in groups.items()}
+    found = {
+        label: {
+            **summarise_climbs(runs, within),
+            "out_of_pile": summarise_climbs(runs, within, out_of_pile=True),
+        }
+        for label, runs in groups.items()
+    }
     if as_json:
         print(json.dumps(found, indent=2, ensure_ascii=False))
         return
     for label, climbs in found.items():
         print("\n".join([*([label] if label else []), describe_climbs(climbs)]))
+        if climbs["out_of_pile"]["climbs"] < climbs["climbs"]:
+            print("of clusters that came out of the pile, and did not hang on a wall since the pouring:")
+            print(describe_climbs(climbs["out_of_pile"]))
