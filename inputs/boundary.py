@@ -62,6 +62,11 @@ class Face:
         """Unit vector into the space where the beads are."""
         return self.turned(tuple(float(self.side) * (axis == self.axis) for axis in ("x", "y", "z")))  # type: ignore[arg-type]
 
+    @property
+    def triangles(self) -> int:
+        """How many triangles it is made of in the engine: one, or two for each piece of a round wall's side."""
+        return 2 * self.of.pieces if self.of else 1
+
     def turned(self, vector: Vector) -> Vector:
         """A vector of the face's own axes in those of the boundary."""
         x, y, z = vector
@@ -141,11 +146,6 @@ class Boundary:
     def walls(self) -> tuple[str, ...]:
         """Names of the walls: the floor first, if there is one, then the sides."""
         return tuple(dict.fromkeys(face.wall for face in self.faces()))
-
-    @property
-    def triangles_of_a_side(self) -> int:
-        """How many triangles each face after the first is made of in the engine; the first is always one."""
-        return 1
 
     @property
     def bare(self) -> bool:
@@ -391,11 +391,6 @@ class Cylinder(Container):
         narrowest = 2.0 * Round(self.width / 2.0, bottom, top, 1).half_width(self.width / 8.0)
         return Round(self.width / 2.0, bottom, top, ceil(_SLENDER * (top - bottom) / narrowest))
 
-    @property
-    def triangles_of_a_side(self) -> int:
-        """Two for each piece of a face."""
-        return 2 * self._wall.pieces
-
     def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
         """Distance from the nearest of the prism's faces, m."""
         del z
@@ -424,10 +419,11 @@ def _turns() -> list[float]:
 
 def _room_above(boundary: Boundary, half: tuple[float, float], top: float, largest: float, ranks: int) -> Room:
     """A box from far below the floor, where the carriers are: for each MPI rank one a triangle, in its own part."""
-    triangles, below = 1 + (len(boundary.faces()) - 1) * boundary.triangles_of_a_side, 4.0 * largest
+    faces, below = boundary.faces(), 4.0 * largest
+    triangles = sum(face.triangles for face in faces)
     width, depth = 2.0 * half[0] / ranks, 2.0 * half[1]
     # Those of few faces stand in one column.
-    columns, rows = (max(1, int(size / below)) if boundary.triangles_of_a_side > 1 else 1 for size in (width, depth))
+    columns, rows = (max(1, int(size / below)) if triangles > len(faces) else 1 for size in (width, depth))
     layers = ceil(triangles / (columns * rows))
     lower = (-half[0], -half[1], -(layers + 2) * below)
     places = [

@@ -45,32 +45,24 @@ def kinds(table: pd.DataFrame) -> npt.NDArray[np.int64]:
 def fig_climbing(sources: Sources) -> Figure:
     """Dimer, fan and diamond: the film against friction on a wall, and against tilt."""
     figure, rows = new_figure(9.0, 5.6, nrows=2, ncols=3, sharey=True)
-    drawn = None
-    for axes, (sweep, key, label) in zip(
-        rows,
-        (
-            ("climb-film", _FRICTION, "friction, on a wall"),
-            ("climb-tilt", _TILT, "tilt (°), friction 0.5"),
-        ),
-        strict=True,
-    ):
+    maps = (("climb-film", _FRICTION, "friction, on a wall"), ("climb-tilt", _TILT, "tilt (°), friction 0.5"))
+    for axes, (sweep, key, label) in zip(rows, maps, strict=True):
         table = sources.finished(sweep)
         for one, (shape, name) in zip(axes, _SHAPES.items(), strict=True):
-            drawn = _map(one, table[table[_SHAPE] == shape], key) or drawn
+            drawn = _map(one, table[table[_SHAPE] == shape], key)
             one.set_xlabel(label)
             if sweep == "climb-film":
                 one.set_title(name)
         axes[0].set_ylabel("drag of the film over Stokes's")
-    if drawn is not None:
-        figure.colorbar(drawn, ax=rows, label="up the slope (mm/s)", shrink=0.6)
+    figure.colorbar(drawn, ax=rows, label="up the slope (mm/s)", shrink=0.6)
     handles, labels = rows[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
     return figure
 
 
-def _map(axes: Axes, table: pd.DataFrame, key: str) -> PathCollection | None:
+def _map(axes: Axes, table: pd.DataFrame, key: str) -> PathCollection:
+    """The points of a sweep by kind; all have one scale of colours, which is given back."""
     found, speed = kinds(table), table["axial_velocity"].to_numpy() * 1e3
-    drawn = None
     for kind, (name, marker) in enumerate(zip(KINDS, _MARKERS, strict=True)):
         here = found == kind
         drawn = axes.scatter(
@@ -83,8 +75,7 @@ def _map(axes: Axes, table: pd.DataFrame, key: str) -> PathCollection | None:
 @styled
 def fig_zoo(sources: Sources) -> Figure:
     """Each cluster as it is after a second, above its speed and what it does."""
-    entries = [(run, row, False) for run, row in _points(sources, "zoo")]
-    entries += [(run, row, True) for run, row in _points(sources, "zoo-corner")]
+    entries = [(*point, sweep == "zoo-corner") for sweep in ("zoo", "zoo-corner") for point in _points(sources, sweep)]
     rows = -(-len(entries) // _COLUMNS)
     figure, axes = new_figure(9.0, 2.3 * rows, nrows=rows, ncols=_COLUMNS, squeeze=False)
     for one in axes.flat:

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from math import pi
 
-from walkers.physics.capillary import bridge_volume_at_wall, rupture_distance
+from walkers.physics.capillary import rupture_distance_at_wall
 
 
 def film_drag(film_viscosity: float, radius: float) -> float:
@@ -45,4 +45,4 @@ def film_thickness(radius: float, volume_fraction: float, contact_angle: float) 
     contact_angle
         Effective contact angle, rad.
     """
-    return rupture_distance(bridge_volume_at_wall(radius, volume_fraction), contact_angle)
+    return rupture_distance_at_wall(radius, volume_fraction, contact_angle)

@@ -248,7 +248,8 @@ def classify(
         raise ValueError("a track without a frame")
     gained, seconds = _gained(track, time, height)
     risen = gained - np.minimum.accumulate(gained)
-    onset, first = _qualified(gained, definition.min_rise) or (None, None)
+    moments = _qualified(gained, definition.min_rise)
+    onset, qualified = (float(time[track.frames[place]]) for place in moments) if moments else (np.nan, np.nan)
     end = int(np.argmax(risen))
     begin = int(np.argmin(gained[: end + 1]))
     span = range(begin, end + 1)
@@ -259,8 +260,8 @@ def classify(
     return Climb(
         begin=float(time[track.frames[begin]]),
         end=float(time[last]),
-        onset=float("nan") if onset is None else float(time[track.frames[onset]]),
-        qualified=float("nan") if first is None else float(time[track.frames[first]]),
+        onset=onset,
+        qualified=qualified,
         gain=float(risen[end]),
         speed=speed,
         standard_error=error,
@@ -269,7 +270,7 @@ def classify(
         size=len(members),
         large=int(large[list(members)].sum()),
         walls=tuple(sorted(track.walls[end])),
-        climbed=first is not None,
+        climbed=moments is not None,
     )
 
 

@@ -13,6 +13,7 @@ from walkers.postprocess.drawing import new_figure, plain_text, save_figure, sty
 from walkers.postprocess.gait import distance_walked, fit_slopes, gait
 from walkers.postprocess.motion import Group, read_motion
 from walkers.postprocess.piles import PileAnalysis, analyse
+from walkers.postprocess.posture import ways
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,14 +60,13 @@ def _walk_figure(groups: list[Group]) -> Figure:
     top, middle, bottom = axes["strobe"], axes["walked"], axes["turned"]
     figure.suptitle(_title(groups[0].case), fontsize=10)
     _draw_strobe(top, groups[0])
-    run, ways = groups[0].case.run, ("up", "down") if groups[0].case.goes_uphill else ("right", "left")
+    run, facing = groups[0].case.run, ways(uphill=groups[0].case.goes_uphill)
     for group in groups:
         time, distance = distance_walked(group)
         slope, _ = fit_slopes(time[run.settled_strobes :], distance[run.settled_strobes :])
         for place, walker in enumerate(group.walkers):
             number = walker.walker
-            way = ways[int(walker.facing < 0)]
-            label = f"{number}: {way}, {slope[place] * 1e3:.3g} mm/s"
+            label = f"{number}: {facing[int(walker.facing < 0)]}, {slope[place] * 1e3:.3g} mm/s"
             middle.plot(time, distance[:, place] * 1e3, "o" if number % 2 == 0 else "s", mfc="none", label=label)
             bottom.plot(time, np.degrees(group.orientation[:: run.samples_per_cycle, place]))
     middle.axvspan(0.0, time[run.settled_strobes], color="0.93", zorder=0, label="settling")

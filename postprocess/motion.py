@@ -395,7 +395,8 @@ def read_bridges(motion: Motion) -> Iterator[Bridges]:
         If a dump cannot be read, or ends early.
     """
     stride = motion.case.run.samples_per_bridge_sample
-    names, faces = motion.case.boundary.walls, motion.case.boundary.faces()
+    names = motion.case.boundary.walls
+    faces = [face for face in motion.case.boundary.faces() for _ in range(face.triangles)]
     normals, walls_of = np.array([one.normal for one in faces]), np.array([names.index(one.wall) for one in faces])
     wanted = {place: frame for frame, place in enumerate(motion.frames)}
     for segment in dict.fromkeys(segment for segment, _ in motion.frames):
@@ -420,7 +421,7 @@ def _bridges(
     normals: FloatArray,
     walls_of: IntArray,
 ) -> Bridges:
-    """The bridges of a frame, given the rows of its dumps, and the normal and the wall of each face."""
+    """The bridges of a frame, given the rows of its dumps, and the normal and the wall of each triangle."""
     place = motion.position[frame]
     pair, wall = layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
     # Neighbours without a bridge are reported too, with no force.
@@ -430,11 +431,10 @@ def _bridges(
     arm = place[ids[:, 1]] - place[ids[:, 0]]
     force = between[:, pair("fx") : pair("fx") + 3]
     beads = against[:, wall("id")].astype(np.int64) - motion.first_id
-    # The first face is one triangle, each of the others so many.
-    face = 1 + (against[:, wall("triangle")].astype(np.int64) - 1) // motion.case.boundary.triangles_of_a_side
-    pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals[face])
+    triangle = against[:, wall("triangle")].astype(np.int64)
+    pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals[triangle])
     count = int(walls_of.max()) + 1  # bead and wall as one number: rows are compared ten times more slowly
-    held, which = np.unique(beads * count + walls_of[face], return_inverse=True)
+    held, which = np.unique(beads * count + walls_of[triangle], return_inverse=True)
     gap = np.full(len(held), np.inf)
     np.minimum.at(gap, which, -against[:, wall("overlap")])
     return Bridges(

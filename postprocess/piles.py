@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
@@ -52,8 +52,9 @@ class PileAnalysis:
         Contacts and bridges of the beads at no wall (`coordination_of_inner`) at rest, just before the drive.
     bulks, held
         Of each frame, which beads were of the bulk, and the clusters that were free and held (none before the drive).
-    tracks, climbs
-        These clusters followed through time, and what each of them did.
+    tracks, climbs, out_of_pile
+        These clusters followed through time, what each of them did, and whether it came out of the pile
+        (`came_out_of_pile`).
     events
         When they came free, met, parted and ended.
     definition
@@ -68,6 +69,7 @@ class PileAnalysis:
     held: list[list[Cluster]]
     tracks: list[Track]
     climbs: list[Climb]
+    out_of_pile: list[bool]
     events: list[Event]
     definition: ClimbCriteria
 
@@ -93,17 +95,18 @@ def analyse(run: str | Path | Motion, definition: ClimbCriteria | None = None) -
     beds: list[Bed] = []
     liquid, bulks, held = [], [], []
     inner: dict[str, float | None] = {}
+    rest = _at_rest(motion)
     for bridges in read_bridges(motion):
         labels = connected(len(motion.radius), bridges.beads)
         bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
         liquid.append(liquid_of_beads(motion.radius, case.liquid.volume_fraction, bridges))
         beds.append(bed_of(motion, bridges.frame, bulks[-1], bridges, liquid[-1]))
-        if bridges.frame == _at_rest(motion):
+        if bridges.frame == rest:
             inner = coordination_of_inner(bridges, len(motion.radius))
         # While the pile falls and settles, most of it is free of the rest.
         driven = motion.time[bridges.frame] >= 0.0
         held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
-    return classified(PileAnalysis(motion, beds, np.stack(liquid), inner, bulks, held, [], [], [], rule), rule)
+    return classified(PileAnalysis(motion, beds, np.stack(liquid), inner, bulks, held, [], [], [], [], rule), rule)
 
 
 def _at_rest(motion: Motion) -> int:
@@ -116,8 +119,31 @@ def classified(found: PileAnalysis, definition: ClimbCriteria) -> PileAnalysis:
     motion = found.motion
     tracks = follow(motion.time, found.held, definition)
     climbs = [classify(track, motion.time, motion.position[:, :, 2], motion.large, definition) for track in tracks]
+    out = [came_out_of_pile(track, found.bulks, motion.first_driven, definition) for track in tracks]
     events = events_of(tracks, motion.time, found.bulks, definition, motion.first_driven)
-    return replace(found, tracks=tracks, climbs=climbs, events=events, definition=definition)
+    return replace(found, tracks=tracks, climbs=climbs, out_of_pile=out, events=events, definition=definition)
+
+
+def came_out_of_pile(
+    track: Track, bulks: Sequence[npt.NDArray[np.bool_]], first: int, definition: ClimbCriteria
+) -> bool:
+    """Whether most of the beads that a cluster began with were in the bulk before, while the pile was driven.
+
+    What was not has hung on a wall since the beads were poured.
+
+    Parameters
+    ----------
+    track
+        Of the cluster.
+    bulks
+        Of each frame, which beads were of the bulk.
+    first
+        The first frame of the drive.
+    definition
+        That of the track: what most of them are.
+    """
+    members = list(track.members[0])
+    return any(bulk[members].mean() >= definition.min_overlap for bulk in bulks[first : track.frames[0]])
 
 
 class Pile(Analysis):
@@ -209,16 +235,6 @@ class Pile(Analysis):
         return plot_pile(directory, destination)
 
 
-def out_of_pile(found: PileAnalysis, track: Track) -> bool:
-    """Whether most of the beads that a cluster began with were in the bulk before, while the pile was driven.
-
-    What was not has hung on a wall since the beads were poured.
-    """
-    before = found.bulks[found.motion.first_driven : track.frames[0]]
-    share = found.definition.min_overlap
-    return any(bulk[list(track.members[0])].mean() >= share for bulk in before)
-
-
 def _bed_columns(found: PileAnalysis) -> Columns:
     held = np.zeros(len(found.beds), dtype=np.int64)
     highest = np.array([bed.surface for bed in found.beds])
@@ -255,7 +271,7 @@ def _cluster_columns(found: PileAnalysis) -> Columns:
     for name in ("leader", "size", "large"):
         columns[name] = column([getattr(climb, name) for climb in climbs], np.int64)
     columns["climbed"] = column([climb.climbed for climb in climbs], np.bool_)
-    columns["out_of_pile"] = column([out_of_pile(found, track) for track in tracks], np.bool_)
+    columns["out_of_pile"] = column(found.out_of_pile, np.bool_)
     return columns
 
 
@@ -323,9 +339,9 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
                 "size": climb.size,
                 "large": climb.large,
                 "walls": names_of_walls(climb.walls, case.boundary).split(),
-                "out_of_pile": out_of_pile(found, track),
+                "out_of_pile": out_of_pile,
             }
-            for climb, track in zip(found.climbs, found.tracks, strict=True)
+            for climb, out_of_pile in zip(found.climbs, found.out_of_pile, strict=True)
             if climb.climbed
         ],
         "definition": vars(found.definition),

@@ -42,13 +42,18 @@ def postures(group: Group) -> list[str]:
     off = np.abs(_strobed(group))
     end, middle = off[-1], off[len(off) // 2]
     stands = (end <= UPRIGHT) & (end <= middle + _NO_MORE)
-    turned = (off > np.pi / 2.0).any(axis=0)
+    turned = np.isfinite(turned_over_at(group))
     return [POSTURES[number] for number in np.select([turned, stands], [2, 0], 1)]
 
 
 def _strobed(group: Group) -> FloatArray:
     strobed: FloatArray = group.orientation[:: group.case.run.samples_per_cycle]
     return strobed
+
+
+def ways(*, uphill: bool) -> tuple[str, str]:
+    """What the ways along the drive axis are called, the one that is positive first."""
+    return ("up", "down") if uphill else ("right", "left")
 
 
 def posture_summary(found: Sequence[str], turned_at: FloatArray, end: FloatArray) -> dict[str, Any]:

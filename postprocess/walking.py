@@ -20,7 +20,7 @@ from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, gait, settled_samples, walk
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
-from walkers.postprocess.posture import describe_posture, posture_summary, postures, turned_over_at
+from walkers.postprocess.posture import describe_posture, posture_summary, postures, turned_over_at, ways
 from walkers.postprocess.tables import WALKERS, described
 
 SEPARATED = 0.1
@@ -394,7 +394,7 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     of_what = f"over {count} walkers" if count > 1 else "of the fit"
     doubt = f" (standard error {_speed(error)} {of_what})" if error is not None else ""
     toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
-    ways = ("up", "down") if result["goes_uphill"] else ("right", "left")
+    first, second = ways(uphill=result["goes_uphill"])
     one, other = (result[side]["mean"] for side in ("right_facing", "left_facing"))
     headline = f"{_speed(velocity['mean'])} mm/s, positive {toward}{doubt}"
     if (
@@ -403,30 +403,29 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
         and abs(one - other) > STEADY_SPEED
     ):
         # The mean over both is no walker's.
-        headline = f"facing {ways[0]} {_speed(one)}, facing {ways[1]} {_speed(other)} mm/s, positive {toward}"
+        headline = f"facing {first} {_speed(one)}, facing {second} {_speed(other)} mm/s, positive {toward}"
     return [
         *_headlines(result, drive),
         f"  velocity   {headline}",
         f"    smallest {_speed(velocity['smallest'])}, largest {_speed(velocity['largest'])}; {_steady(result)}",
-        f"    started facing {ways[0]} {_side(result['right_facing'])}, {ways[1]} {_side(result['left_facing'])}",
+        f"    started facing {first} {_side(result['right_facing'])}, {second} {_side(result['left_facing'])}",
     ]
 
 
-def _headlines(result: Mapping[str, Any], drive: str) -> list[str]:
-    """The drive; before it, on a slope, whether walkers stay as they were to face."""
-    if result["posture"] is None:
-        return [f"{result['case']}: {drive}"]
-    return [f"{result['case']}: {describe_posture(result['posture'])}", f"  drive      {drive}"]
+def _headlines(result: Mapping[str, Any], drive: str, level: str = "") -> list[str]:
+    """The drive; before it, on a slope, whether walkers stay as they were to face, and what is to be said elsewhere."""
+    told = level if result["posture"] is None else describe_posture(result["posture"])
+    return [f"{result['case']}: {told}", f"  drive      {drive}"] if told else [f"{result['case']}: {drive}"]
 
 
 def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
     """What became of walkers of which some turned by more than 90°: a velocity along their heading says nothing."""
     axial, kept = result["axial_velocity"], result["kept_heading"]
     tilted = result["goes_uphill"]
-    first, second = ("up", "down") if tilted else ("right", "left")
-    told = f"{result['turned_round']} of {result['walkers']} turned round, axial velocity {_speed(axial['mean'])} mm/s"
+    first, second = ways(uphill=tilted)
+    round_ones = f"{result['turned_round']} of {result['walkers']} turned round"
     return [
-        *(_headlines(result, drive) if tilted else [f"{result['case']}: {told}", f"  drive      {drive}"]),
+        *_headlines(result, drive, f"{round_ones}, axial velocity {_speed(axial['mean'])} mm/s"),
         f"  axial velocity, positive {'up' if tilted else 'to the right'}: started facing {first} "
         f"{_speed(axial['right_facing'])}, {second} {_speed(axial['left_facing'])} mm/s; {_steady(result)}",
         f"  velocity   {_speed(kept['mean'])} mm/s along the heading, of the {kept['n']} that kept it"

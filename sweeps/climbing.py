@@ -87,7 +87,7 @@ def _short(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def summarise_climbs(runs: Sequence[Path], within: float | None = None, *, out_of_pile: bool = False) -> dict[str, Any]:
+def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
     """Climbs over several runs that differ by their seeds and lengths alone.
 
     Parameters
@@ -97,8 +97,6 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None, *, out_o
     within
         Seconds of drive by which a pile has climbed or not, and after which no run counts any more; if left out the
         length of the shortest run, the longest time at which all of them still count.
-    out_of_pile
-        Whether climbs count only of clusters that came out of the pile; others have hung on a wall since the pouring.
 
     Returns
     -------
@@ -110,10 +108,18 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None, *, out_o
 
         Of the climbs that had qualified by ``within``: ``climbs``, ``times`` (s, when the first climb of each run
         qualified), ``onsets`` (s, when it had begun), ``speeds`` (m/s), ``sizes``, ``led_by_large``, ``in_corners``.
+
+        And all of this in ``out_of_pile``, without the clusters that have hung on a wall since the pouring.
     """
     results = [result_in(run) for run in runs]
     driven = np.array([result["driven"] for result in results])
-    told = [[climb for climb in result["climbs"] if climb["out_of_pile"] or not out_of_pile] for result in results]
+    every = [result["climbs"] for result in results]
+    freed = [[climb for climb in climbs if climb["out_of_pile"]] for climbs in every]
+    return {**_summary(driven, every, within), "out_of_pile": _summary(driven, freed, within)}
+
+
+def _summary(driven: FloatArray, told: Sequence[Sequence[dict[str, Any]]], within: float | None) -> dict[str, Any]:
+    """`summarise_climbs` of runs of such lengths (s) and their climbs."""
     first = np.array([min((climb["qualified"] for climb in climbs), default=np.inf) for climbs in told])
     at, cut = (float(driven.min()), np.inf) if within is None else (within, within)
     chances = survival(first, np.minimum(driven, cut), at)
@@ -122,7 +128,7 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None, *, out_o
     every = [climb for climbs in counted for climb in climbs]
     return {
         "within": at,
-        "runs": len(results),
+        "runs": len(told),
         **chances,
         "climbs": len(every),
         "times": [climb["qualified"] for climb in firsts],

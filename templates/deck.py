@@ -267,9 +267,9 @@ def compose(plan: Plan) -> Deck:
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
     angle = case.liquid.contact_angle
     surfaces = plan.surfaces or (case.contact,)
-    forces, film = _forces(plan, scene), _film(plan, scene)
+    moving = _moving(plan)
+    forces, film = _forces(plan, scene), _film(plan, scene, moving)
     meshes = wall_meshes(scene.beads, scene.faces, max(scene.upper))
-    copies = [(f"{mesh.name}_{number}", mesh) for mesh in meshes for number in range(1, workarounds.wall_copies + 1)]
     text = rendered(
         "walkers.templates",
         "walker.lig.j2",
@@ -282,8 +282,7 @@ def compose(plan: Plan) -> Deck:
         layout_name=LAYOUT_NAME,
         meshes=meshes,
         wall_copies=workarounds.wall_copies,
-        copies=[name for name, _ in copies],
-        mesh_of=dict(copies),
+        copies=[(f"{mesh.name}_{number}", mesh) for mesh in meshes for number in range(1, workarounds.wall_copies + 1)],
         contact_model=_contact_model(case),
         types=len(surfaces) + 1,
         friction=_pairs([(surface.friction_bead_bead, surface.friction_bead_wall) for surface in surfaces]),
@@ -300,7 +299,7 @@ def compose(plan: Plan) -> Deck:
         forces=forces,
         film=film,
         loaded=[axis for axis in "xyz" if (film and axis in film.speeds) or any(one.axis == axis for one in forces)],
-        moving=_moving(plan),
+        moving=moving,
         pair_bridge_terms=_terms("pair_bridges", layout.pair_bridge_columns, " ".join(PAIR_BRIDGES).split()),
         wall_bridge_terms=_terms("wall_bridges", layout.wall_bridge_columns, " ".join(WALL_BRIDGES).split()),
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
@@ -352,11 +351,11 @@ def _forces(plan: Plan, scene: Scene) -> list[_Force]:
     return [one for one in forces if any(one.shares.values())]
 
 
-def _film(plan: Plan, scene: Scene) -> Film | None:
-    """The film on the walls, if there is one."""
+def _film(plan: Plan, scene: Scene, moving: str) -> Film | None:
+    """The film on the walls, which move along some axes, if there is one."""
     loadings = plan.loadings or (loading_of(plan.case),)
     viscosities = [one.film_viscosity for one in loadings]
-    return film_of(scene.beads, viscosities, plan.case.liquid, scene.faces, _moving(plan))
+    return film_of(scene.beads, viscosities, plan.case.liquid, scene.faces, moving)
 
 
 def _moving(plan: Plan) -> str:

@@ -12,7 +12,7 @@ from itertools import combinations_with_replacement
 from math import degrees, sqrt
 
 from walkers.inputs.boundary import Face, Round
-from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
+from walkers.physics.capillary import bridge_volume_between_beads, rupture_distance, rupture_distance_at_wall
 from walkers.physics.wall import WALL_COPIES
 from walkers.templates.scene import Bead
 
@@ -279,7 +279,7 @@ def separation_cap(radii: Iterable[float], volume_fraction: float, contact_angle
     sizes = sorted(set(radii))
     ratios = []
     for radius in sizes:
-        at_wall = rupture_distance(bridge_volume_at_wall(radius, volume_fraction), contact_angle) / radius
+        at_wall = rupture_distance_at_wall(radius, volume_fraction, contact_angle) / radius
         ratios += [at_wall / 2.0, (1.0 + at_wall) / _SIGHT - 1.0]
     for first, second in combinations_with_replacement(sizes, 2):
         volume = bridge_volume_between_beads(first, second, volume_fraction)

@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -23,11 +23,16 @@ import pytest
 
 from walkers import run as run_case
 from walkers.inputs import resolve_case
+from walkers.inputs.axes import flatten, is_axis
 from walkers.inputs.case import Case
+from walkers.inputs.reading import read_toml
+from walkers.inputs.sweep import expand, shipped_sweeps
 from walkers.main import main
 from walkers.postprocess.gait import Walk, walk
 from walkers.postprocess.motion import Group, read_motion
 from walkers.runner.failures import RunBusy
+from walkers.sweeps.run import run_sweep
+from walkers.sweeps.scheduler import Options
 
 # The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, no rolling friction, one walker that starts on the
 # axis in equilibrium.
@@ -242,6 +247,23 @@ def call(*arguments: str, check: bool = False, folder: Path | None = None) -> su
     if check:
         assert done.returncode == 0, done.stderr
     return done
+
+
+def shipped_sweep(name: str, settings: Mapping[str, Any], axes: Mapping[str, Any]) -> dict[str, Any]:
+    """The file of a shipped sweep with further settings, and other values on some of its axes if it has any."""
+    given = read_toml(shipped_sweeps()[name])
+    given["set"] = {**flatten(given.get("set", {}), lambda _: False), **settings}
+    if "axes" in given:
+        given["axes"] = {**flatten(given["axes"], is_axis), **axes}
+    return given
+
+
+def run_shipped(name: str, given: dict[str, Any], out: Path) -> None:
+    """Run what `shipped_sweep` gave, under the sweep's name; no point may fail."""
+    _, failures = run_sweep(
+        expand(given, source=name, name=name, folder=shipped_sweeps()[name].parent), out, Options(2)
+    )
+    assert not failures
 
 
 @contextmanager

@@ -8,15 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from walkers.inputs.axes import flatten, is_axis
-from walkers.inputs.reading import read_toml
-from walkers.inputs.sweep import expand, shipped_sweeps
+from tests.conftest import run_shipped, shipped_sweep
 from walkers.paper.climbing import KINDS, kinds
 from walkers.paper.make import FIGURES
 from walkers.paper.sources import Sources
 from walkers.postprocess.drawing import save_figure
-from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Options
 
 RADII = [["0.545 mm", "0.3075 mm"], ["0.545 mm", "0.3075 mm", "0.3075 mm"]]
 FEWER: dict[str, dict[str, Any]] = {
@@ -35,15 +31,10 @@ def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
 
 def _run_briefly(out: Path) -> None:
     for name, axes in FEWER.items():
-        given = read_toml(shipped_sweeps()[name])
-        given["set"] = {**flatten(given.get("set", {}), lambda _: False), **BRIEF}
-        if "axes" in given:
-            given["axes"] = {**flatten(given["axes"], is_axis), **axes}
+        given = shipped_sweep(name, BRIEF, axes)
         if name == "climb-film":
             given["zip"][0] = {f"contact.friction.bead_{other}": [0.3, 0.5] for other in ("wall", "bead")}
-        sweep = expand(given, source=name, name=name, folder=shipped_sweeps()[name].parent)
-        _, failures = run_sweep(sweep, out, Options(2))
-        assert not failures
+        run_shipped(name, given, out)
 
 
 @pytest.mark.parametrize("name", ["climbing", "zoo"])

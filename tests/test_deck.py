@@ -124,7 +124,7 @@ def test_a_round_wall_has_a_mesh_for_each_size_of_beads_whose_faces_are_shared_b
     assert sorted(int(one) for line in groups for one in line[3:]) == [bead.id for bead in scene.beads]
     assert len({tuple(line[5:6]) for line in meshes}) == len(meshes) / 2 > 1
     faces = round_one.faces()
-    assert len(scene.carriers) == 1 + (len(faces) - 1) * round_one.triangles_of_a_side
+    assert len(scene.carriers) == 1 + (len(faces) - 1) * faces[1].triangles
     for line in meshes[::2]:
         precision = float(line[line.index("precision") + 1])
         ids = {int(one) for group in groups if group[1] == line[2] for one in group[3:]}
@@ -132,9 +132,7 @@ def test_a_round_wall_has_a_mesh_for_each_size_of_beads_whose_faces_are_shared_b
         corners = _triangles(deck.files[line[5]])
         assert len(corners) == len(scene.carriers)
         wound = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals = np.array(
-            [faces[0].normal, *(one.normal for one in faces[1:] for _ in range(round_one.triangles_of_a_side))]
-        )
+        normals = np.array([faces[0].normal, *(one.normal for one in faces[1:] for _ in range(one.triangles))])
         np.testing.assert_allclose(wound / np.linalg.norm(wound, axis=1)[:, None], normals, atol=1e-12)
         # Beads that touch the wall find their faces' ends meeting, never a gap between them.
         half = np.linalg.norm(np.diff(corners[1:, :, :2], axis=1), axis=2).max() / 2.0

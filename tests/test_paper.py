@@ -11,13 +11,12 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from tests.conftest import call
+from tests.conftest import call, run_shipped, shipped_sweep
 from walkers.inputs import load_case
-from walkers.inputs.axes import flatten, is_axis
 from walkers.inputs.errors import InputError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import read_toml
-from walkers.inputs.sweep import expand, shipped_sweeps
+from walkers.inputs.sweep import shipped_sweeps
 from walkers.paper import dimers, published
 from walkers.paper.alignment import climber, paper_drives
 from walkers.paper.comparison import as_markdown, compare, count
@@ -31,7 +30,6 @@ from walkers.postprocess.gait import gait
 from walkers.postprocess.steady_state import steady_walkers
 from walkers.runner.ensemble import finished_place
 from walkers.sweeps.record import read_record
-from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
 from walkers.theory.mathieu import alignment, turning
 from walkers.theory.prediction import motion_of
@@ -59,17 +57,12 @@ def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
 
 def _run_shortened(out: Path) -> None:
     for name, axes in FEWER.items():
-        given = read_toml(shipped_sweeps()[name])
-        given["set"] = {**flatten(given.get("set", {}), lambda _: False), **SHORT}
+        given = shipped_sweep(name, SHORT, axes)
         if name == "alignment":
             given["set"] |= {"run.cycles": 50}  # three images 0.3 s apart
-        if "axes" in given:
-            given["axes"] = {**flatten(given["axes"], is_axis), **axes}
         if "descend" in given:
             given["descend"] |= {"from": "1.4 g", "to": "0.4 g", "step": "0.2 g"}
-        sweep = expand(given, source=name, name=name, folder=shipped_sweeps()[name].parent)
-        _, failures = run_sweep(sweep, out, Options(2))
-        assert not failures
+        run_shipped(name, given, out)
 
 
 @pytest.fixture(scope="session")
@@ -82,10 +75,7 @@ def _run_two_cycles(out: Path) -> None:
     given = read_toml(shipped_sweeps()["sensitivity"])
     experiments = len(given["zip"][0]["run"]["most_cycles"])
     given["zip"][0]["run"] = {"cycles": [2] * experiments, "settling_cycles": [0] * experiments}
-    _, failures = run_sweep(
-        expand(given, source="test", name="sensitivity", folder=shipped_sweeps()["sensitivity"].parent), out, Options(2)
-    )
-    assert not failures
+    run_shipped("sensitivity", given, out)
 
 
 def test_the_published_fits_are_the_papers_model() -> None:

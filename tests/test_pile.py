@@ -546,7 +546,7 @@ def test_climbs_of_what_hung_on_a_wall_since_the_pouring_can_be_left_out(monkeyp
         results[Path(number)]["climbs"][0] |= {"out_of_pile": False}
     monkeypatch.setattr("walkers.sweeps.climbing.result_in", results.__getitem__)
     assert summarise_climbs(list(results))["climbed"] == 4
-    kept = summarise_climbs(list(results), out_of_pile=True)
+    kept = summarise_climbs(list(results))["out_of_pile"]
     assert (kept["climbed"], kept["onsets"]) == (2, [1.0, 2.0])
 
 

@@ -84,10 +84,10 @@ def alignment(
     """
     (first, second), masses = dimer.radii, dimer.masses
     lever = (first - second) / (2.0 * sqrt(first * second))
-    inverse_radius = (masses[0] * first + masses[1] * second) / (masses[0] * first**2 + masses[1] * second**2)
+    moment = masses[0] * first**2 + masses[1] * second**2
+    inverse_radius = (masses[0] * first + masses[1] * second) / moment
     per_acceleration = 5.0 / 7.0 * lever * inverse_radius / (pi * frequency) ** 2
-    inertia = 7.0 / 5.0 * (masses[0] * first**2 + masses[1] * second**2)
-    rate = sum(film_drag(film_viscosity, radius) * radius**2 for radius in dimer.radii) / inertia
+    rate = sum(film_drag(film_viscosity, radius) * radius**2 for radius in dimer.radii) / (7.0 / 5.0 * moment)
     return Alignment(
         steady_acceleration * per_acceleration,
         peak_acceleration * per_acceleration / 4.0,

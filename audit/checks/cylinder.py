@@ -14,7 +14,7 @@ from walkers.audit.checks.viscous import viscous_case
 from walkers.audit.laws import Exerted, Partner, bridge_law, frame_by_frame_error
 from walkers.inputs.boundary import SIDES, Cylinder, Span
 from walkers.inputs.case import Case
-from walkers.physics.capillary import bridge_volume_at_wall, rupture_distance
+from walkers.physics.capillary import rupture_distance_at_wall
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import prescribed_motion
 from walkers.templates.deck import Plan
@@ -63,6 +63,11 @@ def _leaving() -> list[Bead]:
     return beads
 
 
+def _half_chord(radius: float) -> float:
+    """Half the length of the way of a bead around the wall, in whose middle its gap is `_GAP`, m."""
+    return sqrt(2.0 * (_CYLINDER.width / 2.0 - radius) * _GAP * radius)
+
+
 def _around() -> list[Bead]:
     """Beads of three sizes that move on chords past several faces, either way: touching, open, touching again."""
     beads: list[Bead] = []
@@ -70,7 +75,7 @@ def _around() -> list[Bead]:
         inner = _CYLINDER.width / 2.0 - radius
         for way in (1.0, -1.0):
             azimuth, z = _places(len(beads), 12 + 8 * len(beads))  # none whose triangles are numbered like a bead
-            reach = sqrt(2.0 * inner * _GAP * radius)
+            reach = _half_chord(radius)
             place = _at(azimuth, sqrt(inner**2 - reach**2) + _OVERLAP, -way * reach, z)
             x, y, _ = _at(azimuth, 0.0, way * _SPEED, 0.0)
             beads.append(Bead(0, place, radius, (x, y, 0.0), _SPIN))
@@ -102,7 +107,7 @@ def at_cylinder(bench: Bench) -> Iterator[Line]:
     """Beads that leave the wall, at rest and moving; beads on their way around it; the wall without its strips."""
     scene = _scene(_leaving())
     for where, case in (("at rest", viscous_case()), ("moving along x", viscous_case("lab", "0.25 g", "x"))):
-        farthest = rupture_distance(bridge_volume_at_wall(max(_RADII), case.liquid.volume_fraction), 0.0)
+        farthest = rupture_distance_at_wall(max(_RADII), case.liquid.volume_fraction, 0.0)
         series = _run(bench, case, scene, 1.2 * farthest / _RETREAT, 20)
         judged = slice(int(case.drive.frame == "lab"), None)  # moving walls do so from the first step on
         force = torque = 0.0
@@ -127,8 +132,7 @@ def at_cylinder(bench: Bench) -> Iterator[Line]:
 
 
 def _around_run(bench: Bench, case: Case, scene: Scene) -> Measured:
-    inner = _CYLINDER.width / 2.0 - max(_RADII)
-    return _run(bench, case, scene, 2.0 * sqrt(2.0 * inner * _GAP * max(_RADII)) / _SPEED, 1)
+    return _run(bench, case, scene, 2.0 * _half_chord(max(_RADII)) / _SPEED, 1)
 
 
 def _mean_errors(case: Case, scene: Scene, series: Measured) -> dict[int, float]:
@@ -136,9 +140,7 @@ def _mean_errors(case: Case, scene: Scene, series: Measured) -> dict[int, float]
     errors = {}
     for bead in scene.beads:
         law = _law(case, bead, series)
-        inner = _CYLINDER.width / 2.0 - bead.radius
-        frames = int(2.0 * sqrt(2.0 * inner * _GAP * bead.radius) / _SPEED / case.run.time_step)
-        there = slice(0, frames)
+        there = slice(0, int(2.0 * _half_chord(bead.radius) / _SPEED / case.run.time_step))
         deviation: FloatArray = np.linalg.norm(series.force[there, series.row(bead.id)] - law.force[there], axis=1)
         errors[bead.id] = float(deviation.mean() / np.linalg.norm(law.force[there], axis=1).mean())
     return errors

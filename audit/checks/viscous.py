@@ -15,7 +15,7 @@ from walkers.audit.laws import Partner, bridge_law, frame_by_frame_error
 from walkers.inputs.boundary import AxisName, Face
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
-from walkers.physics.capillary import bridge_volume_at_wall, rupture_distance
+from walkers.physics.capillary import rupture_distance_at_wall
 from walkers.physics.film import film_drag, film_thickness
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import prescribed_motion
@@ -127,7 +127,7 @@ def run_box(bench: Bench, case: Case, workarounds: Workarounds, ranks: int = 1) 
     """Retract the 26 beads from their walls, from touching to past rupture."""
     radius = case.walkers[0].radii[0]
     scene = box_scene(radius, ranks)
-    rupture = rupture_distance(bridge_volume_at_wall(radius, case.liquid.volume_fraction), 0.0)
+    rupture = rupture_distance_at_wall(radius, case.liquid.volume_fraction, 0.0)
     steps = int(1.4 * rupture / (_RETREAT * case.run.time_step) / 100) * 100
     plan = Plan(case, scene, bench_recording(steps, 5), workarounds=workarounds, prescribed=True, ranks=ranks)
     return scene, bench.run(plan)

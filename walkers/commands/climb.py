@@ -36,13 +36,7 @@ def command(
         text = [line for label, rows in tried.items() for line in (label, describe_sensitivity(rows)) if line]
         print(json.dumps(tried, indent=2, ensure_ascii=False) if as_json else "\n".join(text))
         return
-    found = {
-        label: {
-            **summarise_climbs(runs, within),
-            "out_of_pile": summarise_climbs(runs, within, out_of_pile=True),
-        }
-        for label, runs in groups.items()
-    }
+    found = {label: summarise_climbs(runs, within) for label, runs in groups.items()}
     if as_json:
         print(json.dumps(found, indent=2, ensure_ascii=False))
         return
