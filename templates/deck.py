@@ -16,6 +16,7 @@ from walkers.physics.matter import Contact
 from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds, contact_angle_setting, separation_cap, wall_meshes
 from walkers.templates.layout import (
     BEAD_COLUMNS,
+    MEAN_SPIN_COLUMNS,
     PAIR_BRIDGE_COLUMNS,
     PAIR_BRIDGES,
     WALL_BRIDGE_COLUMNS,
@@ -234,6 +235,7 @@ def plan_of(*cases: Case, segment: Segment | None = None, workarounds: Workaroun
         sample_every=run.steps_per_sample,
         bridge_every=run.steps_per_sample * run.samples_per_bridge_sample,
         status_every=-(-run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
+        bead_columns=(*BEAD_COLUMNS, *MEAN_SPIN_COLUMNS) if walkers else BEAD_COLUMNS,
         begin=segment.begin,
     )
     checkpoint = NO_CHECKPOINT
