@@ -39,7 +39,7 @@ class Walking(Analysis):
     """How walkers walk."""
 
     name = "walking"
-    version = 4
+    version = 5
     tables = ("trajectory", "walkers", "bridges")
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
