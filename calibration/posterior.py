@@ -122,7 +122,7 @@ class Density:
         """At points (N, D + G), shape (N,)."""
         unit, discrepancy = self.places(points)
         # Chains know no ends: what is uniform in the cube, or half-Cauchy, is standard normal in their coordinates.
-        total = self._space.log_prior(unit) - 0.5 * np.sum(points**2, axis=1)
+        total: FloatArray = self._space.log_prior(unit) - 0.5 * np.sum(points**2, axis=1)
         mean, deviation = self._emulators.predict(unit)
         total += log_likelihood(mean, deviation, self._emulators.correlation, self._shared, discrepancy[:, self._group])
         # What was published was seen, of walkers that walked.
