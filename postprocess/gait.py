@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from walkers.postprocess.dump import DumpError, FloatArray
 from walkers.postprocess.motion import Group
+from walkers.postprocess.slopes import fit_slopes
 
 STEADY_DIFFERENCE = 0.05
 """A walker is steady if the velocities of the two halves of the fitted cycles differ by less than this share …"""
@@ -127,9 +128,9 @@ def _nearest_wall(group: Group) -> tuple[FloatArray, FloatArray | None]:
 class Walk:
     """Velocities of W walkers after the settling cycles, m/s, each of shape (W,).
 
-    ``velocity`` is the slope of the distance walked along the heading, one sample a cycle, with the standard error of
-    the least-squares fit; ``axial`` and ``lateral`` are the mass centre's velocities along and across the drive axis in
-    the frame of the substrate; ``steady`` says whether the first and the second half agree.
+    ``velocity`` is the slope of the distance walked along the heading, one sample a cycle, with its standard error
+    (`walkers.postprocess.slopes.fit_slopes`); ``axial`` and ``lateral`` are the mass centre's velocities along and
+    across the drive axis in the frame of the substrate; ``steady`` says whether the first and the second half agree.
     """
 
     velocity: FloatArray
@@ -157,30 +158,6 @@ def distance_walked(group: Group) -> tuple[FloatArray, FloatArray]:
     steps = np.einsum("fwx,fwx->fw", np.diff(centre, axis=0), (heading[1:] + heading[:-1]) / 2.0)
     distance = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
     return group.time[::strobe], distance
-
-
-def fit_slopes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Slopes of the columns of ``values`` against time and their standard errors (least squares).
-
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-    values : ndarray, shape (N, K)
-
-    Returns
-    -------
-    slope, standard_error : ndarray, shape (K,)
-        The error is NaN for fewer than three points.
-    """
-    # Moving the origin keeps rounding out of the sums: positions reach metres, steps micrometres.
-    time, values = time - time.mean(), values - values.mean(axis=0)
-    square = float(np.sum(time**2))
-    slope = time @ values / square
-    freedom = len(time) - 2
-    residuals = np.sum((values - np.outer(time, slope)) ** 2, axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        error = np.sqrt(residuals / freedom / square) if freedom > 0 else np.full(slope.shape, np.nan)
-    return slope, error
 
 
 def walk(group: Group) -> Walk:
