@@ -436,7 +436,7 @@ REDUCED: dict[str, Any] = {
     },
     "held_out": {"ratio": ["r"]},
     "bands": [{"title": "60 and 90 Hz", "of": ["slow", "strong"], "against": "gamma0"}],
-    "design": {"waves": [16, 12], "predictive": 2, "steps": 3000, "seed": 2},
+    "design": {"waves": [12, 6], "predictive": 2, "steps": 3000, "seed": 2},
 }
 
 
@@ -475,13 +475,15 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     ]
     assert [Path(line).name for line in told.splitlines()] == names
     said = json.loads((tmp_path / "here" / "calibration.json").read_text())
-    assert said["sets"] == 28
+    assert said["sets"] == 18
     assert said["chain"]["converged"]
     assert "not converged" not in (tmp_path / "here" / "calibration.md").read_text()
     for name, true in TRUE.items():
         low, middle, high = said["intervals"][name]
         assert low * 0.97 < true < high * 1.03, name
-        assert middle == pytest.approx(true, rel=0.3), name
+        # Less friction and less drag give the three speeds nearly as well: the engine tells them apart, 18 sets do not.
+        assert middle == pytest.approx(true, rel=0.6), name
+        assert said["best"][name] == pytest.approx(true, rel=0.15), name
     assert said["agree"] == 4
     assert said["emulators_within_two_errors"] >= 0.6  # of six
     samples = pd.read_parquet(tmp_path / "here" / "posterior.parquet")
@@ -548,7 +550,7 @@ def test_values_have_their_units_and_guesses_lead_the_first_wave(tmp_path: Path)
     case = next(iter(wave_sweep(found, np.array(found.guesses), "units").cases()))
     assert case.liquid.contact_angle == pytest.approx(np.pi / 6.0)
     unit = first_wave(found, space)
-    assert len(unit) == 17
+    assert len(unit) == 13
     np.testing.assert_allclose(space.values(unit[0]), [0.1, 2.0, 30.0])
 
 
