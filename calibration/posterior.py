@@ -138,7 +138,8 @@ class Density:
     def beginnings(self, walkers: int, draw: np.random.Generator) -> FloatArray:
         """The likelier of many points, so that a chain need not look for the posterior, shape (walkers, D + G)."""
         tried = draw.standard_normal((40 * walkers, self.dimensions))
-        likely = np.argsort(self(tried))[::-1][: 2 * walkers]
+        density = np.concatenate([self(part) for part in np.array_split(tried, walkers)])  # for the memory's sake
+        likely = np.argsort(density)[::-1][: 2 * walkers]
         chosen: FloatArray = tried[draw.choice(likely, walkers, replace=False)]
         return chosen
 

@@ -296,7 +296,7 @@ def as_markdown(found: Outcome, rows: list[Row]) -> str:
         inside=inside,
         made=made,
         expected=expected,
-        chains={"all observations": posterior, **found.held_out},
+        chains={"of all observations": posterior, **{f"for {name}": one for name, one in found.held_out.items()}},
         limits=(LARGEST_RHAT, LEAST_SAMPLES),
         narrow=_NARROW,
     )

@@ -236,8 +236,7 @@ def test_sets_at_rest_and_sets_without_a_walker_do_not_make_one_that_walks_betwe
     points = np.stack([across, np.full(97, 0.5), np.full(97, 0.75)], axis=1)  # the discrepancy: its upper quartile
     # The density in the chain's coordinates has the prior in it, which is uniform in the cube.
     likelihood = density(norm.ppf(points)) + 0.5 * np.sum(norm.ppf(points) ** 2, axis=1)
-    # The nearest sets are at 0.485 and 0.504: a few hundredths aside it is not known yet on which side one is.
-    walks, cliff = across < 0.4, np.abs(across - 0.5) < 0.04
+    walks, cliff = across < 0.4, np.abs(across - 0.5) < 0.02
     assert across[np.argmax(likelihood)] < 0.45
     assert likelihood[cliff].max() < likelihood[walks].min()
     assert np.ptp(likelihood[walks]) < 1.0  # all at rest alike
@@ -246,7 +245,7 @@ def test_sets_at_rest_and_sets_without_a_walker_do_not_make_one_that_walks_betwe
     before = Density(imputed, SPACE)(norm.ppf(points)) + 0.5 * np.sum(norm.ppf(points) ** 2, axis=1)
     assert abs(across[np.argmax(before)] - 0.5) < 0.04
     posterior = sample_posterior(emulators, SPACE, 800, 1)
-    assert np.mean(np.abs(posterior.unit[:, 0] - 0.5) < 0.06) < 0.12
+    assert np.mean(np.abs(posterior.unit[:, 0] - 0.5) < 0.02) < 0.05
     assert np.mean(posterior.unit[:, 0] < 0.5) > 0.7
 
 
@@ -302,7 +301,7 @@ def test_few_feasible_sets_and_few_others_can_be_had(made: int) -> None:
     low, high = emulators.feasibility.probability(np.array([[0.02, 0.5], [0.98, 0.5]]))[:, 0]
     assert low > high - 0.02
     if made in {0, 63, 64}:
-        assert (low > 0.9) == (made > 0)
+        assert (low > 0.8) == (made > 0)
 
 
 def test_emulators_of_several_observations_are_those_of_each() -> None:
@@ -437,7 +436,7 @@ REDUCED: dict[str, Any] = {
     },
     "held_out": {"ratio": ["r"]},
     "bands": [{"title": "60 and 90 Hz", "of": ["slow", "strong"], "against": "gamma0"}],
-    "design": {"waves": [16, 12], "predictive": 2, "steps": 3000, "seed": 2},
+    "design": {"waves": [12, 6], "predictive": 2, "steps": 3000, "seed": 2},
 }
 
 
@@ -476,13 +475,15 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     ]
     assert [Path(line).name for line in told.splitlines()] == names
     said = json.loads((tmp_path / "here" / "calibration.json").read_text())
-    assert said["sets"] == 28
+    assert said["sets"] == 18
     assert said["chain"]["converged"]
     assert "not converged" not in (tmp_path / "here" / "calibration.md").read_text()
     for name, true in TRUE.items():
         low, middle, high = said["intervals"][name]
         assert low * 0.97 < true < high * 1.03, name
-        assert middle == pytest.approx(true, rel=0.3), name
+        # Less friction and less drag give the three speeds nearly as well: the engine tells them apart, 18 sets do not.
+        assert middle == pytest.approx(true, rel=0.6), name
+        assert said["best"][name] == pytest.approx(true, rel=0.15), name
     assert said["agree"] == 4
     assert said["emulators_within_two_errors"] >= 0.6  # of six
     samples = pd.read_parquet(tmp_path / "here" / "posterior.parquet")
@@ -549,7 +550,7 @@ def test_values_have_their_units_and_guesses_lead_the_first_wave(tmp_path: Path)
     case = next(iter(wave_sweep(found, np.array(found.guesses), "units").cases()))
     assert case.liquid.contact_angle == pytest.approx(np.pi / 6.0)
     unit = first_wave(found, space)
-    assert len(unit) == 17
+    assert len(unit) == 13
     np.testing.assert_allclose(space.values(unit[0]), [0.1, 2.0, 30.0])
 
 
