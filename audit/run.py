@@ -16,6 +16,7 @@ from walkers.audit.check import Check, Line, Verdict
 from walkers.audit.checks import (
     benchmarks,
     capillary,
+    closed_forms,
     contact,
     cylinder,
     drive,
@@ -40,6 +41,7 @@ CHECKS: tuple[Check, ...] = (
     *timestep.CHECKS,
     *energy.CHECKS,
     *benchmarks.CHECKS,
+    *closed_forms.CHECKS,
 )
 
 
