@@ -23,6 +23,7 @@ spring leaves out: the micro-slip within the contact).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from math import exp, pi, sqrt
 
 import numpy as np
@@ -133,14 +134,20 @@ def after_impact(impact: Impact, before: Motion, steps: int = 4000) -> Motion:
     return Motion(-approach, along, rolling)
 
 
-def friction_excess(impact: Impact) -> float:
+@cache
+def friction_excess(impact: Impact, steps: int = 20000) -> float:
     """What a sphere loses of its tangential velocity in the engine's model when it slides all the way, over μ(1+e)v_n.
 
     It is above one in damped impacts: friction counts the damping's pull at the end as a load, and the damping of the
     spring comes on top of the limit while the spring alone is below it.
+
+    Parameters
+    ----------
+    steps
+        Of the elastic contact; with some thousand the number is uncertain by 2 %, for the stiffness vanishes at the end.
     """
     slippery = replace(impact, friction=1e-3)
     fast = Motion(np.ones(1), np.ones(1), np.zeros(1))
-    after = after_impact(slippery, fast, steps=20000)
+    after = after_impact(slippery, fast, steps)
     expected = sliding_loss(slippery.friction, float(after.normal[0]), fast.normal)
     return float(((1.0 - after.tangential) / expected)[0])

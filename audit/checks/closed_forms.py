@@ -45,7 +45,6 @@ FILM_VISCOSITY = 0.05
 """Pa s."""
 BOUNCY = Sphere(5e7, 0.3, 4000.0, RADIUS)
 SPINNING_FRICTION, FALL_SPEED = 0.3, 0.05
-_WALL = frozenset({"walls"})
 COURSE = 2e-3
 """Largest error along a way, over its largest value: some thousand steps, overlaps of some 1e-4 of the radius."""
 
@@ -178,7 +177,7 @@ def first_step_lines(bench: Bench) -> Iterator[Line]:
         lost, expected = first_step(bench, wall)
         what = f"a damped bead that starts to slide on a {wall}: lost in the first step"
         source = "½ Δt 2√(5/6) β √(k_t/m), nearly 0 by Coulomb"
-        yield Line(what, source, expected, lost, "", 0.02, defect=True, needs=_WALL if WALLS[wall] > 1 else frozenset())
+        yield Line(what, source, expected, lost, "", 0.02, defect=True)
 
 
 def rolling_lines(bench: Bench) -> Iterator[Line]:
