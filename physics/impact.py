@@ -144,7 +144,7 @@ def friction_excess(impact: Impact, steps: int = 20000) -> float:
     Parameters
     ----------
     steps
-        Of the elastic contact; with some thousand the number is uncertain by 2 %, for the stiffness vanishes at the end.
+        Of the elastic contact; with some thousand the number is uncertain by 2 %: stiffness vanishes at the end.
     """
     slippery = replace(impact, friction=1e-3)
     fast = Motion(np.ones(1), np.ones(1), np.zeros(1))
