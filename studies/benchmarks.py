@@ -13,6 +13,7 @@ from walkers.audit.bench import Bench
 from walkers.audit.check import Line, Verdict
 from walkers.audit.checks import benchmarks as tests
 from walkers.audit.impacts import Course
+from walkers.audit.oblique import Oblique
 from walkers.inputs.text import rendered
 from walkers.postprocess.drawing import new_figure, styled
 from walkers.postprocess.dump import FloatArray
@@ -40,11 +41,11 @@ class Measured:
 
     pair: Mapping[str, Course]
     plane: Mapping[str, Course]
-    damped: Mapping[str, tests.Oblique]
-    by_angle: Mapping[str, tests.Oblique]
-    by_tangential_speed: Mapping[str, tests.Oblique]
-    by_spin: Mapping[str, tests.Oblique]
-    unequal: tests.Oblique
+    damped: Mapping[str, Oblique]
+    by_angle: Mapping[str, Oblique]
+    by_tangential_speed: Mapping[str, Oblique]
+    by_spin: Mapping[str, Oblique]
+    unequal: Oblique
 
 
 def measure(bench: Bench) -> Measured:
@@ -113,7 +114,7 @@ def _ours(x: FloatArray, y: FloatArray, at: float) -> str:
     return f"{np.interp(at, x[order], y[order]):.3g}"
 
 
-def angle_table(by_wall: Mapping[str, tests.Oblique]) -> str:
+def angle_table(by_wall: Mapping[str, Oblique]) -> str:
     """Test 4: tangential restitution."""
     rows = [
         (
@@ -127,7 +128,7 @@ def angle_table(by_wall: Mapping[str, tests.Oblique]) -> str:
     return table(("angle", "simulated", "measured", *(f"engine, {wall}" for wall in by_wall)), rows)
 
 
-def tangential_table(by_wall: Mapping[str, tests.Oblique]) -> str:
+def tangential_table(by_wall: Mapping[str, Oblique]) -> str:
     """Test 5: the surface's velocity, at the incidences of the finite elements."""
     rows = []
     for x, y in published.TANGENTIAL_FINITE_ELEMENTS_SURFACE:
@@ -145,18 +146,11 @@ def spin_table(measured: Measured) -> str:
     rows = []
     for x, alloy in published.SPIN_ALLOY_BETA:
         ours = (
-            _ours(_stickiness(found), found.beta, float(x)) for found in (*measured.by_spin.values(), measured.unequal)
+            _ours(found.stickiness, found.beta, float(x)) for found in (*measured.by_spin.values(), measured.unequal)
         )
         rows.append((f"{x:.3g}", f"{alloy:.3g}", _at(published.SPIN_NYLON_BETA, float(x), 0.2), *ours))
     walls = (f"6: engine, {wall}" for wall in measured.by_spin)
     return table(("7/2 μ(1+e) v_n/s", "6: alloy", "6: nylon", *walls, "8: engine"), rows)
-
-
-def _stickiness(found: tests.Oblique) -> FloatArray:
-    """7/2 μ(1+e) v_n/s with the restitution as given, as the paper has it."""
-    restitution = found.launches[0].restitution
-    stickiness: FloatArray = 3.5 * found.impact.friction * (1.0 + restitution) / found.incidence
-    return stickiness
 
 
 @styled
@@ -188,7 +182,7 @@ def fig_normal(measured: Measured) -> Figure:
 
 
 @styled
-def fig_angle(by_wall: Mapping[str, tests.Oblique]) -> Figure:
+def fig_angle(by_wall: Mapping[str, Oblique]) -> Figure:
     """Test 4."""
     figure, panels = new_figure(10.0, 3.8, ncols=3)
     drawn = (
@@ -231,10 +225,10 @@ def fig_spin(measured: Measured) -> Figure:
     six.plot(*published.SPIN_ALLOY_BETA.T, label="simulated, aluminium alloy", **_SIMULATED)
     six.plot(*published.SPIN_NYLON_BETA.T, label="simulated, nylon", **_OTHER_SIMULATED)
     for wall, found in measured.by_spin.items():
-        six.plot(_stickiness(found), found.beta, label=f"engine, {wall}", **_WALL_STYLES[wall])
+        six.plot(found.stickiness, found.beta, label=f"engine, {wall}", **_WALL_STYLES[wall])
     eight.plot(*published.UNEQUAL_A_BETA.T, label="simulated, case A", **_SIMULATED)
     eight.plot(*published.UNEQUAL_B_BETA.T, label="simulated, case B", **{**_OTHER_SIMULATED, "marker": "x"})
-    eight.plot(_stickiness(measured.unequal), measured.unequal.beta, color="C1", label="engine")
+    eight.plot(measured.unequal.stickiness, measured.unequal.beta, color="C1", label="engine")
     slides = np.geomspace(0.15, 1.0, 40)
     for axes, title in ((six, "6: on a plane, e = 0.5"), (eight, "8: on a larger sphere, e = 0.5")):
         axes.plot(slides, slides - 1.0, label="slides all the way: x - 1", **_CLOSED)

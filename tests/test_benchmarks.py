@@ -13,8 +13,9 @@ import pytest
 from walkers.audit import AuditReport, Verdict, chung_ooi, run_audit
 from walkers.audit.bench import FIRST_BEAD, bench_recording, scene_on_floor
 from walkers.audit.checks import benchmarks, closed_forms
-from walkers.audit.checks.benchmarks import ALLOY, GLASS, OXIDE, STEEL, farthest
+from walkers.audit.checks.benchmarks import ALLOY, GLASS, OXIDE, STEEL
 from walkers.audit.impacts import stiff_case
+from walkers.audit.oblique import farthest
 from walkers.audit.run import selected
 from walkers.physics.impact import Impact, Motion, after_impact, friction_excess, sliding_loss
 from walkers.studies import benchmarks as benchmark_study

@@ -15,7 +15,7 @@ contact, which Mindlin's spring does not have, or points on which the published 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from walkers.audit.check import Check, Line
 from walkers.audit.impacts import (
     Course,
     Launch,
-    Rebound,
     Sphere,
     between_spheres,
     course_of_pair,
@@ -33,7 +32,8 @@ from walkers.audit.impacts import (
     onto_floor,
     walls_of,
 )
-from walkers.physics.impact import SURFACE_OVER_CENTRE, Impact, Motion, after_impact, friction_excess, sliding_loss
+from walkers.audit.oblique import Oblique, as_the_model, excess_line, farthest, largest
+from walkers.physics.impact import SURFACE_OVER_CENTRE, Impact, sliding_loss
 from walkers.physics.wall import WALL_COPIES
 from walkers.postprocess.dump import FloatArray
 
@@ -41,13 +41,8 @@ READING = 0.02
 """Of an axis: how far a point read off a printed figure may be off."""
 STEP = 2e-3
 """Relative error of speeds and forces at a thousand steps a contact."""
-SLIP = 5e-3
-"""Of the sliding velocity: what the step at which a contact begins to slip makes of the rest, at a thousand steps."""
-EXCESS = 0.02
-"""Of friction's impulse: what a thousand steps make of the end of a damped contact, where stiffness vanishes."""
 _PAPER = "Chung, Ooi 2011, doi 10.1007/s10035-011-0277-0, "
 _HERTZ = "Hertz: "
-_MODEL = "the engine's model, integrated apart from it"
 _WALL = frozenset({"walls"})
 
 GLASS = Sphere(4.8e10, 0.20, 2800.0, 0.01)
@@ -63,98 +58,6 @@ RIGID = Sphere(7.0e13, 0.33, 2.7e6, 0.5)
 """The larger sphere of test 8: a thousand times stiffer and denser."""
 ANGLES = np.arange(5.0, 90.0, 5.0)
 """Angles of incidence of the simulated points, degrees from the normal."""
-
-
-@dataclass(frozen=True)
-class Oblique:
-    """Rebounds of one series of launches from walls of one kind, with what the closed forms need of them."""
-
-    launches: tuple[Launch, ...]
-    impact: Impact
-    rebound: Rebound
-
-    def before(self, name: str) -> FloatArray:
-        """An attribute of the launches, shape (N,)."""
-        return np.array([getattr(launch, name) for launch in self.launches])
-
-    @property
-    def motion(self) -> Motion:
-        """At the launch; tangential speeds as the engine has them."""
-        rolling = self.impact.radius * self.before("spin")
-        return Motion(self.before("normal_speed"), self.before("tangential_speed"), rolling)
-
-    @property
-    def restitution(self) -> FloatArray:
-        """Measured."""
-        return self.rebound.normal_speed / self.before("normal_speed")
-
-    @property
-    def tangential_restitution(self) -> FloatArray:
-        """Of the centres' velocities."""
-        return self.rebound.tangential_speed / self.before("tangential_speed")
-
-    @property
-    def angle(self) -> FloatArray:
-        """Of incidence, degrees from the normal."""
-        return np.degrees(np.arctan2(self.before("tangential_speed"), self.before("normal_speed")))
-
-    @property
-    def rebound_angle(self) -> FloatArray:
-        """Of the surfaces, degrees."""
-        return np.degrees(np.arctan(self.rebound.sliding / self.rebound.normal_speed))
-
-    @property
-    def incidence(self) -> FloatArray:
-        """Of the surfaces: s/v_n."""
-        return self.motion.sliding / self.motion.normal
-
-    @property
-    def recoil(self) -> FloatArray:
-        """Of the surfaces: s'/v_n'."""
-        return self.rebound.sliding / self.rebound.normal_speed
-
-    @property
-    def beta(self) -> FloatArray:
-        """-s'/s."""
-        return -self.rebound.sliding / self.motion.sliding
-
-    @property
-    def stickiness(self) -> FloatArray:
-        """7/2 μ(1+e) v_n/s with the measured restitution; below one a rigid sphere slides all the way."""
-        return SURFACE_OVER_CENTRE * self.impact.friction * (1.0 + self.restitution) / self.incidence
-
-    @property
-    def deepest(self) -> float:
-        """Overlap over the radius."""
-        return self.impact.depth(float(self.motion.normal.max())) / self.impact.radius
-
-
-def farthest(
-    what: str, source: str, points: published.Points, x: FloatArray, y: FloatArray, axis: float, tolerance: float | None
-) -> Line:
-    """The one of some points that is farthest from a curve through (x, y); judged by the distance over the axis."""
-    order = np.argsort(x)
-    ours = np.interp(points[:, 0], x[order], y[order])
-    worst = int(np.argmax(np.abs(ours - points[:, 1])))
-    expected, measured = float(points[worst, 1]), float(ours[worst])
-    what = f"{what}: farthest point, at {points[worst, 0]:g}"
-    return Line(what, source, expected, measured, "", tolerance, abs(measured - expected) / axis)
-
-
-def _largest(what: str, source: str, expected: FloatArray, measured: FloatArray, tolerance: float) -> Line:
-    """The one of several numbers that is farthest, judged absolutely."""
-    worst = int(np.argmax(np.abs(measured - expected)))
-    error = abs(float(measured[worst] - expected[worst]))
-    return Line(what, source, float(expected[worst]), float(measured[worst]), "", tolerance, error)
-
-
-def _as_the_model(what: str, found: Oblique, needs: frozenset[str] = frozenset()) -> Line:
-    law = after_impact(found.impact, found.motion)
-    before = found.motion.sliding
-    line = _largest(
-        f"{what}, surface after over before", _MODEL, law.sliding / before, found.rebound.sliding / before, SLIP
-    )
-    return replace(line, needs=needs)
 
 
 def _course_lines(name: str, course: Course, impact: Impact, closing: float, leaving: float) -> Iterator[Line]:
@@ -268,12 +171,12 @@ def angle_lines(bench: Bench) -> Iterator[Line]:
         for wall, found in by_angle(bench, sphere).items():
             what, source = f"4: {name} on a {wall}", _PAPER + "simulated"
             angle, back = found.angle, -found.rebound.spin
-            yield _as_the_model(what, found)
+            yield as_the_model(what, found)
             loss = sliding_loss(0.092, 0.0, 1.0 + found.restitution) / np.tan(np.radians(angle))
             slides = angle > 36.0  # well beyond where a rigid sphere begins to: tan 32.5° = 7/2 μ(1+e)
             e_t = found.tangential_restitution
             kinematic = f"{what}, e_t of what slides all the way"
-            yield _largest(kinematic, "1 - μ(1+e)/tan θ", (1.0 - loss)[slides], e_t[slides], STEP)
+            yield largest(kinematic, "1 - μ(1+e)/tan θ", (1.0 - loss)[slides], e_t[slides], STEP)
             steep = (
                 restitution[:, 0] < 15.0
             )  # e_t falls by 0.05 a degree there, so that it hangs on the angle's reading
@@ -319,12 +222,12 @@ def tangential_lines(bench: Bench) -> Iterator[Line]:
     for wall, found in by_tangential_speed(bench).items():
         what, x = f"5: steel on a {wall}", found.incidence / STEEL_FRICTION
         surface, turn = reduced_rebound(found)
-        yield _as_the_model(what, found)
+        yield as_the_model(what, found)
         slides = x > 7.0
-        arm = SURFACE_OVER_CENTRE * 2.0 * found.deepest
+        arm = 2.5 * found.deepest  # 5/2 (1+e) times half of the overlap over the radius
         kinematic = "s/(μ v_n) - 7 (1+e = 2)"
-        yield _largest(f"{what}, surface of what slides all the way", kinematic, x[slides] - 7.0, surface[slides], arm)
-        yield _largest(
+        yield largest(f"{what}, surface of what slides all the way", kinematic, x[slides] - 7.0, surface[slides], arm)
+        yield largest(
             f"{what}, spin of what slides all the way", "-5/2 (1+e)", np.full(slides.sum(), -5.0), turn[slides], arm
         )
         for by, surfaces, spins in (
@@ -367,9 +270,9 @@ def spin_lines(bench: Bench) -> Iterator[Line]:
     for wall, found in by_spin(bench).items():
         what = f"6: aluminium alloy on a {wall}"
         needs = _WALL if found.impact.copies > 1 else frozenset[str]()
-        yield _as_the_model(what, found, needs)
+        yield as_the_model(what, found, needs)
         expected = found.impact.rebound
-        line = _largest(f"{what}, restitution", "of the damping", np.full(1, expected), found.restitution[:1], 0.01)
+        line = largest(f"{what}, restitution", "of the damping", np.full(1, expected), found.restitution[:1], 0.01)
         yield replace(line, needs=needs)
         yield excess_line(what, found)
         if found.impact.copies == 1:
@@ -383,19 +286,9 @@ def spin_lines(bench: Bench) -> Iterator[Line]:
 def _spin_points(test: str, what: str, found: Oblique, points: published.Points) -> Iterator[Line]:
     sliding = points[:, 0] < 1.0
     source = f"{_PAPER}test {test}, simulated"
-    x = SURFACE_OVER_CENTRE * 0.4 * 1.5 / found.incidence
+    x = found.stickiness
     yield farthest(f"{what}, -s'/s, sliding", source, points[sliding], x, found.beta, 1.6, None)
     yield farthest(f"{what}, -s'/s, the rest", source, points[~sliding], x, found.beta, 1.6, None)
-
-
-def excess_line(what: str, found: Oblique) -> Line:
-    """By how much friction's impulse exceeds μ times the normal one in the fastest of the launches: a defect."""
-    fastest = int(np.argmax(found.incidence))
-    lost = float(found.rebound.tangential_speed[fastest] - found.before("tangential_speed")[fastest])
-    normal = found.impact.friction * (1.0 + found.restitution[fastest]) * found.before("normal_speed")[fastest]
-    source = "1 by Coulomb; the number is the engine's model's, integrated apart from it"
-    said = f"{what}, friction beyond its limit: impulse over μ(1+e)"
-    return Line(said, source, friction_excess(found.impact), abs(lost) / float(normal), "", EXCESS, defect=True)
 
 
 def turning_together(bench: Bench) -> Oblique:
@@ -411,10 +304,10 @@ def turning_lines(bench: Bench) -> Iterator[Line]:
     spin = found.before("spin")
     source = _PAPER + "surfaces do not slide"
     turned = found.rebound.spin / spin
-    yield _largest("7: two spheres, spin after over before", source, np.ones_like(spin), turned, 1e-6)
+    yield largest("7: two spheres, spin after over before", source, np.ones_like(spin), turned, 1e-6)
     speed = found.rebound.tangential_speed / 0.2
-    yield _largest("7: two spheres, tangential speed over normal", source, np.zeros_like(spin), speed, 1e-6)
-    yield _largest("7: two spheres, restitution", "as given", np.full_like(spin, 0.5), found.restitution, 0.01)
+    yield largest("7: two spheres, tangential speed over normal", source, np.zeros_like(spin), speed, 1e-6)
+    yield largest("7: two spheres, restitution", "as given", np.full_like(spin, 0.5), found.restitution, 0.01)
 
 
 def unequal(bench: Bench) -> Oblique:
@@ -428,7 +321,7 @@ def unequal_lines(bench: Bench) -> Iterator[Line]:
     """Test 8."""
     found = unequal(bench)
     what = "8: on a large sphere"
-    yield _as_the_model(f"{what}, as on a plane", found)
+    yield as_the_model(f"{what}, as on a plane", found)
     yield excess_line(what, found)
     for case, points in (("case A", published.UNEQUAL_A_BETA), ("case B", published.UNEQUAL_B_BETA)):
         yield from _spin_points("8", f"{what}, {case}", found, points)

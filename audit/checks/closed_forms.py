@@ -25,6 +25,7 @@ from walkers.audit.check import Check, Line
 from walkers.audit.checks.benchmarks import WALLS
 from walkers.audit.impacts import Launch, Sphere, onto_floor, walls_of
 from walkers.audit.laws import largest_error
+from walkers.audit.oblique import MODEL
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads
 from walkers.physics.contact import damping_ratio, hertz_overlap, reduced_modulus, reduced_shear_modulus
@@ -230,7 +231,7 @@ def spinning_lines(bench: Bench) -> Iterator[Line]:
         what = f"a spinning bead thrown sideways by a {wall}"
         for name, expected, kept, source in (
             ("sliding to the end", found.expected, slides, "μ(1+e)v_n"),
-            ("all spins", found.model, found.spin > 0.0, "the engine's model, integrated apart from it"),
+            ("all spins", found.model, found.spin > 0.0, MODEL),
         ):
             error = largest_error(found.sideways[kept, None], expected[kept, None])
             ends = float(expected[kept][-1]), float(found.sideways[kept][-1])
