@@ -13,7 +13,18 @@ from typing import Any
 
 from walkers.audit.bench import Bench
 from walkers.audit.check import Check, Line, Verdict
-from walkers.audit.checks import capillary, contact, cylinder, drive, energy, repeatability, timestep, viscous
+from walkers.audit.checks import (
+    benchmarks,
+    capillary,
+    closed_forms,
+    contact,
+    cylinder,
+    drive,
+    energy,
+    repeatability,
+    timestep,
+    viscous,
+)
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.runner.audits import AuditRecord, write_audit
@@ -29,6 +40,8 @@ CHECKS: tuple[Check, ...] = (
     *repeatability.CHECKS,
     *timestep.CHECKS,
     *energy.CHECKS,
+    *benchmarks.CHECKS,
+    *closed_forms.CHECKS,
 )
 
 

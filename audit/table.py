@@ -20,6 +20,8 @@ GROUPS = {
     7: "Independence, repeatability, restart, ranks",
     8: "Time step",
     9: "Energy",
+    10: "Published benchmarks (Chung, Ooi 2011)",
+    11: "Closed forms",
 }
 
 

@@ -40,6 +40,8 @@ RESTART_NAME = "state.restart"
 PREVIOUS_RESTART_NAME = "previous.restart"
 SETTLING_SECONDS = 0.05
 """Length of the segments in which beads come to rest; at the end of each we check whether they have."""
+_STIFFEST = 1e9
+"""Pa; no case has stiffer contacts, but a check may."""
 _SKIN = 2e-4
 """m; of piles: between 0.1 and 0.3 mm it makes no difference of more than some per cent to the time of a step."""
 
@@ -269,6 +271,7 @@ def compose(plan: Plan) -> Deck:
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
     angle = case.liquid.contact_angle
     surfaces = plan.surfaces or (case.contact,)
+    moduli = [*(surface.youngs_modulus for surface in surfaces), case.contact.youngs_modulus]
     moving = _moving(plan)
     forces, of_walls = _forces(plan, scene), _wall_forces(plan, scene, moving)
     meshes = wall_meshes(scene.beads, scene.faces, max(scene.upper))
@@ -287,6 +290,8 @@ def compose(plan: Plan) -> Deck:
         copies=[(f"{mesh.name}_{number}", mesh) for mesh in meshes for number in range(1, workarounds.wall_copies + 1)],
         contact_model=_contact_model(case),
         types=len(surfaces) + 1,
+        moduli=moduli,
+        stiff=max(moduli) > _STIFFEST,
         friction=_pairs([(surface.friction_bead_bead, surface.friction_bead_wall) for surface in surfaces]),
         rolling_friction=_pairs([(surface.rolling_friction,) * 2 for surface in surfaces]),
         restitution=_pairs([(surface.restitution,) * 2 for surface in surfaces]),

@@ -20,6 +20,8 @@ class Bead:
         Which of the deck's ways to touch is its, from 1.
     loading
         Which of the deck's loadings it feels, from 0 (`walkers.templates.sharing.Loading`).
+    density
+        kg/m³; None for that of the case.
     """
 
     id: int
@@ -29,6 +31,7 @@ class Bead:
     spin: Vector = (0.0, 0.0, 0.0)
     surface: int = 1
     loading: int = 0
+    density: float | None = None
 
 
 @dataclass(frozen=True)
