@@ -1,180 +1,35 @@
-"""How far laws of capillary bridges are from the Young–Laplace equation, the engine's among them.
-
-Each law gives the pull over the surface tension, F/γ, of a bridge of constant volume at gaps. Laws made for equal
-spheres of radius R take unequal ones and planes in Derjaguin's way, R = 2 R1 R2 / (R1 + R2), twice the sphere's radius
-at a plane; the engine's own takes √(R1 R2), and a wall for an equal sphere, twice (`walkers.physics.wall`). The
-reference is `walkers.studies.laplace`.
-
-References
-----------
-F. Soulié, F. Cherblanc, M. S. El Youssoufi, C. Saix, Int. J. Numer. Anal. Meth. Geomech. 30 (2006) 213–228,
-doi 10.1002/nag.476.
-C. D. Willett, M. J. Adams, S. A. Johnson, J. P. K. Seville, Langmuir 16 (2000) 9396–9405, doi 10.1021/la000657y.
-Y. I. Rabinovich, M. S. Esayanur, B. M. Moudgil, Langmuir 21 (2005) 10992–10997, doi 10.1021/la0517639.
-P. Lambert, A. Chau, A. Delchambre, S. Régnier, Langmuir 24 (2008) 3157–3163, doi 10.1021/la7036444.
-T. Weigert, S. Ripperger, Part. Part. Syst. Charact. 16 (1999) 238–242,
-doi 10.1002/(SICI)1521-4117(199910)16:5<238::AID-PPSC238>3.0.CO;2-E.
-M. Bagheri, S. Roy, T. Pöschel, Comput. Part. Mech. 11 (2024) 2179–2190, doi 10.1007/s40571-024-00772-5.
-G. Lian, C. Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138–147, doi 10.1006/jcis.1993.1452.
-"""
+"""How far laws of capillary bridges are from the Young–Laplace equation, and what that does to walkers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from math import cbrt, cos, inf, log, pi, sin, sqrt
+from math import acos, degrees, inf, log, pi, radians
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
+from walkers.inputs.reading import load_case
+from walkers.inputs.text import rendered
+from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics import capillary
-from walkers.studies.laplace import FloatArray, ForceCurve, force_curve
+from walkers.postprocess.drawing import new_figure, styled
+from walkers.studies.bridge_laws import ENGINE, LAWS, Law
+from walkers.studies.chapter import Chapter
+from walkers.studies.laplace import POINTS, FloatArray, ForceCurve, bridge, force_curve
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import friction_of
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 CONTACT_NAMES = ("large bead on wall", "small bead on wall", "bead on bead")
-_GAPS = 400
+WALL = ("wall", (3.0e-4, inf))
+_GAPS = 280
 _SMALL_CHANGE = 0.02
-
-
-def derjaguin_radius(radius_1: float, radius_2: float) -> float:
-    """Radius of the equal spheres whose surfaces part as these do, 2 R1 R2 / (R1 + R2); infinity is a plane."""
-    return 2.0 / (1.0 / radius_1 + 1.0 / radius_2)
-
-
-def soulie(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
-    """The engine's law (Soulié et al. 2006, Eqs. 13 and 14), at a plane that of two equal spheres, twice."""
-    if radius_2 == inf:
-        return np.array(
-            [capillary.capillary_force_at_wall(1.0, radius_1, volume, contact_angle, float(gap)) for gap in gaps]
-        )
-    pair = (radius_1, radius_2)
-    return np.array([capillary.capillary_force(1.0, *pair, volume, contact_angle, float(gap)) for gap in gaps])
-
-
-def willett(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
-    """Willett et al. (2000), appendix: ln(F / 2πRγ) = f1 - f2 exp(f3 ln s + f4 ln² s), s half the gap over √(V/R)."""
-    radius = derjaguin_radius(radius_1, radius_2)
-    v, t = log(volume / radius**3), np.array([1.0, contact_angle, contact_angle**2])
-    f1 = (
-        t @ [-0.44507, 0.050832, -1.1466]
-        + t @ [-0.1119, -0.000411, -0.1490] * v
-        + t @ [-0.012101, -0.0036456, -0.01255] * v**2
-        + t @ [-0.0005, -0.0003505, -0.00029076] * v**3
-    )
-    f2 = (
-        t @ [1.9222, -0.57473, -1.2918]
-        + t @ [-0.0668, -0.1201, -0.22574] * v
-        + t @ [-0.0013375, -0.0068988, -0.01137] * v**2
-    )
-    f3 = (
-        t @ [1.268, -0.01396, -0.23566]
-        + t @ [0.198, 0.092, -0.06418] * v
-        + t @ [0.02232, 0.02238, -0.009853] * v**2
-        + t @ [0.0008585, 0.001318, -0.00053] * v**3
-    )
-    f4 = (
-        t @ [-0.010703, 0.073776, -0.34742]
-        + t @ [0.03345, 0.04543, -0.09056] * v
-        + t @ [0.0018574, 0.004456, -0.006257] * v**2
-    )
-    # At contact ln s is -∞: a gap so small that the force is the one there.
-    s = np.log(np.maximum(gaps, 1e-9 * radius) / 2.0 / sqrt(volume / radius))
-    apart = np.where(gaps > 0.0, np.exp(f3 * s + f4 * s**2), 0.0)
-    return 2.0 * pi * radius * np.exp(f1 - f2 * apart)
-
-
-def willett_simple(
-    radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray
-) -> FloatArray:
-    """Willett et al. (2000), Eq. 12, for small volumes: F = 2πRγ cos θ / (1 + 2.1 s + 10 s²)."""
-    radius = derjaguin_radius(radius_1, radius_2)
-    s = gaps / 2.0 / sqrt(volume / radius)
-    return 2.0 * pi * radius * cos(contact_angle) / (1.0 + 2.1 * s + 10.0 * s**2)
-
-
-def lambert(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
-    """Rabinovich et al.'s without its second term, as Lambert et al. (2008) correct it: 2πRγ cos θ / (1 + h / 2d).
-
-    d, half the immersed height, from the volume: 2d/h = -1 + √(1 + 2V / πRh²) (Rabinovich et al., Eq. 20).
-    """
-    radius = derjaguin_radius(radius_1, radius_2)
-    # h / 2d without a division by h.
-    immersed = np.sqrt(gaps**2 + 2.0 * volume / (pi * radius)) - gaps
-    return 2.0 * pi * radius * cos(contact_angle) / (1.0 + gaps / immersed)
-
-
-def rabinovich(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
-    """Rabinovich et al. (2005), Eq. 19: `lambert`, and 2πRγ sin α sin(θ + α) with α² = 2d/R (their Eq. A3)."""
-    radius = derjaguin_radius(radius_1, radius_2)
-    immersed = np.sqrt(gaps**2 + 2.0 * volume / (pi * radius)) - gaps
-    embracing = np.sqrt(immersed / radius)
-    pressed = lambert(radius_1, radius_2, volume, contact_angle, gaps)
-    return pressed + 2.0 * pi * radius * np.sin(embracing) * np.sin(contact_angle + embracing)
-
-
-def weigert(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
-    """Weigert and Ripperger (1999), Eqs. 5, 6, 15–17, 21, 22: a toroid, its filling angle by a fit."""
-    radius = derjaguin_radius(radius_1, radius_2)
-    spread = (1.0 + 3.0 * gaps / radius) * (1.0 + 1.1 * sin(contact_angle))
-    angle = np.arcsin(np.minimum(1.0, (volume / (0.96 * radius**3 * spread)) ** 0.25))
-    meridian = (2.0 * radius * (1.0 - np.cos(angle)) + gaps) / (2.0 * np.cos(angle + contact_angle))
-    neck = radius * np.sin(angle) + meridian * (np.sin(angle + contact_angle) - 1.0)
-    line = radius * np.sin(angle)
-    pressure = 1.0 / meridian - 1.0 / neck
-    return pi * line**2 * pressure + 2.0 * pi * line * np.sin(angle + contact_angle)
-
-
-def bagheri(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
-    """Bagheri, Roy and Pöschel (2024), Eqs. 24–30, with the gap over `rupture_of_willett`."""
-    radius = derjaguin_radius(radius_1, radius_2)
-    v, t = volume / radius**3, contact_angle
-    a, b = 0.4158 * v**0.2835 + 0.6474, -0.2087 * v**0.3113 + 2.267
-    touching = 2.0 * pi * (1.0 - 0.3823 * v**0.2586) * (1.0 - a * sin(t) ** b)
-    a_s = -0.3319 * v**0.4974 + 0.6717 * v**0.1995
-    b_s = 13.84 * v**-0.3909 - 12.11 * v**-0.3945
-    cubic = -0.007815 * log(v) ** 2 - 0.2105 * log(v) - 1.426
-    linear = -1.78 * v**0.8351 + 0.6669 * v**-0.01391
-    b_s *= cubic * t**3 + linear * t + 1.0
-    s = gaps / rupture_of_willett(radius_1, radius_2, volume, contact_angle)
-    return np.asarray(radius * touching * (1.0 + a_s * s) / (1.0 + b_s * a_s * s + b_s * s**2))
-
-
-def rupture_of_lian(radius_1: float, radius_2: float, volume: float, contact_angle: float) -> float:  # noqa: ARG001
-    """Lian, Thornton and Adams (1993), the engine's: (1 + θ/2) V^(1/3), whatever the radii."""
-    return capillary.rupture_distance(volume, contact_angle)
-
-
-def rupture_of_willett(radius_1: float, radius_2: float, volume: float, contact_angle: float) -> float:
-    """Willett et al. (2000), Eq. 15, for equal spheres: (1 + θ/2) (V^(1/3) + 0.1 V^(2/3) / R)."""
-    radius = derjaguin_radius(radius_1, radius_2)
-    return (1.0 + 0.5 * contact_angle) * (cbrt(volume) + 0.1 * cbrt(volume) ** 2 / radius)
-
-
-@dataclass(frozen=True)
-class Law:
-    """A published law: its ``force`` (radii, volume, contact angle, gaps → F/γ) and its ``rupture`` distance.
-
-    Those that give no rupture distance are taken as far as the engine's law.
-    """
-
-    name: str
-    force: Callable[[float, float, float, float, FloatArray], FloatArray]
-    rupture: Callable[[float, float, float, float], float]
-
-
-LAWS = (
-    Law("Soulié 2006 (engine)", soulie, rupture_of_lian),
-    Law("Willett 2000", willett, rupture_of_willett),
-    Law("Willett 2000, Eq. 12", willett_simple, rupture_of_willett),
-    Law("Rabinovich 2005", rabinovich, rupture_of_lian),
-    Law("Lambert 2008", lambert, rupture_of_lian),
-    Law("Weigert 1999", weigert, rupture_of_lian),
-    Law("Bagheri 2024", bagheri, rupture_of_willett),
-)
-ENGINE = LAWS[0]
 
 
 @dataclass(frozen=True)
@@ -338,7 +193,7 @@ def speeds(case: Case) -> Speeds:
     factors = [np.ones(3), np.array(exact), *single, np.full(3, up), np.full(3, down)]
     velocity = _velocities(case, np.array(factors))
     slopes = np.diff(np.log(velocity[2:].reshape(4, 2)), axis=1)[:, 0] / (log(down) - log(up))
-    one, other, pair, together = (float(slope) for slope in slopes)
+    one, other, pair, together = (round(float(slope), 6) + 0.0 for slope in slopes)  # no -0
     return Speeds(float(velocity[0]), float(velocity[1]), (one, other, pair, together))
 
 
@@ -351,3 +206,228 @@ def _velocities(case: Case, factors: FloatArray) -> FloatArray:
     friction = friction_of(*[case] * len(factors), viscous=True)
     drive = (case.drive.frequency, case.drive.peak_acceleration)
     return walk(Walker.joined(many), friction, *drive, steady_acceleration=case.axial_gravity).velocity
+
+
+PAIRS = ((3.0e-4, 2.0e-4), (6.0e-4, 3.0e-4), (5.45e-4, 3.075e-4))
+"""Radii of the paper's dimers and of its climbing beads, m."""
+FRACTIONS = (0.01, 0.05, 0.171)
+ANGLES = (0.0, radians(38.2))
+"""Perfect wetting, and the calibrated contact angle."""
+
+
+def conditions() -> tuple[Condition, ...]:
+    """The paper's pairs of beads, and a bead on a wall, which is the same in units of its radius for all radii."""
+    return tuple(
+        Condition(name, *pair, fraction, angle)
+        for fraction in FRACTIONS
+        for angle in ANGLES
+        for name, pair in (*((f"{1e3 * one:.4g}/{1e3 * two:.4g} mm", (one, two)) for one, two in PAIRS), WALL)
+    )
+
+
+CASES = ("fig1b", "fig4a")
+_CLIMBER = "climber-dimer"
+SHIPPED = (FRACTIONS[-1], ANGLES[-1])
+PILES = (FRACTIONS[0], ANGLES[0])
+_COLLOCATED = 1e-8
+_ENERGY = 2e-3
+_FITTED = 0.02
+
+
+def chapter(*, quick: bool = False) -> Chapter:
+    """Bridges by Young–Laplace, published laws beside them, and what the engine's errors do to walkers.
+
+    Parameters
+    ----------
+    quick
+        Two conditions instead of six.
+    """
+    all_of = [one for one in conditions() if not quick or (one.volume_fraction, one.contact_angle) in (SHIPPED, PILES)]
+    engine = [{**asdict(one), "volume": one.volume, **asdict(deviation(ENGINE, one))} for one in all_of]
+    laws = [_row_of(law) for law in LAWS]
+    walking = {name: _walking(load_case(name)) for name in CASES}
+    checks = _checks(all_of)
+    numbers = {
+        "engine": engine,
+        "laws": laws,
+        "walkers": walking,
+        "checks": checks,
+        "bond_numbers": {name: _bond_number(load_case(name)) for name in (*CASES, _CLIMBER)},
+        "angle_of_engines_wall_pull": _angle_of_wall_pull(),
+        "coverage": _coverage(load_case(CASES[0])),
+    }
+    return Chapter(
+        name="bridges",
+        title="Capillary bridges by the Young–Laplace equation",
+        text=_text_of(numbers),
+        figures={"bridges": figure()},
+        numbers=numbers,
+        failed=tuple(check["what"] for check in checks if not check["largest"] <= check["expected"]),
+    )
+
+
+def _text_of(numbers: dict[str, Any]) -> str:
+    """The chapter's Markdown."""
+    pairs = [row for row in numbers["engine"] if row["name"] != WALL[0]]
+    walls = [row for row in numbers["engine"] if row["name"] == WALL[0]]
+    fits = [row for row in numbers["laws"] if row["name"] in {LAWS[1].name, LAWS[-1].name}]
+    gains = [100.0 * (one["young_laplace"] / one["engine"] - 1.0) for one in numbers["walkers"].values()]
+    coverage = numbers["coverage"]
+    left = [
+        coverage[f"{bead}_room"] - coverage[f"{bead}_wall"] - coverage[f"{bead}_pair"] for bead in ("large", "small")
+    ]
+    return rendered(
+        "walkers.studies",
+        "bridges.md.j2",
+        degrees=degrees,
+        points=POINTS,
+        names=CONTACT_NAMES,
+        max_pair=max(pairs, key=lambda row: float(row["pull"])),
+        wall_pulls=_range(walls, "pull"),
+        wall_works=_range(walls, "work"),
+        wall_ruptures=_range(walls, "rupture"),
+        pair_works=_range(pairs, "work"),
+        pair_pulls=_range(pairs, "pull"),
+        best_pull=max(abs(one["pull"] - 1.0) for row in fits for key, one in row.items() if key != "name"),
+        gains=[f"{gain:.0f} %" for gain in gains],
+        merging=_MERGING if min(left) < 0.0 else _APART,
+        **numbers,
+    )
+
+
+def _range(rows: list[dict[str, Any]], key: str) -> str:
+    values = [float(row[key]) for row in rows]
+    return f"{min(values):.2f} to {max(values):.2f}"
+
+
+_MERGING = "They overlap: there liquid merges, which no law of pairs knows."
+_APART = "They do not meet, if only just."
+
+
+def _row_of(law: Law) -> dict[str, Any]:
+    """A law between two beads and at a wall, as shipped and in piles."""
+    chosen = {}
+    for label, liquid in (("shipped", SHIPPED), ("piles", PILES)):
+        for contact, name, pair in (("beads", "0.3/0.2 mm", PAIRS[0]), ("wall", *WALL)):
+            chosen[f"{label} {contact}"] = asdict(deviation(law, Condition(name, *pair, *liquid)))
+    return {"name": law.name, **chosen}
+
+
+def _walking(case: Case) -> dict[str, Any]:
+    found = speeds(case)
+    contacts = [
+        {"name": one.name, "engine_pull": one.engine_pull, "pull": one.pull, **asdict(one.deviation)}
+        for one in capillary_errors(case)
+    ]
+    return {**asdict(found), "contacts": contacts}
+
+
+def _checks(all_of: list[Condition]) -> list[dict[str, Any]]:
+    """What must hold of the reference, the largest difference that was found, and what was expected."""
+    collocated, energetic = [], []
+    middle = POINTS // 2
+    for one in all_of:
+        exact = reference(one)
+        energetic.append(abs(float(np.trapezoid(exact.forces, exact.gaps)) / exact.work - 1.0))
+        if (one.volume_fraction, one.contact_angle) in (SHIPPED, PILES):
+            solved = bridge(*one.bridge, float(exact.gaps[middle]))
+            collocated.append(abs(solved.force / exact.forces[middle] - 1.0))
+    fitted = [abs(deviation(LAWS[-1], one).pull - 1.0) for one in all_of if one.radius_2 != inf]
+    return [
+        {"what": "force by collocation and in closed form", "largest": max(collocated), "expected": _COLLOCATED},
+        {
+            "what": "work of the tabulated forces and fall of surface energy",
+            "largest": max(energetic),
+            "expected": _ENERGY,
+        },
+        {
+            "what": "pull at contact and Bagheri et al.'s fit to their own solutions",
+            "largest": max(fitted),
+            "expected": _FITTED,
+        },
+    ]
+
+
+def _bond_number(case: Case) -> dict[str, float]:
+    """ρgR²/γ of the largest bead, and what the drive's peak acceleration makes of it."""
+    liquid, radius = case.liquid, max(dimer_of(case).radii)
+    if liquid.density is None:
+        raise ValueError("liquid.density: expected, for a Bond number")
+    at_rest = liquid.density * ACCELERATION_OF_ONE_G * radius**2 / liquid.surface_tension
+    return {"at_rest": at_rest, "driven": at_rest * case.drive.peak_acceleration / ACCELERATION_OF_ONE_G}
+
+
+def _angle_of_wall_pull() -> float:
+    """Contact angle at which Young–Laplace gives the engine's pull at a wall with the shipped liquid, rad."""
+    shipped = Condition(*_flat(WALL), *SHIPPED)
+    engine = force_of(ENGINE, shipped, np.zeros(1))[0]
+
+    def excess(angle: float) -> float:
+        return float(force_curve(*shipped.bridge[:3], angle, [0.0]).forces[0] - engine)
+
+    return float(brentq(excess, 0.0, SHIPPED[1], xtol=1e-6))
+
+
+def _flat(named: tuple[str, tuple[float, float]]) -> tuple[str, float, float]:
+    return named[0], *named[1]
+
+
+def _coverage(case: Case) -> dict[str, float]:
+    """How far bridges at contact reach around the beads of a dimer, rad, and the room between wall and other bead."""
+    radii, (large, small, pair) = dimer_of(case).radii, [one.condition for one in capillary_errors(case)]
+    on_walls = [bridge(*one.bridge, 0.0).filling_angles[0] for one in (large, small)]
+    between = bridge(*pair.bridge, 0.0).filling_angles
+    apart = acos((radii[0] - radii[1]) / (radii[0] + radii[1]))
+    return {
+        "large_wall": on_walls[0],
+        "large_pair": between[0],
+        "large_room": apart,
+        "small_wall": on_walls[1],
+        "small_pair": between[1],
+        "small_room": pi - apart,
+    }
+
+
+_SHOWN = tuple(law for law in LAWS if "Eq. 12" not in law.name)
+_LOOKS = (("#c4473a", "-"), ("#1f4e8c", "--"), ("#8f8f8f", ":"), ("#58b89a", "-."), ("#e8c060", "-"), ("#7b52a1", "--"))
+_HIGHEST = 2.0
+
+
+@styled
+def figure() -> Figure:
+    """Force against gap by Young–Laplace and by the laws, and their differences, between beads and at a wall."""
+    panels = (
+        ("between beads of 0.3 and 0.2 mm", Condition("0.3/0.2 mm", *PAIRS[0], *SHIPPED)),
+        ("bead on wall", Condition(*_flat(WALL), *SHIPPED)),
+        ("bead on wall", Condition(*_flat(WALL), *PILES)),
+    )
+    drawing, axes = new_figure(10.0, 6.2, nrows=2, ncols=3, sharex="col", sharey="row")
+    for column, (what, condition) in enumerate(panels):
+        _draw(axes[:, column], condition)
+        angle = degrees(condition.contact_angle)
+        axes[0, column].set_title(f"{what}\nliquid {condition.volume_fraction:g} of a bead, {angle:.3g}°", fontsize=9)
+        axes[1, column].set_xlabel("gap / rupture distance by Young–Laplace")
+    axes[0, 0].set(ylabel="pull / pull at contact by Young–Laplace", ylim=(0.0, _HIGHEST))
+    axes[1, 0].set(ylabel="difference / pull at contact", ylim=(-0.25, 0.5))
+    drawing.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return drawing
+
+
+def _draw(axes: Any, condition: Condition) -> None:
+    exact = reference(condition)
+    gaps = np.linspace(0.0, 1.4, _GAPS) * exact.rupture
+    inside = gaps <= exact.rupture
+    pull = np.zeros(_GAPS)
+    pull[inside] = force_curve(*condition.bridge, gaps[inside]).forces
+    axes[0].plot(
+        gaps[inside] / exact.rupture, pull[inside] / pull[0], color="black", linewidth=2.2, label="Young–Laplace"
+    )
+    axes[0].plot(1.0, exact.forces[-1] / pull[0], "o", color="black", markersize=5)
+    axes[1].axhline(0.0, color="black", linewidth=1.0)
+    for law, (colour, dashes) in zip(_SHOWN, _LOOKS, strict=True):
+        until = gaps <= law.rupture(*condition.bridge)
+        forces = force_of(law, condition, gaps)
+        width = 2.0 if law is ENGINE else 1.2
+        look = {"color": colour, "linestyle": dashes, "linewidth": width}
+        axes[0].plot(gaps[until] / exact.rupture, forces[until] / pull[0], label=law.name, **look)
+        axes[1].plot(gaps / exact.rupture, (forces - pull) / pull[0], **look)

@@ -62,6 +62,8 @@ _COMPLEX_STEP = 1e-30
 _ARC_STEP, _MOST_STEPS, _LARGEST_TURN = 0.05, 2000, 0.2
 _SHARES = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
 _GROWTH = 1.2
+_SAME_GAP = 1e-9
+_PROFILE = 301
 _TURNING = 1e-9
 
 
@@ -158,7 +160,7 @@ class _Solid:
         return np.asarray(pi / 6.0 * rise * (3.0 * self.radius(arc) ** 2 + rise**2))
 
     def wetted_area(self, arc: Array) -> Array:
-        return pi * (self.radius(arc) ** 2 + self.rise(arc) ** 2)
+        return np.asarray(pi * (self.radius(arc) ** 2 + self.rise(arc) ** 2))
 
 
 def _sinc(x: Array) -> Array:
@@ -234,10 +236,10 @@ class _Family:
 
     def neck(self, x: FloatArray) -> float:
         """Smallest radius: where the profile is upright, if it is anywhere."""
-        fractions = np.linspace(0.0, 1.0, 801)
+        fractions = np.linspace(0.0, 1.0, _PROFILE)
         radius = self.profile(x, fractions)[0]
         least = int(np.argmin(radius))
-        if least in {0, 800}:
+        if least in {0, _PROFILE - 1}:
             return float(radius[least])
         around = radius[least - 1 : least + 2]
         # The vertex of the parabola through the three.
@@ -447,7 +449,10 @@ def _stable(family: _Family, branch: _Branch, gap: float) -> FloatArray:
     # At its left end the piece may begin above the gap by rounding.
     at = low if gap <= gaps[index] else float(brentq(lambda arc: between(arc)[4] - gap, low, high))
     found = family.at_gap(between(at), gap)
-    if found is None:
+    if found is None:  # at the largest gap itself, where bridges hardly move with it: that at this arc
+        row = branch.tangents[index + 1]
+        found = family.solve(between(at), row, float(row @ between(at)))
+    if found is None or abs(found[4] - gap) > _SAME_GAP:
         raise NoBridgeError(f"no bridge was found at a gap of {gap:.6g} of the volume's cube root")
     return found
 
@@ -591,7 +596,7 @@ def _bridge_of(family: _Family, found: Any, unit: float) -> Bridge:
     """A solution of the boundary-value problem in the unit of the user."""
     one, other, pressure, length = (float(value) for value in found.p)
     solids = ((family.first, one), (family.second, other))
-    radius, height = found.sol(np.linspace(0.0, 1.0, 401))[:2]
+    radius, height = found.sol(np.linspace(0.0, 1.0, _PROFILE))[:2]
     nodes = found.sol(_NODES)
     upright = found.y[0] * np.sin(found.y[2])
     pull = pi * (2.0 * upright - pressure * found.y[0] ** 2)
