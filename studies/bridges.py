@@ -243,7 +243,15 @@ def chapter(*, quick: bool = False) -> Chapter:
         Two conditions instead of six.
     """
     all_of = [one for one in conditions() if not quick or (one.volume_fraction, one.contact_angle) in (SHIPPED, PILES)]
-    engine = [{**asdict(one), "volume": one.volume, **asdict(deviation(ENGINE, one))} for one in all_of]
+    engine = [
+        {
+            **asdict(one),
+            "radius_2": None if one.radius_2 == inf else one.radius_2,  # JSON has no infinity
+            "volume": one.volume,
+            **asdict(deviation(ENGINE, one)),
+        }
+        for one in all_of
+    ]
     laws = [_row_of(law) for law in LAWS]
     walking = {name: _walking(load_case(name)) for name in CASES}
     checks = _checks(all_of)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from math import cos, inf, log, pi, radians
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from walkers.studies.bridges import (
     CASES,
     CONTACT_NAMES,
     PAIRS,
+    SHIPPED,
     Condition,
     capillary_errors,
     chapter,
@@ -80,8 +82,18 @@ def test_the_engines_law() -> None:
         beads = deviation(ENGINE, Condition("beads", *pair, 0.171, radians(38.2)))
         assert 1.28 < beads.pull < 1.41
         assert beads.work == pytest.approx(1.0, abs=0.03)
+    equal = deviation(ENGINE, Condition("beads", 3e-4, 3e-4, 0.171, radians(38.2)))
+    assert equal.pull == pytest.approx(1.2, abs=0.02)
     dry = deviation(ENGINE, Condition("wall", 2e-4, inf, 0.01, 0.0))
     assert dry.pull == pytest.approx(0.957, abs=0.01)
+
+
+def test_the_conditions_are_those_of_shipped_cases() -> None:
+    for name in CASES:
+        case = load_case(name)
+        assert case.liquid.volume_fraction == SHIPPED[0]
+        assert case.liquid.contact_angle == pytest.approx(SHIPPED[1])
+        assert case.walkers[0].radii in [pytest.approx(pair) for pair in PAIRS]
 
 
 def test_errors_are_those_of_the_cases_own_contacts() -> None:
@@ -126,6 +138,6 @@ def test_chapter() -> None:
     assert not found.failed
     assert set(found.figures) == {"bridges"}
     assert "figures/validation-bridges.png" in found.text
-    assert "nan" not in found.text.split()
+    assert "nan" not in json.dumps(found.numbers, allow_nan=False)
     assert {row["name"] for row in found.numbers["laws"]} == {law.name for law in LAWS}
     assert len(found.numbers["engine"]) == 8
