@@ -1,0 +1,624 @@
+"""Capillary bridges by the Young–Laplace equation: force against gap, and where they break.
+
+A bridge is axisymmetric and without weight, between two spheres, or a sphere and a plane (a radius of infinity). Its
+profile r(s), z(s) by the arc length s, φ its angle to the radius, obeys
+
+    dr/ds = cos φ,   dz/ds = sin φ,   dφ/ds = p - sin φ / r,
+
+p the liquid's excess pressure over the surface tension; it meets the solids, whose slopes there are the filling angles
+α, at their contact angles θ, φ = π - α1 - θ1 and α2 + θ2, and encloses the given volume. Along it
+
+    F / γ = π (2 r sin φ - p r²)
+
+is the same everywhere, and is the pull on either solid.
+
+The equation is solved twice. `bridge` solves it as a boundary-value problem, by collocation. `force_curve` and
+`rupture_distance` take its solutions in closed form, those of Delaunay,
+
+    r² = r0² + 2 (1 - p r0 sin φ0) (1 - cos ps) / p² + 2 r0 cos φ0 sin(ps) / p,
+
+follow the family of bridges of one volume through the largest gap that it reaches, and stop there: beyond are the
+unstable ones, with thinner necks at smaller gaps, and no bridge is at a larger one.
+
+Lengths may be in any one unit, volumes in its cube; forces over the surface tension are lengths. Within, the unit
+is the cube root of the volume.
+
+References
+----------
+C. Delaunay, J. Math. Pures Appl. 6 (1841) 309–314; K. Kenmotsu, Tôhoku Math. J. 32 (1980) 147–153,
+doi 10.2748/tmj/1178229688 (the closed form).
+F. M. Orr, L. E. Scriven, A. P. Rivas, J. Fluid Mech. 67 (1975) 723–742, doi 10.1017/S0022112075000572 (bridges without
+weight, special cases).
+C. D. Willett, M. J. Adams, S. A. Johnson, J. P. K. Seville, Langmuir 16 (2000) 9396–9405, doi 10.1021/la000657y (force
+against gap by numerical integration; filling angles that are not monotonic).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from math import cbrt, cos, inf, pi, sin, sqrt
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.integrate import cumulative_simpson, solve_bvp
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
+
+FloatArray = npt.NDArray[np.float64]
+Array = npt.NDArray[Any]
+"""Real, or complex to be differentiated by complex steps."""
+
+POINTS = 60
+"""Gaps of a table."""
+_NODES, _WEIGHTS = (
+    0.5 * (part + shift) for part, shift in zip(np.polynomial.legendre.leggauss(48), (1.0, 0.0), strict=True)
+)
+_NEWTON_STEPS = 30
+_CONVERGED = 1e-12
+_COMPLEX_STEP = 1e-30
+_ARC_STEP, _MOST_STEPS, _LARGEST_TURN = 0.05, 2000, 0.2
+_SHARES = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
+_GROWTH = 1.2
+_SAME_GAP = 1e-9
+_PROFILE = 301
+_TURNING = 1e-9
+
+
+class NoBridgeError(ValueError):
+    """There is no bridge as asked for, or none was found."""
+
+
+@dataclass(frozen=True)
+class Bridge:
+    """A capillary bridge; lengths in the unit of the radii that were given.
+
+    Attributes
+    ----------
+    force
+        Its pull over the surface tension, F/γ: positive if it attracts.
+    force_at_contact_lines
+        The same from the wetting line at either solid, -p π b² + 2π b sin φ.
+    pressure
+        Excess pressure of the liquid over the surface tension, 1/length; negative in a bridge that sucks.
+    neck
+        Smallest radius.
+    filling_angles
+        Angle of each solid's axis to its wetting line, rad; 0 at a plane.
+    contact_radii
+        Radii of the wetting lines.
+    volume
+        Of the liquid, from the profile.
+    energy
+        Surface energy over the surface tension, length²: of the free surface, less cos θ times each wetted one.
+    radius, height : ndarray, shape (n,)
+        The profile, from the first solid to the second; heights above the first one's apex.
+    """
+
+    force: float
+    force_at_contact_lines: tuple[float, float]
+    pressure: float
+    neck: float
+    filling_angles: tuple[float, float]
+    contact_radii: tuple[float, float]
+    volume: float
+    energy: float
+    radius: FloatArray
+    height: FloatArray
+
+
+@dataclass(frozen=True)
+class ForceCurve:
+    """The stable bridges of one volume, from contact to rupture.
+
+    Attributes
+    ----------
+    gaps, forces : ndarray, shape (n,)
+        Rising gaps from 0 to `rupture`, and F/γ there, in the unit of length that was given.
+    energies : ndarray, shape (n,)
+        Surface energies over the surface tension (`Bridge.energy`): their slope is the force.
+    necks : ndarray, shape (n,)
+        Smallest radii.
+    rupture
+        The largest gap.
+    """
+
+    gaps: FloatArray
+    forces: FloatArray
+    energies: FloatArray
+    necks: FloatArray
+    rupture: float
+
+    @property
+    def work(self) -> float:
+        """Work from contact to rupture over the surface tension, length²."""
+        return float(self.energies[-1] - self.energies[0])
+
+
+@dataclass(frozen=True)
+class _Solid:
+    """A sphere of curvature k (0: a plane), met at the contact angle θ, on arcs t from its apex."""
+
+    curvature: float
+    contact_angle: float
+
+    def slope(self, arc: Array) -> Array:
+        """Filling angle."""
+        return self.curvature * arc
+
+    def radius(self, arc: Array) -> Array:
+        return np.asarray(arc * _sinc(self.curvature * arc))
+
+    def rise(self, arc: Array) -> Array:
+        """Height of the cap that is wetted."""
+        return np.asarray(0.5 * self.curvature * arc**2 * _sinc(0.5 * self.curvature * arc) ** 2)
+
+    def cap_volume(self, arc: Array) -> Array:
+        rise = self.rise(arc)
+        return np.asarray(pi / 6.0 * rise * (3.0 * self.radius(arc) ** 2 + rise**2))
+
+    def wetted_area(self, arc: Array) -> Array:
+        return np.asarray(pi * (self.radius(arc) ** 2 + self.rise(arc) ** 2))
+
+
+def _sinc(x: Array) -> Array:
+    """sin(x)/x, for complex arguments as well: differentiated by complex steps."""
+    small = np.abs(x) < 1e-4
+    safe = np.where(small, 1.0, x)
+    return np.where(small, 1.0 - x**2 / 6.0, np.sin(safe) / safe)
+
+
+@dataclass(frozen=True)
+class _Family:
+    """Bridges of volume 1 between two solids; a bridge is x = (arc 1, arc 2, p, length of the profile, gap)."""
+
+    first: _Solid
+    second: _Solid
+
+    def start(self, arc: Array) -> tuple[Array, Array]:
+        """The profile's r sin φ and r cos φ at the first solid."""
+        slope = pi - self.first.contact_angle - self.first.slope(arc)
+        radius = self.first.radius(arc)
+        return radius * np.sin(slope), radius * np.cos(slope)
+
+    def profile(self, x: Array, fractions: FloatArray) -> tuple[Array, Array]:
+        """Radii r and r sin φ at fractions of the length, shape (..., n), of bridges of shape (..., 5)."""
+        pressure, length = x[..., 2, None], x[..., 3, None]
+        upright, outward = (part[..., None] for part in self.start(x[..., 0]))
+        at, start = length * fractions, upright**2 + outward**2
+        squared = (
+            start
+            + (1.0 - pressure * upright) * at**2 * _sinc(0.5 * pressure * at) ** 2
+            + 2.0 * outward * at * _sinc(pressure * at)
+        )
+        return np.sqrt(squared), upright + 0.5 * pressure * (squared - start)
+
+    def misfit(self, x: Array) -> Array:
+        """What vanishes for a bridge, shape (..., 4): it ends on the second solid, at its angle, with the volume."""
+        radius, upright = self.profile(x, _NODES)
+        pressure, length = x[..., 2], x[..., 3]
+        solids = ((self.first, x[..., 0]), (self.second, x[..., 1]))
+        rise = length * np.sum(_WEIGHTS * upright / radius, axis=-1)
+        volume = pi * length * np.sum(_WEIGHTS * upright * radius, axis=-1)
+        slope, end = self.second.contact_angle + self.second.slope(x[..., 1]), self.second.radius(x[..., 1])
+        start_upright, start_outward = self.start(x[..., 0])
+        turn = pressure * length
+        outward = start_outward * np.cos(turn) + (1.0 - pressure * start_upright) * length * _sinc(turn)
+        return np.stack(
+            [
+                self.profile(x, np.ones(1))[1][..., 0] - end * np.sin(slope),
+                outward - end * np.cos(slope),
+                rise - x[..., 4] - sum(solid.rise(arc) for solid, arc in solids),
+                volume - 1.0 - sum(solid.cap_volume(arc) for solid, arc in solids),
+            ],
+            axis=-1,
+        )
+
+    def jacobian(self, x: FloatArray) -> FloatArray:
+        """Derivatives of the misfit, shape (4, 5), exact: by complex steps."""
+        steps = x + 1j * _COMPLEX_STEP * np.eye(5)
+        return self.misfit(steps).imag.T / _COMPLEX_STEP
+
+    def force(self, x: FloatArray) -> float:
+        """F/γ at the start of the profile."""
+        upright = self.start(x[0])[0]
+        return float(pi * (2.0 * upright - x[2] * self.first.radius(x[0]) ** 2))
+
+    def energy(self, x: FloatArray) -> float:
+        free = 2.0 * pi * x[3] * np.sum(_WEIGHTS * self.profile(x, _NODES)[0])
+        wetted = [
+            cos(solid.contact_angle) * solid.wetted_area(arc)
+            for solid, arc in ((self.first, x[0]), (self.second, x[1]))
+        ]
+        return float(free - sum(wetted))
+
+    def neck(self, x: FloatArray) -> float:
+        """Smallest radius: where the profile is upright, if it is anywhere."""
+        fractions = np.linspace(0.0, 1.0, _PROFILE)
+        radius = self.profile(x, fractions)[0]
+        least = int(np.argmin(radius))
+        if least in {0, _PROFILE - 1}:
+            return float(radius[least])
+        around = radius[least - 1 : least + 2]
+        # The vertex of the parabola through the three.
+        bend = around[0] - 2.0 * around[1] + around[2]
+        return float(around[1] - (around[2] - around[0]) ** 2 / (8.0 * bend)) if bend > 0.0 else float(around[1])
+
+    def solve(self, x: FloatArray, row: FloatArray, value: float) -> FloatArray | None:
+        """Newton's method from x for a bridge with row · x = value; None where it fails."""
+        for _ in range(_NEWTON_STEPS):
+            misfit = np.append(self.misfit(x), row @ x - value)
+            matrix = np.vstack([self.jacobian(x), row])
+            try:
+                step = np.linalg.solve(matrix, misfit)
+            except np.linalg.LinAlgError:
+                return None
+            x = x - step * min(1.0, 0.3 / float(np.max(np.abs(step[[0, 1, 3]] / x[[0, 1, 3]])) + 1e-300))
+            if not np.all(np.isfinite(x)) or np.any(x[[0, 1, 3]] <= 0.0):
+                return None
+            if np.max(np.abs(step)) < _CONVERGED * max(1.0, float(np.max(np.abs(x)))):
+                return x
+        return None
+
+    def at_gap(self, x: FloatArray, gap: float) -> FloatArray | None:
+        return self.solve(x, _GAP, gap)
+
+    def tangent(self, x: FloatArray, before: FloatArray, scale: FloatArray) -> FloatArray:
+        """Direction of the family at x, of length 1 in units of `scale`, onward from `before`."""
+        direction = np.linalg.svd(self.jacobian(x) * scale)[2][-1] * scale
+        return direction if (direction / scale) @ (before / scale) > 0.0 else -direction  # type: ignore[no-any-return]
+
+
+_GAP = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
+
+
+def _toroid(family: _Family, gap: float) -> FloatArray:
+    """A circular profile between wetting lines of the same radius, of the volume 1 that a flat ring has."""
+    curvature = family.first.curvature + family.second.curvature
+    # π b² (gap + k b² / 4) = 1, from surfaces that part as k b² / 2.
+    squared = 2.0 / (pi * gap + sqrt((pi * gap) ** 2 + pi * curvature))
+    arc = np.full(2, sqrt(squared))
+    height = gap + float(family.first.rise(arc)[0] + family.second.rise(arc)[0])
+    angles = [solid.contact_angle + float(solid.slope(arc)[0]) for solid in (family.first, family.second)]
+    turn = 0.5 * (pi - sum(angles))
+    length = height / float(_sinc(np.array(turn)))
+    return np.array([*arc, 1.0 / arc[0] - 2.0 * sin(turn) / height, length, gap])
+
+
+def _family_of(radii: tuple[float, float], volume: float, contact_angles: tuple[float, float]) -> _Family:
+    """The family of bridges, lengths in units of the volume's cube root."""
+    if volume <= 0.0 or min(radii) <= 0.0 or not volume < inf or min(radii) == inf:
+        raise ValueError(f"radii {radii}, volume {volume}: expected positive numbers, and a plane at one side at most")
+    if not all(0.0 <= angle < pi for angle in contact_angles):
+        raise ValueError(f"contact angles {contact_angles}: expected 0 to π")
+    unit = cbrt(volume)
+    first, second = (_Solid(unit / radius, angle) for radius, angle in zip(radii, contact_angles, strict=True))
+    return _Family(first, second)
+
+
+def _shrunk(family: _Family, share: float) -> _Family:
+    """The same liquid between solids that are less curved by a factor."""
+    first, second = (_Solid(share * one.curvature, one.contact_angle) for one in (family.first, family.second))
+    return _Family(first, second)
+
+
+def _touching(family: _Family) -> FloatArray:
+    """The bridge at contact, by way of flatter solids, on which it is the thin ring that `_toroid` takes it for.
+
+    Raises
+    ------
+    NoBridgeError
+        If Newton's method does not find it.
+    """
+    for first_share in _SHARES:
+        share, x = first_share, _toroid(_shrunk(family, first_share), 0.0)
+        while (found := _shrunk(family, share).at_gap(x, 0.0)) is not None:
+            if share == 1.0:
+                return found
+            x, share = found, min(1.0, _GROWTH * share)
+    raise NoBridgeError("no bridge was found at contact")
+
+
+@dataclass(frozen=True)
+class _Branch:
+    """Stable bridges, from contact to the one at the largest gap: x and dx/ds by the arc s of the family."""
+
+    arcs: FloatArray
+    bridges: FloatArray
+    tangents: FloatArray
+
+
+@lru_cache(maxsize=256)
+def _branch(family: _Family) -> _Branch:
+    """Follow a family by its arc length until its gap falls.
+
+    Raises
+    ------
+    NoBridgeError
+        If there is none at contact, or the end is not reached.
+    """
+    x = _touching(family)
+    scale = np.array([1.0, 1.0, max(1.0, abs(float(x[2]))), 1.0, 1.0])
+    tangent, step = family.tangent(x, _GAP, scale), _ARC_STEP
+    arcs, bridges, tangents = [0.0], [x], [tangent]
+    for _ in range(_MOST_STEPS):
+        found = _onward(family, x, tangent, step, scale)
+        if found is None or float(np.linalg.norm((found[1] - tangent) / scale)) > _LARGEST_TURN:
+            step *= 0.5
+            continue
+        if found[1][4] <= 0.0:
+            found, step = _turning_point(family, x, tangent, step, scale)
+        x, tangent = found
+        arcs.append(arcs[-1] + step)
+        bridges.append(x)
+        tangents.append(tangent)
+        if abs(tangent[4]) < _TURNING:
+            return _Branch(np.array(arcs), np.array(bridges), np.array(tangents))
+        step = min(_ARC_STEP, 1.5 * step)
+    raise NoBridgeError("the largest gap was not reached")
+
+
+def _onward(
+    family: _Family, x: FloatArray, tangent: FloatArray, step: float, scale: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """The bridge a step along the family, and the family's direction there."""
+    row = tangent / scale**2
+    found = family.solve(x + step * tangent, row, float(row @ x) + step)
+    return None if found is None else (found, family.tangent(found, tangent, scale))
+
+
+def _turning_point(
+    family: _Family, x: FloatArray, tangent: FloatArray, step: float, scale: FloatArray
+) -> tuple[tuple[FloatArray, FloatArray], float]:
+    """The bridge at the largest gap, which is less than a step along the family, and the step to it."""
+
+    def opening(part: float) -> float:
+        found = _onward(family, x, tangent, part, scale)
+        if found is None:
+            raise NoBridgeError("the family was lost at its largest gap")
+        return float(found[1][4])
+
+    part = float(brentq(opening, 0.0, step, xtol=1e-13, rtol=1e-13))
+    found = _onward(family, x, tangent, part, scale)
+    assert found is not None
+    return found, part
+
+
+def force_curve(
+    radius_1: float,
+    radius_2: float,
+    volume: float,
+    contact_angle: float | tuple[float, float],
+    gaps: npt.ArrayLike | None = None,
+) -> ForceCurve:
+    """Pull of a bridge of constant volume against the gap.
+
+    Parameters
+    ----------
+    radius_1, radius_2
+        Of the spheres; infinity: a plane.
+    volume
+        Of the liquid, in the cube of their unit.
+    contact_angle
+        rad; one, or one on each solid.
+    gaps
+        Rising, from 0 to rupture at most, shape (n,); left out, `POINTS` of them over that range, closer at
+        both ends.
+
+    Returns
+    -------
+    ForceCurve
+
+    Raises
+    ------
+    ValueError
+        If a gap is negative or beyond rupture, or nothing positive was given for radii and volume.
+    NoBridgeError
+        If no bridge was found (a contact angle so large that the liquid is not held between them).
+    """
+    family = _family_of((radius_1, radius_2), volume, _pair(contact_angle))
+    unit, branch = cbrt(volume), _branch(family)
+    largest = float(branch.bridges[-1, 4])
+    if gaps is None:
+        wanted = 0.5 * largest * (1.0 - np.cos(np.linspace(0.0, pi, POINTS)))
+    else:
+        wanted = np.atleast_1d(np.asarray(gaps, np.float64)) / unit
+    if wanted.min() < 0.0 or wanted.max() > largest * (1.0 + 1e-12):
+        raise ValueError(f"gaps: expected 0 to {largest * unit:.6g}, where the bridge ruptures")
+    bridges = [_stable(family, branch, min(float(gap), largest)) for gap in wanted]
+    return ForceCurve(
+        gaps=unit * np.minimum(wanted, largest),
+        forces=unit * np.array([family.force(x) for x in bridges]),
+        energies=unit**2 * np.array([family.energy(x) for x in bridges]),
+        necks=unit * np.array([family.neck(x) for x in bridges]),
+        rupture=unit * largest,
+    )
+
+
+def _stable(family: _Family, branch: _Branch, gap: float) -> FloatArray:
+    """The stable bridge at a gap."""
+    gaps = branch.bridges[:, 4]
+    if gap >= gaps[-1]:
+        return branch.bridges[-1]  # type: ignore[no-any-return]
+    index = min(int(np.searchsorted(gaps, gap, side="right")) - 1, len(gaps) - 2)
+    piece = slice(index, index + 2)
+    between = CubicHermiteSpline(branch.arcs[piece], branch.bridges[piece], branch.tangents[piece])
+    low, high = branch.arcs[piece]
+    # At its left end the piece may begin above the gap by rounding.
+    at = low if gap <= gaps[index] else float(brentq(lambda arc: between(arc)[4] - gap, low, high))
+    found = family.at_gap(between(at), gap)
+    if found is None:  # at the largest gap itself, where bridges hardly move with it: that at this arc
+        row = branch.tangents[index + 1]
+        found = family.solve(between(at), row, float(row @ between(at)))
+    if found is None or abs(found[4] - gap) > _SAME_GAP:
+        raise NoBridgeError(f"no bridge was found at a gap of {gap:.6g} of the volume's cube root")
+    return found
+
+
+def _pair(contact_angle: float | tuple[float, float]) -> tuple[float, float]:
+    return contact_angle if isinstance(contact_angle, tuple) else (contact_angle, contact_angle)
+
+
+def rupture_distance(
+    radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float]
+) -> float:
+    """Largest gap at which a bridge of this volume exists; parameters and errors as for `force_curve`."""
+    family = _family_of((radius_1, radius_2), volume, _pair(contact_angle))
+    return cbrt(volume) * float(_branch(family).bridges[-1, 4])
+
+
+def force_table(
+    radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Gaps from 0 to rupture and F/γ there, each of shape (`POINTS`,), for a law that interpolates.
+
+    Parameters and errors as for `force_curve`. The gaps are closer at both ends; between them straight lines are within
+    a part in a thousand of the force at contact for the volumes of the paper's bridges (in the tests).
+    """
+    curve = force_curve(radius_1, radius_2, volume, contact_angle)
+    return curve.gaps, curve.forces
+
+
+_MESH = 41
+_ROUGH, _FINE = 1e-4, 1e-10
+_FEWEST_STEPS, _SMALLEST_STEP = 8, 1e-4
+_MOST_NODES = {_ROUGH: 600, _FINE: 20000}
+_LARGEST_CHANGE = 0.15
+
+
+def _collocate(family: _Family, gap: float, guess: Any, tolerance: float) -> Any:
+    """The boundary-value problem of a bridge at a gap, from a guess (mesh, r z φ volume, parameters)."""
+
+    def slopes(_: FloatArray, y: FloatArray, unknown: FloatArray) -> FloatArray:
+        upright = np.sin(y[2])
+        turning = unknown[2] - upright / y[0]
+        return unknown[3] * np.stack([np.cos(y[2]), upright, turning, pi * y[0] ** 2 * upright])  # type: ignore[no-any-return]
+
+    def ends(start: FloatArray, end: FloatArray, unknown: FloatArray) -> FloatArray:
+        first, second = family.first, family.second
+        one, other = unknown[0], unknown[1]
+        return np.array(
+            [
+                start[0] - first.radius(one),
+                start[1] + first.rise(one),
+                start[2] - (pi - first.contact_angle - first.slope(one)),
+                start[3],
+                end[0] - second.radius(other),
+                end[1] - gap - second.rise(other),
+                end[2] - (second.contact_angle + second.slope(other)),
+                end[3] - 1.0 - first.cap_volume(one) - second.cap_volume(other),
+            ]
+        )
+
+    mesh, profile, unknown = guess
+    with np.errstate(all="ignore"):  # guesses from too far overflow before they are given up
+        return solve_bvp(slopes, ends, mesh, profile, unknown, tol=tolerance, max_nodes=_MOST_NODES[tolerance])
+
+
+def _arc_of_circle(family: _Family) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The profile of `_toroid` at contact as a guess for `_collocate`."""
+    x, mesh = _toroid(family, 0.0), np.linspace(0.0, 1.0, _MESH)
+    start = pi - family.first.contact_angle - float(family.first.slope(x[:1])[0])
+    end = family.second.contact_angle + float(family.second.slope(x[1:2])[0])
+    angle = start + (end - start) * mesh
+    step = x[3] / (_MESH - 1)
+    radius = float(family.first.radius(x[:1])[0]) + cumulative_simpson(np.cos(angle), dx=step, initial=0.0)
+    height = -float(family.first.rise(x[:1])[0]) + cumulative_simpson(np.sin(angle), dx=step, initial=0.0)
+    inside = cumulative_simpson(pi * radius**2 * np.sin(angle), dx=step, initial=0.0)
+    return mesh, np.stack([radius, height, angle, inside]), x[:4]
+
+
+def bridge(
+    radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float], gap: float
+) -> Bridge:
+    """The stable bridge at a gap, by `scipy.integrate.solve_bvp`.
+
+    The profile of a thin ring between flat solids is the first guess; the solids are curved and then parted in steps,
+    each solved from the one before.
+
+    Parameters
+    ----------
+    radius_1, radius_2, volume, contact_angle
+        As for `force_curve`.
+    gap
+        Distance of the surfaces, 0 or more.
+
+    Returns
+    -------
+    Bridge
+
+    Raises
+    ------
+    ValueError
+        If the gap is negative, or radii and volume are not positive.
+    NoBridgeError
+        If there is no bridge at this gap, or none was found.
+    """
+    if gap < 0.0:
+        raise ValueError(f"gap {gap}: expected 0 or more")
+    family, unit = _family_of((radius_1, radius_2), volume, _pair(contact_angle)), cbrt(volume)
+    guess = _arc_of_circle(_shrunk(family, _SHARES[-1]))
+    guess = _march(lambda share, near: _collocate(_shrunk(family, share), 0.0, near, _ROUGH), guess, _SHARES[-1], 1.0)
+    if gap > 0.0:
+        guess = _march(lambda at, near: _collocate(family, at, near, _ROUGH), guess, 0.0, gap / unit)
+    found = _collocate(family, gap / unit, guess, _FINE)
+    if not found.success:
+        raise NoBridgeError(f"gap {gap:.6g}: {found.message}")
+    return _bridge_of(family, found, unit)
+
+
+def _march(solve: Callable[[float, Any], Any], guess: Any, start: float, end: float) -> Any:
+    """Solve a problem of one parameter from its start to its end in steps, each from the one before.
+
+    Raises
+    ------
+    NoBridgeError
+        If it cannot be gone on with.
+    """
+    at, step = start, (end - start) / _FEWEST_STEPS
+    found = solve(at, guess)
+    if not found.success:
+        raise NoBridgeError(found.message)
+    while at < end:
+        further = min(end, at + step)
+        result = solve(further, (found.x, found.y, found.p))
+        # A bridge that is not close to the last one is on another branch.
+        if result.success and np.max(np.abs(result.p - found.p) / np.maximum(1.0, np.abs(found.p))) < _LARGEST_CHANGE:
+            at, found, step = further, result, 1.5 * step
+        elif (step := 0.5 * step) < _SMALLEST_STEP * (end - start):
+            raise NoBridgeError(f"no bridge beyond {at:.6g} of the volume's cube root")
+    return found.x, found.y, found.p
+
+
+def _bridge_of(family: _Family, found: Any, unit: float) -> Bridge:
+    """A solution of the boundary-value problem in the unit of the user."""
+    one, other, pressure, length = (float(value) for value in found.p)
+    solids = ((family.first, one), (family.second, other))
+    radius, height = found.sol(np.linspace(0.0, 1.0, _PROFILE))[:2]
+    nodes = found.sol(_NODES)
+    upright = found.y[0] * np.sin(found.y[2])
+    pull = pi * (2.0 * upright - pressure * found.y[0] ** 2)
+    contacts = [float(solid.radius(np.array(arc))) for solid, arc in solids]
+    slopes = [float(solid.slope(np.array(arc))) for solid, arc in solids]
+    lines = [
+        pi * (2.0 * line * sin(slope + solid.contact_angle) - pressure * line**2)
+        for (solid, _), line, slope in zip(solids, contacts, slopes, strict=True)
+    ]
+    wetted = sum(cos(solid.contact_angle) * float(solid.wetted_area(np.array(arc))) for solid, arc in solids)
+    caps = sum(float(solid.cap_volume(np.array(arc))) for solid, arc in solids)
+    inside = pi * length * float(np.sum(_WEIGHTS * nodes[0] ** 2 * np.sin(nodes[2])))
+    neck = int(np.argmin(found.y[0]))
+    return Bridge(
+        force=unit * float(pull[neck]),
+        force_at_contact_lines=(unit * lines[0], unit * lines[1]),
+        pressure=pressure / unit,
+        neck=unit * float(radius.min()),
+        filling_angles=(slopes[0], slopes[1]),
+        contact_radii=(unit * contacts[0], unit * contacts[1]),
+        volume=unit**3 * (inside - caps),
+        energy=unit**2 * (2.0 * pi * length * float(np.sum(_WEIGHTS * nodes[0])) - wetted),
+        radius=unit * radius,
+        height=unit * height,
+    )
