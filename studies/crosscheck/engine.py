@@ -119,7 +119,21 @@ class SecondEngine:
         self._reach = self.radius + np.maximum(bridge, self._tables.longest / 2.0) + self._skin / 2.0
         self._pairs = _no_pairs()
         self._list()
-        self._advance(clock, (clock, 1), np.empty((0, len(self.radius), 9)))
+        self.evaluate()
+
+    def evaluate(self) -> None:
+        """Evaluate the forces once more, at the places and velocities that there are, as an engine does that starts."""
+        self._advance(self.clock, (self.clock, 1), np.empty((0, len(self.radius), 9)))
+
+    def restart(self) -> None:
+        """Go on as LIGGGHTS 3.8.0 does from a restart file: it forgets the springs of contacts between beads.
+
+        Those at walls and all bridges it keeps; forces are evaluated once more. A pile goes on so within 2e-11 m of how
+        it goes on there, and 9e-6 m apart if the springs are kept.
+        """
+        self._pairs.spring[:] = 0.0
+        self._pairs.slips[:] = False
+        self.evaluate()
 
     def run(self, steps: int, every: int) -> FloatArray:
         """Move on.
@@ -232,7 +246,9 @@ def _constants(
         radius=radius,
         mass=4.0 / 3.0 * pi * radius**3 * matter.density,
         film=6.0 * pi * matter.film_viscosity * radius * laws.film,
-        film_reach=(1.0 + 0.5 * matter.contact_angle) * np.cbrt(liquid / 2.0) * (laws.film and matter.film_viscosity > 0.0),
+        film_reach=(1.0 + 0.5 * matter.contact_angle)
+        * np.cbrt(liquid / 2.0)
+        * (laws.film and matter.film_viscosity > 0.0),
         point=np.ascontiguousarray(around.point, dtype=np.float64),
         normal=np.ascontiguousarray(around.normal, dtype=np.float64),
         gravity=np.array(around.gravity) * laws.gravity,

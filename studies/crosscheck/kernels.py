@@ -19,7 +19,7 @@ Rolling friction: J. Ai, J.-F. Chen, J. M. Rotter, J. Y. Ooi, Powder Technology 
 
 from __future__ import annotations
 
-from math import cos, exp, log, pi, sin, sqrt
+from math import exp, log, pi, sin, sqrt
 from typing import NamedTuple
 
 import numba
@@ -394,8 +394,17 @@ def wall_forces(c: Constants, state: State, moves: bool) -> None:
                 spring, slips = state.wall_spring[bead, wall], state.wall_slips[bead, wall]
                 elastic, force, tx, ty, tz, slips = touching(c, of, n, (speed, slide), spring, slips, moves)
                 state.wall_slips[bead, wall] = slips
-                push(state, bead, 1.0, arm, n, along_normal(n, c.copies * force, (c.copies * tx, c.copies * ty, c.copies * tz)))
-                torque = rolling_torque(n, (w[bead, 0], w[bead, 1], w[bead, 2]), c.copies * c.rolling * elastic * radius)
+                push(
+                    state,
+                    bead,
+                    1.0,
+                    arm,
+                    n,
+                    along_normal(n, c.copies * force, (c.copies * tx, c.copies * ty, c.copies * tz)),
+                )
+                torque = rolling_torque(
+                    n, (w[bead, 0], w[bead, 1], w[bead, 2]), c.copies * c.rolling * elastic * radius
+                )
                 for axis in range(3):
                     state.torque[bead, axis] += torque[axis]
             elif gap >= bridge[RUPTURE]:

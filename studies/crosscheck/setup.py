@@ -46,10 +46,7 @@ def surroundings_of(case: Case) -> Surroundings:
         normal=np.array([face.normal for face in faces]),
         gravity=case.gravity_vector,
         harmonics=np.array(
-            [
-                (*one.direction, one.angular_frequency, one.peak_acceleration, one.phase)
-                for one in case.drive.harmonics
-            ]
+            [(*one.direction, one.angular_frequency, one.peak_acceleration, one.phase) for one in case.drive.harmonics]
         ),
     )
 
