@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from math import isfinite
-from typing import Literal, get_args, get_type_hints
+from typing import Any, Literal, get_args, get_type_hints
 
 import numpy as np
 
@@ -153,19 +153,19 @@ def laws_from(without: Sequence[str] = (), settings: Sequence[str] = ()) -> Laws
     >>> laws_from(["film"], ["wall-lubrication=plane"]).differences()
     ['wall-lubrication=plane', 'film=off']
     """
-    laws = Laws()
+    changes: dict[str, Any] = {}
     for term in without:
         if term not in TERMS:
             raise ValueError(f"without {term}: expected one of {', '.join(TERMS)}")
-        laws = replace(laws, **{term.replace("-", "_"): False})
+        changes[term.replace("-", "_")] = False
     types = get_type_hints(Laws)
     for setting in settings:
         name, _, value = setting.partition("=")
         if name not in SETTINGS:
             raise ValueError(f"set {setting}: expected NAME=VALUE, the name one of {', '.join(SETTINGS)}")
         key = name.replace("-", "_")
-        laws = replace(laws, **{key: _read(name, value, types[key])})
-    return laws
+        changes[key] = _read(name, value, types[key])
+    return replace(Laws(), **changes)
 
 
 def _read(name: str, value: str, kind: type) -> str | float | int:
