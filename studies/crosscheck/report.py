@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ALONE = {"replicates": 2, "facing": "right"}
-_PILE_CYCLES = 24
+_PILE_CYCLES, _PILE_COUNT = 18, 36
+_IN_GROOVE = "groove of 120°"
 _SAMPLED = ("fig1b", "fig4b")
 """Cases whose means over all steps are told."""
 SUPPOSITIONS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
@@ -81,6 +82,7 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
         piles=piles,
         whatif=whatif,
         ratio=_ratio(found),
+        jitter=_jitter(single[_IN_GROOVE]) if _IN_GROOVE in single else None,
         every_step=[(name, row) for name, row in sampled if row.every_step is not None],
     )
     return Chapter(
@@ -116,10 +118,10 @@ def full_cases() -> dict[str, Callable[[], Case]]:
         "fan of three": lambda: _changed("fig1b", 40, ("dimers",), **fan),
         "two tones": lambda: _changed("symmetric", 24, dimers=_ALONE, drive={"harmonics": tones}),
         "slope of 5°": lambda: _changed("fig1b", 24, boundary={"tilt": "5 deg"}),
-        "groove of 120°": lambda: _changed("fig1b", 24, boundary={"shape": "groove", "opening": "120 deg"}),
+        _IN_GROOVE: lambda: _changed("fig1b", 24, boundary={"shape": "groove", "opening": "120 deg"}),
         "climber": lambda: shortened(load_case("climber"), 30),
         "cluster in a corner": lambda: shortened(load_case("cluster"), 30),
-        "pile-ci": lambda: shortened(load_case("pile-ci"), _PILE_CYCLES),
+        "pile-ci": lambda: _changed("pile-ci", _PILE_CYCLES, mixture={"count": _PILE_COUNT}),
     }
 
 
@@ -148,6 +150,14 @@ def _speed(motion: Motion, laws: Laws) -> float:
     return 1e3 * float(walk(made.motion.groups[0]).velocity.mean())
 
 
+def _jitter(found: Comparison) -> float:
+    """How far the second engine departs from itself if it begins elsewhere by the rounding of its numbers, m."""
+    first = found.first.position.copy()
+    first[0] *= 1.0 + 1e-15
+    moved = simulate(replace(found.first, position=first), found.laws, every_step=False).motion
+    return float(np.linalg.norm(moved.position - found.second.position, axis=-1).max())
+
+
 def _ratio(found: Mapping[str, Comparison | PileComparison]) -> float:
     """Wall time of LIGGGHTS's steps over the second engine's, of the runs that LIGGGHTS made alone."""
     single = [one for each in found.values() for one in (each.starts if isinstance(each, PileComparison) else (each,))]
@@ -158,17 +168,20 @@ def _ratio(found: Mapping[str, Comparison | PileComparison]) -> float:
 @styled
 def draw(single: Mapping[str, Comparison], piles: Mapping[str, PileComparison]) -> Figure:
     """Gait of a walker in both engines, and how far apart beads are through the runs."""
+    from matplotlib import colormaps
+
     figure, (left, right) = new_figure(7.2, 3.0, ncols=2)
     name = "fig4b" if "fig4b" in single else next(iter(single))
     shown = single[name]
     _draw_gait(left, shown, name)
-    for label, one in single.items():
-        right.semilogy(*_apart(one), label=label, lw=0.8)
+    colours = colormaps["tab20"].colors  # type: ignore[attr-defined]
+    for (label, one), colour in zip(single.items(), colours, strict=False):
+        right.semilogy(*_apart(one), label=label, lw=0.8, color=colour)
     for label, pile in piles.items():
         for number, one in enumerate(pile.starts):
             right.semilogy(*_apart(one), color="0.6", lw=0.6, label=None if number else label)
     right.set(xlabel="cycles", ylabel="largest distance of a bead / radius")
-    right.legend(fontsize=5, ncols=2)
+    right.legend(fontsize=5, ncols=2, loc="lower right")
     return figure
 
 
