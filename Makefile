@@ -66,6 +66,14 @@ audit: setup ## Prove what the installed engine does, against published formulas
 docs-audit: setup ## Write docs/engine.md from an audit of the installed engine
 	@$(WALKERS) audit --markdown docs/engine.md
 
+.PHONY: validate
+validate: setup ## Check it against published benchmarks, exact solutions and a second engine (under ten minutes)
+	@$(WALKERS) validate --out $(OUT)
+
+.PHONY: docs-validation
+docs-validation: setup ## Write docs/validation.md and its pictures
+	@$(WALKERS) validate --out $(OUT) --to docs
+
 .PHONY: docs-figures
 docs-figures: setup ## Write the figures and the comparison that docs/ shows
 	@$(WALKERS) figures --out $(OUT) --to docs/figures

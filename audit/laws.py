@@ -18,7 +18,14 @@ from walkers.physics.capillary import (
     capillary_force_at_wall,
     rupture_distance,
 )
-from walkers.physics.contact import hertz_repulsion, hertz_repulsion_at_wall, reduced_modulus
+from walkers.physics.contact import (
+    damping_ratio,
+    hertz_repulsion,
+    hertz_repulsion_at_wall,
+    normal_damping,
+    normal_damping_at_wall,
+    reduced_modulus,
+)
 from walkers.physics.lubrication import normal_drag, normal_drag_at_wall, tangential_drag, tangential_drag_at_wall
 from walkers.physics.wall import WALL_COPIES
 from walkers.postprocess.dump import FloatArray
@@ -60,6 +67,14 @@ def hertz_law(case: Case, radius: float, partner: Partner, gap: FloatArray) -> F
     if partner.wall:
         return np.array([hertz_repulsion_at_wall(-float(h), radius, modulus) for h in gap])
     return np.array([hertz_repulsion(-float(h), partner.reduced_radius(radius), modulus) for h in gap])
+
+
+def damping_law(case: Case, radius: float, partner: Partner, gap: FloatArray, mass: float) -> FloatArray:
+    """Coefficient of the damping along the normal (`walkers.physics.contact`), N s/m; reduced mass in kg."""
+    modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
+    law, size = (normal_damping_at_wall, radius) if partner.wall else (normal_damping, partner.reduced_radius(radius))
+    ratio = damping_ratio(case.contact.restitution)
+    return np.array([law(-float(h), size, modulus, mass, ratio) for h in gap])
 
 
 def lubrication_drags(case: Case, radius: float, partner: Partner, gap: FloatArray) -> FloatArray:

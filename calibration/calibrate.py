@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import norm
 
-from walkers.calibration.emulator import Emulator, fit_emulators
+from walkers.calibration.emulator import LARGEST, Emulators, fit_emulators
 from walkers.calibration.posterior import Posterior, sample_posterior
+from walkers.calibration.sensitivity import sobol_indices
 from walkers.calibration.space import Space, spread_out
 from walkers.calibration.waves import Wave, run_wave, wave_sweep
 from walkers.inputs.calibration import Calibration
@@ -30,6 +31,10 @@ _STEPS_BETWEEN_WAVES = 800
 """Of the chain that places the next wave; the last chain has the file's number."""
 _PARENTS, _NEAR, _TRIED = 5, 0.06, 4000
 """How many of the best sets a wave looks around, how far (of the ranges), and how many sets it thinks of."""
+_PARTS = 16
+"""In which these are thought of, for the memory's sake."""
+MISSING_MISFIT = float(np.log1p(30.0**2))
+"""ln(1 + r²) of an observation that cannot be made: as of one that is 30 deviations off."""
 _QUANTILES = norm.ppf((np.arange(5) + 0.5) / 5.0)
 FINAL = frozenset(failure.__name__ for failure in (BeadsLost, BlowUp))
 """Failures of a set's own making: calling again would bring the same."""
@@ -50,9 +55,9 @@ class Outcome:
     unit : ndarray, shape (P, D)
         All sets of all waves, in the unit cube.
     outcome : ndarray, shape (P, K)
-        What the engine made of them.
+        What the engine made of them; NaN where there was nothing to observe.
     emulators
-        One an observation, fitted to all waves.
+        Fitted to all waves.
     posterior
         From all observations.
     held_out
@@ -63,7 +68,8 @@ class Outcome:
         The engine at the best set of all that were run: as in the waves (``best``), with half the time step
         (``half-step``), and for twice as long (``twice-as-long``).
     sobol : ndarray, shape (2, K, D)
-        First and total order indices of each observation's transformed residual over the whole range.
+        First and total order indices of each observation's transformed residual over the feasible part of the range
+        (`walkers.calibration.sensitivity`).
     failures
         Points that failed, by sweep.
     """
@@ -72,7 +78,7 @@ class Outcome:
     space: Space
     unit: FloatArray
     outcome: FloatArray
-    emulators: list[Emulator]
+    emulators: Emulators
     posterior: Posterior
     held_out: dict[str, Posterior]
     predictive: Wave
@@ -171,11 +177,10 @@ def calibrate(
         unit, outcome = np.concatenate([unit, design]), np.concatenate([outcome, wave.outcome])
         filling = filling or len(design)
     emulators = fit_emulators(unit, outcome, calibration.observations, seed, filling)
-    posterior = sample_posterior(emulators, space, calibration.design.steps, seed)
-    held_out = {
-        name: sample_posterior(emulators, space, calibration.design.steps, seed, groups)
-        for name, groups in calibration.file.held_out.items()
-    }
+    sample = partial(sample_posterior, emulators, space, calibration.design.steps, seed)
+    sample = partial(sample, shared_errors=calibration.file.shared_errors)
+    posterior = sample()
+    held_out = {name: sample(groups) for name, groups in calibration.file.held_out.items()}
     seen = sha256(posterior.unit.tobytes() + posterior.log_density.tobytes())
     draw = partial(_drawn, posterior, calibration.design.predictive)
     follows = f"{seen.hexdigest()} {calibration.design.predictive}"
@@ -297,7 +302,8 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
     if not len(unit):
         return first_wave(calibration, space)
     emulators = fit_emulators(unit, outcome, calibration.observations, seed, filling)
-    posterior = sample_posterior(emulators, space, min(_STEPS_BETWEEN_WAVES, calibration.design.steps), seed)
+    steps = min(_STEPS_BETWEEN_WAVES, calibration.design.steps)
+    posterior = sample_posterior(emulators, space, steps, seed, shared_errors=calibration.file.shared_errors)
     samples, places = np.unique(posterior.unit, axis=0, return_index=True)
     likely = samples[np.argsort(posterior.log_density[places])[::-1]][: len(samples) // 2]
     draw = np.random.default_rng([seed, len(unit)])
@@ -312,18 +318,26 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
 
 
 def _promising(
-    emulators: list[Emulator], parents: FloatArray, points: int, taken: FloatArray, draw: np.random.Generator
+    emulators: Emulators, parents: FloatArray, points: int, taken: FloatArray, draw: np.random.Generator
 ) -> FloatArray:
-    """Of many sets around and between some those that the emulators expect least misfit of, not too near each other."""
+    """Of many sets around and between some those of which least misfit is expected, not too near each other.
+
+    The misfit of an observation that may not be made is `MISSING_MISFIT`, as in `ranking`.
+    """
     shares = draw.dirichlet(np.full(len(parents), 0.5), _TRIED)
     tried = np.clip(shares @ parents + draw.normal(0.0, _NEAR, (_TRIED, parents.shape[1])), 0.0, 1.0)
-    expected = np.zeros(len(tried))
-    for emulator in emulators:
-        if not emulator.observation.derived:
-            mean, deviation = emulator.predict(tried)
-            residuals = np.sinh(mean[:, None] + emulator.error_inflation * deviation[:, None] * _QUANTILES)
-            expected += np.log1p(residuals**2).mean(axis=1)
+    own = [place for place, one in enumerate(emulators.observations) if not one.derived]
+    expected = np.concatenate([_expected_misfit(emulators.of(own), part) for part in np.array_split(tried, _PARTS)])
     return spread_out(tried[np.argsort(expected)[: 4 * points]], points, taken)
+
+
+def _expected_misfit(emulators: Emulators, unit: FloatArray) -> FloatArray:
+    """Σ ln(1 + r²) as the emulators expect it at points (N, D), shape (N,)."""
+    mean, deviation = emulators.predict(unit)
+    transformed = np.clip(mean[..., None] + deviation[..., None] * _QUANTILES, -LARGEST, LARGEST)
+    misfit = np.log1p(np.sinh(transformed) ** 2).mean(axis=2)
+    made = emulators.feasibility.probability(unit)
+    return np.asarray((made * misfit + (1.0 - made) * MISSING_MISFIT).sum(axis=1))
 
 
 def _drawn(posterior: Posterior, points: int) -> FloatArray:
@@ -336,21 +350,23 @@ def ranking(calibration: Calibration, outcome: FloatArray) -> npt.NDArray[np.int
     """Places of sets that were run: those first that give most observations within their deviations, shape (P,).
 
     Those that are derived from others do not count. Of several sets that with the least misfit Σ ln(1 + r²), r in
-    standard deviations; the logarithm keeps an observation that none of them gives from deciding. It is the engine's
-    own word: emulators err most where they hope most.
+    standard deviations; the logarithm keeps an observation that none of them gives from deciding. One that could not be
+    made is not given, and its misfit is `MISSING_MISFIT`. It is the engine's own word: emulators err most where they
+    hope most.
 
     Parameters
     ----------
     calibration
         Whose observations.
     outcome : ndarray, shape (P, K)
-        What the engine made of each set.
+        What the engine made of each set; NaN where there was nothing to observe.
     """
     value = np.array([one.value for one in calibration.observations])
     deviation = np.array([one.deviation for one in calibration.observations])
     own = np.array([not one.derived for one in calibration.observations])
     residual = ((outcome - value) / deviation)[:, own]
-    given, misfit = (np.abs(residual) <= 1.0).sum(axis=1), np.log1p(residual**2).sum(axis=1)
+    given = (np.abs(residual) <= 1.0).sum(axis=1)
+    misfit = np.where(np.isnan(residual), MISSING_MISFIT, np.log1p(residual**2)).sum(axis=1)
     return np.lexsort((misfit, -given))
 
 
@@ -362,22 +378,3 @@ def _finer_and_longer(calibration: Calibration, values: FloatArray) -> dict[str,
         finer[label] = {"run.time_step": f"{case.run.time_step / 2.0 * 1e6:.6g} us"}
         longer[label] = {"run.cycles": 2 * case.run.cycles}
     return {"best": {}, "half-step": finer, "twice-as-long": longer}
-
-
-def sobol_indices(emulators: list[Emulator], space: Space, seed: int, points: int = 512) -> FloatArray:
-    """How much of each observation's variance over the whole range depends on each parameter (Saltelli et al. 2010).
-
-    Returns
-    -------
-    ndarray, shape (2, K, D)
-        First order: alone; total order: with all others too. Of the transformed residual.
-    """
-    from scipy.stats import sobol_indices as indices_of
-    from scipy.stats import uniform
-
-    def respond(points: FloatArray) -> FloatArray:
-        return np.stack([one.predict(points.T)[0] for one in emulators])
-
-    found = indices_of(func=respond, n=points, dists=[uniform()] * space.dimensions, rng=np.random.default_rng(seed))
-    indices: FloatArray = np.stack([found.first_order, found.total_order])  # without K where that is 1
-    return np.clip(indices.reshape(2, len(emulators), space.dimensions), 0.0, 1.0)

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from walkers.calibration.feasibility import Feasibility, fit_feasibility
+from walkers.calibration.processes import Process, Processes, knowing_nothing, of_regressor
 from walkers.inputs.calibration import Observation
 
 FloatArray = npt.NDArray[np.float64]
 _FOLDS = 10
 _FEW = 20
+_LEAST = 5
+_UNKNOWN = 3.0
+"""Standard deviation of the transformed residual of an observation that fewer than five sets gave: ten deviations
+either way, and the same for all parameters."""
+_EXTREME = 3.0
 LARGEST = 12.0
 """Of the transformed residuals: beyond, sinh overflows and nobody asks."""
 
@@ -22,7 +30,7 @@ LARGEST = 12.0
 def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:
     """Arsinh of the residual in standard deviations: linear near the observation, logarithmic far from it.
 
-    A walker that came apart may run at any speed; on this scale it does not outweigh those that walk.
+    Walkers that are far too fast do not outweigh on this scale those that are nearly right.
     """
     return np.asarray(np.arcsinh((outcome - observation.value) / observation.deviation))
 
@@ -31,39 +39,39 @@ def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:
 class Emulator:
     """One observation as a function of the parameters: a Gaussian process of the transformed residual.
 
+    It knows the sets alone in which there was something to observe (`walkers.calibration.feasibility`).
+
     Attributes
     ----------
     observation
         What it gives.
     process
-        scikit-learn's regressor.
-    inverse : ndarray, shape (P, P)
-        Of its covariance matrix.
+        Fitted.
     error_inflation
         By how much its standard deviations are too small, from cross-validation in the later waves; at least 1.
     error
-        Root mean square of the cross-validated error, in the transformed residual.
+        Root mean square of the cross-validated error, in the transformed residual; NaN if too few sets were feasible.
     explained
-        Share of the variance that is explained in cross-validation.
+        Share of the variance that is explained in cross-validation; NaN if too few sets were feasible.
+    sets
+        Number of the sets that it knows.
     """
 
     observation: Observation
-    process: Any
-    inverse: FloatArray
+    process: Process
     error_inflation: float
     error: float
     explained: float
+    sets: int
+
+    @cached_property
+    def _alone(self) -> Processes:
+        return Processes([self.process])
 
     def predict(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Transformed residual and its standard deviation, as the process gives them: shape (N,).
-
-        The process's own ``predict`` checks and solves anew each time, which takes a chain ten times as long.
-        """
-        process = self.process
-        near = process.kernel_(unit, process.X_train_)
-        mean = near @ process.alpha_ * process._y_train_std + process._y_train_mean
-        variance = process.kernel_.diag(unit) - np.einsum("np,np->n", near @ self.inverse, near)
-        return mean, np.sqrt(np.maximum(variance, 0.0)) * process._y_train_std
+        """Transformed residual and its standard deviation, as the process gives them: shape (N,)."""
+        mean, deviation = self._alone.predict(unit)
+        return mean[:, 0], deviation[:, 0]
 
     def draw(self, unit: FloatArray, normal: FloatArray) -> FloatArray:
         """The observation as it may be at points (N, D), SI units and degrees: shape (N,).
@@ -84,17 +92,68 @@ class Emulator:
         return middle, (high - low) / 2.0
 
 
+@dataclass(frozen=True)
+class Emulators:
+    """The engine, as far as sets that were run tell of it: K observations, and whether they can be made.
+
+    Attributes
+    ----------
+    each
+        One an observation.
+    feasibility
+        Of all observations.
+    correlation : ndarray, shape (K, K)
+        Of the emulators' errors, for observations share runs and sets; from cross-validation, shrunk toward none.
+    """
+
+    each: tuple[Emulator, ...]
+    feasibility: Feasibility
+    correlation: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.each)
+
+    def __iter__(self) -> Iterator[Emulator]:
+        return iter(self.each)
+
+    def __getitem__(self, place: int) -> Emulator:
+        return self.each[place]
+
+    @property
+    def observations(self) -> list[Observation]:
+        """What they give."""
+        return [one.observation for one in self.each]
+
+    @cached_property
+    def _side_by_side(self) -> Processes:
+        return Processes([one.process for one in self.each])
+
+    @cached_property
+    def _inflation(self) -> FloatArray:
+        return np.array([one.error_inflation for one in self.each])
+
+    def predict(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Transformed residuals and their standard deviations, widened by ``error_inflation``: shape (N, K)."""
+        mean, deviation = self._side_by_side.predict(unit)
+        return mean, deviation * self._inflation
+
+    def of(self, places: list[int]) -> Emulators:
+        """Those of some observations; their events are still those of all."""
+        feasibility = replace(self.feasibility, event=self.feasibility.event[places])
+        return Emulators(tuple(self.each[one] for one in places), feasibility, self.correlation[np.ix_(places, places)])
+
+
 def fit_emulators(
     unit: FloatArray, outcome: FloatArray, observations: Sequence[Observation], seed: int, filling: int = 0
-) -> list[Emulator]:
-    """One emulator an observation.
+) -> Emulators:
+    """Fit values where there are some, and where there are none.
 
     Parameters
     ----------
     unit : ndarray, shape (P, D)
         The sets that were run, in the unit cube.
     outcome : ndarray, shape (P, K)
-        What they gave.
+        What they gave; NaN where there was nothing to observe.
     observations
         K of them.
     seed
@@ -103,35 +162,66 @@ def fit_emulators(
         Number of the sets that fill the range. Errors are judged by the sets after them, if there are enough: these are
         where the posterior is, and there walkers are more than elsewhere on the verge of something.
     """
-    judged = slice(filling if len(unit) - filling >= _FEW else 0, None)
-    return [_fitted(unit, outcome[:, k], observation, seed, judged) for k, observation in enumerate(observations)]
+    later = np.arange(len(unit)) >= filling
+    fitted = [_fitted(unit, outcome[:, k], observation, seed, later) for k, observation in enumerate(observations)]
+    return Emulators(
+        tuple(emulator for emulator, _ in fitted),
+        fit_feasibility(unit, outcome, seed),
+        _correlation(np.stack([miss for _, miss in fitted], axis=1)),
+    )
 
 
-def _fitted(unit: FloatArray, outcome: FloatArray, observation: Observation, seed: int, judged: slice) -> Emulator:
-    from scipy.linalg import cho_solve
+def _fitted(
+    unit: FloatArray, outcome: FloatArray, observation: Observation, seed: int, later: npt.NDArray[np.bool_]
+) -> tuple[Emulator, FloatArray]:
+    """An emulator, and its cross-validated errors in stated standard errors, shape (P,); 0 where there is no value."""
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
     from threadpoolctl import threadpool_limits
 
-    wanted = transformed(outcome, observation)
+    made, errors = np.isfinite(outcome), np.zeros(len(outcome))
+    if made.sum() < _LEAST:
+        nothing = knowing_nothing(unit.shape[1], 0.0, _UNKNOWN)
+        return Emulator(observation, nothing, 1.0, np.nan, np.nan, int(made.sum())), errors
+    wanted, known = transformed(outcome[made], observation), unit[made]
     scales = np.full(unit.shape[1], 0.7)
     kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(scales, (5e-2, 2e1), nu=2.5) + WhiteKernel(1e-2, (1e-6, 1.0))
     process = GaussianProcessRegressor(kernel, normalize_y=True, n_restarts_optimizer=1, random_state=seed)
     with warnings.catch_warnings(), threadpool_limits(1):  # matrices are small: threads would wait for each other
         warnings.simplefilter("ignore", ConvergenceWarning)  # a scale at its bound: no influence
-        process.fit(unit, wanted)
-    predicted, deviation = _cross_validated(process, unit, wanted, seed)
+        process.fit(known, wanted)
+        predicted, deviation = _cross_validated(process, known, wanted, seed)
     miss = wanted - predicted
+    errors[made] = miss / deviation
+    judged = made & later if (made & later).sum() >= _FEW else made
     spread = float(np.var(wanted))
-    return Emulator(
+    emulator = Emulator(
         observation,
-        process,
-        inverse=cho_solve((process.L_, True), np.eye(len(unit))),
-        error_inflation=max(1.0, float(np.sqrt(np.mean((miss / deviation)[judged] ** 2)))),
+        of_regressor(process),
+        error_inflation=max(1.0, float(np.sqrt(np.mean(errors[judged] ** 2)))),
         error=float(np.sqrt(np.mean(miss**2))),
         explained=1.0 - float(np.mean(miss**2)) / spread if spread > 0.0 else 1.0,
+        sets=int(made.sum()),
     )
+    return emulator, errors
+
+
+def _correlation(errors: FloatArray) -> FloatArray:
+    """Correlation of errors (P, K) about zero, shrunk as by Ledoit and Wolf (doi 10.1016/S0047-259X(03)00096-4).
+
+    An error that is not known counts as none, which keeps the matrix positive; one of many deviations counts as three,
+    lest one set decide.
+    """
+    from sklearn.covariance import ledoit_wolf_shrinkage
+
+    clipped = np.clip(errors, -_EXTREME, _EXTREME)
+    size = np.sqrt(np.mean(clipped**2, axis=0))
+    standard = clipped / np.where(size > 0.0, size, 1.0)
+    left = 1.0 - ledoit_wolf_shrinkage(standard, assume_centered=True) if standard.any() else 0.0
+    found = left * standard.T @ standard / len(standard)
+    np.fill_diagonal(found, 1.0)
+    return np.asarray(found)
 
 
 def _cross_validated(process: Any, unit: FloatArray, wanted: FloatArray, seed: int) -> tuple[FloatArray, FloatArray]:

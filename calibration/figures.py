@@ -151,11 +151,11 @@ def _sobol(found: Outcome) -> Figure:
     figure, axes = new_figure(1.0 * len(names) + 3.4, 0.28 * len(found.emulators) + 1.6)
     total = found.sobol[1]
     image = axes.imshow(total, aspect="auto", cmap="Blues", vmin=0.0, vmax=1.0)
-    for row, column in np.ndindex(*total.shape):
+    for row, column in np.argwhere(np.isfinite(total)):
         colour = "w" if total[row, column] > 0.55 else "0.2"
         axes.text(column, row, f"{total[row, column]:.2f}", ha="center", va="center", fontsize=6, color=colour)
     axes.set_xticks(range(len(names)), names, rotation=35, ha="right", fontsize=7)
     axes.set_yticks(range(len(found.emulators)), [one.observation.title for one in found.emulators], fontsize=7)
     axes.grid(visible=False)
-    figure.colorbar(image, ax=axes, label="total Sobol index over the whole range")
+    figure.colorbar(image, ax=axes, label="total Sobol index over the feasible part")
     return figure

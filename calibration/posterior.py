@@ -1,25 +1,32 @@
-"""What the observations say of the parameters: a posterior, walked through by emcee."""
+"""What the observations say of the parameters: a posterior, walked through by emcee from several starts."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import ndtr
 
-from walkers.calibration.emulator import LARGEST, Emulator
+from walkers.calibration.convergence import LARGEST_RHAT, LEAST_SAMPLES, effective_samples, rhat
+from walkers.calibration.emulator import Emulators
+from walkers.calibration.likelihood import log_likelihood, observation_covariance
 from walkers.calibration.space import Space
+from walkers.inputs.calibration import SharedError
 
 FloatArray = npt.NDArray[np.float64]
-_WALKERS_PER_DIMENSION = 8
+STARTS = 4
+_PARTS = 8
+"""Of the most steps; after each it is seen whether the chains have converged."""
 _BURN = 0.4
 _KEPT = 4000
 _DISCREPANCY = 0.5
 """Scale of the half-Cauchy prior about a group's discrepancy, in standard deviations of its observations: most groups
 have little, but one may have much without bending all parameters toward it."""
-_LOG_DISCREPANCY = (-5.0, 5.0)
-_NODES, _WEIGHTS = np.polynomial.hermite.hermgauss(21)
+_MOST = 0.998
+"""Probability of the prior beyond which a discrepancy, then of 160 deviations, does not grow."""
 
 
 @dataclass(frozen=True)
@@ -36,21 +43,30 @@ class Posterior:
         But for a constant.
     groups
         G names; those that were held out have no discrepancy of their own.
-    autocorrelation
-        Longest autocorrelation time of the chain, in its steps.
+    starts
+        Number of ensembles that were started independently of each other.
     steps
-        Of the chain, after those that were thrown away.
+        Of each ensemble, after those that were thrown away.
+    walkers
+        Of each ensemble.
     acceptance
         Mean share of accepted moves.
+    rhat
+        The largest of all coordinates (`walkers.calibration.convergence.rhat`).
+    effective_samples
+        The fewest of all coordinates (`walkers.calibration.convergence.effective_samples`).
     """
 
     unit: FloatArray
     discrepancy: FloatArray
     log_density: FloatArray
     groups: tuple[str, ...]
-    autocorrelation: float
+    starts: int
     steps: int
+    walkers: int
     acceptance: float
+    rhat: float
+    effective_samples: float
 
     @property
     def best(self) -> FloatArray:
@@ -58,58 +74,14 @@ class Posterior:
         best: FloatArray = self.unit[int(np.argmax(self.log_density))]
         return best
 
-
-def log_likelihood(mean: FloatArray, deviation: FloatArray, variance: FloatArray) -> FloatArray:
-    """Logarithm of what a residual of 0 is worth if its arsinh is normally distributed, but for a constant.
-
-    ln ∫ N(sinh z; 0, variance) N(z; mean, deviation²) dz, by Gauss and Hermite. Taking the residual's own error for
-    cosh(mean) deviation instead would make the hopeless cheap: no residual would be more than 1/deviation errors off.
-
-    Parameters
-    ----------
-    mean, deviation
-        Of the transformed residual (`walkers.calibration.emulator.transformed`).
-    variance
-        Of the residual: 1, and the square of the discrepancy.
-    """
-    places = np.clip(mean[..., None] + np.sqrt(2.0) * deviation[..., None] * _NODES, -LARGEST, LARGEST)
-    exponents = -0.5 * np.sinh(places) ** 2 / variance[..., None] + np.log(_WEIGHTS)
-    largest = exponents.max(axis=-1, keepdims=True)
-    total = np.log(np.exp(exponents - largest).sum(axis=-1)) + largest[..., 0]
-    return np.asarray(total - 0.5 * np.log(variance))
+    @property
+    def converged(self) -> bool:
+        """Whether the starts agree and the chains are long enough to say something of the posterior."""
+        return self.rhat < LARGEST_RHAT and self.effective_samples > LEAST_SAMPLES
 
 
-class _Density:
-    """Log density of the parameters and of the logarithms of the discrepancies."""
-
-    def __init__(self, emulators: Sequence[Emulator], space: Space, groups: tuple[str, ...]) -> None:
-        self.emulators, self.space = emulators, space
-        self.group = np.array([groups.index(one.observation.group) for one in emulators])
-        self.error_inflation = np.array([one.error_inflation for one in emulators])
-        self.dimensions = space.dimensions
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        unit, logs = points[:, : self.dimensions], points[:, self.dimensions :]
-        total = self.space.log_prior(unit)
-        low, high = _LOG_DISCREPANCY
-        total = np.where(np.all((logs >= low) & (logs <= high), axis=1), total, -np.inf)
-        inside = np.isfinite(total)
-        if not inside.any():
-            return total
-        logs = logs[inside]
-        variance = 1.0 + np.exp(2.0 * logs)[:, self.group]
-        mean, deviation = np.stack([one.predict(unit[inside]) for one in self.emulators], axis=2)
-        likelihood = log_likelihood(mean, deviation * self.error_inflation, variance).sum(axis=1)
-        # Half-Cauchy, with the Jacobian of the logarithm.
-        prior = (logs - np.log1p((np.exp(logs) / _DISCREPANCY) ** 2)).sum(axis=1)
-        total[inside] += likelihood + prior
-        return total
-
-
-def sample_posterior(
-    emulators: Sequence[Emulator], space: Space, steps: int, seed: int, held_out: Collection[str] = ()
-) -> Posterior:
-    """Walk through the posterior.
+class Density:
+    """Log density of the parameters and of the groups' discrepancies, in coordinates of which all numbers are allowed.
 
     Parameters
     ----------
@@ -117,56 +89,131 @@ def sample_posterior(
         Of all observations.
     space
         Of the parameters.
-    steps
-        Of the chain; the first two fifths are thrown away.
-    seed
-        Of the chain.
     held_out
         Groups of observations that are not used.
+    shared_errors
+        Of the calibration's file.
+
+    Attributes
+    ----------
+    groups
+        Names of the G groups that are used.
+    dimensions
+        D + G.
+    """
+
+    def __init__(
+        self,
+        emulators: Emulators,
+        space: Space,
+        held_out: Collection[str] = (),
+        shared_errors: Mapping[str, SharedError] | None = None,
+    ) -> None:
+        observations = emulators.observations
+        used = [k for k, one in enumerate(observations) if one.group not in held_out and not one.derived]
+        self.groups = tuple(dict.fromkeys(observations[k].group for k in used))
+        self.dimensions = space.dimensions + len(self.groups)
+        self._space, self._emulators = space, emulators.of(used)
+        self._events = emulators.feasibility.needed(used)
+        self._group = np.array([self.groups.index(observations[k].group) for k in used])
+        self._shared = observation_covariance(self._emulators.observations, shared_errors or {})
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """At points (N, D + G), shape (N,)."""
+        unit, discrepancy = self.places(points)
+        # Chains know no ends: what is uniform in the cube, or half-Cauchy, is standard normal in their coordinates.
+        total: FloatArray = self._space.log_prior(unit) - 0.5 * np.sum(points**2, axis=1)
+        mean, deviation = self._emulators.predict(unit)
+        total += log_likelihood(mean, deviation, self._emulators.correlation, self._shared, discrepancy[:, self._group])
+        # What was published was seen, of walkers that walked.
+        total += self._emulators.feasibility.log_probabilities(unit)[:, self._events].sum(axis=1)
+        return total
+
+    def places(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The points of the unit cube, shape (N, D), and the discrepancies, shape (N, G), at coordinates (N, D + G)."""
+        uniform: FloatArray = ndtr(points)
+        count = self._space.dimensions
+        return uniform[:, :count], _DISCREPANCY * np.tan(0.5 * np.pi * np.minimum(uniform[:, count:], _MOST))
+
+    def beginnings(self, walkers: int, draw: np.random.Generator) -> FloatArray:
+        """The likelier of many points, so that a chain need not look for the posterior, shape (walkers, D + G)."""
+        tried = draw.standard_normal((40 * walkers, self.dimensions))
+        likely = np.argsort(self(tried))[::-1][: 2 * walkers]
+        chosen: FloatArray = tried[draw.choice(likely, walkers, replace=False)]
+        return chosen
+
+
+def sample_posterior(
+    emulators: Emulators,
+    space: Space,
+    steps: int,
+    seed: int,
+    held_out: Collection[str] = (),
+    *,
+    shared_errors: Mapping[str, SharedError] | None = None,
+) -> Posterior:
+    """Walk through the posterior until the chains have converged, or for so many steps.
+
+    Parameters
+    ----------
+    emulators, space, held_out, shared_errors
+        As for `Density`.
+    steps
+        Of each ensemble, at most; the first two fifths of those made are thrown away.
+    seed
+        Of the chains.
 
     Returns
     -------
     Posterior
+        Whose ``converged`` says whether it may be believed.
     """
-    import emcee
     from threadpoolctl import threadpool_limits
 
-    used = [one for one in emulators if one.observation.group not in held_out and not one.observation.derived]
-    groups = tuple(dict.fromkeys(one.observation.group for one in used))
-    density = _Density(used, space, groups)
-    dimensions = space.dimensions + len(groups)
-    walkers = 2 * ((_WALKERS_PER_DIMENSION * dimensions + 1) // 2)
-    draw = np.random.default_rng(seed)
-    sampler = emcee.EnsembleSampler(
-        walkers,
-        dimensions,
-        density,
-        vectorize=True,
-        moves=[(emcee.moves.DEMove(), 0.7), (emcee.moves.DESnookerMove(), 0.1), (emcee.moves.StretchMove(), 0.2)],
-    )
-    sampler.random_state = np.random.RandomState(seed).get_state()
+    density = Density(emulators, space, held_out, shared_errors)
+    walkers = 2 * (density.dimensions + 1)
+    part = max(steps // _PARTS, 1)
     with threadpool_limits(1):  # matrices are small: threads would wait for each other
-        sampler.run_mcmc(_beginnings(density, walkers, dimensions, draw), steps)
-    gone = int(_BURN * steps)
-    chain, log_density = sampler.get_chain(discard=gone), sampler.get_log_prob(discard=gone)
-    thin = max(1, chain.shape[0] * walkers // _KEPT)
-    samples = chain[::thin].reshape(-1, dimensions)
-    times = emcee.autocorr.integrated_time(chain, tol=0, has_walkers=True)
+        samplers = [_ensemble(density, walkers, seed, start) for start in range(STARTS)]
+        states = [density.beginnings(walkers, np.random.default_rng([seed, start])) for start in range(STARTS)]
+        while (left := steps - samplers[0].iteration) > 0:
+            states = [sampler.run_mcmc(state, min(part, left)) for sampler, state in zip(samplers, states, strict=True)]
+            found = _posterior(density, samplers)
+            if found.converged:
+                break
+    return found
+
+
+def _ensemble(density: Density, walkers: int, seed: int, start: int) -> Any:
+    """A sampler of emcee. A tenth of the moves are as long as from one walker to another: from peak to peak."""
+    import emcee
+    from emcee.moves import DEMove, DESnookerMove, StretchMove
+
+    moves = [(DEMove(), 0.6), (DEMove(gamma0=1.0), 0.1), (DESnookerMove(), 0.1), (StretchMove(), 0.2)]
+    sampler = emcee.EnsembleSampler(walkers, density.dimensions, density, vectorize=True, moves=moves)
+    sampler.random_state = np.random.RandomState(np.random.SeedSequence([seed, start]).generate_state(8)).get_state()
+    return sampler
+
+
+def _posterior(density: Density, samplers: Sequence[Any]) -> Posterior:
+    """What the ensembles have said so far."""
+    gone = int(_BURN * samplers[0].iteration)
+    # Starts, steps, walkers, coordinates.
+    chains = np.stack([sampler.get_chain(discard=gone) for sampler in samplers])
+    log_density = np.stack([sampler.get_log_prob(discard=gone) for sampler in samplers])
+    starts, steps, walkers, coordinates = chains.shape
+    apart = chains.transpose(3, 0, 2, 1)
+    thin = max(1, starts * steps * walkers // _KEPT)
+    unit, discrepancy = density.places(chains[:, ::thin].reshape(-1, coordinates))
     return Posterior(
-        unit=samples[:, : space.dimensions],
-        discrepancy=np.exp(samples[:, space.dimensions :]),
-        log_density=log_density[::thin].reshape(-1),
-        groups=groups,
-        autocorrelation=float(np.max(times)),
-        steps=chain.shape[0],
-        acceptance=float(np.mean(sampler.acceptance_fraction)),
+        unit=unit,
+        discrepancy=discrepancy,
+        log_density=log_density[:, ::thin].reshape(-1),
+        groups=density.groups,
+        starts=starts,
+        steps=steps,
+        walkers=walkers,
+        acceptance=float(np.mean([sampler.acceptance_fraction.mean() for sampler in samplers])),
+        rhat=max(map(rhat, apart)),
+        effective_samples=min(map(effective_samples, apart)),
     )
-
-
-def _beginnings(density: _Density, walkers: int, dimensions: int, draw: np.random.Generator) -> FloatArray:
-    """The likeliest of many points of the cube, so that the chain need not look for the posterior."""
-    tried = draw.uniform(0.02, 0.98, (40 * walkers, dimensions))
-    tried[:, density.dimensions :] = draw.normal(0.0, 1.0, (len(tried), dimensions - density.dimensions))
-    likely = np.argsort(density(tried))[::-1][: 2 * walkers]
-    chosen: FloatArray = tried[draw.choice(likely, walkers, replace=False)]
-    return chosen

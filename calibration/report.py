@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from walkers.calibration.calibrate import Outcome
+from walkers.calibration.convergence import LARGEST_RHAT, LEAST_SAMPLES
 from walkers.calibration.emulator import Emulator, transformed
 from walkers.calibration.posterior import Posterior
 from walkers.calibration.waves import Wave
@@ -20,6 +21,9 @@ from walkers.runner.files import write_bytes, write_json, write_text
 
 FloatArray = npt.NDArray[np.float64]
 _SIGMAS = 2.0
+_NARROW, _NARROWER = 1.0 / 3.0, 2.0 / 3.0
+"""A parameter is identified if the posterior's interval is less than a third of the prior's and the chains have
+converged."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +38,8 @@ class Row:
         At the best set; None where there is no walker.
     low, high, samples
         Of the engine over samples of the posterior, of those that are walkers, and how many these are.
-    emulator, error
-        At the best set.
+    emulator, error, feasible
+        At the best set; ``feasible`` is the probability that there is a walker, as it is learned from the waves.
     agrees
         Whether the engine lies within the deviation of the published value.
     half_step, twice_as_long
@@ -56,6 +60,7 @@ class Row:
     samples: int
     emulator: float
     error: float
+    feasible: float
     agrees: bool
     half_step: float | None
     twice_as_long: float | None
@@ -77,6 +82,7 @@ def labelled(parameter: Parameter) -> str:
 def rows_of(found: Outcome) -> list[Row]:
     """A row an observation."""
     rows = []
+    feasible = found.emulators.feasibility.probability(found.checks["best"].unit)[0]
     for place, observation in enumerate(found.calibration.observations):
         unit, scale = unit_of(observation)
         emulated, error = found.emulators[place].value(found.checks["best"].unit)
@@ -98,6 +104,7 @@ def rows_of(found: Outcome) -> list[Row]:
                 samples=len(seen),
                 emulator=float(emulated[0]) * scale,
                 error=float(error[0]) * scale,
+                feasible=float(feasible[place]),
                 agrees=best is not None and abs(best - observation.value * scale) <= observation.deviation * scale,
                 half_step=finer,
                 twice_as_long=longer,
@@ -113,7 +120,7 @@ def rows_of(found: Outcome) -> list[Row]:
 
 def _seen(wave: Wave, place: int, scale: float) -> list[float]:
     """An observation of those of a wave's sets that have a walker."""
-    values = wave.seen[:, place]
+    values = wave.outcome[:, place]
     return [float(value) * scale for value in values[~np.isnan(values)]]
 
 
@@ -125,13 +132,54 @@ def _predicted(emulator: Emulator, posterior: Posterior, scale: float) -> tuple[
 
 
 def emulator_checks(found: Outcome) -> FloatArray:
-    """Errors of the emulators at the runs of the predictive wave, in their stated standard errors, shape (S, K)."""
-    columns = []
-    for place, emulator in enumerate(found.emulators):
-        mean, deviation = emulator.predict(found.predictive.unit)
-        seen = transformed(found.predictive.outcome[:, place], emulator.observation)
-        columns.append((seen - mean) / (deviation * emulator.error_inflation))
-    return np.stack(columns, axis=1)
+    """Errors of the emulators at the runs of the predictive wave, in their stated standard errors, shape (S, K).
+
+    NaN where there was nothing to observe.
+    """
+    mean, deviation = found.emulators.predict(found.predictive.unit)
+    seen = [
+        transformed(found.predictive.outcome[:, place], observation)
+        for place, observation in enumerate(found.emulators.observations)
+    ]
+    return np.asarray((np.stack(seen, axis=1) - mean) / deviation)
+
+
+def _inside(found: Outcome) -> tuple[int, float]:
+    """How many of the engine's values were there to check, and the share of those within two standard errors."""
+    checks = emulator_checks(found)
+    known = np.abs(checks[np.isfinite(checks)])
+    return len(known), float(np.mean(known <= _SIGMAS)) if len(known) else nan
+
+
+def feasibility_check(found: Outcome) -> tuple[float, float]:
+    """Share of the predictive wave's outcomes that exist, and the mean of the probabilities that they were given."""
+    expected = found.emulators.feasibility.probability(found.predictive.unit)
+    return float(np.mean(~np.isnan(found.predictive.outcome))), float(expected.mean())
+
+
+def narrowing(found: Outcome) -> dict[str, float]:
+    """Of each parameter the posterior's 5 to 95 % interval over that of the prior: 1 if nothing was learned.
+
+    In logarithms where the parameter's range is one of these.
+    """
+    fine = np.linspace(0.0, 1.0, 2001)
+    low, high = np.percentile(found.posterior.unit, (5.0, 95.0), axis=0)
+    shares = {}
+    for place, one in enumerate(found.space.parameters):
+        points = np.full((len(fine), found.space.dimensions), 0.5)
+        points[:, place] = fine
+        density = found.space.log_prior(points)
+        below = np.cumsum(np.exp(density - density.max()))
+        begin, end = np.interp([0.05, 0.95], below / below[-1], fine)
+        shares[one.name] = float((high[place] - low[place]) / (end - begin))
+    return shares
+
+
+def words_of(share: float, *, converged: bool) -> str:
+    """What may be said of a parameter whose interval is so much of the prior's."""
+    if not converged:
+        return "not said: the chains have not converged"
+    return "identified" if share < _NARROW else "narrowed" if share < _NARROWER else "not identified"
 
 
 def intervals(found: Outcome) -> dict[str, tuple[float, float, float]]:
@@ -165,7 +213,7 @@ def write_tables(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
 
 
 def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
-    posterior, checks = found.posterior, emulator_checks(found)
+    posterior, (checked, inside), (made, expected) = found.posterior, _inside(found), feasibility_check(found)
     contents: dict[str, object] = {
         "calibration": found.calibration.name,
         "sets": len(found.unit),
@@ -174,25 +222,27 @@ def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
         "discrepancies": {
             group: float(np.median(posterior.discrepancy[:, place])) for place, group in enumerate(posterior.groups)
         },
-        "chain": {
-            "steps": posterior.steps,
-            "autocorrelation": posterior.autocorrelation if isfinite(posterior.autocorrelation) else None,
-            "acceptance": posterior.acceptance,
-        },
+        "narrowing": narrowing(found),
+        "words": {name: words_of(share, converged=posterior.converged) for name, share in narrowing(found).items()},
+        "chain": {"converged": posterior.converged, **_chain(posterior)},
+        "held_out_chains": {name: {"converged": one.converged, **_chain(one)} for name, one in found.held_out.items()},
         "emulators": {
             one.observation.name: {
-                "explained": one.explained,
-                "error": one.error,
+                "explained": _finite(one.explained),
+                "error": _finite(one.error),
                 "error_inflation": one.error_inflation,
+                "sets": one.sets,
             }
             for one in found.emulators
         },
-        "emulators_within_two_errors": float(np.mean(np.abs(checks) <= _SIGMAS)),
+        "emulators_checked": checked,
+        "emulators_within_two_errors": _finite(inside),
+        "feasible": {"seen": made, "expected": expected},
         "agree": sum(row.agrees for row in rows),
         "observations": [asdict(row) for row in rows],
         "sobol_total": {
             one.observation.name: dict(
-                zip([p.name for p in found.space.parameters], map(float, found.sobol[1, place]), strict=True)
+                zip([p.name for p in found.space.parameters], map(_finite, found.sobol[1, place]), strict=True)
             )
             for place, one in enumerate(found.emulators)
         },
@@ -200,9 +250,24 @@ def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
     return contents
 
 
+def _finite(value: float) -> float | None:
+    return float(value) if isfinite(value) else None
+
+
+def _chain(posterior: Posterior) -> dict[str, float | None]:
+    return {
+        "starts": posterior.starts,
+        "walkers": posterior.walkers,
+        "steps": posterior.steps,
+        "acceptance": posterior.acceptance,
+        "rhat": _finite(posterior.rhat),
+        "effective_samples": _finite(posterior.effective_samples),
+    }
+
+
 def as_markdown(found: Outcome, rows: list[Row]) -> str:
     """The tables as a page."""
-    known, checks = intervals(found), emulator_checks(found)
+    known, narrowed, posterior = intervals(found), narrowing(found), found.posterior
     parameters = [
         {
             "label": labelled(one),
@@ -210,10 +275,11 @@ def as_markdown(found: Outcome, rows: list[Row]) -> str:
             "interval": known[one.name],
             "low": one.low,
             "high": one.high,
+            "words": words_of(narrowed[one.name], converged=posterior.converged),
         }
         for one in found.space.parameters
     ]
-    posterior = found.posterior
+    (checked, inside), (made, expected) = _inside(found), feasibility_check(found)
     percentiles = np.percentile(posterior.discrepancy, (5.0, 50.0, 95.0), axis=0).T
     return rendered(
         "walkers.calibration",
@@ -226,7 +292,11 @@ def as_markdown(found: Outcome, rows: list[Row]) -> str:
         trials=list(found.calibration.file.held_out),
         samples=len(found.predictive.unit),
         discrepancies=dict(zip(posterior.groups, percentiles, strict=True)),
-        checks=len(checks),
-        inside=float(np.mean(np.abs(checks) <= _SIGMAS)),
-        posterior=posterior,
+        checked=checked,
+        inside=inside,
+        made=made,
+        expected=expected,
+        chains={"all observations": posterior, **found.held_out},
+        limits=(LARGEST_RHAT, LEAST_SAMPLES),
+        narrow=_NARROW,
     )

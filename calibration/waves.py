@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 _DIGITS = 9
-FAILED_RESIDUAL = 30.0
-"""Deviations by which an observation is off that could not be made."""
 
 
 @dataclass(frozen=True)
@@ -39,16 +37,13 @@ class Wave:
     ----------
     unit : ndarray, shape (P, D)
         The sets, in the unit cube.
-    seen : ndarray, shape (P, K)
-        Each observation, SI units and degrees; NaN where there is none.
     outcome : ndarray, shape (P, K)
-        The same, but `FAILED_RESIDUAL` deviations off where there is none.
+        Each observation, SI units and degrees; NaN where there is none.
     table
         The sweep's, P times the number of experiments long.
     """
 
     unit: FloatArray
-    seen: FloatArray
     outcome: FloatArray
     table: pd.DataFrame
 
@@ -132,11 +127,6 @@ def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-def _failed_outcome(calibration: Calibration) -> FloatArray:
-    """What counts where nothing was observed, shape (K,): an emulator has to know that it is bad there."""
-    return np.array([one.value + FAILED_RESIDUAL * one.deviation for one in calibration.observations])
-
-
 _LEAST_SPEED = 5e-5
 
 
@@ -185,5 +175,4 @@ def run_wave(  # noqa: PLR0913
         sweep, out, options, engine=engine, allow_failed_audit=allow_failed_audit, on_progress=on_progress
     )
     table = load(record.directory)
-    seen = observed(calibration, table)
-    return Wave(unit, seen, np.where(np.isnan(seen), _failed_outcome(calibration), seen), table), failures
+    return Wave(unit, observed(calibration, table), table), failures

@@ -82,6 +82,16 @@ class ObservationTable(_Table):
     derived: bool = False
 
 
+class SharedError(_Table):
+    """``[shared_errors.NAME]``: observations whose published values are wrong together, and by how much of the whole.
+
+    ``share`` of the variance of each is shared: so large is the correlation of any two of them.
+    """
+
+    observations: Annotated[list[str], Field(min_length=2)]
+    share: Annotated[Number, Field(gt=0, lt=1)]
+
+
 class Band(_Table):
     """``[[bands]]``: a picture of a quantity of some experiments against a column of their sweep's table."""
 
@@ -109,6 +119,7 @@ class CalibrationFile(_Table):
     parameters: Annotated[dict[str, ParameterTable], Field(min_length=1)]
     experiments: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
     observations: Annotated[list[ObservationTable], Field(min_length=1)]
+    shared_errors: dict[str, SharedError] = {}
     guesses: list[dict[str, Number]] = []
     bands: list[Band] = []
     held_out: dict[str, list[str]] = {}
@@ -247,6 +258,7 @@ def _problems(file: CalibrationFile) -> list[Problem]:
             found += _unreadable(f"{place}.{key}", getattr(observation, key), observation)
     if all(observation.derived for observation in file.observations):
         found.append(Problem("observations", None, "expected one that is not derived"))
+    found += _problems_of_shared_errors(file, names)
     found += _problems_of_guesses(file)
     for number, band in enumerate(file.bands):
         found += _unknown(f"bands[{number}].of", band.of, file.experiments, "an experiment")
@@ -254,6 +266,23 @@ def _problems(file: CalibrationFile) -> list[Problem]:
         found += _unknown(f"held_out.{name}", held, groups, "a group of observations")
         if set(held) >= {observation.group for observation in file.observations if not observation.derived}:
             found.append(Problem(f"held_out.{name}", None, "expected to leave a group to calibrate on"))
+    return found
+
+
+def _problems_of_shared_errors(file: CalibrationFile, names: list[str]) -> list[Problem]:
+    found = []
+    for label, error in file.shared_errors.items():
+        place = f"shared_errors.{label}.observations"
+        found += _unknown(place, error.observations, names, "an observation")
+        for name in dict.fromkeys(error.observations):
+            if error.observations.count(name) > 1:
+                found.append(Problem(place, f'"{name}"', "expected each observation once"))
+    for name in names:
+        having = [label for label, error in file.shared_errors.items() if name in error.observations]
+        whole = sum(file.shared_errors[label].share for label in having)
+        if whole >= 1.0:
+            told = f"expected {name} to have an error of its own: the shares of {', '.join(having)} are {whole:g} of it"
+            found.append(Problem("shared_errors", None, told))
     return found
 
 

@@ -69,7 +69,8 @@ class Row:
     within_bounds
         Whether it lies within what the paper says; None where the paper gives no bounds.
     agrees
-        Whether it lies within the bounds or, where there are none, within `AGREES` of the published value.
+        Whether it lies within the bounds or, where there are none, within `AGREES` of the published value. What is
+        published in words has bounds of its own, and is not counted (`count`).
     why
         What the disagreement depends on; empty where it agrees.
     """
@@ -134,8 +135,8 @@ def _why(number: Published, value: Value, ours: float) -> str:
 
 
 def _near(ours: float, value: float | None) -> bool:
-    if value is None:
-        return bool(np.isfinite(ours))
+    if value is None:  # words without bounds: nothing to be near to
+        return False
     return abs(ours - value) <= (AGREES * abs(value) if value else _SMALL)
 
 
@@ -273,8 +274,8 @@ def _mathieu(_: Sources) -> dict[str, Value]:
 
 
 def count(rows: list[Row], *, measured: bool) -> tuple[int, int]:
-    """How many rows agree, of how many: those in which the engine has a say, or the others."""
-    chosen = [row for row in rows if row.measured == measured]
+    """How many rows agree, of how many: those in which the engine has a say, or the others; none that is in words."""
+    chosen = [row for row in rows if row.measured == measured and row.published is not None]
     return sum(row.agrees for row in chosen), len(chosen)
 
 

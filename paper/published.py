@@ -39,7 +39,8 @@ class Published:
     what
         In words.
     value
-        As published, in ``unit``; None where the paper states it in words only.
+        As published, in ``unit``; None where the paper states it in words only. Such a one has bounds, and does not
+        count among those that agree or disagree.
     unit
         Shown with it.
     bounds
@@ -118,9 +119,10 @@ NUMBERS = (
     ),
     Published(
         "fig2_threshold",
-        "Fig. 2, inset: Γc, in words: a threshold that does not depend on the frequency",
+        "Fig. 2, inset: Γc, in words: a threshold, below the least drive of the fit",
         None,
         "",
+        (0.0, 0.191),
         depends_on=_THRESHOLD,
     ),
     Published(

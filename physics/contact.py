@@ -1,7 +1,9 @@
 """Contacts of softened beads: Hertz's repulsion 4/3 E* √R* δ^(3/2), its damping, Mindlin's tangential modulus.
 
 E* = E/(2(1 − ν²)) and G* = E/(4(1 + ν)(2 − ν)) of two bodies of the same modulus. Hertz 1881; Mindlin 1949; K. L.
-Johnson, Contact Mechanics (1985). Friction is limited to μ times the normal force of the contact without its bridge.
+Johnson, Contact Mechanics (1985). Coulomb's limit is μ times the normal force of the contact without its bridge, its
+repulsion and its damping together: a bead that is pressed on rubs more than one that leaves (measured; the audit's
+`coulomb-limit`).
 """
 
 from __future__ import annotations
@@ -55,6 +57,30 @@ def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -
 def hertz_overlap_at_wall(force: float, radius: float, reduced_modulus: float) -> float:
     """Overlap at which a wall (`walkers.physics.wall`) carries a load (N), m; of a bead of ``radius`` (m)."""
     return hertz_overlap(force / WALL_COPIES, radius, reduced_modulus)
+
+
+def normal_damping(overlap: float, reduced_radius: float, reduced_modulus: float, mass: float, ratio: float) -> float:
+    """Coefficient of the damping of two beads along their normal, 2 √(5/6) β √(2 E* √(R*δ) m*), N s/m.
+
+    Y. Tsuji, T. Tanaka, T. Ishida, Powder Technology 71 (1992) 239–250, doi 10.1016/0032-5910(92)88030-L, for the
+    damping ratio of D. Antypov, J. A. Elliott, EPL 94 (2011) 50004, doi 10.1209/0295-5075/94/50004.
+
+    Parameters
+    ----------
+    overlap
+        δ, m; none for a gap (negative).
+    reduced_radius, reduced_modulus, mass
+        R* in m, E* in Pa, m* in kg.
+    ratio
+        β (`damping_ratio`).
+    """
+    stiffness = 2.0 * reduced_modulus * sqrt(reduced_radius * max(overlap, 0.0))
+    return 2.0 * sqrt(5.0 / 6.0) * ratio * sqrt(stiffness * mass)
+
+
+def normal_damping_at_wall(overlap: float, radius: float, reduced_modulus: float, mass: float, ratio: float) -> float:
+    """Coefficient of the damping of a bead of ``radius`` (m) by a wall (`walkers.physics.wall`), N s/m."""
+    return WALL_COPIES * normal_damping(overlap, radius, reduced_modulus, mass, ratio)
 
 
 def damping_ratio(restitution: float) -> float:

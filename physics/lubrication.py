@@ -44,12 +44,16 @@ def tangential_drag(
 def normal_drag_at_wall(
     dynamic_viscosity: float, radius: float, minimum_separation_ratio: float, gap: float = 0.0
 ) -> float:
-    """Coefficient of the normal force at a wall (`walkers.physics.wall`), N s/m; of a bead of ``radius`` (m)."""
-    return WALL_COPIES * normal_drag(dynamic_viscosity, radius / 2.0, minimum_separation_ratio, gap)
+    """Coefficient of the normal force between a bead of ``radius`` (m) and a plane, 6πηR/max(ε, h/R), N s/m."""
+    return normal_drag(dynamic_viscosity, radius, minimum_separation_ratio, gap)
 
 
 def tangential_drag_at_wall(
     dynamic_viscosity: float, radius: float, minimum_separation_ratio: float, gap: float = 0.0
 ) -> float:
-    """Coefficient of the tangential force at a wall (`walkers.physics.wall`), N s/m; of a bead of ``radius`` (m)."""
+    """Coefficient of the tangential force at a wall as the engine has it, N s/m; of a bead of ``radius`` (m).
+
+    It is that of two equal spheres, taken twice (`walkers.physics.wall`): that of a plane (`tangential_drag`, whose R*
+    is the radius) where they touch, up to a fifth less where they do not.
+    """
     return WALL_COPIES * tangential_drag(dynamic_viscosity, radius / 2.0, minimum_separation_ratio, gap)

@@ -10,10 +10,11 @@ import numpy as np
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.postprocess.drawing import new_figure, plain_text, save_figure, styled
-from walkers.postprocess.gait import distance_walked, fit_slopes, gait
+from walkers.postprocess.gait import distance_walked, gait
 from walkers.postprocess.motion import Group, read_motion
 from walkers.postprocess.piles import PileAnalysis, analyse
 from walkers.postprocess.posture import ways
+from walkers.postprocess.slopes import fit_slopes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

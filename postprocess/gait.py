@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from walkers.postprocess.dump import DumpError, FloatArray
 from walkers.postprocess.motion import Group
+from walkers.postprocess.slopes import fit_slopes
 
 STEADY_DIFFERENCE = 0.05
 """A walker is steady if the velocities of the two halves of the fitted cycles differ by less than this share …"""
@@ -71,6 +72,46 @@ def gait(group: Group) -> Gait:
     )
 
 
+@dataclass(frozen=True)
+class Averages:
+    """Means over the cycles after the settling ones of W walkers of n beads; contacts as in `Gait`.
+
+    Attributes
+    ----------
+    rotation : ndarray, shape (W, n)
+        m/s.
+    sliding : ndarray, shape (W, n + pairs)
+        m/s.
+    open : ndarray, shape (W, n + pairs)
+        Share of the time in which the surfaces do not touch.
+    """
+
+    rotation: FloatArray
+    sliding: FloatArray
+    open: FloatArray
+
+
+_PARTS = 10
+"""Of an interval between samples, at which gaps are looked at: with 20 samples a cycle 200 times."""
+
+
+def averages(group: Group) -> Averages:
+    """Mean rotation and sliding over all steps, and how long contacts are open, after the settling cycles.
+
+    Means over 20 samples a cycle are up to a tenth off where contacts open: spins change within few steps as beads
+    touch. So spins are those that the engine averaged, velocities are displacements, and gaps are looked at ten times
+    between samples, on cubics through places and velocities.
+    """
+    samples = settled_samples(group)
+    mean = gait(Group(group.motion.averaged, group.make, group.walkers))
+    gaps = (gait(Group(group.motion.between(part / _PARTS), group.make, group.walkers)).gap for part in range(_PARTS))
+    return Averages(
+        rotation=mean.rotation[samples].mean(axis=0),
+        sliding=mean.sliding[samples].mean(axis=0),
+        open=np.mean([(gap[samples] > 0.0).mean(axis=0) for gap in gaps], axis=0),
+    )
+
+
 def _nearest_wall(group: Group) -> tuple[FloatArray, FloatArray | None]:
     """Gap of each bead to the wall that is nearest to it, and that wall's normal; None where there is but a floor."""
     faces = group.case.boundary.faces()
@@ -87,9 +128,9 @@ def _nearest_wall(group: Group) -> tuple[FloatArray, FloatArray | None]:
 class Walk:
     """Velocities of W walkers after the settling cycles, m/s, each of shape (W,).
 
-    ``velocity`` is the slope of the distance walked along the heading, one sample a cycle, with the standard error of
-    the least-squares fit; ``axial`` and ``lateral`` are the mass centre's velocities along and across the drive axis in
-    the frame of the substrate; ``steady`` says whether the first and the second half agree.
+    ``velocity`` is the slope of the distance walked along the heading, one sample a cycle, with its standard error
+    (`walkers.postprocess.slopes.fit_slopes`); ``axial`` and ``lateral`` are the mass centre's velocities along and
+    across the drive axis in the frame of the substrate; ``steady`` says whether the first and the second half agree.
     """
 
     velocity: FloatArray
@@ -117,30 +158,6 @@ def distance_walked(group: Group) -> tuple[FloatArray, FloatArray]:
     steps = np.einsum("fwx,fwx->fw", np.diff(centre, axis=0), (heading[1:] + heading[:-1]) / 2.0)
     distance = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
     return group.time[::strobe], distance
-
-
-def fit_slopes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Slopes of the columns of ``values`` against time and their standard errors (least squares).
-
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-    values : ndarray, shape (N, K)
-
-    Returns
-    -------
-    slope, standard_error : ndarray, shape (K,)
-        The error is NaN for fewer than three points.
-    """
-    # Moving the origin keeps rounding out of the sums: positions reach metres, steps micrometres.
-    time, values = time - time.mean(), values - values.mean(axis=0)
-    square = float(np.sum(time**2))
-    slope = time @ values / square
-    freedom = len(time) - 2
-    residuals = np.sum((values - np.outer(time, slope)) ** 2, axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        error = np.sqrt(residuals / freedom / square) if freedom > 0 else np.full(slope.shape, np.nan)
-    return slope, error
 
 
 def walk(group: Group) -> Walk:

@@ -18,7 +18,7 @@ from walkers.postprocess.dump import BinaryDump, DumpError, FloatArray
 from walkers.postprocess.local_dump import local_frames
 from walkers.runner.directory import SEGMENT_NAME, case_of, layout_of, segment_directories
 from walkers.runner.files import read_json
-from walkers.templates.layout import Layout, PlacedWalker
+from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 
 IntArray = npt.NDArray[np.int64]
 FLOOR = 0
@@ -48,6 +48,9 @@ class Motion:
         The engine's id of the first bead.
     frames : list of (Path, int)
         Segment and number of each frame within it, for the bridges.
+    mean_spin : ndarray, shape (F, N, 3), or None
+        Angular velocity averaged over all steps since the frame before, where there are walkers (nothing in the first
+        frame).
     truncated : bool
         Whether the dump ends within a frame.
     ended_early : bool
@@ -67,6 +70,7 @@ class Motion:
     frames: list[tuple[Path, int]]
     truncated: bool
     ended_early: bool = False
+    mean_spin: FloatArray | None = None
 
     def __repr__(self) -> str:
         return f"<Motion of {self.case.name}: {len(self.time)} frames of {len(self.radius)} beads>"
@@ -82,8 +86,35 @@ class Motion:
         first = self.first_driven
         if not first:
             return self
-        names = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames")
-        return replace(self, **{name: getattr(self, name)[first:] for name in names})
+        return self._of(slice(first, None))
+
+    def _of(self, frames: slice, **changes: Any) -> Motion:
+        """Some of the frames, with changes."""
+        names = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin")
+        kept: dict[str, Any] = {name: getattr(self, name) for name in names if name not in changes}
+        parts: dict[str, Any] = {name: part if part is None else part[frames] for name, part in kept.items()}
+        return replace(self, **parts, **changes)
+
+    @property
+    def averaged(self) -> Motion:
+        """The F - 1 intervals between frames: mean places, velocities and spins.
+
+        Velocities are displacements over time, which is the average over all steps, and so are spins where they were
+        averaged; elsewhere they are the mean of both ends.
+        """
+        spin = (self.spin[1:] + self.spin[:-1]) / 2.0 if self.mean_spin is None else self.mean_spin[1:]
+        interval = np.diff(self.time)[:, None, None]
+        position = (self.position[1:] + self.position[:-1]) / 2.0
+        velocity = np.diff(self.position, axis=0) / interval
+        return self._of(slice(1, None), position=position, velocity=velocity, spin=spin)
+
+    def between(self, share: float) -> Motion:
+        """The F - 1 places at a share of the intervals between frames, by cubics through places and velocities."""
+        interval = np.diff(self.time)[:, None, None]
+        begin, end, left = self.position[:-1], self.position[1:], 1.0 - share
+        position = left**2 * (1.0 + 2.0 * share) * begin + share**2 * (3.0 - 2.0 * share) * end
+        position += share * left * interval * (left * self.velocity[:-1] - share * self.velocity[1:])
+        return self._of(slice(1, None), position=position)
 
     @property
     def large(self) -> npt.NDArray[np.bool_]:
@@ -221,7 +252,7 @@ def gathered(motion: Motion) -> Motion:
         return moved
     count = len(motion.walkers[0].beads)
     arrays = {name: getattr(moved, name)[:, :count] for name in ("position", "velocity", "spin")}
-    return replace(moved, **arrays, radius=motion.radius[:count], walkers=motion.walkers[:1])
+    return replace(moved, **arrays, mean_spin=None, radius=motion.radius[:count], walkers=motion.walkers[:1])
 
 
 def read_motion(directory: str | Path) -> Motion:
@@ -317,6 +348,7 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
         frames=frames,
         truncated=truncated,
         ended_early=ended_early,
+        mean_spin=vectors(MEAN_SPIN_COLUMNS[0])[:, first:] if MEAN_SPIN_COLUMNS[0] in layout.bead_columns else None,
     )
 
 

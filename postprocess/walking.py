@@ -18,7 +18,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, gait, settled_samples, walk
+from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, averages, gait, settled_samples, walk
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
 from walkers.postprocess.posture import describe_posture, posture_summary, postures, turned_over_at, ways
 from walkers.postprocess.tables import WALKERS, described
@@ -39,7 +39,7 @@ class Walking(Analysis):
     """How walkers walk."""
 
     name = "walking"
-    version = 4
+    version = 5
     tables = ("trajectory", "walkers", "bridges")
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
@@ -217,7 +217,7 @@ def _trajectory_columns(group: Group, motion: Gait) -> Columns:
 
 
 def _walker_columns(group: Group, motion: Gait, walked: Walk) -> Columns:
-    samples, beads = settled_samples(group), len(group.radii)
+    samples, beads, means = settled_samples(group), len(group.radii), averages(group)
     between = motion.gap[samples, :, beads:]
     reach = np.array(contact_loads(group.case, group.make).rupture[beads:])
     return {
@@ -236,9 +236,9 @@ def _walker_columns(group: Group, motion: Gait, walked: Walk) -> Columns:
         "orientation_end": group.orientation[-1],
         "turned_at": turned_over_at(group),
         "separated_fraction": (between > reach).any(axis=-1).mean(axis=0),
-        **_numbered("rotation", motion.rotation[samples].mean(axis=0)),
-        **_numbered("sliding", motion.sliding[samples].mean(axis=0)),
-        **_numbered("open", (motion.gap[samples] > 0.0).mean(axis=0)),
+        **_numbered("rotation", means.rotation),
+        **_numbered("sliding", means.sliding),
+        **_numbered("open", means.open),
     }
 
 

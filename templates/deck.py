@@ -14,9 +14,9 @@ from walkers.inputs.text import rendered
 from walkers.physics.capillary import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
 from walkers.physics.matter import Contact
 from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds, contact_angle_setting, separation_cap, wall_meshes
-from walkers.templates.film import Film, film_of
 from walkers.templates.layout import (
     BEAD_COLUMNS,
+    MEAN_SPIN_COLUMNS,
     PAIR_BRIDGE_COLUMNS,
     PAIR_BRIDGES,
     WALL_BRIDGE_COLUMNS,
@@ -27,12 +27,13 @@ from walkers.templates.layout import (
 from walkers.templates.placement import place
 from walkers.templates.scene import Scene, without_carriers
 from walkers.templates.sharing import Loading, check_sharing, loading_of, loadings_of, surfaces_of
+from walkers.templates.wall_forces import WallForces, wall_forces
 
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
 STATUS_LINES_PER_CYCLE = 4
-CONTENT_VERSION = 4
+CONTENT_VERSION = 5
 """Of what decks compute: to be raised where the same case gives another deck, comments aside. Runs are named by it."""
 
 RESTART_NAME = "state.restart"
@@ -234,6 +235,7 @@ def plan_of(*cases: Case, segment: Segment | None = None, workarounds: Workaroun
         sample_every=run.steps_per_sample,
         bridge_every=run.steps_per_sample * run.samples_per_bridge_sample,
         status_every=-(-run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
+        bead_columns=(*BEAD_COLUMNS, *MEAN_SPIN_COLUMNS) if walkers else BEAD_COLUMNS,
         begin=segment.begin,
     )
     checkpoint = NO_CHECKPOINT
@@ -268,7 +270,7 @@ def compose(plan: Plan) -> Deck:
     angle = case.liquid.contact_angle
     surfaces = plan.surfaces or (case.contact,)
     moving = _moving(plan)
-    forces, film = _forces(plan, scene), _film(plan, scene, moving)
+    forces, of_walls = _forces(plan, scene), _wall_forces(plan, scene, moving)
     meshes = wall_meshes(scene.beads, scene.faces, max(scene.upper))
     text = rendered(
         "walkers.templates",
@@ -297,8 +299,8 @@ def compose(plan: Plan) -> Deck:
         amplitude=[first.amplitude * component for component in first.direction],
         peak_velocity=[first.peak_velocity * component for component in first.direction],
         forces=forces,
-        film=film,
-        loaded=[axis for axis in "xyz" if (film and axis in film.speeds) or any(one.axis == axis for one in forces)],
+        of_walls=of_walls,
+        loaded=[axis for axis in "xyz" if axis in of_walls.formulas or any(one.axis == axis for one in forces)],
         moving=moving,
         pair_bridge_terms=_terms("pair_bridges", layout.pair_bridge_columns, " ".join(PAIR_BRIDGES).split()),
         wall_bridge_terms=_terms("wall_bridges", layout.wall_bridge_columns, " ".join(WALL_BRIDGES).split()),
@@ -310,8 +312,7 @@ def compose(plan: Plan) -> Deck:
     )  # fmt: skip
     files = {f"{mesh.name}.stl": mesh.text for mesh in meshes}
     files |= {one.file: _atom_file(one.shares) for one in forces}
-    if film is not None:
-        files |= {"film_drag.txt": _atom_file(film.drags), "film_reach.txt": _atom_file(film.reaches)}
+    files |= {f"{name}.txt": _atom_file(shares) for name, shares in of_walls.shares.items()}
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, beyond)
@@ -351,11 +352,18 @@ def _forces(plan: Plan, scene: Scene) -> list[_Force]:
     return [one for one in forces if any(one.shares.values())]
 
 
-def _film(plan: Plan, scene: Scene, moving: str) -> Film | None:
-    """The film on the walls, which move along some axes, if there is one."""
+def _wall_forces(plan: Plan, scene: Scene, moving: str) -> WallForces:
+    """The forces of the walls, which move along some axes, that the engine lacks."""
     loadings = plan.loadings or (loading_of(plan.case),)
-    viscosities = [one.film_viscosity for one in loadings]
-    return film_of(scene.beads, viscosities, plan.case.liquid, scene.faces, moving)
+    nearest = plan.case.contact.minimum_separation_ratio
+    return wall_forces(
+        scene.beads,
+        [one.film_viscosity for one in loadings],
+        plan.case.liquid,
+        scene.faces,
+        minimum_separation_ratio=nearest if plan.workarounds.open_bridges else None,
+        moving=moving,
+    )
 
 
 def _moving(plan: Plan) -> str:

@@ -69,6 +69,19 @@ DEFECTS = (
         ),
     ),
     Defect(
+        "Open bridges to a wall drag half as hard",
+        "As the wall counts as an equal sphere, R* is R/2, and twice 6πηR*²/h is half of a plane's 6πηR²/h. While the "
+        "bridge is shorter than half of the minimum separation, nothing is missing; from the whole of it on it is "
+        "half, and up to a fifth of the tangential drag.",
+        "The missing half of the normal drag is an added force, a formula of place and velocity, wherever a bead is "
+        "nearer to a wall than its bridge reaches, whether it has touched the wall or not. Tangential drag stays as it "
+        "is, for the engine can add no torque: it is small where a bridge is open.",
+        (
+            "viscous-walls",
+            "open-bridges",
+        ),
+    ),
+    Defect(
         "The contact angle enters as ½ θi θj",
         "in radians, though given in degrees: 30° acts as 7.9°.",
         "Both types are given √(2θ) for an effective angle θ.",
@@ -246,11 +259,14 @@ class Workarounds:
         How often every wall stands in the deck.
     contact_angle
         Whether the contact angle is translated.
+    open_bridges
+        Whether open bridges to walls are given the half of their normal drag that the engine leaves out.
     """
 
     carriers: bool = True
     wall_copies: int = WALL_COPIES
     contact_angle: bool = True
+    open_bridges: bool = True
 
 
 ALL_WORKAROUNDS = Workarounds()

@@ -7,6 +7,8 @@ from typing import Any
 
 BEAD_COLUMNS = ("id", "type", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
 """Columns of the bead dump, in the engine's names (m, m/s, rad/s)."""
+MEAN_SPIN_COLUMNS = ("f_mean_spin[1]", "f_mean_spin[2]", "f_mean_spin[3]")
+"""Further ones where there are walkers: the angular velocity, mean over the steps since the frame before (rad/s)."""
 FORCE_COLUMNS = ("fx", "fy", "fz", "tqx", "tqy", "tqz")
 """Further ones that it may have (N, N m)."""
 

@@ -181,7 +181,13 @@ def test_there_is_one_run_and_one_thermo_style(deck: str) -> None:
     assert len(_lines(deck, "thermo_style")) == 1
 
 
-CONTENT = {1: "7dc0566616dc45cc", 2: "c2be1211d5b6b532", 3: "e993195041abe10b", 4: "9700ab33da1ab01e"}
+CONTENT = {
+    1: "7dc0566616dc45cc",
+    2: "c2be1211d5b6b532",
+    3: "e993195041abe10b",
+    4: "9700ab33da1ab01e",
+    5: "2b1ea590ddc4bf57",
+}
 """Digest of all that the engine reads of some cases, by the version of the decks' content."""
 
 

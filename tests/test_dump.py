@@ -16,12 +16,15 @@ from walkers.postprocess.dump import BinaryDump, DumpError
 from walkers.postprocess.local_dump import read_local_dump
 from walkers.runner import finished_run
 from walkers.runner.directory import FIRST_SEGMENT
-from walkers.templates.layout import BEAD_COLUMNS
+from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
 
 
 @pytest.fixture(scope="module")
 def directory(run_directory: Callable[..., Path]) -> Path:
     return run_directory(dimers={"replicates": 2}, run=SHORT)
+
+
+COLUMNS = (*BEAD_COLUMNS, *MEAN_SPIN_COLUMNS)
 
 
 @pytest.fixture(scope="module")
@@ -33,26 +36,26 @@ def beads(directory: Path) -> Path:
 def test_all_frames_are_read(directory: Path, beads: Path) -> None:
     run = finished_run(directory)
     assert run is not None
-    dump = BinaryDump(beads, BEAD_COLUMNS)
+    dump = BinaryDump(beads, COLUMNS)
     assert len(dump) == run.layout.frames == 61
     assert not dump.truncated
     np.testing.assert_array_equal(np.diff(dump.steps), run.layout.sample_every)
     frames = dump.stack()
-    assert frames.shape == (61, 5, len(BEAD_COLUMNS))
+    assert frames.shape == (61, 5, len(COLUMNS))
     np.testing.assert_array_equal(frames[:, :, dump.column("id")], np.tile(np.arange(1, 6), (61, 1)))
     np.testing.assert_allclose(frames[0, 1:, dump.column("radius")], [3e-4, 2e-4, 3e-4, 2e-4], rtol=1e-15)
     assert beads.stat().st_size == run.layout.bead_dump_bytes
 
 
-@pytest.mark.parametrize("cut", [1, 8, 200, 470, 550])  # of a frame of 584 bytes, 104 of them its head
+@pytest.mark.parametrize("cut", [1, 8, 200, 470, 550])  # of a frame of 704 bytes, 104 of them its head
 def test_a_truncated_last_frame_is_left_out_and_told(beads: Path, tmp_path: Path, cut: int) -> None:
     whole = beads.read_bytes()
     short = tmp_path / "short.bin"
     short.write_bytes(whole[:-cut])
-    dump = BinaryDump(short, BEAD_COLUMNS)
+    dump = BinaryDump(short, COLUMNS)
     assert dump.truncated
     assert len(dump) == 60
-    np.testing.assert_array_equal(dump.stack(), BinaryDump(beads, BEAD_COLUMNS).stack()[:60])
+    np.testing.assert_array_equal(dump.stack(), BinaryDump(beads, COLUMNS).stack()[:60])
 
 
 def test_an_empty_dump_has_no_frames(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -107,6 +108,13 @@ def test_every_published_number_is_compared(sources: Sources) -> None:
             ours = row.engine if row.engine is not None else row.theory
             assert ours is not None and row.published is not None
             assert row.ratio * row.published == pytest.approx(ours)
+    in_words = [row for row in rows if row.published is None]
+    assert [row.key for row in in_words] == ["fig2_threshold"]
+    assert all(number.bounds is not None for number in published.NUMBERS if number.value is None)
+    agreeing, counted = count(rows, measured=True)
+    assert counted == sum(row.measured for row in rows) - len(in_words)
+    either_way = [[replace(row, agrees=agrees) if row in in_words else row for row in rows] for agrees in (True, False)]
+    assert [count(one, measured=True) for one in either_way] == [(agreeing, counted)] * 2
     agree, of = count(rows, measured=False)
     assert of == 9
     assert agree == 9
@@ -285,7 +293,7 @@ def test_the_comparison_is_written_for_programs_too(sources: Sources, tmp_path: 
     rows = compare(sources)
     contents = json.loads(json.dumps(as_dict(rows)))
     assert len(contents["numbers"]) == len(rows)
-    assert contents["of"] == sum(row.measured for row in rows)
+    assert contents["of"] == sum(row.measured and row.published is not None for row in rows)
 
 
 def test_unknown_figures_are_refused(tmp_path: Path) -> None:

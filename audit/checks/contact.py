@@ -10,7 +10,7 @@ import numpy as np
 
 from walkers.audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
 from walkers.audit.check import Check, Line
-from walkers.audit.laws import Partner, hertz_law, largest_error
+from walkers.audit.laws import Partner, damping_law, hertz_law, largest_error
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads
 from walkers.physics.contact import damping_ratio, reduced_shear_modulus
@@ -58,6 +58,40 @@ def friction(bench: Bench) -> Iterator[Line]:
         float(spring * moved[held][-1]), float(drag[held][-1]), "N", 1e-3,
         largest_error(drag[held, None], spring * moved[held, None]), _WALL,
     )  # fmt: skip
+
+
+def coulomb_limit(bench: Bench) -> Iterator[Line]:
+    """A damped bead that slides fast while it is pressed on, and while it leaves: damping counts in Coulomb's limit."""
+    coefficient, speed = 0.3, 0.003
+    case = bench_case(
+        contact={"friction": {"bead_bead": 0.0, "bead_wall": coefficient}, "restitution": 0.3},
+        run={"time_step": "0.2 us"},
+    )
+    still, _ = _pressed_bead(case)
+    for what, sense in (("pressed on", -1.0), ("leaving", 1.0)):
+        bead = replace(still, velocity=(0.2, 0.0, sense * speed))
+        recording = bench_recording(100, 10)
+        plan = Plan(case, scene_on_floor([bead]), recording, workarounds=bench.workarounds, prescribed=True)
+        series = bench.run(plan)
+        row, partner = series.row(FIRST_BEAD), Partner(bead.radius, wall=True)
+        gap = series.position[:, row, 2] - bead.radius
+        elastic = hertz_law(case, bead.radius, partner, gap)
+        mass = 4.0 / 3.0 * pi * bead.radius**3 * case.density
+        law = coefficient * np.abs(elastic - damping_law(case, bead.radius, partner, gap, mass) * sense * speed)
+        drag = -series.force[:, row, 0]
+        slides = slice(2, None)  # the spring is loaded by then
+        error = float(np.abs(drag / law - 1.0)[slides].max())
+        share = float((law / (coefficient * elastic))[slides].mean())
+        yield Line(
+            f"sliding friction of a bead that is {what}, {share:.2f} times μ F_elastic",
+            "μ |F_elastic + F_damping|",
+            float(law[-1]),
+            float(drag[-1]),
+            "N",
+            1e-3,
+            error,
+            _WALL,
+        )
 
 
 def rolling(bench: Bench) -> Iterator[Line]:
@@ -216,6 +250,7 @@ def restitution(bench: Bench) -> Iterator[Line]:
 CHECKS = (
     Check("friction", 5, "sliding friction and rest under the capillary load", True, friction),
     Check("rolling-friction", 5, "rolling resistance torque", True, rolling),
+    Check("coulomb-limit", 5, "friction of a bead that is pressed on or leaves", True, coulomb_limit),
     Check("friction-beads", 5, "sliding friction and rolling resistance between beads", True, between_beads),
     Check("reported-forces", 5, "reported forces of a sliding contact", True, reported_forces),
     Check("hertz", 5, "Hertz force against overlap", True, hertz),

@@ -18,7 +18,7 @@ import numpy as np
 from walkers.audit.bench import Bench, bench_plan
 from walkers.audit.check import Check, Line
 from walkers.audit.checks.drive import reference_walker
-from walkers.audit.laws import Partner, lubrication_drags
+from walkers.audit.laws import Partner, damping_law, lubrication_drags
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.physics.contact import damping_ratio, reduced_modulus, reduced_shear_modulus
@@ -73,7 +73,7 @@ def dissipation(case: Case, touch: Touch, begin: int) -> Dissipated:
     modulus = reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
     shear_modulus = reduced_shear_modulus(contact.youngs_modulus, contact.poissons_ratio)
     damping = damping_ratio(contact.restitution)
-    normal_damping = 2.0 * sqrt(5.0 / 6.0) * damping * np.sqrt(2.0 * modulus * root * touch.mass)
+    normal_damping = damping_law(case, touch.radius, touch.partner, touch.gap, touch.mass) / touch.partner.copies
     stiffness = 8.0 * shear_modulus * root
     tangential_damping = 2.0 * sqrt(5.0 / 6.0) * damping * np.sqrt(stiffness * touch.mass)
     limit = touch.friction * np.abs(4.0 / 3.0 * modulus * root * overlap - normal_damping * touch.normal_speed)

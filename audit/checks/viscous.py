@@ -17,6 +17,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.physics.capillary import rupture_distance_at_wall
 from walkers.physics.film import film_drag, film_thickness
+from walkers.physics.lubrication import normal_drag, tangential_drag, tangential_drag_at_wall
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import prescribed_motion
 from walkers.templates.deck import Plan
@@ -208,9 +209,51 @@ def without_carriers(bench: Bench) -> Iterator[Line]:
     yield Line(what, "viscous force off by more than 10 %: 1", 1.0, off, defect=True)
 
 
+_PLANE = "6πηR v_n/max(ε, h/R), 6πηR (8/15 ln(1/max(ε, h/R)) + 0.9588) v_t: R* of a plane is R"
+
+
+def open_bridges(bench: Bench) -> Iterator[Line]:
+    """A bead that slides away from the floor, against the drags of a plane: with what decks add, and without it."""
+    case = viscous_case()
+    radius, liquid, nearest = case.walkers[0].radii[0], case.liquid, case.contact.minimum_separation_ratio
+    bead = Bead(2, (0.0, 0.0, radius - _OVERLAP), radius, (_ALONG[0], 0.0, _RETREAT))
+    steps = int(rupture_distance_at_wall(radius, liquid.volume_fraction, 0.0) / (_RETREAT * case.run.time_step))
+    scene, recording = scene_on_floor([bead]), bench_recording(steps, 5)
+    for workarounds, defect in ((bench.workarounds, False), (replace(bench.workarounds, open_bridges=False), True)):
+        plan = Plan(case, scene, recording, workarounds=workarounds, prescribed=True)
+        normal, along, gap = _drags(case, radius, bench.run(plan))
+        plane = np.array([normal_drag(liquid.dynamic_viscosity, radius, nearest, float(h)) for h in gap])
+        ratio = normal / plane
+        opened = gap > 1.05 * nearest * radius
+        if not defect:
+            error = float(np.abs(ratio - 1.0).max())
+            what = "normal drag of a bridge to a wall, closed and open"
+            yield Line(what, _PLANE, 0.0, error, "rel.", 1e-3, error, _NEEDS)
+            shear = np.array([tangential_drag(liquid.dynamic_viscosity, radius, nearest, float(h)) for h in gap])
+            least = min(tangential_drag_at_wall(1.0, radius, nearest, h) / tangential_drag(1.0, radius, nearest, h)
+                        for h in map(float, gap))  # fmt: skip
+            what = "tangential drag of open wall bridges over a plane's, least"
+            yield Line(what, _PLANE, least, float((along / shear).min()), "", 1e-3, defect=True)
+        else:
+            what = "normal drag of open wall bridges over a plane's, without what decks add"
+            yield Line(what, _PLANE, 0.5, float(ratio[opened].mean()), "", 1e-3, defect=True)
+
+
+def _drags(case: Case, radius: float, series: Measured) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Of a bead that slides away from the floor: force over velocity normal to it and along it (N s/m), gap (m)."""
+    row = series.row(2)
+    gap = series.position[:, row, 2] - radius
+    upward = np.broadcast_to([0.0, 0.0, 1.0], (len(gap), 3))
+    velocity, spin = series.velocity[:, row], series.spin[:, row]
+    law = bridge_law(case, radius, Partner(radius, wall=True), upward, gap, velocity, spin)
+    viscous = series.force[:, row] - law.steady
+    return -viscous[:, 2] / velocity[:, 2], -viscous[:, 0] / velocity[:, 0], gap
+
+
 CHECKS = (
     Check("viscous-beads", 4, "viscous force between beads", True, between_beads),
     Check("viscous-walls", 4, "viscous force at faces, edges and corners, at rest and moving", True, at_walls),
     Check("film-walls", 4, "a film on one, two and three walls, at rest and moving", True, in_film),
+    Check("open-bridges", 4, "drag of open bridges to a wall against that of a plane", True, open_bridges),
     Check("viscous-carriers", 4, "the same without carriers", True, without_carriers),
 )

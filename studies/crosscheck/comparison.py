@@ -15,10 +15,10 @@ from scipy.spatial import cKDTree
 from scipy.stats import ks_2samp
 
 from walkers.inputs.case import Case, settling_of
-from walkers.postprocess.gait import Gait, gait, settled_samples, walk
+from walkers.postprocess.gait import Averages, averages, gait, walk
 from walkers.postprocess.motion import Group, Motion
 from walkers.studies.crosscheck.engine import SecondEngine
-from walkers.studies.crosscheck.kernels import FloatArray, IntArray
+from walkers.studies.crosscheck.kernels import FloatArray
 from walkers.studies.crosscheck.laws import Laws
 from walkers.studies.crosscheck.setup import engine_of
 
@@ -34,8 +34,6 @@ SIGNIFICANCE = 0.01
 """Distributions differ if a Kolmogorov-Smirnov test says so with a smaller p …"""
 FEWEST_SEEDS = 5
 """… which it can from so many starts on."""
-_MOST_BEADS = 60
-"""Up to which means are taken over every step: what one cycle has of them is kept at a time."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +110,7 @@ class Simulated:
     """What the second engine made of a run's start: the motion, each make's gait over all steps, its wall time (s)."""
 
     motion: Motion
-    gaits: list[Gait] | None
+    gaits: list[Averages] | None
     seconds: float
 
 
@@ -193,7 +191,7 @@ def simulate(motion: Motion, laws: Laws, every_step: bool = True) -> Simulated:
     laws
         Of the second engine.
     every_step
-        Whether to average the gait over all steps after the settling cycles.
+        Whether to average walkers' gait over all steps after the settling cycles.
 
     Raises
     ------
@@ -201,36 +199,43 @@ def simulate(motion: Motion, laws: Laws, every_step: bool = True) -> Simulated:
         If a wall is round.
     """
     engine = engine_of(motion, laws)
-    steps = np.rint(motion.time / motion.case.run.time_step).astype(np.int64)
-    averaging = _Averaging(motion) if every_step and motion.groups and len(motion.radius) <= _MOST_BEADS else None
+    averaging = _Averaging(motion) if every_step and motion.groups else None
     began = time.perf_counter()
     first = np.concatenate([motion.position[:1], motion.velocity[:1], motion.spin[:1]], axis=-1)
-    frames = [first, *_moved(engine, motion, steps, averaging)]
+    parts = [(first, np.zeros_like(motion.spin[:1])), *_moved(engine, motion, averaging)]
     seconds = time.perf_counter() - began - (averaging.seconds if averaging else 0.0)
-    return Simulated(
-        _with_frames(motion, motion.time, np.concatenate(frames)), averaging.means() if averaging else None, seconds
-    )
+    frames, spins = (np.concatenate([part[which] for part in parts]) for which in (0, 1))
+    made = _with_frames(motion, motion.time, frames, spins if motion.groups else None)
+    return Simulated(made, averaging.means() if averaging else None, seconds)
 
 
-def _moved(engine: SecondEngine, motion: Motion, steps: IntArray, averaging: _Averaging | None) -> Iterator[FloatArray]:
-    """The frames after the first, in parts that end where a segment does, or a cycle if gaits are averaged."""
-    segments, run = [segment for segment, _ in motion.frames], motion.case.run
-    inner = range(2, len(steps))
-    if averaging:
-        begins = list(range(1, len(steps), run.samples_per_cycle))[1:]
+def _moved(
+    engine: SecondEngine, motion: Motion, averaging: _Averaging | None
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """The frames after the first and the mean spins since those before, in parts.
+
+    Of walkers, whose spins are averaged over all steps, a part is a cycle; of other beads a segment of the run.
+    """
+    steps = np.rint(motion.time / motion.case.run.time_step).astype(np.int64)
+    segments = [segment for segment, _ in motion.frames]
+    if motion.groups:
+        begins = list(range(1, len(steps), motion.case.run.samples_per_cycle))[1:]
     else:
-        begins = [frame for frame in inner if segments[frame] != segments[frame - 1]]
+        begins = [frame for frame in range(2, len(steps)) if segments[frame] != segments[frame - 1]]
     for begin, end in pairwise([1, *begins, len(steps)]):
         if segments[begin] != segments[begin - 1]:
             engine.restart()
         length = int(steps[end - 1] - steps[begin - 1])
         every = length // (end - begin)
-        if averaging is None:
-            yield engine.run(length, every)
+        if not motion.groups:
+            frames = engine.run(length, every)
+            yield frames, np.zeros_like(frames[..., 6:])
             continue
         dense = engine.run(length, 1)
-        averaging.add(dense, int(steps[begin - 1]))
-        yield dense[every - 1 :: every]
+        if averaging:
+            averaging.add(dense, int(steps[begin - 1]))
+        spins = dense[..., 6:].reshape(end - begin, every, -1, 3).mean(axis=1)
+        yield dense[every - 1 :: every].copy(), spins
 
 
 class _Averaging:
@@ -248,23 +253,27 @@ class _Averaging:
             return
         began = time.perf_counter()
         times = np.arange(begin + 1, begin + 1 + len(frames), dtype=np.float64) * self.motion.case.run.time_step
-        gaits = [gait(group) for group in _with_frames(self.motion, times, frames).groups]
-        sums = [
-            [one.velocity.sum(0), one.rotation.sum(0), one.sliding.sum(0), (one.gap > 0.0).sum(0, dtype=np.float64)]
-            for one in gaits
-        ]
+        gaits = [gait(group) for group in _with_frames(self.motion, times, frames, None).groups]
+        sums = [[one.rotation.sum(0), one.sliding.sum(0), (one.gap > 0.0).sum(0, dtype=np.float64)] for one in gaits]
         old = self.sums or [[np.zeros_like(part) for part in one] for one in sums]
         self.sums = [[a + b for a, b in zip(one, two, strict=True)] for one, two in zip(old, sums, strict=True)]
         self.count += len(frames)
         self.seconds += time.perf_counter() - began
 
-    def means(self) -> list[Gait]:
-        """Of each make; in place of gaps the share of time for which contacts are open."""
-        return [Gait(*(part / self.count for part in one)) for one in self.sums]
+    def means(self) -> list[Averages]:
+        """Of each make."""
+        return [Averages(*(part / self.count for part in one)) for one in self.sums]
 
 
-def _with_frames(motion: Motion, times: FloatArray, frames: FloatArray) -> Motion:
-    return replace(motion, time=times, position=frames[..., :3], velocity=frames[..., 3:6], spin=frames[..., 6:])
+def _with_frames(motion: Motion, times: FloatArray, frames: FloatArray, mean_spin: FloatArray | None) -> Motion:
+    return replace(
+        motion,
+        time=times,
+        position=frames[..., :3],
+        velocity=frames[..., 3:6],
+        spin=frames[..., 6:],
+        mean_spin=mean_spin,
+    )
 
 
 def parting_of(first: Motion, second: Motion) -> Parting:
@@ -313,27 +322,24 @@ def _drift(first: Motion, second: Motion) -> list[Row]:
     ]
 
 
-def _rows(first: Group, second: Group, every_step: Gait | None, label: str) -> list[Row]:
+def _rows(first: Group, second: Group, every_step: Averages | None, label: str) -> list[Row]:
     """Velocity, rotation, sliding and open shares of a make's walkers, means over them."""
-    gaits, walks = (gait(first), gait(second)), (walk(first), walk(second))
-    samples = settled_samples(first)
-    speed, other = (1e3 * float(one.velocity.mean()) for one in walks)
+    speed, other = (1e3 * float(walk(one).velocity.mean()) for one in (first, second))
     rows = [Row(f"velocity{label}", "mm/s", speed, other, None, max(SPEED_TOLERANCE * abs(speed), 1e3 * SPEED_FLOOR))]
-    beads = len(first.radii)
-    names = [f"bead {bead + 1}" for bead in range(beads)]
-    contacts = [*names, *(f"beads {one + 1}-{two + 1}" for one, two in first.make.pairs)]
-    found = []
-    for what, named, factor in (("rotation", names, 1e3), ("sliding", contacts, 1e3)):
-        values = [(factor * getattr(one, what)[samples].mean(axis=(0, 1))).tolist() for one in gaits]
-        dense = (factor * getattr(every_step, what).mean(axis=0)).tolist() if every_step else [None] * len(named)
-        found += [(f"{what} {name}{label}", *of) for name, *of in zip(named, *values, dense, strict=True)]
+    beads = [f"bead {bead + 1}" for bead in range(len(first.radii))]
+    contacts = [*beads, *(f"beads {one + 1}-{two + 1}" for one, two in first.make.pairs)]
+    both = (averages(first), averages(second))
+
+    def means(what: str, names: list[str], factor: float) -> list[tuple[str, float, float, float | None]]:
+        values = [(factor * getattr(one, what).mean(axis=0)).tolist() for one in both]
+        dense = (factor * getattr(every_step, what).mean(axis=0)).tolist() if every_step else [None] * len(names)
+        return [(f"{what} {name}{label}", *of) for name, *of in zip(names, *values, dense, strict=True)]
+
+    found = [*means("rotation", beads, 1e3), *means("sliding", contacts, 1e3)]
     allowed = max(GAIT_TOLERANCE * max(abs(speed), *(abs(one) for _, one, *_ in found)), 1e3 * SPEED_FLOOR)
     rows += [Row(name, "mm/s", one, two, of, allowed) for name, one, two, of in found]
-    opened = [(100.0 * (one.gap[samples] > 0.0).mean(axis=(0, 1))).tolist() for one in gaits]
-    dense = (100.0 * every_step.gap.mean(axis=0)).tolist() if every_step else [None] * len(contacts)
-    for name, one, two, of in zip(contacts, *opened, dense, strict=True):
-        if one > 0.0 or two > 0.0 or (of or 0.0) > 0.0:
-            rows.append(Row(f"open {name}{label}", "%", one, two, of))
+    opened = [of for of in means("open", contacts, 100.0) if any(of[1:])]
+    rows += [Row(name, "%", one, two, of) for name, one, two, of in opened]
     ends = [degrees(float(one.orientation[-1].mean())) for one in (first, second)]
     return [*rows, Row(f"orientation at the end{label}", "°", ends[0], ends[1], None, 0.5)]
 

@@ -73,9 +73,9 @@ class Laws:
     normal_lubrication, tangential_lubrication
         Viscous forces of the bridges.
     wall_lubrication
-        ``halves``: a wall is an equal sphere, R* = R/2, as many times as the wall has copies. ``plane-normal``: with
-        what is missing then of the normal force of a sphere and a plane, 6πηR v/max(ε, h/R), within reach of a bridge,
-        whether or not there is one. ``plane``: normal and tangential with R* = R, once.
+        ``plane-normal``: a wall is an equal sphere, R* = R/2, as many times as the wall has copies, and what is missing
+        then of the normal force of a sphere and a plane, 6πηR v/max(ε, h/R), is added within reach of a bridge, whether
+        or not there is one. ``halves``: without that. ``plane``: normal and tangential with R* = R, once.
     liquid_transfer
         When a bridge between beads breaks they share its liquid by their volumes.
     rolling_friction
@@ -100,7 +100,7 @@ class Laws:
     capillary_tables: tuple[ForceTable, ...] = ()
     normal_lubrication: bool = True
     tangential_lubrication: bool = True
-    wall_lubrication: WallLubrication = "halves"
+    wall_lubrication: WallLubrication = "plane-normal"
     liquid_transfer: bool = True
     rolling_friction: bool = True
     film: bool = True

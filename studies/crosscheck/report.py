@@ -35,7 +35,7 @@ _SAMPLED = ("fig1b", "fig4b")
 SUPPOSITIONS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("the decks' laws", (), ()),
     ("Coulomb's limit of the elastic repulsion alone", (), ("coulomb-limit=elastic",)),
-    ("a plane's normal lubrication", (), ("wall-lubrication=plane-normal",)),
+    ("open bridges to walls as LIGGGHTS alone has them", (), ("wall-lubrication=halves",)),
     ("all of a plane's lubrication", (), ("wall-lubrication=plane",)),
     ("no film", ("film",), ()),
     ("no rolling friction", ("rolling-friction",), ()),

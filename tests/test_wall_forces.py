@@ -1,9 +1,11 @@
-"""The film on the walls: where it is, and what the deck says of it. Its forces are measured by the audit."""
+"""Forces of the walls that decks add: where they are, and their formulas. The audit measures them."""
 
+import math
 import tomllib
 from collections.abc import Callable
 from math import pi, sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,11 +13,12 @@ import pytest
 import walkers
 from tests.conftest import make_case
 from walkers.inputs import load_case, resolve_case, shipped_cases
-from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Groove, Plane
+from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Face, Groove, Plane
 from walkers.physics.film import film_drag, film_thickness
+from walkers.physics.lubrication import normal_drag, normal_drag_at_wall
 from walkers.templates import render_deck
-from walkers.templates.film import film_of, film_walls
 from walkers.templates.scene import Bead
+from walkers.templates.wall_forces import WallForces, formula_walls, wall_forces
 
 PLACES = np.random.default_rng(1).uniform(-1e-3, 1e-3, (50, 3))
 """m; in all of the boundaries."""
@@ -23,8 +26,9 @@ PLACES = np.random.default_rng(1).uniform(-1e-3, 1e-3, (50, 3))
 
 def nearest_first(boundary: Boundary, place: tuple[float, float, float], **moved: float) -> list[float]:
     """What the engine's formulas give, m."""
-    names = dict(zip("xyz", place, strict=True)) | {"sqrt": sqrt, "abs": abs} | moved
-    walls = film_walls(boundary.faces(), "".join(name[-1] for name in moved))
+    names = dict(zip("xyz", place, strict=True)) | {name: getattr(math, name) for name in ("cos", "sin", "atan2")}
+    names |= {"abs": abs, "round": round} | moved  # type: ignore[dict-item]
+    walls = formula_walls(boundary.faces(), "".join(name[-1] for name in moved))
     return sorted(eval(wall.distance, {}, names) for wall in walls)
 
 
@@ -35,7 +39,7 @@ def across(boundary: Boundary) -> Callable[[float, float, float], list[float]]:
         Plane: lambda x, y, z: [z],
         Channel: lambda x, y, z: [z, half - abs(y)],
         Box: lambda x, y, z: [z, half - abs(x), half - abs(y)],
-        Cylinder: lambda x, y, z: [z, half - np.hypot(x, y)],
+        Cylinder: lambda x, y, z: [z, boundary.side_clearance(x, y)],
     }
     return known[type(boundary)]
 
@@ -71,7 +75,7 @@ def test_walls_that_move_are_followed() -> None:
 def test_a_film_is_as_thick_as_a_bridge_reaches() -> None:
     case = make_case(liquid={"film_drag_ratio": 2.0, "volume_fraction": 0.02})
     files, liquid = render_deck(case).files, case.liquid
-    number, *lines = files["film_reach.txt"].splitlines()
+    number, *lines = files["reach.txt"].splitlines()
     assert int(number) == case.count == len(lines)
     reaches = [float(line.split()[1]) for line in lines]
     drags = [float(line.split()[1]) for line in files["film_drag.txt"].splitlines()[1:]]
@@ -82,15 +86,23 @@ def test_a_film_is_as_thick_as_a_bridge_reaches() -> None:
         assert drag == pytest.approx(film_drag(2.0 * 5e-6 * 920.0, radius))
 
 
-def dragged(boundary: Boundary, place: tuple[float, float, float], velocity: tuple[float, float, float]) -> list[float]:
-    """The velocity that the engine's formulas drag of a bead with a radius of 0.3 mm, m/s."""
-    bead = Bead(1, place, 3e-4)
+Vector = tuple[float, float, float]
+ONE = Bead(1, (0.0, 0.0, 0.0), 3e-4)
+
+
+def evaluated(forces: WallForces, place: Vector, velocity: Vector) -> list[float]:
+    """What the engine's formulas give for one bead, N."""
+    names: dict[str, Any] = {name: getattr(math, name) for name in ("sqrt", "cos", "sin", "atan2")}
+    names |= {"abs": abs, "round": round} | {f"v_{name}": share[ONE.id] for name, share in forces.shares.items()}
+    names |= dict(zip("xyz", place, strict=True)) | dict(zip(("vx", "vy", "vz"), velocity, strict=True))
+    return [float(eval(forces.formulas.get(axis, "0"), {}, names)) for axis in "xyz"]
+
+
+def dragged(boundary: Boundary, place: Vector, velocity: Vector) -> list[float]:
+    """The velocity that a film drags of a bead with a radius of 0.3 mm, m/s."""
     liquid = load_case("pile-small").liquid
-    film = film_of([bead], [0.1], liquid, boundary.faces())
-    assert film is not None
-    names = {"sqrt": sqrt, "abs": abs, "v_film_reach": film.reaches[1], "vx": velocity[0], "vy": velocity[1]}
-    names |= dict(zip("xyz", place, strict=True)) | {"vz": velocity[2]}
-    return [float(eval(film.speeds.get(axis, "0"), {}, names)) for axis in "xyz"]
+    film = wall_forces([ONE], [0.1], liquid, boundary.faces(), minimum_separation_ratio=None)
+    return [force / -film_drag(0.1, ONE.radius) for force in evaluated(film, place, velocity)]
 
 
 V = (0.03, -0.02, 0.05)
@@ -108,11 +120,11 @@ def test_films_drag_along_their_walls() -> None:
 
 
 def test_in_a_cylinder_and_a_groove_what_is_normal_to_the_wall_is_left_out() -> None:
-    turn = 0.7
+    round_one = Cylinder(material="glass", width=5e-3, height=0.02)
+    turn = round_one.faces()[5].turn
     outward, along = np.array([np.cos(turn), np.sin(turn), 0.0]), np.array([-np.sin(turn), np.cos(turn), 0.0])
     velocity = tuple(float(part) for part in 0.04 * outward + 0.03 * along + np.array([0.0, 0.0, 0.02]))
     place = tuple(float(part) for part in 2.2e-3 * outward + np.array([0.0, 0.0, 5e-3]))
-    round_one = Cylinder(material="glass", width=5e-3, height=0.02)
     expected = 0.03 * along + np.array([0.0, 0.0, 0.02])
     assert dragged(round_one, place, velocity) == pytest.approx(expected.tolist())  # type: ignore[arg-type]
     assert dragged(round_one, (0.0, 0.0, 5e-3), V) == [0.0, 0.0, 0.0]
@@ -127,11 +139,36 @@ def test_piles_have_a_film_on_each_of_their_walls() -> None:
     """The shipped ones: the floor drags what goes sideways, the walls also what climbs."""
     deck = render_deck(load_case("pile-small")).text
     loads = {line.split()[1]: line for line in deck.splitlines() if line.startswith("variable        load_")}
-    assert [loads[f"load_{axis}"].count("<v_film_reach") for axis in "xyz"] == [2, 2, 2]
+    assert [loads[f"load_{axis}"].count("<v_reach") for axis in "xyz"] == [3, 3, 3]
 
 
 def test_without_a_film_the_deck_has_none() -> None:
     assert "film" not in render_deck(make_case()).text
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4, 1.0])
+def test_an_open_bridge_gets_the_half_that_the_engine_leaves_out(turn: float) -> None:
+    """Twice 6πηR*/max(ε, h/R*) with R* = R/2, and the rest of a plane's, at the sides of a round wall."""
+    liquid, radius, nearest = load_case("pile-small").liquid, ONE.radius, 0.02
+    round_one = Cylinder(material="glass", width=5e-3, height=0.02)
+    forces = wall_forces([ONE], [0.0], liquid, round_one.faces(), minimum_separation_ratio=nearest)
+    side = min(round_one.faces()[1:], key=lambda face: abs((face.turn - turn) % (2.0 * pi)))
+    inward = np.array(side.normal)
+    reach = forces.shares["reach"][1] - radius
+    for gap in (-1e-7, 0.0, 0.3 * nearest * radius, 0.7 * nearest * radius, 1.5 * nearest * radius, 0.99 * reach):
+        place = (radius + gap - 2.5e-3) * inward + np.array([0.0, 0.0, 5e-3])
+        expected = normal_drag_at_wall(liquid.dynamic_viscosity, radius, nearest, gap)
+        expected -= 2.0 * normal_drag(liquid.dynamic_viscosity, radius / 2.0, nearest, gap)
+        found = evaluated(forces, tuple(place), V)  # type: ignore[arg-type]
+        assert found == pytest.approx((-expected * (inward @ V) * inward).tolist(), rel=1e-9, abs=1e-15)
+    beyond = (radius + 1.01 * reach - 2.5e-3) * inward + np.array([0.0, 0.0, 5e-3])
+    assert evaluated(forces, tuple(beyond), V) == [0.0, 0.0, 0.0]  # type: ignore[arg-type]
+
+
+def test_bridges_that_break_before_anything_is_missing_get_nothing() -> None:
+    assert wall_forces(
+        [ONE], [0.0], load_case("pile-small").liquid, [Face("z", 1, (0.0, 0.0, 0.0))], minimum_separation_ratio=1.0
+    ) == WallForces({}, {})
 
 
 def test_the_film_goes_on_after_a_restart_and_slows_what_falls(tmp_path: Path) -> None:

@@ -1,0 +1,110 @@
+"""All chapters of docs/validation.md, from their studies to the files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.library import suggestion
+from walkers.inputs.text import rendered
+from walkers.postprocess.drawing import save_figure
+from walkers.runner.files import write_text
+from walkers.studies.chapter import Chapter
+
+CHAPTERS = ("benchmarks", "closed-forms", "bridges", "crosscheck", "static-friction")
+"""In the order of the page; each the function ``chapter`` of a module of `walkers.studies`."""
+PAGE = "validation.md"
+
+
+@dataclass(frozen=True)
+class Validation:
+    """The chapters that were made, in the order of the page, and the files."""
+
+    chapters: tuple[Chapter, ...]
+    files: tuple[Path, ...]
+
+    @property
+    def failed(self) -> list[str]:
+        """What was expected to hold and does not, with the chapter's name before it."""
+        return [f"{chapter.name}: {statement}" for chapter in self.chapters for statement in chapter.failed]
+
+
+def selected(only: Sequence[str] = ()) -> tuple[str, ...]:
+    """Names of chapters: those given, or all.
+
+    Raises
+    ------
+    InputError
+        If one is none.
+    """
+    for name in only:
+        if name not in CHAPTERS:
+            told = f"no chapter {name!r}; expected one of {', '.join(CHAPTERS)}{suggestion(name, CHAPTERS)}"
+            raise InputError("walkers validate", [Problem("", None, told)])
+    return tuple(name for name in CHAPTERS if name in only or not only)
+
+
+def validate(
+    out: Path,
+    to: Path,
+    *,
+    only: Sequence[str] = (),
+    quick: bool = False,
+    jobs: int = 1,
+    on_done: Callable[[Chapter], None] | None = None,
+) -> Validation:
+    """Make chapters, and write the page and its pictures.
+
+    Parameters
+    ----------
+    out
+        Folder of the run directories.
+    to
+        Folder of the page; pictures go into ``figures`` in it.
+    only
+        Names of `CHAPTERS`; if empty, all.
+    quick
+        A part of each that takes seconds.
+    jobs
+        Chapters at once.
+    on_done
+        Called with each chapter as it is done.
+
+    Raises
+    ------
+    InputError
+        If there is no such chapter.
+    runner.EngineFailure
+        If there is no engine, or a run fails.
+    """
+    from joblib import Parallel, delayed
+
+    names = selected(only)
+    made: dict[str, Chapter] = {}
+    works = Parallel(jobs, return_as="generator_unordered")
+    for chapter in works(delayed(_chapter)(name, out, quick) for name in names):
+        made[chapter.name] = chapter
+        if on_done:
+            on_done(chapter)
+    chapters = tuple(made[name] for name in names)
+    return Validation(chapters, tuple(_written(chapters, to)))
+
+
+def _chapter(name: str, out: Path, quick: bool) -> Chapter:
+    module = import_module(f"walkers.studies.{name.replace('-', '_')}")
+    chapter: Chapter = module.chapter(out, quick=quick)
+    return chapter
+
+
+def _written(chapters: Sequence[Chapter], to: Path) -> list[Path]:
+    files: list[Path] = []
+    for chapter in chapters:
+        for name, figure in chapter.figures.items():
+            place = to / "figures" / f"validation-{name}.png"
+            files += save_figure(figure, place, (), title=chapter.title)
+    text = rendered("walkers.studies", "validation.md.j2", chapters=chapters)
+    write_text(to / PAGE, text)
+    return [to / PAGE, *files]
