@@ -104,7 +104,7 @@ def _quick_but(*longest: str) -> tuple[Check, ...]:
 
 
 def test_without_riders_exactly_the_viscous_wall_lines_fail(report: AuditReport) -> None:
-    longest = ("known-speed", "independence", "restart", "energy", "restitution", "contact-angle", "viscous-carriers")
+    longest = ("independence", "restart", "energy", "restitution", "contact-angle", "viscous-carriers")
     checks = _quick_but(*longest)
     broken = run_audit(checks, workarounds=Workarounds(carriers=False))
     assert _failing(broken) == _standing_on(report, "carriers")

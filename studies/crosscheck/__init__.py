@@ -1,0 +1,21 @@
+"""A second engine, written from the published formulas alone, that the decks' results are checked against.
+
+It is a referee and no replacement: `laws` says which terms act, `kernels` has their formulas and the integration,
+`engine` drives them, `setup` takes beads, walls and drive from a case, `comparison` compares a run with it, `chapter`
+tells what came out. Nothing here imports the laws of `walkers.physics` or the decks of `walkers.templates`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from walkers.studies.chapter import Chapter
+
+
+def chapter(out: Path, *, quick: bool = False) -> Chapter:
+    """The chapter of docs/validation.md; see `walkers.studies.crosscheck.report.chapter`."""
+    from walkers.studies.crosscheck import report
+
+    return report.chapter(out, quick=quick)

@@ -1,0 +1,65 @@
+"""A case for the second engine: its numbers as they stand in the resolved case, its beads from where its run began."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from walkers.inputs.case import Case
+from walkers.postprocess.motion import Motion
+from walkers.studies.crosscheck.engine import Beads, Matter, SecondEngine, Surroundings
+from walkers.studies.crosscheck.laws import Laws
+
+
+def matter_of(case: Case) -> Matter:
+    """What a case's beads, walls and liquid are made of."""
+    contact, liquid = case.contact, case.liquid
+    return Matter(
+        density=case.density,
+        youngs_modulus=contact.youngs_modulus,
+        poissons_ratio=contact.poissons_ratio,
+        restitution=contact.restitution,
+        friction_beads=contact.friction_bead_bead,
+        friction_walls=contact.friction_bead_wall,
+        rolling_friction=contact.rolling_friction,
+        surface_tension=liquid.surface_tension,
+        viscosity=liquid.dynamic_viscosity,
+        film_viscosity=liquid.film_viscosity,
+        volume_fraction=liquid.volume_fraction,
+        contact_angle=liquid.contact_angle,
+        separation_ratio=contact.minimum_separation_ratio,
+    )
+
+
+def surroundings_of(case: Case) -> Surroundings:
+    """A case's walls, weight and drive.
+
+    Raises
+    ------
+    ValueError
+        If a wall is round.
+    """
+    faces = case.boundary.faces()
+    if any(face.of for face in faces):
+        raise ValueError("boundary.shape: the second engine has flat walls only, no cylinder")
+    return Surroundings(
+        point=np.array([face.centroid for face in faces]),
+        normal=np.array([face.normal for face in faces]),
+        gravity=case.gravity_vector,
+        harmonics=np.array(
+            [(*one.direction, one.angular_frequency, one.peak_acceleration, one.phase) for one in case.drive.harmonics]
+        ),
+    )
+
+
+def engine_of(motion: Motion, laws: Laws) -> SecondEngine:
+    """The second engine at the first frame of a motion.
+
+    Raises
+    ------
+    ValueError
+        If a wall is round.
+    """
+    case = motion.case
+    beads = Beads(motion.radius, motion.position[0], motion.velocity[0], motion.spin[0])
+    clock = round(float(motion.time[0]) / case.run.time_step)
+    return SecondEngine(beads, matter_of(case), surroundings_of(case), laws, case.run.time_step, clock)
