@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,6 @@ from walkers.audit.oblique import Oblique
 from walkers.inputs.text import rendered
 from walkers.postprocess.drawing import new_figure, styled
 from walkers.postprocess.dump import FloatArray
-from walkers.runner.binary import Engine
 from walkers.studies.audited import as_numbers, failures, line_table, lines_of, table, temporary_bench
 from walkers.studies.chapter import Chapter
 
@@ -61,9 +61,10 @@ def measure(bench: Bench) -> Measured:
     )
 
 
-def chapter(engine: Engine | None = None) -> Chapter:
-    """The benchmarks on an engine; the installed one if None."""
-    with temporary_bench(engine) as bench:
+def chapter(out: Path, *, quick: bool = False) -> Chapter:
+    """The benchmarks on the installed engine; they take seconds, however ``quick`` it is to be, and leave no runs."""
+    del out, quick
+    with temporary_bench() as bench:
         measured, lines = measure(bench), lines_of(tests.CHECKS, bench)
     return Chapter(
         name="benchmarks",

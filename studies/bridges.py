@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from math import acos, degrees, inf, log, pi, radians
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -234,14 +235,17 @@ _ENERGY = 2e-3
 _FITTED = 0.02
 
 
-def chapter(*, quick: bool = False) -> Chapter:
+def chapter(out: Path, *, quick: bool = False) -> Chapter:
     """Bridges by Young–Laplace, published laws beside them, and what the engine's errors do to walkers.
 
     Parameters
     ----------
+    out
+        Folder of the run directories; none is made.
     quick
         Two conditions instead of six.
     """
+    del out
     all_of = [one for one in conditions() if not quick or (one.volume_fraction, one.contact_angle) in (SHIPPED, PILES)]
     engine = [
         {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.audit.bench import Bench
@@ -12,7 +13,6 @@ from walkers.audit.checks import closed_forms as forms
 from walkers.audit.checks.benchmarks import WALLS
 from walkers.inputs.text import rendered
 from walkers.postprocess.drawing import new_figure, styled
-from walkers.runner.binary import Engine
 from walkers.studies.audited import as_numbers, failures, line_table, lines_of, temporary_bench
 from walkers.studies.chapter import Chapter
 
@@ -50,9 +50,10 @@ def measure(bench: Bench) -> Measured:
     )
 
 
-def chapter(engine: Engine | None = None) -> Chapter:
-    """The closed forms on an engine; the installed one if None."""
-    with temporary_bench(engine) as bench:
+def chapter(out: Path, *, quick: bool = False) -> Chapter:
+    """The closed forms on the installed engine; they take seconds, however ``quick`` it is to be, and leave no runs."""
+    del out, quick
+    with temporary_bench() as bench:
         measured, lines = measure(bench), lines_of(forms.CHECKS, bench)
     return Chapter(
         name="closed-forms",

@@ -170,8 +170,8 @@ def test_a_table_keeps_bars_within_its_cells() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("chapter", [benchmark_study.chapter, closed_form_study.chapter], ids=["impacts", "closed"])
-def test_chapters(chapter: Callable[[], Chapter], tmp_path: Path) -> None:
-    found = chapter()
+def test_chapters(chapter: Callable[[Path], Chapter], tmp_path: Path) -> None:
+    found = chapter(tmp_path)
     assert not found.failed
     assert found.numbers
     assert "doi.org/10." in found.text

@@ -133,8 +133,8 @@ def test_weaker_bridges_make_walkers_faster() -> None:
     assert large + small + pair == pytest.approx(together, abs=0.02)
 
 
-def test_chapter() -> None:
-    found = chapter(quick=True)
+def test_chapter(tmp_path: Path) -> None:
+    found = chapter(tmp_path, quick=True)
     assert not found.failed
     assert set(found.figures) == {"bridges"}
     assert "figures/validation-bridges.png" in found.text
