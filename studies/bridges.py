@@ -377,7 +377,7 @@ def _angle_of_wall_pull() -> float:
     def excess(angle: float) -> float:
         return float(force_curve(*shipped.bridge[:3], angle, [0.0]).forces[0] - engine)
 
-    return float(brentq(excess, 0.0, SHIPPED[1], xtol=1e-6))
+    return float(brentq(excess, 0.0, SHIPPED[1], xtol=1e-4))
 
 
 def _flat(named: tuple[str, tuple[float, float]]) -> tuple[str, float, float]:
