@@ -138,7 +138,7 @@ def tangential_table(by_wall: Mapping[str, Oblique]) -> str:
             for found in by_wall.values()
         )
         rows.append((f"{x:.3g}", f"{y:.3g}", _at(published.TANGENTIAL_STEEL_SURFACE, float(x), 0.3), *ours))
-    head = ("s/(μ v_n)", "finite elements", "simulated (nearest)", *(f"engine, {wall}" for wall in by_wall))
+    head = ("s/(μ vₙ)", "finite elements", "simulated (nearest)", *(f"engine, {wall}" for wall in by_wall))
     return table(head, rows)
 
 
@@ -151,7 +151,7 @@ def spin_table(measured: Measured) -> str:
         )
         rows.append((f"{x:.3g}", f"{alloy:.3g}", _at(published.SPIN_NYLON_BETA, float(x), 0.2), *ours))
     walls = (f"6: engine, {wall}" for wall in measured.by_spin)
-    return table(("7/2 μ(1+e) v_n/s", "6: alloy", "6: nylon", *walls, "8: engine"), rows)
+    return table(("7/2 μ(1+e) vₙ/s", "6: alloy", "6: nylon", *walls, "8: engine"), rows)
 
 
 @styled
@@ -220,8 +220,8 @@ def fig_spin(measured: Measured) -> Figure:
         incidence = found.incidence / tests.STEEL_FRICTION
         for axes, values in zip((surface, turn), tests.reduced_rebound(found), strict=True):
             axes.plot(incidence, values, label=f"engine, {wall}", **_WALL_STYLES[wall])
-    surface.set(xlabel="s/(μ v_n)", ylabel="s′/(μ v_n′)", title="5: steel, elastic", xlim=(0.0, 13.2))
-    turn.set(xlabel="s/(μ v_n)", ylabel="-Rω′/(μ v_n)", title="5: steel, elastic", xlim=(0.0, 13.2))
+    surface.set(xlabel="s/(μ vₙ)", ylabel="s′/(μ vₙ′)", title="5: steel, elastic", xlim=(0.0, 13.2))
+    turn.set(xlabel="s/(μ vₙ)", ylabel="-Rω′/(μ vₙ)", title="5: steel, elastic", xlim=(0.0, 13.2))
     surface.legend(loc="upper left", fontsize=7)
     six.plot(*published.SPIN_ALLOY_BETA.T, label="simulated, aluminium alloy", **_SIMULATED)
     six.plot(*published.SPIN_NYLON_BETA.T, label="simulated, nylon", **_OTHER_SIMULATED)
@@ -233,6 +233,6 @@ def fig_spin(measured: Measured) -> Figure:
     slides = np.geomspace(0.15, 1.0, 40)
     for axes, title in ((six, "6: on a plane, e = 0.5"), (eight, "8: on a larger sphere, e = 0.5")):
         axes.plot(slides, slides - 1.0, label="slides all the way: x - 1", **_CLOSED)
-        axes.set(xlabel="7/2 μ(1+e) v_n/s", ylabel="-s′/s", title=title, xscale="log")
+        axes.set(xlabel="7/2 μ(1+e) vₙ/s", ylabel="-s′/s", title=title, xscale="log")
         axes.legend(loc="lower right", fontsize=7)
     return figure

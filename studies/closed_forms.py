@@ -90,7 +90,7 @@ def fig_ways(measured: Measured) -> Figure:
     throw.plot(found.spin, found.model, color="0.3", ls=":", label="Mindlin's spring, integrated")
     for wall, one in measured.thrown.items():
         throw.plot(one.spin, one.sideways, label=wall, **_WALL_STYLES[wall])
-    throw.set(xlabel="Rω/(μ v_n)", ylabel="velocity sideways/(μ v_n)", title="spins as it falls")
+    throw.set(xlabel="Rω/(μ vₙ)", ylabel="velocity sideways/(μ vₙ)", title="spins as it falls")
     throw.legend(loc="lower right", fontsize=7)
     return figure
 

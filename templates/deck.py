@@ -13,7 +13,14 @@ from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import rendered
 from walkers.physics.capillary import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
 from walkers.physics.matter import Contact
-from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds, contact_angle_setting, separation_cap, wall_meshes
+from walkers.templates.engine import (
+    ALL_WORKAROUNDS,
+    Workarounds,
+    contact_angle_setting,
+    separation_cap,
+    static_friction_settings,
+    wall_meshes,
+)
 from walkers.templates.layout import (
     BEAD_COLUMNS,
     MEAN_SPIN_COLUMNS,
@@ -142,6 +149,9 @@ class Plan:
     skin
         How far beyond contact neighbours are looked for, m; if left out, the smallest radius, and wide bins, which
         suits few beads far apart.
+    static_ratio
+        Friction at rest over that in motion, by another of the engine's models, on linear springs; None for the one
+        that cases have. docs/validation.md tells what it does.
     """
 
     case: Case
@@ -157,6 +167,7 @@ class Plan:
     fastest: float | None = None
     drive_from: int | None = 0
     skin: float | None = None
+    static_ratio: float | None = None
 
     @property
     def shaken(self) -> bool:
@@ -270,7 +281,7 @@ def compose(plan: Plan) -> Deck:
     first = case.drive.harmonics[0]
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
     angle = case.liquid.contact_angle
-    surfaces = plan.surfaces or (case.contact,)
+    surfaces, at_rest = plan.surfaces or (case.contact,), plan.static_ratio or 1.0
     moduli = [*(surface.youngs_modulus for surface in surfaces), case.contact.youngs_modulus]
     moving = _moving(plan)
     forces, of_walls = _forces(plan, scene), _wall_forces(plan, scene, moving)
@@ -288,11 +299,12 @@ def compose(plan: Plan) -> Deck:
         meshes=meshes,
         wall_copies=workarounds.wall_copies,
         copies=[(f"{mesh.name}_{number}", mesh) for mesh in meshes for number in range(1, workarounds.wall_copies + 1)],
-        contact_model=_contact_model(case),
+        contact_model=_contact_model(plan),
         types=len(surfaces) + 1,
         moduli=moduli,
         stiff=max(moduli) > _STIFFEST,
-        friction=_pairs([(surface.friction_bead_bead, surface.friction_bead_wall) for surface in surfaces]),
+        friction=_pairs([(at_rest * one.friction_bead_bead, at_rest * one.friction_bead_wall) for one in surfaces]),
+        luding=static_friction_settings(at_rest, case.contact.restitution) if plan.static_ratio else {},
         rolling_friction=_pairs([(surface.rolling_friction,) * 2 for surface in surfaces]),
         restitution=_pairs([(surface.restitution,) * 2 for surface in surfaces]),
         contact_angle_setting=contact_angle_setting(angle) if workarounds.contact_angle else degrees(angle),
@@ -405,9 +417,10 @@ def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
     ]
 
 
-def _contact_model(case: Case) -> str:
-    rolling = " rolling_friction cdt" if case.contact.rolling_friction > 0 else ""
-    return f"hertz tangential history cohesion easo/capillary/viscous{rolling}"
+def _contact_model(plan: Plan) -> str:
+    rolling = " rolling_friction cdt" if plan.case.contact.rolling_friction > 0 else ""
+    contact = "hertz tangential history" if plan.static_ratio is None else "luding tangential tan_luding"
+    return f"{contact} cohesion easo/capillary/viscous{rolling}"
 
 
 def _bin_size(scene: Scene) -> float:
