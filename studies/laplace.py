@@ -59,10 +59,10 @@ _NODES, _WEIGHTS = (
 _NEWTON_STEPS = 30
 _CONVERGED = 1e-12
 _COMPLEX_STEP = 1e-30
-_ARC_STEP, _MOST_STEPS, _LARGEST_TURN = 0.1, 2000, 0.2
+_ARC_STEP, _MOST_STEPS, _LARGEST_TURN = 0.05, 2000, 0.2
 _SHARES = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
 _GROWTH = 1.2
-_SAME_GAP = 1e-9
+_SAME_GAP, _NEAR = 1e-9, 1e-3
 _PROFILE = 301
 _TURNING = 1e-9
 
@@ -449,10 +449,18 @@ def _stable(family: _Family, branch: _Branch, gap: float) -> FloatArray:
     # At its left end the piece may begin above the gap by rounding.
     at = low if gap <= gaps[index] else float(brentq(lambda arc: between(arc)[4] - gap, low, high))
     found = family.at_gap(between(at), gap)
-    if found is None:  # at the largest gap itself, where bridges hardly move with it: that at this arc
-        row = branch.tangents[index + 1]
-        found = family.solve(between(at), row, float(row @ between(at)))
-    if found is None or abs(found[4] - gap) > _SAME_GAP:
+    if found is None or np.max(np.abs(found - between(at))[[0, 1, 3]]) > _NEAR:
+        # Close to the largest gap bridges hardly move with it, or are the unstable one: along the family instead.
+        chord = branch.bridges[index + 1] - branch.bridges[index]
+
+        def across(arc: float) -> FloatArray:
+            near = between(arc)
+            other = family.solve(near, chord, float(chord @ near))
+            return near if other is None else other
+
+        last = across(high)[4] <= gap
+        found = across(high if last else float(brentq(lambda arc: across(arc)[4] - gap, low, high, xtol=1e-12)))
+    if abs(found[4] - gap) > _SAME_GAP or np.max(np.abs(family.misfit(found))) > _SAME_GAP:
         raise NoBridgeError(f"no bridge was found at a gap of {gap:.6g} of the volume's cube root")
     return found
 
