@@ -15,7 +15,8 @@ class Friction:
     """F∥ = F (μ(v) sign v + κ v) + c v at each of the three contacts; at v = 0 whatever up to F μs holds it.
 
     μ(v) = μk + (μs - μk) exp(-(v/vs)²), after Stribeck. Each is a number, or an array that broadcasts to (3, N) for N
-    parameter sets: contacts 1, 2 (beads on the substrate) and 3 (bead on bead).
+    parameter sets: contacts 1, 2 (beads on the substrate) and 3 (bead on bead). F is that of rigid beads; the engine's
+    Coulomb limit has the damping of the contact besides, which is nothing while beads neither approach nor part.
 
     Attributes
     ----------
