@@ -120,7 +120,7 @@ def full_cases() -> dict[str, Callable[[], Case]]:
         "slope of 5°": lambda: _changed("fig1b", 24, boundary={"tilt": "5 deg"}),
         _IN_GROOVE: lambda: _changed("fig1b", 24, boundary={"shape": "groove", "opening": "120 deg"}),
         "climber": lambda: shortened(load_case("climber"), 20),
-        "cluster in a corner": lambda: shortened(load_case("cluster"), 20),
+        "cluster in a corner": lambda: shortened(load_case("cluster"), 21),
         "pile-ci": lambda: shortened(load_case("pile-ci"), _PILE_CYCLES),
     }
 
