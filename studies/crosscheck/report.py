@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ALONE = {"replicates": 2, "facing": "right"}
-_PILE_CYCLES = 18
+_PILE_CYCLES = 24
 _IN_GROOVE = "groove of 120°"
 _SAMPLED = ("fig1b", "fig4b")
 """Cases whose means over all steps are told."""
@@ -41,7 +41,7 @@ SUPPOSITIONS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("no rolling friction", ("rolling-friction",), ()),
     ("no lubrication at all", ("normal-lubrication", "tangential-lubrication"), ()),
     ("friction 1.5 times as large at rest, stick-slip", (), ("static-friction=stick-slip", "static-ratio=1.5")),
-    ("... that weakens with the velocity (1 mm/s)", (), ("static-friction=velocity", "static-ratio=1.5")),
+    ("friction 1.5 times as large at rest, weaker with velocity (1 mm/s)", (), ("static-friction=velocity", "static-ratio=1.5")),
 )
 """What if: each with the terms that are left out and the settings."""
 
