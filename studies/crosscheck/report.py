@@ -41,7 +41,11 @@ SUPPOSITIONS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("no rolling friction", ("rolling-friction",), ()),
     ("no lubrication at all", ("normal-lubrication", "tangential-lubrication"), ()),
     ("friction 1.5 times as large at rest, stick-slip", (), ("static-friction=stick-slip", "static-ratio=1.5")),
-    ("friction 1.5 times as large at rest, weaker with velocity (1 mm/s)", (), ("static-friction=velocity", "static-ratio=1.5")),
+    (
+        "friction 1.5 times as large at rest, weaker with velocity (1 mm/s)",
+        (),
+        ("static-friction=velocity", "static-ratio=1.5"),
+    ),
 )
 """What if: each with the terms that are left out and the settings."""
 
