@@ -72,8 +72,8 @@ DEFECTS = (
         "Open bridges to a wall drag half as hard",
         "As the wall counts as an equal sphere, R* is R/2, and twice 6πηR*²/h is half of a plane's 6πηR²/h. While the "
         "bridge is shorter than half of the minimum separation, nothing is missing; from the whole of it on it is "
-        "half, and up to a fifth of the tangential drag. The walkers of Fig. 4b, whose beads part in every cycle, went at "
-        "9.2 mm/s with it and go at 7.7 without; those whose contacts stay closed are the same.",
+        "half, and up to a fifth of the tangential drag. The walkers of Fig. 4b, whose beads part in every cycle, "
+        "walked at 9.2 mm/s so, and at 7.7 with what was missing; those whose contacts stay closed are the same.",
         "The missing half of the normal drag is an added force, a formula of place and velocity, wherever a bead is "
         "nearer to a wall than its bridge reaches, whether it has touched the wall or not. Tangential drag stays as it "
         "is, for the engine can add no torque: it is small where a bridge is open.",

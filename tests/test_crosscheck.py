@@ -208,7 +208,7 @@ def test_other_kinds_of_cases_agree(name: str, tmp_path: Path) -> None:
 def test_a_restart_forgets_what_is_between_beads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A settling pile follows LIGGGHTS through a restart only if springs and open bridges are forgotten."""
     document = read_toml(shipped_cases()["pile-ci"])
-    document["mixture"] |= {"count": 16}
+    document["mixture"] |= {"count": 24}
     motion = run(shortened(resolve_case(document, name="pile"), 9), tmp_path).motion
     settling = replace(
         motion, **{name: getattr(motion, name)[:7] for name in ("time", "position", "velocity", "spin", "frames")}

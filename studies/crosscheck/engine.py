@@ -248,9 +248,7 @@ def _constants(
         radius=radius,
         mass=4.0 / 3.0 * pi * radius**3 * matter.density,
         film=6.0 * pi * matter.film_viscosity * radius * laws.film,
-        film_reach=(1.0 + 0.5 * matter.contact_angle)
-        * np.cbrt(liquid / 2.0)
-        * (laws.film and matter.film_viscosity > 0.0),
+        reach=(1.0 + 0.5 * matter.contact_angle) * np.cbrt(liquid / 2.0),
         point=np.ascontiguousarray(around.point, dtype=np.float64),
         normal=np.ascontiguousarray(around.normal, dtype=np.float64),
         gravity=np.array(around.gravity) * laws.gravity,

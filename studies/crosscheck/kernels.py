@@ -48,8 +48,9 @@ class Constants(NamedTuple):
     step : float
     radius, mass, film : ndarray, shape (N,)
         ``film`` is 6πη_f R, N s/m.
-    film_reach : ndarray, shape (N,)
-        Gap up to which the film acts, m.
+    reach : ndarray, shape (N,)
+        Gap up to which the film acts, and what two spheres lack of a plane's lubrication, m: that at which a bridge of
+        the liquid that a bead has at first would break.
     point, normal : ndarray, shape (W, 3)
     gravity : ndarray, shape (3,)
     harmonics : ndarray, shape (H, 6)
@@ -66,7 +67,7 @@ class Constants(NamedTuple):
     radius: FloatArray
     mass: FloatArray
     film: FloatArray
-    film_reach: FloatArray
+    reach: FloatArray
     point: FloatArray
     normal: FloatArray
     gravity: FloatArray
@@ -380,7 +381,7 @@ def wall_forces(c: Constants, state: State, moves: bool) -> None:
             p = c.point[wall]
             height = (x[bead, 0] - p[0]) * n[0] + (x[bead, 1] - p[1]) * n[1] + (x[bead, 2] - p[2]) * n[2]
             gap = height - radius
-            if gap >= max(bridge[RUPTURE], c.film_reach[bead]):
+            if gap >= max(bridge[RUPTURE], c.reach[bead]):
                 leave(state.wall_spring[bead, wall], state.wall_bridged[bead], state.wall_slips[bead], wall)
                 continue
             arm = radius + min(gap, 0.0) / 2.0
@@ -416,11 +417,11 @@ def wall_forces(c: Constants, state: State, moves: bool) -> None:
                 normal, tangential = wall_drags(c, radius, gap)
                 normal *= -speed
                 normal -= pull(c, bridge, gap) * (c.copies if bridge[TABLE] < 0.0 else 1.0)
-            if c.wall_lubrication == PLANE_NORMAL and 0.0 < gap < bridge[RUPTURE]:
+            if c.wall_lubrication == PLANE_NORMAL and 0.0 < gap < c.reach[bead]:
                 normal -= missing_wall_drag(c, radius, gap) * speed
             viscous = (-tangential * slide[0], -tangential * slide[1], -tangential * slide[2])
             push(state, bead, 1.0, arm, n, along_normal(n, normal, viscous))
-            if gap < c.film_reach[bead]:
+            if gap < c.reach[bead]:
                 for axis in range(3):
                     state.force[bead, axis] -= c.film[bead] * (between[axis] - speed * n[axis])
 

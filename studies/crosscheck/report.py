@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ALONE = {"replicates": 2, "facing": "right"}
-_PILE_CYCLES, _PILE_COUNT = 18, 36
+_PILE_CYCLES = 24
 _IN_GROOVE = "groove of 120°"
 _SAMPLED = ("fig1b", "fig4b")
 """Cases whose means over all steps are told."""
@@ -41,7 +41,11 @@ SUPPOSITIONS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("no rolling friction", ("rolling-friction",), ()),
     ("no lubrication at all", ("normal-lubrication", "tangential-lubrication"), ()),
     ("friction 1.5 times as large at rest, stick-slip", (), ("static-friction=stick-slip", "static-ratio=1.5")),
-    ("... that weakens with the velocity (1 mm/s)", (), ("static-friction=velocity", "static-ratio=1.5")),
+    (
+        "friction 1.5 times as large at rest, weaker with velocity (1 mm/s)",
+        (),
+        ("static-friction=velocity", "static-ratio=1.5"),
+    ),
 )
 """What if: each with the terms that are left out and the settings."""
 
@@ -113,15 +117,15 @@ def full_cases() -> dict[str, Callable[[], Case]]:
     return {
         **{name: partial(load_case, name) for name in ("fig1b", "fig4a", "fig4b")},
         "reference walker": lambda: reference_walker(drive={"frame": "container"}),
-        "alignment from 30°": lambda: _changed("fig1b", 60, dimers={"angle": "30 deg", **_ALONE}),
-        "symmetric from 30°": lambda: _changed("symmetric", 60, dimers={"angle": "30 deg", **_ALONE}),
-        "fan of three": lambda: _changed("fig1b", 40, ("dimers",), **fan),
+        "alignment from 30°": lambda: _changed("fig1b", 40, dimers={"angle": "30 deg", **_ALONE}),
+        "symmetric from 30°": lambda: _changed("symmetric", 40, dimers={"angle": "30 deg", **_ALONE}),
+        "fan of three": lambda: _changed("fig1b", 24, ("dimers",), **fan),
         "two tones": lambda: _changed("symmetric", 24, dimers=_ALONE, drive={"harmonics": tones}),
         "slope of 5°": lambda: _changed("fig1b", 24, boundary={"tilt": "5 deg"}),
         _IN_GROOVE: lambda: _changed("fig1b", 24, boundary={"shape": "groove", "opening": "120 deg"}),
-        "climber": lambda: shortened(load_case("climber"), 30),
-        "cluster in a corner": lambda: shortened(load_case("cluster"), 30),
-        "pile-ci": lambda: _changed("pile-ci", _PILE_CYCLES, mixture={"count": _PILE_COUNT}),
+        "climber": lambda: shortened(load_case("climber"), 20),
+        "cluster in a corner": lambda: shortened(load_case("cluster"), 21),
+        "pile-ci": lambda: shortened(load_case("pile-ci"), _PILE_CYCLES),
     }
 
 
