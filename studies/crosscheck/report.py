@@ -19,6 +19,7 @@ from walkers.pipeline import run
 from walkers.postprocess.drawing import new_figure, styled
 from walkers.postprocess.gait import gait, walk
 from walkers.postprocess.motion import Motion
+from walkers.studies.bridges import force_tables
 from walkers.studies.chapter import Chapter
 from walkers.studies.crosscheck.checking import crosscheck
 from walkers.studies.crosscheck.comparison import FEWEST_SEEDS, Comparison, PileComparison, shortened, simulate
@@ -143,10 +144,13 @@ def _changed(shipped: str, cycles: int, without: tuple[str, ...] = (), **tables:
 def suppose(out: Path) -> list[Supposition]:
     """Velocities of the paper's walkers by the second engine under other laws, mm/s."""
     motions = {name: run(load_case(name), out).motion for name in ("fig1b", "fig4a", "fig4b")}
-    return [
+    found = [
         Supposition(name, {case: _speed(motion, laws_from(without, settings)) for case, motion in motions.items()})
         for name, without, settings in SUPPOSITIONS
     ]
+    solved = {case: Laws(capillary_tables=force_tables(motion.case)) for case, motion in motions.items()}
+    exact = {case: _speed(motion, solved[case]) for case, motion in motions.items()}
+    return [*found, Supposition("bridges that pull as Young–Laplace has it, and break where it does", exact)]
 
 
 def _speed(motion: Motion, laws: Laws) -> float:
