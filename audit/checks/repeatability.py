@@ -9,14 +9,16 @@ from math import nan
 
 import numpy as np
 
-from walkers.audit.bench import FIRST_BEAD, Bench
+from walkers.audit.bench import FIRST_BEAD, Bench, bench_case, bench_recording, scene_on_floor
 from walkers.audit.check import Check, Line, Verdict
 from walkers.audit.checks.drive import reference_walker
 from walkers.audit.checks.viscous import box_errors, box_lines, run_box, viscous_case
-from walkers.audit.laws import largest_error
+from walkers.audit.laws import Partner, capillary_law, largest_error
 from walkers.inputs.case import Case
 from walkers.inputs.drive import AXES
-from walkers.templates.deck import Checkpoint, plan_of
+from walkers.physics.capillary import bridge_volume_between_beads, rupture_distance
+from walkers.templates.deck import Checkpoint, Plan, plan_of
+from walkers.templates.scene import Bead
 
 _RESTART_FILE = "half.restart"
 
@@ -106,6 +108,36 @@ def restart(bench: Bench) -> Iterator[Line]:
     )
 
 
+def restart_bridges(bench: Bench) -> Iterator[Line]:
+    """Beads that part, with a restart file while their bridges are open: as decks write it, and as they do not."""
+    case = bench_case()
+    large, small, speed = 3e-4, 2e-4, 0.02
+    rupture = rupture_distance(bridge_volume_between_beads(large, small, case.liquid.volume_fraction), 0.0)
+    half = int(0.4 * rupture / (speed * case.run.time_step) / 10) * 10
+    beads = [
+        Bead(0, (0.0, 0.0, 5e-3), large),
+        Bead(0, (0.0, 0.0, 5e-3 + large + small - 2e-7), small, velocity=(0.0, 0.0, speed)),
+    ]
+    plan = Plan(case, scene_on_floor(beads), bench_recording(half, half // 10), prescribed=True)
+    for defect in (False, True):
+        workarounds = replace(bench.workarounds, restart_in_run=bench.workarounds.restart_in_run and not defect)
+        plan = replace(plan, workarounds=workarounds)
+        first = bench.run(replace(plan, checkpoint=Checkpoint(write=_RESTART_FILE)))
+        rest = replace(plan, recording=replace(plan.recording, begin=half, steps=2 * half))
+        going_on = replace(rest, checkpoint=Checkpoint(read=_RESTART_FILE))
+        second = bench.run(going_on, first.directory / _RESTART_FILE)
+        low, high = second.row(FIRST_BEAD), second.row(FIRST_BEAD + 1)
+        gap = second.position[:, high, 2] - second.position[:, low, 2] - large - small
+        law, pull = capillary_law(case, small, Partner(large), gap), -second.force[:, high, 2]
+        if defect:
+            what = "pull of an open bridge between beads after `write_restart`, over the law"
+            yield Line(what, "Soulié et al. 2006", 0.0, float((pull / law).max()), "", 1e-6, defect=True)
+        else:
+            what = "pull of an open bridge between beads after a restart"
+            error = largest_error(pull[:, None], law[:, None])
+            yield Line(what, "Soulié et al. 2006", float(law[-1]), float(pull[-1]), "N", 1e-4, error)
+
+
 def ranks(bench: Bench) -> Iterator[Line]:
     """The box of beads on two MPI ranks, each with its own carriers, against the law and against one rank."""
     if shutil.which("mpirun") is None:
@@ -127,5 +159,6 @@ def ranks(bench: Bench) -> Iterator[Line]:
 CHECKS = (
     Check("independence", 7, "replicates independent, reruns bitwise the same", True, independence),
     Check("restart", 7, "restarted against uninterrupted run", True, restart),
+    Check("restart-bridges", 7, "open bridges between beads after a restart", True, restart_bridges),
     Check("ranks", 7, "two MPI ranks against the law", True, ranks),
 )

@@ -224,7 +224,7 @@ def _moved(
         begins = [frame for frame in range(2, len(steps)) if segments[frame] != segments[frame - 1]]
     for begin, end in pairwise([1, *begins, len(steps)]):
         if segments[begin] != segments[begin - 1]:
-            engine.restart()
+            engine.evaluate()
         length = int(steps[end - 1] - steps[begin - 1])
         every = length // (end - begin)
         if not motion.groups:

@@ -125,18 +125,6 @@ class SecondEngine:
         """Evaluate the forces once more, at the places and velocities that there are, as an engine does that starts."""
         self._advance(self.clock, (self.clock, 1), np.empty((0, len(self.radius), 9)))
 
-    def restart(self) -> None:
-        """Go on as LIGGGHTS 3.8.0 does from a restart file: what was between beads is forgotten.
-
-        Springs between beads and their open bridges are gone, those to walls are not; forces are evaluated once more.
-        Settling piles go on so within 3e-11 m of how they go on there; 9e-6 m apart if springs between beads are kept,
-        1e-6 m if springs at walls are forgotten too, or if two open bridges are kept.
-        """
-        self._pairs.spring[:] = 0.0
-        self._pairs.slips[:] = False
-        self._pairs.bridged[:] = False
-        self.evaluate()
-
     def run(self, steps: int, every: int) -> FloatArray:
         """Move on.
 
