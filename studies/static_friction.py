@@ -347,7 +347,9 @@ def _rows(outcomes: Sequence[Outcome], calibration: Calibration) -> list[dict[st
         {
             "title": one.title or one.name,
             "published": one.value * (1.0 if one.over else 1e3),
-            "found": [(outcome.observed(one), abs(residual(outcome, one)) <= 1.0) for outcome in outcomes],
+            "found": [
+                (round(outcome.observed(one), 4) + 0.0, abs(residual(outcome, one)) <= 1.0) for outcome in outcomes
+            ],
         }
         for one in observations(calibration)
     ]
@@ -356,8 +358,9 @@ def _rows(outcomes: Sequence[Outcome], calibration: Calibration) -> list[dict[st
 def _given(outcome: Outcome, calibration: Calibration) -> dict[str, Any]:
     """How many of the observations a set gives."""
     asked = observations(calibration)
-    within = sum(abs(residual(outcome, one)) <= 1.0 for one in asked)
-    return {"name": outcome.name, "within": within, "of": len(asked), "misfit": misfit(outcome, calibration)}
+    missed = [one.title or one.name for one in asked if abs(residual(outcome, one)) > 1.0]
+    told = {"within": len(asked) - len(missed), "of": len(asked), "misfit": misfit(outcome, calibration)}
+    return {"name": outcome.name, "missed": "; ".join(missed), **told}
 
 
 @styled
