@@ -66,7 +66,7 @@ def surface_pair(first: str | None, second: str | None) -> dict[str, float] | No
     """How two wet surfaces touch, or None where the library has no value for them.
 
     ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio``, ``viscosity_ratio``,
-    ``film_drag_ratio``, ``contact_angle`` (rad) and ``volume_fraction``.
+    ``film_drag_ratio``, ``contact_angle`` (rad), ``volume_fraction`` and ``restitution``.
     """
     for entry in _contents()["surface_pairs"]:
         if sorted(entry["materials"]) == sorted([first or "", second or ""]):

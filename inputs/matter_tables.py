@@ -9,6 +9,7 @@ from walkers.inputs.schema import ContactTable, LiquidTable
 from walkers.physics.matter import Contact, Liquid
 
 _MINIMUM_SEPARATION_RATIO = 0.01
+_RESTITUTION = 0.3
 _LIQUID = {"volume_fraction": 0.01, "viscosity_ratio": 1.0, "film_drag_ratio": 0.0, "contact_angle": 0.0}
 """Where neither the case nor the library says more."""
 
@@ -112,10 +113,11 @@ def resolve_contact(table: ContactTable, bead: str | None, wall_key: str, wall: 
             f"missing{others}; the library has them for {pairs} only, not for {bead or 'these beads'} on {wall}",
         )
     separation = _first(table.minimum_separation_ratio, on_wall, "minimum_separation_ratio")
+    restitution = _first(table.restitution, on_wall, "restitution")
     return Contact(
         youngs_modulus=table.youngs_modulus,
         poissons_ratio=table.poissons_ratio,
-        restitution=table.restitution,
+        restitution=_RESTITUTION if restitution is None else restitution,
         friction_bead_bead=known["friction.bead_bead"] or 0.0,
         friction_bead_wall=known["friction.bead_wall"] or 0.0,
         rolling_friction=known["rolling_friction"] or 0.0,

@@ -199,12 +199,12 @@ class ContactTable(Table):
     """``[contact]``: the model of the contacts.
 
     The engine takes no restitution of 0.05 or less and no modulus above 1 GPa; contacts below 5 MPa change speeds.
-    ``minimum_separation_ratio``, left out, is the library's for the surfaces, else 0.01.
+    ``restitution`` and ``minimum_separation_ratio``, left out, are the library's for the surfaces, else 0.3 and 0.01.
     """
 
     friction: FrictionTable = FrictionTable()
     rolling_friction: Coefficient | None = None
-    restitution: Annotated[Number, Field(gt=0.05, le=1)] = 0.3
+    restitution: Annotated[Number, Field(gt=0.05, le=1)] | None = None
     youngs_modulus: Annotated[Modulus, Field(ge=5e6, le=1e9)] = 5e7
     poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = 0.3
     minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] | None = None
