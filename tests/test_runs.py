@@ -155,6 +155,7 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     assert {path.name for path in (run.directory / FIRST_SEGMENT).iterdir()} == {
         *("layout.json", "walker.lig", "walls.stl", "engine.log", "segment.json"),
         *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
+        *("reach.txt", "radius.txt", "open_drag.txt"),
     }
     assert run.case == case
     assert run.layout == render_deck(case).layout
