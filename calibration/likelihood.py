@@ -59,7 +59,6 @@ def log_likelihood(
     inverse = np.asarray(np.linalg.inv(correlation), dtype=np.float64)
     constant = -0.5 * np.linalg.slogdet(correlation)[1] - np.log(deviation).sum(axis=1)
     start = np.ascontiguousarray(np.clip(mean, -LARGEST, LARGEST))
-    start = np.ascontiguousarray(np.clip(mean, -LARGEST, LARGEST))
     return np.asarray(constant + _laplace(start, deviation, inverse, shared, discrepancy))
 
 

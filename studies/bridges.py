@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
-from math import acos, degrees, inf, log, pi, radians
+from functools import cache, lru_cache
+from math import acos, degrees, inf, log, pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -225,25 +225,29 @@ def _velocities(case: Case, factors: FloatArray) -> FloatArray:
 
 PAIRS = ((3.0e-4, 2.0e-4), (6.0e-4, 3.0e-4), (5.45e-4, 3.075e-4))
 """Radii of the paper's dimers and of its climbing beads, m."""
-FRACTIONS = (0.01, 0.05, 0.171)
-ANGLES = (0.0, radians(38.2))
-"""Perfect wetting, and the calibrated contact angle."""
+PILES = (0.01, 0.0)
+"""Liquid of the piles: its volume over that of a bead, and its contact angle, rad."""
+
+
+@cache
+def shipped() -> tuple[float, float]:
+    """The same of the walkers, as calibrated."""
+    liquid = load_case(CASES[0]).liquid
+    return liquid.volume_fraction, liquid.contact_angle
 
 
 def conditions() -> tuple[Condition, ...]:
     """The paper's pairs of beads, and a bead on a wall, which is the same in units of its radius for all radii."""
     return tuple(
         Condition(name, *pair, fraction, angle)
-        for fraction in FRACTIONS
-        for angle in ANGLES
+        for fraction in (PILES[0], 0.05, shipped()[0])
+        for angle in (PILES[1], shipped()[1])
         for name, pair in (*((f"{1e3 * one:.4g}/{1e3 * two:.4g} mm", (one, two)) for one, two in PAIRS), WALL)
     )
 
 
 CASES = ("fig1b", "fig4a")
 _CLIMBER = "climber-dimer"
-SHIPPED = (FRACTIONS[-1], ANGLES[-1])
-PILES = (FRACTIONS[0], ANGLES[0])
 _COLLOCATED = 1e-8
 _ENERGY = 2e-3
 _FITTED = 0.02
@@ -260,7 +264,8 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
         Two conditions instead of six.
     """
     del out
-    all_of = [one for one in conditions() if not quick or (one.volume_fraction, one.contact_angle) in (SHIPPED, PILES)]
+    few = (shipped(), PILES)
+    all_of = [one for one in conditions() if not quick or (one.volume_fraction, one.contact_angle) in few]
     engine = [
         {
             **asdict(one),
@@ -306,6 +311,7 @@ def _text_of(numbers: dict[str, Any]) -> str:
         "walkers.studies",
         "bridges.md.j2",
         degrees=degrees,
+        liquid=shipped(),
         points=POINTS,
         names=CONTACT_NAMES,
         max_pair=max(pairs, key=lambda row: float(row["pull"])),
@@ -333,7 +339,7 @@ _APART = "They do not meet, if only just."
 def _row_of(law: Law) -> dict[str, Any]:
     """A law between two beads and at a wall, as shipped and in piles."""
     chosen = {}
-    for label, liquid in (("shipped", SHIPPED), ("piles", PILES)):
+    for label, liquid in (("shipped", shipped()), ("piles", PILES)):
         for contact, name, pair in (("beads", "0.3/0.2 mm", PAIRS[0]), ("wall", *WALL)):
             chosen[f"{label} {contact}"] = asdict(deviation(law, Condition(name, *pair, *liquid)))
     return {"name": law.name, **chosen}
@@ -355,7 +361,7 @@ def _checks(all_of: list[Condition]) -> list[dict[str, Any]]:
     for one in all_of:
         exact = reference(one)
         energetic.append(abs(float(np.trapezoid(exact.forces, exact.gaps)) / exact.work - 1.0))
-        if (one.volume_fraction, one.contact_angle) in (SHIPPED, PILES):
+        if (one.volume_fraction, one.contact_angle) in (shipped(), PILES):
             solved = bridge(*one.bridge, float(exact.gaps[middle]))
             collocated.append(abs(solved.force / exact.forces[middle] - 1.0))
     fitted = [abs(deviation(LAWS[-1], one).pull - 1.0) for one in all_of if one.radius_2 != inf]
@@ -385,13 +391,13 @@ def _bond_number(case: Case) -> dict[str, float]:
 
 def _angle_of_wall_pull() -> float:
     """Contact angle at which Young–Laplace gives the engine's pull at a wall with the shipped liquid, rad."""
-    shipped = Condition(*_flat(WALL), *SHIPPED)
-    engine = force_of(ENGINE, shipped, np.zeros(1))[0]
+    wall = Condition(*_flat(WALL), *shipped())
+    engine = force_of(ENGINE, wall, np.zeros(1))[0]
 
     def excess(angle: float) -> float:
-        return float(force_curve(*shipped.bridge[:3], angle, [0.0]).forces[0] - engine)
+        return float(force_curve(*wall.bridge[:3], angle, [0.0]).forces[0] - engine)
 
-    return float(brentq(excess, 0.0, SHIPPED[1], xtol=1e-4))
+    return float(brentq(excess, 0.0, shipped()[1], xtol=1e-4))
 
 
 def _flat(named: tuple[str, tuple[float, float]]) -> tuple[str, float, float]:
@@ -423,8 +429,8 @@ _HIGHEST = 2.0
 def figure() -> Figure:
     """Force against gap by Young–Laplace and by the laws, and their differences, between beads and at a wall."""
     panels = (
-        ("between beads of 0.3 and 0.2 mm", Condition("0.3/0.2 mm", *PAIRS[0], *SHIPPED)),
-        ("bead on wall", Condition(*_flat(WALL), *SHIPPED)),
+        ("between beads of 0.3 and 0.2 mm", Condition("0.3/0.2 mm", *PAIRS[0], *shipped())),
+        ("bead on wall", Condition(*_flat(WALL), *shipped())),
         ("bead on wall", Condition(*_flat(WALL), *PILES)),
     )
     drawing, axes = new_figure(10.0, 6.2, nrows=2, ncols=3, sharex="col", sharey="row")

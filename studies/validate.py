@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.library import suggestion
 from walkers.inputs.text import rendered
 from walkers.postprocess.drawing import save_figure
@@ -65,9 +65,9 @@ def validate(
     to
         Folder of the page; pictures go into ``figures`` in it.
     only
-        Names of `CHAPTERS`; if empty, all.
+        Names of `CHAPTERS`; if empty, all. A page of some has their names in its own.
     quick
-        A part of each that takes seconds.
+        The part of each that takes seconds; of chapters that take no longer, all.
     jobs
         Chapters at once.
     on_done
@@ -77,8 +77,6 @@ def validate(
     ------
     InputError
         If there is no such chapter.
-    runner.EngineFailure
-        If there is no engine, or a run fails.
     """
     from joblib import Parallel, delayed
 
@@ -90,21 +88,27 @@ def validate(
         if on_done:
             on_done(chapter)
     chapters = tuple(made[name] for name in names)
-    return Validation(chapters, tuple(_written(chapters, to)))
+    # A page of some chapters, or of quick ones, is not to take the place of one that has all.
+    some = [*(["quick"] if quick else []), *(names if names != CHAPTERS else [])]
+    page = f"validation-{'-'.join(some)}.md" if some else PAGE
+    return Validation(chapters, tuple(_written(chapters, to / page)))
 
 
 def _chapter(name: str, out: Path, quick: bool) -> Chapter:
+    """A chapter, or what kept it from being made: the others are made all the same."""
     module = import_module(f"walkers.studies.{name.replace('-', '_')}")
-    chapter: Chapter = module.chapter(out, quick=quick)
+    try:
+        chapter: Chapter = module.chapter(out, quick=quick)
+    except WalkersError as error:
+        return Chapter(name, name, "", failed=(f"could not be made: {error}",))
     return chapter
 
 
-def _written(chapters: Sequence[Chapter], to: Path) -> list[Path]:
+def _written(chapters: Sequence[Chapter], page: Path) -> list[Path]:
     files: list[Path] = []
     for chapter in chapters:
         for name, figure in chapter.figures.items():
-            place = to / "figures" / f"validation-{name}.png"
+            place = page.parent / "figures" / f"validation-{name}.png"
             files += save_figure(figure, place, (), title=chapter.title)
-    text = rendered("walkers.studies", "validation.md.j2", chapters=chapters)
-    write_text(to / PAGE, text)
-    return [to / PAGE, *files]
+    write_text(page, rendered("walkers.studies", "validation.md.j2", chapters=chapters))
+    return [page, *files]

@@ -103,7 +103,7 @@ def _quick_but(*longest: str) -> tuple[Check, ...]:
     return tuple(check for check in selected(quick=True) if check.name not in longest)
 
 
-def test_without_riders_exactly_the_viscous_wall_lines_fail(report: AuditReport) -> None:
+def test_without_carriers_exactly_the_viscous_wall_lines_fail(report: AuditReport) -> None:
     longest = ("independence", "restart", "energy", "restitution", "contact-angle", "viscous-carriers")
     checks = _quick_but(*longest)
     broken = run_audit(checks, workarounds=Workarounds(carriers=False))

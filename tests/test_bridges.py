@@ -18,17 +18,17 @@ from walkers.studies.bridges import (
     CASES,
     CONTACT_NAMES,
     PAIRS,
-    SHIPPED,
     Condition,
     capillary_errors,
     chapter,
     deviation,
     reference,
+    shipped,
     speeds,
 )
 from walkers.studies.laplace import FloatArray, force_curve
 
-SHIPPED_WALL = Condition("wall", 3e-4, inf, 0.171, radians(38.2))
+MUCH_LIQUID = Condition("wall", 3e-4, inf, 0.171, radians(38.2))
 
 
 @pytest.mark.parametrize("law", LAWS[2:], ids=lambda law: law.name)
@@ -58,13 +58,13 @@ def test_weigerts_toroid_at_contact() -> None:
 
 def test_deviation_of_a_law_that_is_known() -> None:
     """Young–Laplace's own forces, a tenth larger and to a shorter gap."""
-    exact = reference(SHIPPED_WALL)
+    exact = reference(MUCH_LIQUID)
 
     def larger(one: float, other: float, volume: float, angle: float, gaps: FloatArray) -> FloatArray:
         return 1.1 * np.interp(gaps, exact.gaps, exact.forces)
 
-    found = deviation(Law("larger", larger, lambda *_: 0.8 * exact.rupture), SHIPPED_WALL)
-    end = force_curve(*SHIPPED_WALL.bridge, [0.8 * exact.rupture])
+    found = deviation(Law("larger", larger, lambda *_: 0.8 * exact.rupture), MUCH_LIQUID)
+    end = force_curve(*MUCH_LIQUID.bridge, [0.8 * exact.rupture])
     assert found.pull == pytest.approx(1.1)
     assert found.rupture == pytest.approx(0.8)
     assert found.work == pytest.approx(1.1 * (end.energies[0] - exact.energies[0]) / exact.work, rel=2e-3)
@@ -74,7 +74,7 @@ def test_deviation_of_a_law_that_is_known() -> None:
 
 def test_the_engines_law() -> None:
     """What docs state of it: doubling is right at walls at contact, not beyond, and dimers are held too strongly."""
-    wall = deviation(ENGINE, SHIPPED_WALL)
+    wall = deviation(ENGINE, MUCH_LIQUID)
     assert wall.pull == pytest.approx(1.07, abs=0.01)
     assert wall.work > 1.3
     assert wall.rupture > 1.3
@@ -91,8 +91,8 @@ def test_the_engines_law() -> None:
 def test_the_conditions_are_those_of_shipped_cases() -> None:
     for name in CASES:
         case = load_case(name)
-        assert case.liquid.volume_fraction == SHIPPED[0]
-        assert case.liquid.contact_angle == pytest.approx(SHIPPED[1])
+        assert case.liquid.volume_fraction == shipped()[0]
+        assert case.liquid.contact_angle == pytest.approx(shipped()[1])
         assert case.walkers[0].radii in [pytest.approx(pair) for pair in PAIRS]
 
 

@@ -1,8 +1,8 @@
 """A second engine, written from the published formulas alone, that the decks' results are checked against.
 
 It is a referee and no replacement: `laws` says which terms act, `kernels` has their formulas and the integration,
-`engine` drives them, `setup` takes beads, walls and drive from a case, `comparison` compares a run with it, `chapter`
-tells what came out. Nothing here imports the laws of `walkers.physics` or the decks of `walkers.templates`.
+`engine` drives them, `setup` takes beads, walls and drive from a case: these import neither the laws of
+`walkers.physics` nor the decks of `walkers.templates`. `comparison` compares a run with it, `report` tells what came out.
 """
 
 from __future__ import annotations

@@ -110,11 +110,11 @@ class Laws:
 
     def __post_init__(self) -> None:
         if self.static_ratio < 1.0 or not isfinite(self.static_ratio):
-            raise ValueError("static-ratio: expected at least 1, static friction over kinetic friction")
+            raise ValueError("set static-ratio: expected at least 1, static friction over kinetic friction")
         if not 0.0 < self.static_velocity < float("inf"):
-            raise ValueError("static-velocity: expected more than 0 m/s")
+            raise ValueError("set static-velocity: expected more than 0 m/s")
         if self.wall_copies < 1:
-            raise ValueError("wall-copies: expected at least 1")
+            raise ValueError("set wall-copies: expected at least 1")
 
     def differences(self) -> list[str]:
         """What is unlike the decks, each as ``name=value``."""

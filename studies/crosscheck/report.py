@@ -86,7 +86,6 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
         single=single,
         piles=piles,
         whatif=whatif,
-        ratio=_ratio(found),
         jitter=_jitter(single[_IN_GROOVE]) if _IN_GROOVE in single else None,
         every_step=[(name, row) for name, row in sampled if row.every_step is not None],
     )
@@ -164,13 +163,6 @@ def _jitter(found: Comparison) -> float:
     first[0] *= 1.0 + 1e-15
     moved = simulate(replace(found.first, position=first), found.laws, every_step=False).motion
     return float(np.linalg.norm(moved.position - found.second.position, axis=-1).max())
-
-
-def _ratio(found: Mapping[str, Comparison | PileComparison]) -> float:
-    """Wall time of LIGGGHTS's steps over the second engine's, of the runs that LIGGGHTS made alone."""
-    single = [one for each in found.values() for one in (each.starts if isinstance(each, PileComparison) else (each,))]
-    known = [(one.seconds[0], one.seconds[1]) for one in single if one.seconds[0] is not None]
-    return sum(first for first, _ in known) / sum(second for _, second in known)
 
 
 @styled

@@ -13,7 +13,7 @@ from walkers.commands.arguments import Json, Out, check_folder, check_out
 from walkers.pipeline import DEFAULT_OUT
 
 Chapters = Annotated[list[str] | None, typer.Argument(metavar="[CHAPTER]...", help="Some chapters; all if left out.")]
-Quick = Annotated[bool, typer.Option("--quick", help="A part of each that takes seconds.")]
+Quick = Annotated[bool, typer.Option("--quick", help="Of each the part that takes seconds.")]
 To = Annotated[Path | None, typer.Option("--to", help="Folder of the page; OUT/validation if left out.")]
 Jobs = Annotated[int | None, typer.Option("-j", "--jobs", min=1, help="Chapters at once; all cores if left out.")]
 
