@@ -2,7 +2,8 @@
 
 It is a referee and no replacement: `laws` says which terms act, `kernels` has their formulas and the integration,
 `engine` drives them, `setup` takes beads, walls and drive from a case, `comparison` compares a run with it, `chapter`
-tells what came out. `yade` compares a walker with YADE, which runs `yade_script`, where it is installed. Nothing here imports the laws of `walkers.physics` or the decks of `walkers.templates`.
+tells what came out. `yade` compares a walker with YADE, where that is installed, which runs `yade_script`. Nothing here
+imports the laws of `walkers.physics` or the decks of `walkers.templates`.
 """
 
 from __future__ import annotations
