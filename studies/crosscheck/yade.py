@@ -39,9 +39,9 @@ from walkers.studies.crosscheck.setup import matter_of, surroundings_of
 
 PROGRAMS = ("yade", "yadedaily")
 INSTALL_COMMAND = "sudo apt-get install yade"
-TOLERANCES = Tolerances(speed=0.005, gait=0.005, orientation=0.5)
-"""Of YADE, whose contacts differ from LIGGGHTS's in three ways (docs/crosscheck.md): about three times the most by
-which the paper's walkers then differ, 0.13 % and 0.18 % (fig4b, whose contacts open)."""
+TOLERANCES = Tolerances(speed=0.01, gait=0.01, orientation=0.5)
+"""Of YADE, whose contacts differ from LIGGGHTS's in three ways (docs/crosscheck.md): more than twice what the cases
+there then differ by at most, 0.31 % and 0.40 % (climber)."""
 
 
 @dataclass(frozen=True)
