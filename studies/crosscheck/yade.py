@@ -131,7 +131,7 @@ def walls_of(case: Case) -> list[dict[str, float]]:
 
 
 def first_walkers(motion: Motion) -> Motion:
-    """The first walker of each make alone: in YADE a walker costs what 20 do in LIGGGHTS."""
+    """The first walker of each make alone: in YADE a walker takes some thirty times as long as in LIGGGHTS."""
     walkers = tuple({walker.make: walker for walker in reversed(motion.walkers)}.values())
     rows = np.array([bead - motion.first_id for walker in walkers for bead in walker.beads])
     arrays: dict[str, Any] = {name: getattr(motion, name)[:, rows] for name in ("position", "velocity", "spin")}
