@@ -2,7 +2,8 @@
 
 It is a referee and no replacement: `laws` says which terms act, `kernels` has their formulas and the integration,
 `engine` drives them, `setup` takes beads, walls and drive from a case: these import neither the laws of
-`walkers.physics` nor the decks of `walkers.templates`. `comparison` compares a run with it, `report` tells what came out.
+`walkers.physics` nor the decks of `walkers.templates`. `comparison` compares a run with it, `report` tells what came
+out. `yade` compares a walker with YADE, where that is installed, which runs `yade_script`.
 """
 
 from __future__ import annotations

@@ -22,18 +22,42 @@ from walkers.studies.crosscheck.kernels import FloatArray
 from walkers.studies.crosscheck.laws import Laws
 from walkers.studies.crosscheck.setup import engine_of
 
-SPEED_TOLERANCE = 5e-4
-"""Relative, of walkers' velocities; or …"""
 SPEED_FLOOR = 2e-6
-"""… m/s, of those that hardly move."""
-GAIT_TOLERANCE = 5e-3
-"""Of rotation and sliding, relative to the fastest of them: of small differences these are, where contacts open."""
+"""m/s, of walkers that hardly move: differences that are always allowed."""
 ONE = 0.01
 """Of the smallest radius: places that are no farther apart are those of one motion."""
 SIGNIFICANCE = 0.01
 """Distributions differ if a Kolmogorov-Smirnov test says so with a smaller p …"""
 FEWEST_SEEDS = 5
 """… which it can from so many starts on."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """How far an engine may differ from LIGGGHTS.
+
+    Attributes
+    ----------
+    speed
+        Relative, of walkers' velocities.
+    gait
+        Of rotation and sliding, relative to the fastest of them: of small differences these are, where contacts open.
+    orientation
+        At the end, in degrees.
+    """
+
+    speed: float
+    gait: float
+    orientation: float
+
+    def described(self) -> str:
+        """In words."""
+        gait = f"rotation and sliding {self.gait:.2%} of the fastest"
+        return f"velocity {self.speed:.2%}, {gait}, orientation at the end {self.orientation:g}°"
+
+
+TOLERANCES = Tolerances(speed=5e-4, gait=5e-3, orientation=0.5)
+"""Of the second engine."""
 
 
 @dataclass(frozen=True)
@@ -303,29 +327,36 @@ def compare(motion: Motion, laws: Laws, seconds: float | None, every_step: bool 
     """
     made = simulate(motion, laws, every_step)
     rows = [] if motion.groups or motion.case.mixture else _drift(motion, made.motion)
-    for number, (first, second) in enumerate(zip(motion.groups, made.motion.groups, strict=True)):
-        label = f" ({number + 1})" if len(motion.groups) > 1 else ""
-        rows += _rows(first, second, made.gaits[number] if made.gaits else None, label)
+    rows += walker_rows(motion, made)
     return Comparison(
         motion.case, laws, tuple(rows), parting_of(motion, made.motion), (seconds, made.seconds), motion, made.motion
     )
+
+
+def walker_rows(motion: Motion, made: Simulated, allow: Tolerances = TOLERANCES) -> list[Row]:
+    """What walkers did in a run, beside what an engine made of its start."""
+    rows = []
+    for number, (first, second) in enumerate(zip(motion.groups, made.motion.groups, strict=True)):
+        label = f" ({number + 1})" if len(motion.groups) > 1 else ""
+        rows += _rows(first, second, made.gaits[number] if made.gaits else None, label, allow)
+    return rows
 
 
 def _drift(first: Motion, second: Motion) -> list[Row]:
     """Mean velocity of the mass centre of beads that are no walkers'."""
     weights = first.radius**3 / np.sum(first.radius**3)
     speeds = [1e3 * weights @ (one.position[-1] - one.position[0]) / np.ptp(one.time) for one in (first, second)]
-    allowed = max(GAIT_TOLERANCE * float(np.linalg.norm(speeds[0])), 1e3 * SPEED_FLOOR)
+    allowed = max(TOLERANCES.gait * float(np.linalg.norm(speeds[0])), 1e3 * SPEED_FLOOR)
     return [
         Row(f"mass centre along {axis}", "mm/s", float(one), float(two), None, allowed)
         for axis, one, two in reversed(list(zip("xyz", *speeds, strict=True)))
     ]
 
 
-def _rows(first: Group, second: Group, every_step: Averages | None, label: str) -> list[Row]:
+def _rows(first: Group, second: Group, every_step: Averages | None, label: str, allow: Tolerances) -> list[Row]:
     """Velocity, rotation, sliding and open shares of a make's walkers, means over them."""
     speed, other = (1e3 * float(walk(one).velocity.mean()) for one in (first, second))
-    rows = [Row(f"velocity{label}", "mm/s", speed, other, None, max(SPEED_TOLERANCE * abs(speed), 1e3 * SPEED_FLOOR))]
+    rows = [Row(f"velocity{label}", "mm/s", speed, other, None, max(allow.speed * abs(speed), 1e3 * SPEED_FLOOR))]
     beads = [f"bead {bead + 1}" for bead in range(len(first.radii))]
     contacts = [*beads, *(f"beads {one + 1}-{two + 1}" for one, two in first.make.pairs)]
     both = (averages(first), averages(second))
@@ -336,12 +367,12 @@ def _rows(first: Group, second: Group, every_step: Averages | None, label: str) 
         return [(f"{what} {name}{label}", *of) for name, *of in zip(names, *values, dense, strict=True)]
 
     found = [*means("rotation", beads, 1e3), *means("sliding", contacts, 1e3)]
-    allowed = max(GAIT_TOLERANCE * max(abs(speed), *(abs(one) for _, one, *_ in found)), 1e3 * SPEED_FLOOR)
+    allowed = max(allow.gait * max(abs(speed), *(abs(one) for _, one, *_ in found)), 1e3 * SPEED_FLOOR)
     rows += [Row(name, "mm/s", one, two, of, allowed) for name, one, two, of in found]
     opened = [of for of in means("open", contacts, 100.0) if any(of[1:])]
     rows += [Row(name, "%", one, two, of) for name, one, two, of in opened]
     ends = [degrees(float(one.orientation[-1].mean())) for one in (first, second)]
-    return [*rows, Row(f"orientation at the end{label}", "°", ends[0], ends[1], None, 0.5)]
+    return [*rows, Row(f"orientation at the end{label}", "°", ends[0], ends[1], None, allow.orientation)]
 
 
 @dataclass(frozen=True)
@@ -442,15 +473,22 @@ def describe(found: Comparison) -> str:
     """A comparison in a few lines."""
     case, laws = found.case, ", ".join(found.laws.differences()) or "as in the decks"
     lines = [f"{case.name}: {case.drive.described()}, {case.run.cycles} cycles; laws of the second engine: {laws}"]
-    if found.rows:
-        head = ("", "", "LIGGGHTS", "second engine", "ratio", "every step")
-        lines.append("  {:<28}{:<6}{:>12}{:>15}{:>10}{:>12}".format(*head))
-    for row in found.rows:
+    lines += described_rows(found.rows, "second engine")
+    return "\n".join([*lines, f"  {told_apart(found.parting)}", f"  {_told_time(found)}"])
+
+
+def described_rows(rows: Sequence[Row], engine: str) -> list[str]:
+    """Numbers of LIGGGHTS and of another engine as a table, nothing of none."""
+    if not rows:
+        return []
+    every_step = "every step" if any(row.every_step is not None for row in rows) else ""
+    lines = ["  {:<28}{:<6}{:>12}{:>15}{:>10}{:>12}".format("", "", "LIGGGHTS", engine, "ratio", every_step).rstrip()]
+    for row in rows:
         ratio = f"{row.second / row.first:.5f}" if abs(row.first) > 1e-3 else ""
         dense = "" if row.every_step is None else f"{row.every_step:.4f}"
         mark = "" if row.agrees else "  differs"
         lines.append(f"  {row.name:<28}{row.unit:<6}{row.first:>12.4f}{row.second:>15.4f}{ratio:>10}{dense:>12}{mark}")
-    return "\n".join([*lines, f"  {_told_apart(found.parting)}", f"  {_told_time(found)}"])
+    return lines
 
 
 def describe_piles(found: PileComparison) -> str:
@@ -458,7 +496,7 @@ def describe_piles(found: PileComparison) -> str:
     laws = ", ".join(found.starts[0].laws.differences()) or "as in the decks"
     case = found.starts[0].case
     lines = [f"{case.name}: {case.drive.described()}, {case.run.cycles} cycles; laws of the second engine: {laws}"]
-    lines += [f"  start {one.case.seed}: {_told_apart(one.parting)}" for one in found.starts]
+    lines += [f"  start {one.case.seed}: {told_apart(one.parting)}" for one in found.starts]
     lines.append("  means over the second half of the drive, and over starts:")
     for one in found.tests:
         first, second = np.mean(one.first), np.mean(one.second)
@@ -470,7 +508,8 @@ def describe_piles(found: PileComparison) -> str:
     return "\n".join([*lines, f"  {_told_time(*found.starts)}"])
 
 
-def _told_apart(parting: Parting) -> str:
+def told_apart(parting: Parting) -> str:
+    """How two motions part, in words."""
     cycles = parting.together
     told = "one motion to the end" if cycles is None else f"one motion until cycle {cycles:.1f}"
     return f"{told}; places at most {parting.apart.max() * 1e6:.2g} µm apart"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -14,12 +14,20 @@ from walkers.pipeline import DEFAULT_OUT, Run, run
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case as Resolved
+    from walkers.studies.crosscheck.comparison import Comparison, PileComparison
+    from walkers.studies.crosscheck.yade import YadeComparison
 
 Cycles = Annotated[int | None, typer.Option("--cycles", help="Of the drive, in place of the case's own.")]
 Without = Annotated[list[str] | None, typer.Option("--without", metavar="TERM", help="Leave a term out, such as film.")]
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Replace a law, such as wall-lubrication=plane."),
+]
+With = Annotated[
+    Literal["second-engine", "yade"],
+    typer.Option(
+        "--with", help="Engine beside LIGGGHTS: our own; or YADE, if installed, for contacts and integration."
+    ),
 ]
 Seeds = Annotated[int, typer.Option("--seeds", min=1, help="Of a pile: so many starts, for the statistics.")]
 
@@ -31,6 +39,7 @@ def command(
     without: Without = None,
     settings: Settings = None,
     seeds: Seeds = 1,
+    other: With = "second-engine",
     as_json: Json = False,
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
@@ -40,9 +49,10 @@ def command(
     from walkers.inputs.reading import load_case
     from walkers.progress import progress_of
     from walkers.studies.crosscheck.checking import crosscheck
-    from walkers.studies.crosscheck.comparison import PileComparison, describe, describe_piles, shortened
+    from walkers.studies.crosscheck.comparison import shortened
     from walkers.studies.crosscheck.laws import laws_from
     from walkers.studies.crosscheck.setup import surroundings_of
+    from walkers.studies.crosscheck.yade import compare_with_yade
 
     loaded = load_case(case)
     check_out(out)
@@ -61,15 +71,49 @@ def command(
     except ValueError as error:
         raise InputError("--cycles", [Problem("", None, str(error))]) from error
 
+    program = "" if other == "second-engine" else _yade(loaded, bool(without or settings))
+
     def make(one: Resolved, folder: Path) -> Run:
         with progress_of(one.name) as advance:
             return run(one, folder, engine=engine, on_progress=advance, allow_failed_audit=allow_failed_audit)
 
-    found = crosscheck(loaded, out, laws, seeds=seeds, make=make)
+    found: Comparison | PileComparison | YadeComparison
+    if program:
+        found = compare_with_yade(make(loaded, out).motion, program)
+    else:
+        found = crosscheck(loaded, out, laws, seeds=seeds, make=make)
     if as_json:
         print(json.dumps(found.as_dict(), ensure_ascii=False))
     else:
-        print(describe_piles(found) if isinstance(found, PileComparison) else describe(found))
+        print(_described(found))
         for one in found.disagreements:
             print(f"walkers: {loaded.name}: differs: {one}", file=sys.stderr)
     return 1 if found.disagreements else 0
+
+
+def _yade(case: Resolved, other_laws: bool) -> str:
+    """YADE's program, if it can be asked for this case.
+
+    Raises
+    ------
+    walkers.inputs.errors.InputError
+        If not.
+    """
+    from walkers.studies.crosscheck.yade import INSTALL_COMMAND, check_case, find_program
+
+    refuse("--with yade", other_laws, "it has the decks' laws alone: leave --without and --set away")
+    try:
+        check_case(case)
+    except ValueError as error:
+        refuse("--with yade", True, str(error))
+    program = find_program()
+    refuse("--with yade", program is None, f"YADE is not installed on this machine; install it with: {INSTALL_COMMAND}")
+    return program or ""
+
+
+def _described(found: Comparison | PileComparison | YadeComparison) -> str:
+    from walkers.studies.crosscheck.comparison import Comparison, PileComparison, describe, describe_piles
+
+    if isinstance(found, PileComparison):
+        return describe_piles(found)
+    return describe(found) if isinstance(found, Comparison) else found.described()
