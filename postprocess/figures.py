@@ -10,7 +10,7 @@ import numpy as np
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.postprocess.drawing import new_figure, plain_text, save_figure, styled
-from walkers.postprocess.gait import distance_walked, gait
+from walkers.postprocess.gait import averages, distance_walked, gait, walk
 from walkers.postprocess.motion import Group, read_motion
 from walkers.postprocess.piles import PileAnalysis, analyse
 from walkers.postprocess.posture import ways
@@ -120,12 +120,14 @@ def _gait_figure(group: Group) -> Figure:
     figure, axes = new_figure(6.4, 3.8)
     figure.suptitle(_title(group.case), fontsize=10)
     marks = [("o", "0.1"), ("^", "#1f3b73"), ("v", "#3f7f93"), ("D", "0.5")]
-    series = [("walker", motion.velocity[last, 0], "s", "#c4473a")]
-    beads = range(len(group.radii))
-    series += [(f"bead {bead + 1}", motion.rotation[last, 0, bead], *marks[bead % len(marks)]) for bead in beads]
-    for label, values, marker, colour in series:
-        mean = values[:-1].mean() * 1e3
-        axes.plot(phase, values * 1e3, marker=marker, color=colour, label=f"{label} (mean {mean:.2f} mm/s)")
+    means = averages(group).rotation[0]
+    series = [("walker", motion.velocity[last, 0], walk(group).velocity[0], "s", "#c4473a")]
+    series += [
+        (f"bead {bead + 1}", motion.rotation[last, 0, bead], mean, *marks[bead % len(marks)])
+        for bead, mean in enumerate(means)
+    ]
+    for label, values, mean, marker, colour in series:
+        axes.plot(phase, values * 1e3, marker=marker, color=colour, label=f"{label} (mean {mean * 1e3:.2f} mm/s)")
     shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
     if np.any(shaken):
         facing = group.walkers[0].facing

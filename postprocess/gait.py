@@ -50,25 +50,23 @@ def gait(group: Group) -> Gait:
     along = np.einsum("fwbx,fwx->fwb", group.velocity, heading)
     rotation = radii * np.einsum("fwbx,fwx->fwb", group.spin, np.cross(upward, heading))
     weights = radii**3 / np.sum(radii**3)
-    gap, normal = _nearest_wall(group)
+    _, normal = _nearest_wall(group)
     turning = rotation if normal is None else radii * np.einsum(
         "fwbx,fwbx->fwb", group.spin, np.cross(normal, heading[:, :, None])
     )  # fmt: skip
-    sliding, gaps = [along - turning], [gap]
+    sliding = [along - turning]
     for one, other in group.make.pairs:
         arm = group.position[:, :, one] - group.position[:, :, other]
-        distance = np.linalg.norm(arm, axis=-1)
         arm[..., 2] = 0.0
         arm *= np.where(np.einsum("fwx,fwx->fw", arm, heading) < 0.0, -1.0, 1.0)[..., None]
         arm /= np.maximum(np.linalg.norm(arm, axis=-1, keepdims=True), 1e-300)
         spin = radii[one] * group.spin[:, :, one] + radii[other] * group.spin[:, :, other]
         sliding.append(-np.einsum("fwx,fwx->fw", spin, np.cross(upward, arm))[..., None])
-        gaps.append((distance - (radii[one] + radii[other]))[..., None])
     return Gait(
         velocity=along @ weights,
         rotation=rotation,
         sliding=np.concatenate(sliding, axis=-1),
-        gap=np.concatenate(gaps, axis=-1),
+        gap=gaps(group),
     )
 
 
@@ -93,6 +91,8 @@ class Averages:
 
 _PARTS = 10
 """Of an interval between samples, at which gaps are looked at: with 20 samples a cycle 200 times."""
+_FEWEST = 8
+"""Samples a cycle from which on a cubic between two of them is the way of a bead that hops."""
 
 
 def averages(group: Group) -> Averages:
@@ -100,16 +100,27 @@ def averages(group: Group) -> Averages:
 
     Means over 20 samples a cycle are up to a tenth off where contacts open: spins change within few steps as beads
     touch. So spins are those that the engine averaged, velocities are displacements, and gaps are looked at ten times
-    between samples, on cubics through places and velocities.
+    between samples, on cubics through places and velocities (with less than eight samples a cycle, at these alone).
     """
     samples = settled_samples(group)
     mean = gait(Group(group.motion.averaged, group.make, group.walkers))
-    gaps = (gait(Group(group.motion.between(part / _PARTS), group.make, group.walkers)).gap for part in range(_PARTS))
+    parts = _PARTS if group.case.run.samples_per_cycle >= _FEWEST else 1
+    looks = (Group(group.motion.between(part / parts), group.make, group.walkers) for part in range(parts))
     return Averages(
         rotation=mean.rotation[samples].mean(axis=0),
         sliding=mean.sliding[samples].mean(axis=0),
-        open=np.mean([(gap[samples] > 0.0).mean(axis=0) for gap in gaps], axis=0),
+        open=np.mean([(gaps(look)[samples] > 0.0).mean(axis=0) for look in looks], axis=0),
     )
+
+
+def gaps(group: Group) -> FloatArray:
+    """Gaps at the contacts (as in `Gait`), m, shape (F, W, n + pairs)."""
+    radii, position = group.radii, group.position
+    found = [_nearest_wall(group)[0]]
+    for one, other in group.make.pairs:
+        distance = np.linalg.norm(position[:, :, one] - position[:, :, other], axis=-1)
+        found.append((distance - (radii[one] + radii[other]))[..., None])
+    return np.concatenate(found, axis=-1)
 
 
 def _nearest_wall(group: Group) -> tuple[FloatArray, FloatArray | None]:

@@ -23,7 +23,7 @@ FAMILIES = {
     "rotation": ("m/s", "rotation velocity -R dphi/dt of a bead"),
     "sliding": ("m/s", f"sliding velocity; {_CONTACTS}"),
     "gap": ("m", f"gap, negative where they touch; {_CONTACTS}"),
-    "open": ("", f"share of the samples in which the contact is open; {_CONTACTS}"),
+    "open": ("", f"share of the time for which the contact is open; {_CONTACTS}"),
 }
 """Columns of which there is one for each bead or contact, numbered from 1: ``rotation_1``, ``rotation_2``, …"""
 

@@ -21,14 +21,16 @@ from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
 from walkers.paper import published
+from walkers.physics.wall import WALL_COPIES
 from walkers.postprocess.drawing import new_figure, styled
 from walkers.studies.audited import temporary_bench
 from walkers.studies.chapter import Chapter
-from walkers.studies.crosscheck.engine import Beads, SecondEngine
+from walkers.studies.crosscheck.engine import Beads
 from walkers.studies.crosscheck.kernels import FloatArray
 from walkers.studies.crosscheck.laws import Laws
-from walkers.studies.crosscheck.setup import matter_of, surroundings_of
+from walkers.studies.crosscheck.setup import engine_at
 from walkers.templates.deck import Plan, plan_of
+from walkers.templates.engine import STATIC_SPRING
 from walkers.templates.placement import place
 from walkers.templates.scene import Bead
 
@@ -133,12 +135,17 @@ def evaluate(
     only
         Some of them; if left out, all that an observation of speeds is of.
     """
+    cases = _experiments(parameters, calibration)
+    asked = {label for one in observations(calibration) for label in (*one.of, *one.over)} if only is None else only
+    return Outcome(name, parameters, laws, {label: _speed(cases[label], laws) for label in cases if label in asked})
+
+
+def _experiments(parameters: Mapping[str, float], calibration: Calibration) -> dict[str, Case]:
+    """The calibration's experiments with some parameters."""
     from walkers.calibration.waves import wave_sweep
 
     values = np.array([[parameters[one.name] for one in calibration.parameters]])
-    cases = dict(zip(calibration.experiments, wave_sweep(calibration, values, "static").cases(), strict=True))
-    asked = {label for one in observations(calibration) for label in (*one.of, *one.over)} if only is None else only
-    return Outcome(name, parameters, laws, {label: _speed(cases[label], laws) for label in cases if label in asked})
+    return dict(zip(calibration.experiments, wave_sweep(calibration, values, "static").cases(), strict=True))
 
 
 def _speed(case: Case, laws: Laws) -> float:
@@ -147,8 +154,7 @@ def _speed(case: Case, laws: Laws) -> float:
     beads = [bead for bead in scene.beads if bead.id in walkers[0].beads]
     radius, position = np.array([bead.radius for bead in beads]), np.array([bead.centre for bead in beads])
     still = Beads(radius, position, np.zeros_like(position), np.zeros_like(position))
-    engine = SecondEngine(still, matter_of(case), surroundings_of(case), laws, case.run.time_step)
-    frames = engine.run(CYCLES * case.run.steps_per_cycle, case.run.steps_per_cycle)[:, :, :3]
+    frames = engine_at(case, still, laws).run(CYCLES * case.run.steps_per_cycle, case.run.steps_per_cycle)[:, :, :3]
     return _along_heading(frames, radius, case)
 
 
@@ -256,7 +262,9 @@ def sawteeth(bench: Bench) -> list[Sawtooth]:
         load, radius = contact_loads(case).capillary[0], case.walkers[0].radii[0]
         for speed in (1e-4, 1e-3, 1e-2):
             # Deep enough for linear springs to carry the load on two walls.
-            bead = Bead(FIRST_BEAD, (0.0, 0.0, radius - load / (2.0 * 2000.0)), radius, (speed, 0.0, 0.0))
+            bead = Bead(
+                FIRST_BEAD, (0.0, 0.0, radius - load / (WALL_COPIES * STATIC_SPRING)), radius, (speed, 0.0, 0.0)
+            )
             plan = Plan(case, scene_on_floor([bead]), bench_recording(1000, 1), prescribed=True, static_ratio=_RATIO)
             series = bench.run(plan)
             drag = -series.force[500:, series.row(FIRST_BEAD), 0] / load
@@ -266,10 +274,7 @@ def sawteeth(bench: Bench) -> list[Sawtooth]:
 
 def in_stock_engine(outcome: Outcome, calibration: Calibration, bench: Bench, only: Sequence[str]) -> dict[str, float]:
     """Speeds of some experiments, mm/s, by the engine's own model of static friction with a set's ratio."""
-    from walkers.calibration.waves import wave_sweep
-
-    values = np.array([[outcome.parameters[one.name] for one in calibration.parameters]])
-    cases = dict(zip(calibration.experiments, wave_sweep(calibration, values, "static").cases(), strict=True))
+    cases = _experiments(outcome.parameters, calibration)
     found = {}
     for label in only:
         case = cases[label].for_cycles(CYCLES)

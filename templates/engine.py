@@ -298,7 +298,7 @@ def contact_angle_setting(effective_angle: float) -> float:
     return degrees(sqrt(2.0 * effective_angle))
 
 
-_SPRING = 2000.0
+STATIC_SPRING = 2000.0
 """N/m; walkers on such springs walk within 0.3 % as fast as on Hertz's at 50 MPa."""
 
 
@@ -316,7 +316,7 @@ def static_friction_settings(ratio: float, restitution: float) -> dict[str, floa
         Of the contacts.
     """
     return {
-        "LoadingStiffness": _SPRING,
+        "LoadingStiffness": STATIC_SPRING,
         "UnloadingStiffness": 1.0,
         "coefficientAdhesionStiffness": 0.0,
         "coefficientPlasticityDepth": 0.05,

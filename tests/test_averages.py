@@ -1,6 +1,7 @@
 """Means of rotation, sliding and open contacts: from 20 samples a cycle what far more of them give."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from walkers.inputs import resolve_case, shipped_cases
 from walkers.inputs.case import Case
 from walkers.inputs.reading import read_toml
-from walkers.postprocess.gait import Averages, averages, gait, settled_samples
+from walkers.postprocess.gait import Averages, averages, gait, gaps, settled_samples
 from walkers.postprocess.motion import Group
 
 
@@ -44,3 +45,15 @@ def test_means_do_not_depend_on_how_often_is_looked(groups: dict[int, Group]) ->
     np.testing.assert_allclose(near.sliding, many.sliding, atol=1e-2 * scale)
     assert np.abs(far.sliding - many.sliding).max() > 1.5e-2 * scale
     assert np.abs(far.open - many.open).max() > 0.02
+
+
+def test_with_few_samples_a_cycle_gaps_are_looked_at_there_alone(groups: dict[int, Group]) -> None:
+    """A cubic over a quarter of a cycle or more is no way of a bead that hops."""
+    few = groups[20]
+    run = replace(few.case.run, samples_per_cycle=4)
+    motion = replace(few.motion, case=replace(few.case, run=run))
+    names = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "mean_spin")
+    motion = replace(motion, **{name: getattr(motion, name)[::5] for name in names}, frames=motion.frames[::5])
+    thinned = Group(motion, few.make, few.walkers)
+    samples = settled_samples(thinned)
+    np.testing.assert_array_equal(averages(thinned).open, (gaps(thinned)[samples] > 0.0).mean(axis=0))

@@ -165,6 +165,8 @@ def laws_from(without: Sequence[str] = (), settings: Sequence[str] = ()) -> Laws
             raise ValueError(f"set {setting}: expected NAME=VALUE, the name one of {', '.join(SETTINGS)}")
         key = name.replace("-", "_")
         changes[key] = _read(name, value, types[key])
+    if {"static_ratio", "static_velocity"} & set(changes) and changes.get("static_friction", "none") == "none":
+        raise ValueError("set static-ratio, static-velocity: expected static-friction=velocity or stick-slip with them")
     return replace(Laws(), **changes)
 
 

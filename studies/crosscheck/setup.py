@@ -59,7 +59,16 @@ def engine_of(motion: Motion, laws: Laws) -> SecondEngine:
     ValueError
         If a wall is round.
     """
-    case = motion.case
     beads = Beads(motion.radius, motion.position[0], motion.velocity[0], motion.spin[0])
-    clock = round(float(motion.time[0]) / case.run.time_step)
+    return engine_at(motion.case, beads, laws, round(float(motion.time[0]) / motion.case.run.time_step))
+
+
+def engine_at(case: Case, beads: Beads, laws: Laws, clock: int = 0) -> SecondEngine:
+    """The second engine with a case's matter, walls and drive, and some beads, at a step.
+
+    Raises
+    ------
+    ValueError
+        If a wall is round.
+    """
     return SecondEngine(beads, matter_of(case), surroundings_of(case), laws, case.run.time_step, clock)
