@@ -29,6 +29,7 @@ PARAMETERS = {
     "viscosity ratio": "liquid.viscosity_ratio",
     "film drag ratio": "liquid.film_drag_ratio",
     "contact angle (°)": "liquid.contact_angle",
+    "restitution": "contact.restitution",
 }
 """What is varied, and the column that says so (the friction of bead on bead goes with that of bead on wall)."""
 _TOGETHER = "uncalibrated"
