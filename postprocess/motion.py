@@ -273,10 +273,10 @@ def read_motion(directory: str | Path) -> Motion:
     Examples
     --------
     >>> motion = read_motion(walkers.run("fig1b", tmp).directory)
-    >>> motion.position.shape  # 12 cycles of 20 samples, six walkers of two beads
-    (241, 12, 3)
+    >>> motion.position.shape  # 24 cycles of 20 samples, six walkers of two beads
+    (481, 12, 3)
     >>> motion.groups[0].heading.shape
-    (241, 6, 3)
+    (481, 6, 3)
     """
     directory = Path(directory)
     case = case_of(directory)

@@ -532,7 +532,9 @@ def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
     found = read_calibration(document, source="apart", name="apart", folder=tmp_path)
     unit = Space(found.parameters).unit(np.array([[0.1, 0.5], [0.2, 9.9]]))
     wave, _ = run_wave(found, unit, "apart", tmp_path / "runs", Options(2))
-    assert wave.table["separated_fraction"].tolist() == pytest.approx([0.0, 1.0], abs=0.1)
+    whole, apart = wave.table["separated_fraction"]
+    assert whole < 0.1
+    assert apart > 0.5
     assert wave.outcome[0, 0] == pytest.approx(wave.table["velocity"][0])
     assert np.isnan(wave.outcome[1, 0])
 

@@ -86,7 +86,7 @@ def test_a_triangle_walks_faster_than_its_fundamental_alone(walked: Callable[...
         tables = {**base, **shipped, "drive": {**base["drive"], **drive}}
         tables["dimers"] = {**base["dimers"], **shipped["dimers"]}
         speeds.append(walked(resolve_case(tables, name="triangle")).velocity[0])
-    assert speeds == pytest.approx([0.798e-3, 0.734e-3], rel=0.01)
+    assert speeds == pytest.approx([0.819e-3, 0.755e-3], rel=0.01)
 
 
 def test_one_harmonic_is_the_drive_that_its_keys_describe(run_directory: Callable[..., Path]) -> None:
@@ -134,7 +134,7 @@ def test_gravity_on_a_plane(tilt: float, uphill: float) -> None:
     assert (found[2] == 0.0) == (tilt == 90.0)
 
 
-TILTS = {0.0: 1.335, 5.0: 0.934, 10.0: 0.536, 20.0: -8.0}
+TILTS = {0.0: 1.382, 5.0: 0.934, 10.0: 0.536, 20.0: -8.0}
 """Speeds up the slope, mm/s, measured: the walker's falls with the tilt and changes sign between 10° and 20°."""
 
 

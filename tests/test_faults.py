@@ -27,7 +27,8 @@ from walkers.postprocess.analysis import current_result, describe_result
 from walkers.postprocess.drawing import new_figure, save_figure, styled
 from walkers.postprocess.dump import DumpError
 from walkers.postprocess.local_dump import local_frames, read_local_dump
-from walkers.runner.directory import FIRST_SEGMENT
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import FIRST_SEGMENT, write_deck
 from walkers.runner.failures import DiskFull, EngineError, EngineFailure
 from walkers.runner.launch import launch
 from walkers.sweeps.scheduler import Failure, Options, _severity
@@ -37,28 +38,34 @@ from walkers.templates import render_deck
 # --- what the engine takes --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("contact", "beyond"),
-    [
-        ({"restitution": 0.0501}, {"restitution": 0.05}),
-        ({"youngs_modulus": "1 GPa"}, {"youngs_modulus": "1.001 GPa"}),
-    ],
-)
-def test_bounds_of_a_case_are_the_engines(
-    tmp_path: Path, contact: dict[str, object], beyond: dict[str, object]
-) -> None:
+BRIEF = {"time_step": "0.4 us", "cycles": 2, "settling_cycles": 0, "samples_per_cycle": 1, "allow_unstable": True}
+
+
+def test_the_least_restitution_of_a_case_is_the_engines(tmp_path: Path) -> None:
     """The last value that the case check takes runs; the first that it refuses stops the engine."""
-    brief = {"time_step": "0.4 us", "cycles": 2, "settling_cycles": 0, "samples_per_cycle": 1, "allow_unstable": True}
-    drive = {"frequency": "2 kHz"}
-    case = make_case(contact=contact, run=brief, drive=drive)
+    case = make_case(contact={"restitution": 0.0501}, run=BRIEF, drive={"frequency": "2 kHz"})
     assert not run_case(case, tmp_path).cached
-    (key,) = beyond
-    with pytest.raises(InputError, match=rf"contact\.{key} = .*: expected .*(more than 0\.05|at most 1e\+09)"):
-        make_case(contact=beyond)
-    value = {"restitution": 0.05, "youngs_modulus": 1.001e9}[key]
-    further = replace(case, contact=replace(case.contact, **{key: value}))
-    with pytest.raises(EngineError, match=r"coefficientRestitution <= 1 required|youngsModulus <= 1e9 required"):
+    with pytest.raises(InputError, match=r"contact\.restitution = .*: expected .*more than 0\.05"):
+        make_case(contact={"restitution": 0.05})
+    further = replace(case, contact=replace(case.contact, restitution=0.05))
+    with pytest.raises(EngineError, match="coefficientRestitution <= 1 required"):
         run_case(further, tmp_path)
+
+
+def test_the_largest_modulus_of_a_case_is_the_engines_own(tmp_path: Path) -> None:
+    """Beyond it a deck has to say that beads are hard, as those of the benchmarks do."""
+    case = make_case(contact={"youngs_modulus": "1 GPa"}, run=BRIEF, drive={"frequency": "2 kHz"})
+    assert not run_case(case, tmp_path).cached
+    assert "hard_particles" not in render_deck(case).text
+    with pytest.raises(InputError, match=r"contact\.youngs_modulus = .*: expected .*at most 1e\+09"):
+        make_case(contact={"youngs_modulus": "1.001 GPa"})
+    deck = render_deck(replace(case, contact=replace(case.contact, youngs_modulus=1.001e9)))
+    assert "hard_particles  yes" in deck.text
+    without = replace(deck, text=deck.text.replace("hard_particles  yes", ""))
+    (tmp_path / "soft").mkdir()
+    write_deck(without, tmp_path / "soft")
+    with pytest.raises(EngineError, match="youngsModulus <= 1e9 required"):
+        launch(without, tmp_path / "soft", find_engine())
 
 
 # --- dumps ------------------------------------------------------------------------------------------------------------
