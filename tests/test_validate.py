@@ -1,0 +1,44 @@
+"""The page of all studies, and what becomes of a chapter that cannot be made. Each study has tests of its own."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import call
+from walkers.runner.failures import EngineFailure
+from walkers.studies import static_friction
+from walkers.studies.chapter import Chapter
+from walkers.studies.validate import CHAPTERS, PAGE, validate
+
+
+def test_a_quick_chapter_has_a_page_of_its_own(in_folder: Path) -> None:
+    done = call("validate", "closed-forms", "--quick", "-j", "1", check=True)
+    page = Path("runs/validation/validation-quick-closed-forms.md")
+    assert str(page) in done.stdout
+    assert "## One bead: closed forms" in page.read_text()
+    assert (page.parent / "figures" / "validation-closed-forms.png").exists()
+    assert not (page.parent / PAGE).exists()
+
+
+def test_a_chapter_that_cannot_be_made_leaves_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(out: Path, *, quick: bool = False) -> Chapter:
+        raise EngineFailure("no engine here")
+
+    monkeypatch.setattr(static_friction, "chapter", fail)
+    made = validate(tmp_path, tmp_path, only=("static-friction", "closed-forms"), quick=True)
+    assert made.failed == ["static-friction: could not be made: no engine here"]
+    page = made.files[0].read_text()
+    assert "no engine here" in page
+    assert "## One bead: closed forms" in page
+
+
+def test_docs_have_all_chapters() -> None:
+    page = (Path(__file__).parent.parent / "docs" / PAGE).read_text()
+    assert page.count("\n## ") == len(CHAPTERS)
+    assert "Not as expected" not in page
+
+
+def test_an_unknown_chapter_is_told() -> None:
+    done = call("validate", "benchmark")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "did you mean" in done.stderr
