@@ -96,6 +96,23 @@ def test_a_chain_of_two_is_a_dimer() -> None:
     np.testing.assert_allclose(*starts, atol=1e-15)
 
 
+INDEPENDENT: dict[str, Any] = {
+    "liquid": {
+        "viscosity_ratio": 9.99,
+        "film_drag_ratio": 0.512,
+        "contact_angle": "38.2 deg",
+        "volume_fraction": 0.171,
+    },
+    "contact": {
+        "friction": {"bead_bead": 0.0873, "bead_wall": 0.314},
+        "rolling_friction": 0.00487,
+        "minimum_separation_ratio": 0.016,
+        "restitution": 0.3,
+    },
+}
+"""Parameters of the trimers that independent engines walked."""
+
+
 @pytest.fixture(scope="module")
 def trimers(once: Callable[..., Path]) -> Path:
     """Trimers of Fig. 1b's beads, started at angles: what they have become after a second and a half."""
@@ -107,7 +124,9 @@ def trimers(once: Callable[..., Path]) -> Path:
             ("between", "chain", "sLs", ["2 deg", "90 deg"]),
         ):
             run = {"run": {"cycles": 120, "settling_cycles": 80}}
-            case = to_toml({**FIG1B, **run}) + "[[clusters]]\n" + to_toml(cluster(arrangement, sizes))
+            liquid = {"liquid": {**FIG1B["liquid"], **INDEPENDENT["liquid"]}}
+            tables = {**FIG1B, **run, **INDEPENDENT, **liquid}
+            case = to_toml(tables) + "[[clusters]]\n" + to_toml(cluster(arrangement, sizes))
             (folder / f"{name}-case.toml").write_text(case)
             sweep = f'case = "{name}-case.toml"\n[axes]\n"clusters[0].angle" = {angles}\n'
             (folder / f"{name}.toml").write_text(sweep)
