@@ -165,12 +165,12 @@ def test_a_bridge_between_beads_breaks_and_shares_its_liquid() -> None:
 
 
 def test_fig1b_is_one_motion_in_both_engines(fig1b: Motion) -> None:
-    """Velocity, rotation and sliding agree; and the second engine is no slower by an order of magnitude."""
+    """Velocity, rotation and sliding agree, and so do places: rolling friction amplifies no more than rounding."""
     found = compare(fig1b, Laws(), None)
     assert found.disagreements == []
     assert found.rows[0].second == pytest.approx(found.rows[0].first, rel=5e-6)
     assert found.parting.together is None
-    assert found.parting.apart.max() < 1e-7
+    assert found.parting.apart.max() < 1e-6
 
 
 @pytest.mark.parametrize("term", ["film", "rolling-friction", "tangential-lubrication", "tangential-spring"])
@@ -200,7 +200,7 @@ def test_other_kinds_of_cases_agree(name: str, tmp_path: Path) -> None:
     case = other_kinds()[name]
     found = compare(run(case, tmp_path).motion, Laws(), None, every_step=False)
     assert found.disagreements == []
-    assert found.parting.apart.max() < 1e-6
+    assert found.parting.apart.max() < 1e-5
     free = replace(case, contact=replace(case.contact, rolling_friction=0.0))
     assert compare(run(free, tmp_path).motion, Laws(), None, every_step=False).parting.apart.max() < 1e-10
 
