@@ -18,11 +18,11 @@ def groups(trajectory: Callable[..., Group]) -> dict[int, Group]:
     return {samples: trajectory(_hopping(samples)) for samples in (20, 200)}
 
 
-def _hopping(samples: int) -> Case:
+def _hopping(samples: int, **run: object) -> Case:
     """Fig. 4b's walker, whose beads part in every cycle."""
     tables = read_toml(shipped_cases()["fig4b"])
     tables["dimers"]["replicates"] = 1
-    tables["run"] = {"time_step": "3 us", "cycles": 12, "settling_cycles": 4, "samples_per_cycle": samples}
+    tables["run"] = {"time_step": "3 us", "cycles": 12, "settling_cycles": 4, "samples_per_cycle": samples, **run}
     return resolve_case(tables, source="test", name=f"hopping-{samples}")
 
 
@@ -57,3 +57,15 @@ def test_with_few_samples_a_cycle_gaps_are_looked_at_there_alone(groups: dict[in
     thinned = Group(motion, few.make, few.walkers)
     samples = settled_samples(thinned)
     np.testing.assert_array_equal(averages(thinned).open, (gaps(thinned)[samples] > 0.0).mean(axis=0))
+
+
+def test_a_run_in_parts_has_the_same_means(groups: dict[int, Group], trajectory: Callable[..., Group]) -> None:
+    """The first frame of a part, of which nothing is averaged yet, is the last one of the part before."""
+    parts = trajectory(_hopping(20, segment="0.05 s"))
+    assert len({segment for segment, _ in parts.motion.frames}) == 3
+    assert parts.motion.mean_spin is not None
+    assert np.abs(parts.motion.mean_spin[1:]).max(axis=(1, 2)).min() > 0.0
+    whole, found = averages(groups[20]), averages(parts)
+    scale = float(np.abs(whole.sliding).max())
+    np.testing.assert_allclose(found.rotation, whole.rotation, atol=1e-2 * scale)
+    np.testing.assert_allclose(found.sliding, whole.sliding, atol=1e-2 * scale)
