@@ -8,8 +8,7 @@ from walkers.inputs.library import suggestion
 from walkers.inputs.schema import ContactTable, LiquidTable
 from walkers.physics.matter import Contact, Liquid
 
-_MINIMUM_SEPARATION_RATIO = 0.01
-_RESTITUTION = 0.3
+_CONTACT = {"restitution": 0.3, "minimum_separation_ratio": 0.01}
 _LIQUID = {"volume_fraction": 0.01, "viscosity_ratio": 1.0, "film_drag_ratio": 0.0, "contact_angle": 0.0}
 """Where neither the case nor the library says more."""
 
@@ -72,10 +71,7 @@ def resolve_liquid(table: LiquidTable, pair: dict[str, float] | None = None) -> 
     if tension is None or viscosity is None:
         lacking = "surface_tension" if tension is None else "dynamic_viscosity"
         raise UnusableKeyError(f"liquid.{lacking}", "missing; expected a liquid of the library by name, or this number")
-    chosen = {
-        key: value if (value := _first(getattr(table, key), pair, key)) is not None else usual
-        for key, usual in _LIQUID.items()
-    }
+    chosen = _chosen(table, pair, _LIQUID)
     film, bridges = (float(f"{viscosity * chosen[f'{of}_ratio']:.15g}") for of in ("film_drag", "viscosity"))
     return Liquid(tension, bridges, density, chosen["volume_fraction"], chosen["contact_angle"], table.name, film)
 
@@ -112,17 +108,24 @@ def resolve_contact(table: ContactTable, bead: str | None, wall_key: str, wall: 
             f"contact.{lacking[0]}",
             f"missing{others}; the library has them for {pairs} only, not for {bead or 'these beads'} on {wall}",
         )
-    separation = _first(table.minimum_separation_ratio, on_wall, "minimum_separation_ratio")
-    restitution = _first(table.restitution, on_wall, "restitution")
     return Contact(
         youngs_modulus=table.youngs_modulus,
         poissons_ratio=table.poissons_ratio,
-        restitution=_RESTITUTION if restitution is None else restitution,
         friction_bead_bead=known["friction.bead_bead"] or 0.0,
         friction_bead_wall=known["friction.bead_wall"] or 0.0,
         rolling_friction=known["rolling_friction"] or 0.0,
-        minimum_separation_ratio=_MINIMUM_SEPARATION_RATIO if separation is None else separation,
+        **_chosen(table, on_wall, _CONTACT),
     )
+
+
+def _chosen(
+    table: LiquidTable | ContactTable, pair: dict[str, float] | None, usual: dict[str, float]
+) -> dict[str, float]:
+    """What the case says, or else the library of a pair of surfaces, or else what is usual."""
+    return {
+        key: value if (value := _first(getattr(table, key), pair, key)) is not None else otherwise
+        for key, otherwise in usual.items()
+    }
 
 
 def _first(given: float | None, pair: dict[str, float] | None, key: str) -> float | None:

@@ -8,7 +8,7 @@ repulsion and its damping together: a bead that is pressed on rubs more than one
 
 from __future__ import annotations
 
-from math import log, pi, sqrt
+from math import exp, log, pi, sqrt
 
 from walkers.physics.wall import WALL_COPIES
 
@@ -81,6 +81,12 @@ def normal_damping(overlap: float, reduced_radius: float, reduced_modulus: float
 def normal_damping_at_wall(overlap: float, radius: float, reduced_modulus: float, mass: float, ratio: float) -> float:
     """Coefficient of the damping of a bead of ``radius`` (m) by a wall (`walkers.physics.wall`), N s/m."""
     return WALL_COPIES * normal_damping(overlap, radius, reduced_modulus, mass, ratio)
+
+
+def restitution_of_copies(restitution: float, copies: int) -> float:
+    """Restitution of so many contacts side by side: stiffness and damping add up, which makes it that of √copies β."""
+    ratio = sqrt(copies) * damping_ratio(restitution)
+    return exp(-pi * ratio / sqrt(1.0 - ratio**2)) if ratio < 1.0 else 0.0
 
 
 def damping_ratio(restitution: float) -> float:

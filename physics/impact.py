@@ -24,12 +24,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
-from math import exp, pi, sqrt
+from math import sqrt
 
 import numpy as np
 import numpy.typing as npt
 
-from walkers.physics.contact import damping_ratio
+from walkers.physics.contact import damping_ratio, restitution_of_copies
 
 FloatArray = npt.NDArray[np.float64]
 _DURATION = 2.9432750
@@ -68,9 +68,8 @@ class Impact:
 
     @property
     def rebound(self) -> float:
-        """Restitution of the whole: copies double the damping and the stiffness, so that √copies β is its β."""
-        ratio = sqrt(self.copies) * damping_ratio(self.restitution)
-        return exp(-pi * ratio / sqrt(1.0 - ratio**2)) if ratio < 1.0 else 0.0
+        """Restitution of all copies together."""
+        return restitution_of_copies(self.restitution, self.copies)
 
 
 def sliding_loss(friction: float, restitution: float, normal_speed: FloatArray) -> FloatArray:

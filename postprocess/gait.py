@@ -50,7 +50,7 @@ def gait(group: Group) -> Gait:
     along = np.einsum("fwbx,fwx->fwb", group.velocity, heading)
     rotation = radii * np.einsum("fwbx,fwx->fwb", group.spin, np.cross(upward, heading))
     weights = radii**3 / np.sum(radii**3)
-    _, normal = _nearest_wall(group)
+    at_walls, normal = _nearest_wall(group)
     turning = rotation if normal is None else radii * np.einsum(
         "fwbx,fwbx->fwb", group.spin, np.cross(normal, heading[:, :, None])
     )  # fmt: skip
@@ -66,7 +66,7 @@ def gait(group: Group) -> Gait:
         velocity=along @ weights,
         rotation=rotation,
         sliding=np.concatenate(sliding, axis=-1),
-        gap=gaps(group),
+        gap=_gaps(group, at_walls),
     )
 
 
@@ -115,8 +115,12 @@ def averages(group: Group) -> Averages:
 
 def gaps(group: Group) -> FloatArray:
     """Gaps at the contacts (as in `Gait`), m, shape (F, W, n + pairs)."""
-    radii, position = group.radii, group.position
-    found = [_nearest_wall(group)[0]]
+    return _gaps(group, _nearest_wall(group)[0])
+
+
+def _gaps(group: Group, at_walls: FloatArray) -> FloatArray:
+    """Gaps of beads to walls, then those between beads."""
+    radii, position, found = group.radii, group.position, [at_walls]
     for one, other in group.make.pairs:
         distance = np.linalg.norm(position[:, :, one] - position[:, :, other], axis=-1)
         found.append((distance - (radii[one] + radii[other]))[..., None])

@@ -86,9 +86,9 @@ class Motion:
         first = self.first_driven
         if not first:
             return self
-        return self._of(slice(first, None))
+        return self.part(slice(first, None))
 
-    def _of(self, frames: slice, **changes: Any) -> Motion:
+    def part(self, frames: slice, **changes: Any) -> Motion:
         """Some of the frames, with changes."""
         names = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin")
         kept: dict[str, Any] = {name: getattr(self, name) for name in names if name not in changes}
@@ -106,7 +106,7 @@ class Motion:
         interval = np.diff(self.time)[:, None, None]
         position = (self.position[1:] + self.position[:-1]) / 2.0
         velocity = np.diff(self.position, axis=0) / interval
-        return self._of(slice(1, None), position=position, velocity=velocity, spin=spin)
+        return self.part(slice(1, None), position=position, velocity=velocity, spin=spin)
 
     def between(self, share: float) -> Motion:
         """The F - 1 places at a share of the intervals between frames, by cubics through places and velocities."""
@@ -114,7 +114,7 @@ class Motion:
         begin, end, left = self.position[:-1], self.position[1:], 1.0 - share
         position = left**2 * (1.0 + 2.0 * share) * begin + share**2 * (3.0 - 2.0 * share) * end
         position += share * left * interval * (left * self.velocity[:-1] - share * self.velocity[1:])
-        return self._of(slice(1, None), position=position)
+        return self.part(slice(1, None), position=position)
 
     @property
     def large(self) -> npt.NDArray[np.bool_]:

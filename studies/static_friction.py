@@ -56,8 +56,8 @@ FOUND: Mapping[str, float] = {
     "restitution": 0.444,
 }
 FOUND_RATIO = 1.376
-"""What `search` found, begun at the shipped parameters, with friction that is larger at rest: parameters (kinetic
-frictions), and the ratio of the frictions."""
+"""What `search` found with friction that is larger at rest, begun at the set that was shipped before: parameters
+(kinetic frictions), and the ratio of the frictions."""
 _APART = 1.6
 """Sums of the radii; beads farther apart are no walker."""
 
@@ -328,11 +328,8 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
         ratio=_RATIO,
     )
     figures = {} if quick else {"static-friction": draw(outcomes, plateaus)}
-    title, failed = (
-        "Friction that is larger at rest than in motion",
-        _unlike([_plateau(one.speeds) for one in outcomes]),
-    )
-    return Chapter("static-friction", title, text, figures, numbers, failed)
+    failed = _unlike([_plateau(one.speeds) for one in outcomes])
+    return Chapter("static-friction", "Friction that is larger at rest than in motion", text, figures, numbers, failed)
 
 
 def _unlike(plateaus: Sequence[float]) -> tuple[str, ...]:

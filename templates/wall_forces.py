@@ -13,7 +13,8 @@ from itertools import groupby
 from math import pi
 
 from walkers.inputs.boundary import Face
-from walkers.physics.film import film_drag, film_thickness
+from walkers.physics.capillary import rupture_distance_at_wall
+from walkers.physics.film import film_drag
 from walkers.physics.matter import Liquid
 from walkers.templates.scene import Bead
 
@@ -78,7 +79,7 @@ def wall_forces(
         (m) and how fast (m/s).
     """
     reaches = {
-        bead.id: bead.radius + film_thickness(bead.radius, liquid.volume_fraction, liquid.contact_angle)
+        bead.id: bead.radius + rupture_distance_at_wall(bead.radius, liquid.volume_fraction, liquid.contact_angle)
         for bead in beads
     }
     walls = formula_walls(faces, moving, max(reaches.values()))

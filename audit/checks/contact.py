@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import exp, pi, sqrt
+from math import pi, sqrt
 
 import numpy as np
 
 from walkers.audit.bench import FIRST_BEAD, Bench, Measured, bench_case, bench_recording, scene_on_floor
 from walkers.audit.check import Check, Line
+from walkers.audit.impacts import walls_of
 from walkers.audit.laws import Partner, damping_law, hertz_law, largest_error
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads
-from walkers.physics.contact import damping_ratio, reduced_shear_modulus
+from walkers.physics.contact import reduced_shear_modulus, restitution_of_copies
+from walkers.physics.wall import WALL_COPIES
 from walkers.templates.deck import Plan
-from walkers.templates.engine import Workarounds
 from walkers.templates.scene import Bead
 
 _WALL = frozenset({"walls"})
@@ -201,12 +202,6 @@ def _rebound(series: Measured, bead: int, speed: float) -> float:
     return float(series.velocity[-1, series.row(bead), 2] / speed)
 
 
-def doubled_restitution(coefficient: float) -> float:
-    """Restitution at a wall that stands twice: stiffness and damping double, the damping ratio grows by √2."""
-    ratio = sqrt(2.0) * damping_ratio(coefficient)
-    return exp(-pi * ratio / sqrt(1.0 - ratio**2)) if ratio < 1.0 else 0.0
-
-
 def restitution(bench: Bench) -> Iterator[Line]:
     """Dry impacts: on a single wall, on the doubled wall, between beads."""
     speed = 0.05
@@ -221,27 +216,29 @@ def restitution(bench: Bench) -> Iterator[Line]:
             Bead(0, (6e-3, 0.0, 5e-3 + 2.0 * radius + 1e-7), radius, velocity=(0.0, 0.0, -speed)),
         ]
         recording = bench_recording(2000, 2000)
-        walls = {"single": Workarounds(wall_copies=1), "doubled": bench.workarounds}
         found = {
             name: bench.run(Plan(case, scene_on_floor(beads), recording, workarounds=workarounds))
-            for name, workarounds in walls.items()
+            for name, workarounds in walls_of(bench).items()
         }
         yield Line(
             f"restitution {coefficient:g} on a single wall",
             "given coefficient",
             coefficient,
-            _rebound(found["single"], FIRST_BEAD, speed),
+            _rebound(found["single wall"], FIRST_BEAD, speed),
             "",
             0.02,
         )
-        twice, rebound = doubled_restitution(coefficient), _rebound(found["doubled"], FIRST_BEAD, speed)
+        twice, rebound = (
+            restitution_of_copies(coefficient, WALL_COPIES),
+            _rebound(found["doubled wall"], FIRST_BEAD, speed),
+        )
         what = f"restitution {coefficient:g} on the doubled wall"
         yield Line(what, "e of √2 times the damping ratio", twice, rebound, "", 0.02, None, _WALL)
         yield Line(
             f"restitution {coefficient:g} between beads",
             "given coefficient",
             coefficient,
-            _rebound(found["doubled"], FIRST_BEAD + 2, speed),
+            _rebound(found["doubled wall"], FIRST_BEAD + 2, speed),
             "",
             0.02,
         )

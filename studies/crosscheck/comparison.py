@@ -138,31 +138,23 @@ class Simulated:
     seconds: float
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """One run beside the second engine.
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """One run beside another engine.
 
     Attributes
     ----------
-    case, laws
-        What was run, and the second engine's laws.
+    case
+        What was run.
     rows
-        Numbers of both; none of a pile. The first is the one to look at.
+        Numbers of both; of a pile none. The first is the one to look at.
     parting
         How their motions part.
-    seconds
-        Wall time of LIGGGHTS's steps (None if it made other runs with them) and of the second engine's, s.
-    first, second
-        The motions.
     """
 
     case: Case
-    laws: Laws
     rows: tuple[Row, ...]
     parting: Parting
-    seconds: tuple[float | None, float]
-    first: Motion
-    second: Motion
 
     @property
     def disagreements(self) -> list[str]:
@@ -173,13 +165,39 @@ class Comparison:
         """Plain JSON types, units with the numbers."""
         return {
             "case": self.case.name,
-            "seed": self.case.seed,
-            "laws": self.laws.differences(),
             "rows": [row.as_dict() for row in self.rows],
             "cycles_together": self.parting.together,
             "largest_distance": float(self.parting.apart.max()),
-            "seconds": {"liggghts": self.seconds[0], "second_engine": self.seconds[1]},
             "disagreements": self.disagreements,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison(Compared):
+    """One run beside the second engine.
+
+    Attributes
+    ----------
+    laws
+        The second engine's.
+    seconds
+        Wall time of LIGGGHTS's steps (None if it made other runs with them) and of the second engine's, s.
+    first, second
+        The motions.
+    """
+
+    laws: Laws
+    seconds: tuple[float | None, float]
+    first: Motion
+    second: Motion
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types, units with the numbers."""
+        return {
+            **super().as_dict(),
+            "seed": self.case.seed,
+            "laws": self.laws.differences(),
+            "seconds": {"liggghts": self.seconds[0], "second_engine": self.seconds[1]},
         }
 
 
@@ -329,7 +347,13 @@ def compare(motion: Motion, laws: Laws, seconds: float | None, every_step: bool 
     rows = [] if motion.groups or motion.case.mixture else _drift(motion, made.motion)
     rows += walker_rows(motion, made)
     return Comparison(
-        motion.case, laws, tuple(rows), parting_of(motion, made.motion), (seconds, made.seconds), motion, made.motion
+        case=motion.case,
+        rows=tuple(rows),
+        parting=parting_of(motion, made.motion),
+        laws=laws,
+        seconds=(seconds, made.seconds),
+        first=motion,
+        second=made.motion,
     )
 
 
@@ -446,9 +470,7 @@ def compare_piles(motions: Sequence[Motion], laws: Laws, seconds: Sequence[float
 
 def _later_half(motion: Motion) -> Motion:
     """The second half of the drive."""
-    late = motion.time >= motion.time[-1] / 2.0
-    names = ("time", "position", "velocity", "spin")
-    return replace(motion, **{name: getattr(motion, name)[late] for name in names})
+    return motion.part(slice(int(np.searchsorted(motion.time, motion.time[-1] / 2.0)), None))
 
 
 def _mean_height(motion: Motion) -> float:

@@ -24,8 +24,7 @@ from walkers.inputs.errors import WalkersError
 from walkers.postprocess.motion import Motion
 from walkers.studies.crosscheck import yade_script
 from walkers.studies.crosscheck.comparison import (
-    Parting,
-    Row,
+    Compared,
     Simulated,
     Tolerances,
     described_rows,
@@ -44,43 +43,15 @@ TOLERANCES = Tolerances(speed=0.01, gait=0.01, orientation=0.5)
 there then differ by at most, 0.31 % and 0.40 % (climber)."""
 
 
-@dataclass(frozen=True)
-class YadeComparison:
-    """A walker of a run beside YADE.
+@dataclass(frozen=True, kw_only=True)
+class YadeComparison(Compared):
+    """A walker of a run beside YADE; ``seconds`` is the wall time of that, s."""
 
-    Attributes
-    ----------
-    case
-        What was run.
-    rows
-        Numbers of both.
-    parting
-        How their motions part.
-    seconds
-        Wall time of YADE, s.
-    """
-
-    case: Case
-    rows: tuple[Row, ...]
-    parting: Parting
     seconds: float
-
-    @property
-    def disagreements(self) -> list[str]:
-        """What differs by more than it may."""
-        return [row.name for row in self.rows if not row.agrees]
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types, units with the numbers."""
-        return {
-            "case": self.case.name,
-            "tolerances": asdict(TOLERANCES),
-            "rows": [row.as_dict() for row in self.rows],
-            "cycles_together": self.parting.together,
-            "largest_distance": float(self.parting.apart.max()),
-            "seconds": {"yade": self.seconds},
-            "disagreements": self.disagreements,
-        }
+        return {**super().as_dict(), "tolerances": asdict(TOLERANCES), "seconds": {"yade": self.seconds}}
 
     def described(self) -> str:
         """In a few lines."""
@@ -241,6 +212,5 @@ def compare_with_yade(motion: Motion, program: str) -> YadeComparison:
     """
     alone = first_walkers(motion)
     made = simulate_by(program, alone)
-    return YadeComparison(
-        motion.case, tuple(walker_rows(alone, made, TOLERANCES)), parting_of(alone, made.motion), made.seconds
-    )
+    rows = tuple(walker_rows(alone, made, TOLERANCES))
+    return YadeComparison(case=motion.case, rows=rows, parting=parting_of(alone, made.motion), seconds=made.seconds)

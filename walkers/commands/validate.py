@@ -27,10 +27,9 @@ def command(
     as_json: Json = False,
 ) -> int:
     """Check the decks against published benchmarks, exact solutions and a second engine, and write a page of it."""
-    from walkers.studies.validate import selected, validate
+    from walkers.studies.validate import validate
     from walkers.sweeps.site import cores_here
 
-    selected(chapters or ())
     check_out(out)
     folder = to or out / "validation"
     check_folder("--to", folder)
