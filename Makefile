@@ -142,6 +142,11 @@ endif
 	@.venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
 
+.venv/ready-docs: .venv/ready requirements-docs.txt
+	@echo "installing Sphinx and what the site needs into .venv"
+	@.venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-docs.txt
+	@touch $@
+
 .PHONY: venv-package
 venv-package:
 	$(call debian,python3-venv,python3-venv)
