@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import zlib
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -108,11 +109,6 @@ def picture_uri(path: Path) -> str:
     return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"
 
 
-def largest_first(sizes: Sequence[int]) -> list[int]:  # pragma: no cover
-    """Numbers of the largest things first."""
-    return sorted(range(len(sizes)), key=lambda number: -sizes[number])
-
-
 def _packed(contents: bytes) -> str:
     return base64.b64encode(zlib.compress(contents, 9)).decode()
 
@@ -120,7 +116,9 @@ def _packed(contents: bytes) -> str:
 @cache
 def _library(name: str) -> str:
     if name == "k3d":
-        return _packed(files("k3d").joinpath("static", "standalone.js").read_bytes())
+        source = files("k3d").joinpath("static", "standalone.js").read_text("utf-8")
+        # Its letters are in it as woff2; the same in other formats would be looked for beside the page.
+        return _packed(re.sub(r',url\(fonts/[^)]*\) format\("(?:woff|truetype)"\)', "", source).encode())
     from bokeh.resources import Resources
 
     return _packed("\n".join(Resources(mode="inline", components=["bokeh"], log_level="error").js_raw).encode())

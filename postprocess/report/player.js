@@ -87,6 +87,10 @@
   }
 
   const sections = [...document.querySelectorAll("section[data-run]")];
+  const bokeh = () => {
+    if (!window.Bokeh) (0, eval)(unpacked("library-bokeh"));
+    return window.Bokeh;
+  };
   const players = new Map();
   const plotted = new Set();
 
@@ -94,7 +98,7 @@
     for (const plots of section.querySelectorAll("[data-plots]")) {
       if (plotted.has(plots)) continue;
       plotted.add(plots);
-      Bokeh.embed.embed_item(JSON.parse(unpacked(plots.dataset.plots)), plots);
+      bokeh().embed.embed_item(JSON.parse(unpacked(plots.dataset.plots)), plots);
     }
     for (const element of section.querySelectorAll(".player")) {
       if (!players.has(element)) players.set(element, new Player(element));

@@ -33,6 +33,12 @@ _GORES, _AROUND, _UP = 8, 3, 16
 """Of a beach ball: its gores, and the pieces of each around and along its axis."""
 _GRID = 2.0**-13
 """mm, to which places are rounded: 0.1 µm. What is rounded to powers of two can be packed."""
+_LANE = 1.25
+"""Lengths of a walker between the lanes of independent ones."""
+_VIEW = 30.0
+"""Degrees, of the camera's view."""
+_ASPECT = 1.8
+"""Width of a picture over its height, at least."""
 _RULES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Millimetres between the lines on a floor."""
 
@@ -47,6 +53,8 @@ class Scene:
         The plot; a widget in a notebook.
     begin, end
         Time of the first and the last instant, s.
+    cameras
+        Where one may look from, by name: place, target and upward direction of a camera, mm.
     captions
         Of what is shown and what is left out.
     """
@@ -54,6 +62,7 @@ class Scene:
     plot: k3d.Plot
     begin: float
     end: float
+    cameras: dict[str, list[float]]
     captions: tuple[str, ...]
 
 
@@ -71,15 +80,15 @@ def scene_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int
     """
     import k3d
 
-    whole = gathered(run if isinstance(run, Motion) else read_motion(run)).driven
+    whole = gathered(run if isinstance(run, Motion) else read_motion(run), lane=_LANE).driven
     motion, frames, captions = _thinned(whole, places)
     plot = k3d.plot(
         height=height,
         name=whole.case.name,
         grid_visible=False,
         fps=30.0,
-        camera_fov=30.0,
-        axes=["x (mm)", "y (mm)", "z (mm)"],
+        camera_fov=_VIEW,
+        axes=["x", "y", "z"],
         background_color=0xFFFFFF,
     )
     plot.fps_meter = False
@@ -96,11 +105,12 @@ def scene_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int
         for ball in _balls(motion, rolled[frames][:, beads]):
             plot += ball
     plot.camera_auto_fit = False
-    plot.camera = camera_of(motion)
+    cameras = cameras_of(motion)
+    plot.camera = cameras["as at first"]
     # Plays the run in so many seconds in K3D's own player, which goes by its time speed.
     plot.time = float(motion.time[0])
     plot.time_speed = float(motion.time[-1] - motion.time[0]) / 12.0 or 1.0
-    return Scene(plot, float(motion.time[0]), float(motion.time[-1]), tuple(captions))
+    return Scene(plot, float(motion.time[0]), float(motion.time[-1]), cameras, tuple(captions))
 
 
 def _thinned(motion: Motion, places: int) -> tuple[Motion, npt.NDArray[np.int64], list[str]]:
@@ -250,16 +260,32 @@ def _rules(low: FloatArray, high: FloatArray) -> Any:
     )
 
 
-def camera_of(motion: Motion) -> list[float]:
-    """Place, target and upward direction of the camera, mm: from the side and above, everything in view."""
+def cameras_of(motion: Motion) -> dict[str, list[float]]:
+    """Where to look from so that everything is in view: `Scene.cameras`."""
     reached = motion.position * 1e3
-    margin = float(motion.radius.max()) * 1e3
+    margin = 1.5 * float(motion.radius.max()) * 1e3
     low, high = reached.min(axis=(0, 1)) - margin, reached.max(axis=(0, 1)) + margin
-    middle = (low + high) / 2.0
-    distance = 2.1 * max(float(np.linalg.norm(high - low)) / 2.0, margin) / np.tan(np.radians(30.0))
-    way = np.array([-0.25, -1.0, 0.2]) if motion.case.boundary.closed else np.array([-0.35, -0.8, 0.55])
-    eye = middle + way / np.linalg.norm(way) * distance
-    return [*map(float, eye), *map(float, middle), 0.0, 0.0, 1.0]
+    corners = np.array([[(low, high)[bit][axis] for axis, bit in enumerate(bits)] for bits in np.ndindex(2, 2, 2)])
+    closed = motion.case.boundary.closed
+    upward = np.array([0.0, 0.0, 1.0])
+    ways = {
+        "as at first": (np.array([-0.25, -1.0, 0.2]) if closed else np.array([-0.55, -0.8, 0.6]), upward),
+        "from the side": (np.array([0.0, -1.0, 0.0]), upward),
+        "from above": (upward, np.array([0.0, 1.0, 0.0])),
+    }
+    return {name: _camera(corners, way / np.linalg.norm(way), up) for name, (way, up) in ways.items()}
+
+
+def _camera(corners: FloatArray, way: FloatArray, up: FloatArray) -> list[float]:
+    """A camera that way from the middle of some points, as near as all of them are seen."""
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+    right = np.cross(up, way)
+    right /= np.linalg.norm(right)
+    away = corners - middle
+    steep = np.tan(np.radians(_VIEW / 2.0))
+    needed = np.maximum(np.abs(away @ right) / (steep * _ASPECT), np.abs(away @ np.cross(way, right)) / steep)
+    distance = float((needed + away @ way).max())
+    return [float(one) for one in (*(middle + way * distance), *middle, *up)]
 
 
 def _packed(colour: str) -> int:
