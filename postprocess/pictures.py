@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 PICTURE_NAME = "walker.png"
 SERIES_NAME = "series.png"
 FILM_NAME = "film.mp4"
-RUBY = ("#b0203c", "#e0566c")
-GLASS = ("#8c9aa5", "#c9d2d8")
+_RUBY = ("#b0203c", "#e0566c")
+_GLASS = ("#8c9aa5", "#c9d2d8")
 """Large and small beads, of those that are pointed out and of the others."""
 _FLOOR = "#c9d2d8"
 _FEW, _MANY = 100, 500
@@ -239,7 +239,7 @@ class View:
         motion = self._motion
         chosen = np.zeros(len(motion.radius), dtype=bool)
         chosen[list(coloured)] = True
-        names = np.where(chosen, np.where(motion.large, *RUBY), np.where(motion.large, *GLASS))
+        names = np.where(chosen, np.where(motion.large, *_RUBY), np.where(motion.large, *_GLASS))
         rgb = {str(name): pv.Color(str(name)).int_rgb for name in np.unique(names)}
         colours = np.array([rgb[str(name)] for name in names], dtype=np.uint8)
         self._mesh.points = (self._around + motion.position[frame][:, None] * 1e3).reshape(-1, 3).astype(np.float32)
@@ -292,13 +292,13 @@ def render_series(
     check_picture(path, ".png")
     motion = gathered(read_motion(directory))
     frames = _frames_evenly(motion, images) if apart is None else _frames_apart(motion, images, apart, directory)
-    coloured = pointed_out(motion)
+    pointed_out = _pointed_out(motion)
     view = View(motion)
     sides = (1e3 * view.low[0], 1e3 * view.high[0], 1e3 * view.low[1], 1e3 * view.high[1])
     decimals = 2 if apart is None or apart >= 0.1 else 4
     figure, panels = _panels(len(frames), sides[1] - sides[0], sides[3] - sides[2])
     for panel, frame in zip(panels, frames, strict=True):
-        panel.imshow(view.picture(frame, coloured(frame)), extent=sides, interpolation="antialiased")
+        panel.imshow(view.picture(frame, pointed_out(frame)), extent=sides, interpolation="antialiased")
         panel.set_title(f"{motion.time[frame]:.{decimals}f} s", fontsize=10)
         panel.set_xlabel(f"{view.axes[0]} (mm)")
         panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])
@@ -406,10 +406,10 @@ def _film(motion: Motion, frames: Sequence[int]) -> Generator[npt.NDArray[np.uin
     from PIL import Image, ImageDraw, ImageFont
 
     view = View(motion)
-    coloured, font = pointed_out(motion), ImageFont.load_default(_LETTERS)
+    pointed_out, font = _pointed_out(motion), ImageFont.load_default(_LETTERS)
     try:
         for frame in frames:
-            box = Image.fromarray(view.picture(frame, coloured(frame)))
+            box = Image.fromarray(view.picture(frame, pointed_out(frame)))
             page = Image.new(
                 "RGB", (max(_LEFT + box.width + _RIGHT, _LEAST_WIDTH), _ABOVE + box.height + _BELOW), "white"
             )
@@ -476,7 +476,7 @@ def seconds_apart(text: str, directory: Path) -> float:
     raise InputError("--interval", [Problem("", None, f'{text!r}: expected a time such as "2 s", or "T/4" of a cycle')])
 
 
-def pointed_out(motion: Motion) -> Callable[[int], set[int]]:
+def _pointed_out(motion: Motion) -> Callable[[int], set[int]]:
     """What gives, for a frame, the beads to colour: those of walkers, and of the clusters that climb and are free."""
     walkers = set(np.flatnonzero(motion.walker_of >= 0).tolist())
     if not Pile().applies(motion.case):
@@ -503,7 +503,7 @@ def _add_walker(plotter: pv.Plotter, radii: FloatArray, centres: FloatArray) -> 
 
     for bead, (radius, centre) in enumerate(zip(radii, centres, strict=True)):
         sphere = pv.Sphere(radius=radius, center=centre, theta_resolution=80, phi_resolution=80)
-        plotter.add_mesh(sphere, color=RUBY[int(bead > 0)], smooth_shading=True, specular=0.6, specular_power=40)
+        plotter.add_mesh(sphere, color=_RUBY[int(bead > 0)], smooth_shading=True, specular=0.6, specular_power=40)
 
 
 def _add_floor(plotter: pv.Plotter, low: FloatArray, high: FloatArray) -> None:
