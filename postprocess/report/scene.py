@@ -1,7 +1,7 @@
 """The beads of a run in three dimensions, to be played and turned: one K3D scene for reports and for notebooks.
 
-Seen in the frame of the boundary, in mm. Beads of walkers are beach balls, which shows how they roll; loose beads are
-plain, as their spins are recorded too seldom to be added up (`walkers.postprocess.rolling`).
+Seen in the frame of the boundary, in mm. Beads are beach balls, which shows how they roll, but for those whose spins
+are recorded too seldom to be added up (`walkers.postprocess.rolling`).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from walkers.postprocess.motion import Motion, gathered, read_motion
 from walkers.postprocess.paraview import boundary_of
-from walkers.postprocess.pictures import GLASS, RUBY, pointed_out
-from walkers.postprocess.rolling import turned
+from walkers.postprocess.rolling import turns_of
+from walkers.postprocess.scene import GLASS, RUBY, pointed_out
 
 if TYPE_CHECKING:
     import k3d
@@ -81,7 +81,7 @@ def scene_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int
     import k3d
 
     whole = gathered(run if isinstance(run, Motion) else read_motion(run), lane=_LANE).driven
-    motion, frames, captions = _thinned(whole, places)
+    motion, frames, beads, captions = _thinned(whole, places)
     plot = k3d.plot(
         height=height,
         name=whole.case.name,
@@ -94,15 +94,15 @@ def scene_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int
     plot.fps_meter = False
     for wall in _walls(motion):
         plot += wall
-    pointed = pointed_out(whole)
-    rolled = turned(whole)
-    if rolled is None:
-        chosen = {bead for frame in frames for bead in pointed(int(frame))}
-        plot += _points(motion, chosen)
-        captions.append("Beads do not show how they roll: a pile's frames are too far apart for it.")
+    pointed, turns = pointed_out(whole), turns_of(whole)
+    chosen = np.isin(np.arange(len(whole.radius)), [bead for frame in frames for bead in pointed(int(frame))])
+    colours = np.where(chosen, np.where(whole.large, *RUBY), np.where(whole.large, *GLASS))
+    packed = np.array([int(str(name)[1:], 16) for name in colours], dtype=np.uint32)
+    if turns is None:
+        plot += _points(motion, packed[beads])
+        captions.append("Beads do not show how they roll: their frames are too far apart for it.")
     else:
-        beads = np.isin(whole.walker_of, [walker.walker for walker in motion.walkers])
-        for ball in _balls(motion, rolled[frames][:, beads]):
+        for ball in _balls(motion, turns.turned[frames][:, beads], packed[beads]):
             plot += ball
     plot.camera_auto_fit = False
     cameras = cameras_of(motion)
@@ -113,8 +113,10 @@ def scene_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int
     return Scene(plot, float(motion.time[0]), float(motion.time[-1]), cameras, tuple(captions))
 
 
-def _thinned(motion: Motion, places: int) -> tuple[Motion, npt.NDArray[np.int64], list[str]]:
-    """The motion of fewer walkers at fewer instants, these instants, and what is left out in words."""
+def _thinned(
+    motion: Motion, places: int
+) -> tuple[Motion, npt.NDArray[np.int64], npt.NDArray[np.bool_], list[str]]:
+    """The motion of fewer walkers at fewer instants, these instants and beads, and what is left out in words."""
     captions = []
     beads = np.ones(len(motion.radius), dtype=bool)
     walkers, count = motion.walkers, len(motion.walkers)
@@ -137,7 +139,7 @@ def _thinned(motion: Motion, places: int) -> tuple[Motion, npt.NDArray[np.int64]
         often = f"{samples // stride} instants a cycle" if stride < samples else f"every {stride // samples}th cycle"
         captions.append(f"{often.capitalize()} {'are' if stride < samples else 'is'} shown, with what is between them.")
     part = motion.part(slice(None, None, stride))
-    return _of_beads(part, beads, walkers), frames, captions
+    return _of_beads(part, beads, walkers), frames, beads, captions
 
 
 def _of_beads(motion: Motion, beads: npt.NDArray[np.bool_], walkers: Any) -> Motion:
@@ -150,25 +152,24 @@ def _of_beads(motion: Motion, beads: npt.NDArray[np.bool_], walkers: Any) -> Mot
     return replace(motion, **arrays, mean_spin=None, radius=motion.radius[beads], walkers=walkers)
 
 
-def _balls(motion: Motion, rotations: FloatArray) -> list[Any]:
-    """A ball a bead, its matrix a series in time."""
+def _balls(motion: Motion, turned: FloatArray, colours: npt.NDArray[np.uint32]) -> list[Any]:
+    """A ball a bead, its matrix a series in time, between whose instants K3D turns it on."""
     import k3d
+    from scipy.spatial.transform import Rotation
 
     vertices, indices, white = _beach_ball()
     times = [f"{time:.6f}" for time in motion.time]
     balls = []
-    large = motion.large if motion.large.any() else motion.radius >= motion.radius.max()
     for bead, radius in enumerate(motion.radius * 1e3):
         matrices = np.zeros((len(times), 4, 4), dtype=np.float32)
-        matrices[:, :3, :3] = np.round(rotations[:, bead] * radius / _GRID) * _GRID
+        matrices[:, :3, :3] = np.round(Rotation.from_quat(turned[:, bead]).as_matrix() * radius / _GRID) * _GRID
         matrices[:, :3, 3] = np.round(motion.position[:, bead] * 1e3 / _GRID) * _GRID
         matrices[:, 3, 3] = 1.0
-        colour = _packed(RUBY[0] if large[bead] else RUBY[1])
         ball = k3d.mesh(
             vertices,
             indices,
             normals=vertices,
-            colors=np.where(white, _packed(_WHITE), colour).astype(np.uint32),
+            colors=np.where(white, _packed(_WHITE), colours[bead]).astype(np.uint32),
             flat_shading=False,
             roughness=0.6,
             name=f"bead {bead}",
@@ -197,16 +198,14 @@ def _beach_ball() -> tuple[FloatArray, npt.NDArray[np.uint32], npt.NDArray[np.bo
     return np.concatenate([one.reshape(-1, 3) for one in vertices]), np.array(triangles, np.uint32), np.array(white)
 
 
-def _points(motion: Motion, chosen: set[int]) -> Any:
+def _points(motion: Motion, colours: npt.NDArray[np.uint32]) -> Any:
     """All beads as points with a size."""
     import k3d
 
-    marked = np.isin(np.arange(len(motion.radius)), sorted(chosen))
-    names = np.where(marked, np.where(motion.large, *RUBY), np.where(motion.large, *GLASS))
     points = k3d.points(
         np.zeros((len(motion.radius), 3), dtype=np.float32),
         point_sizes=(2e3 * motion.radius).astype(np.float32),
-        colors=np.array([_packed(str(name)) for name in names], dtype=np.uint32),
+        colors=colours,
         shader="3d",
         roughness=0.5,
         name="beads",
