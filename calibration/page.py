@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from walkers.calibration.report import RECORD_NAME
+from walkers.calibration.report import RECORD_NAME, as_dict, rows_of
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.origins import text_of
 from walkers.postprocess.quantities import Number
 from walkers.postprocess.report.page import NAME, check_report, fill, picture_uri, write_page
+from walkers.postprocess.report.run import flat
 from walkers.runner.files import read_json
+
+if TYPE_CHECKING:
+    from walkers.calibration.calibrate import Outcome
 
 _FIGURES = {
     "predictions": "Published values and the engine's",
@@ -18,6 +22,7 @@ _FIGURES = {
     "sobol": "What each observation depends on: total Sobol indices",
     "bands": "The engine over samples of the posterior",
 }
+_SHOWN_ELSEWHERE = frozenset({"title", "parameters", "observations"})
 
 
 def report_calibration(directory: Path, to: Path | None = None) -> Path:
@@ -51,10 +56,15 @@ def report_calibration(directory: Path, to: Path | None = None) -> Path:
     return write_page(path, record["title"] or record["calibration"], body, {})
 
 
-def _shown(record: dict[str, Any], directory: Path) -> dict[str, Any]:
-    """What the template shows."""
+def outcome_html(found: Outcome) -> str:
+    """The tables of a calibration as a piece of HTML, without figures."""
+    return fill("calibration.html.j2", "walkers.calibration", **_shown(as_dict(found, rows_of(found)), None))
+
+
+def _shown(record: dict[str, Any], directory: Path | None) -> dict[str, Any]:
+    """What the template shows; figures of a directory, if there is one."""
     settings = record["settings"]
-    figures = {told: directory / f"{name}.png" for name, told in _FIGURES.items()}
+    figures = {told: directory / f"{name}.png" for name, told in _FIGURES.items()} if directory else {}
     return {
         "title": record["title"] or record["calibration"],
         "record": record,
@@ -66,7 +76,10 @@ def _shown(record: dict[str, Any], directory: Path) -> dict[str, Any]:
                 "range": " … ".join(text_of(end) for end in settings["parameters"][name]["range"]),
                 "numbers": [
                     Number(f"best.{name}", record["best"][name]),
-                    *(Number(f"intervals.{name}.{place}", value) for place, value in enumerate(record["intervals"][name])),
+                    *(
+                        Number(f"intervals.{name}.{place}", value)
+                        for place, value in enumerate(record["intervals"][name])
+                    ),
                 ],
                 "words": record["words"][name],
             }
@@ -74,9 +87,7 @@ def _shown(record: dict[str, Any], directory: Path) -> dict[str, Any]:
         ],
         "chains": {"of all observations": record["chain"], **record["held_out_chains"]},
         "settings": [
-            (key, text_of(value))
-            for key, value in settings.items()
-            if key not in {"title", "parameters", "observations", "bands"} and value not in ({}, [])
+            (key, text_of(value)) for key, value in flat(settings) if key.partition(".")[0] not in _SHOWN_ELSEWHERE
         ],
         "figures": {told: picture_uri(file) for told, file in figures.items() if file.is_file()},
     }
@@ -88,7 +99,11 @@ def _observation(record: dict[str, Any], place: int) -> dict[str, Any]:
 
     def number(name: str, error: str | None = None) -> Number | None:
         value = row[name]
-        return None if value is None else Number(f"observations.{place}.{name}", value, error=row[error] if error else None)
+        return (
+            None
+            if value is None
+            else Number(f"observations.{place}.{name}", value, error=row[error] if error else None)
+        )
 
     return {
         **{name: row[name] for name in ("title", "name", "unit", "agrees", "samples")},

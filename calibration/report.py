@@ -208,12 +208,13 @@ def write_tables(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
         samples[f"discrepancy_{group}"] = posterior.discrepancy[:, place]
     samples["log_density"] = posterior.log_density
     write_bytes(to / "posterior.parquet", samples.to_parquet(index=False))
-    write_json(to / RECORD_NAME, _as_dict(found, rows))
+    write_json(to / RECORD_NAME, as_dict(found, rows))
     write_text(to / "calibration.md", as_markdown(found, rows))
     return [to / name for name in ("posterior.parquet", RECORD_NAME, "calibration.md")]
 
 
-def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
+def as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
+    """What ``calibration.json`` holds."""
     posterior, (checked, inside), (made, expected) = found.posterior, _inside(found), feasibility_check(found)
     contents: dict[str, object] = {
         "calibration": found.calibration.name,

@@ -252,7 +252,7 @@ def gathered(motion: Motion, lane: float = 2.0) -> Motion:
         return moved
     count = len(motion.walkers[0].beads)
     names = ("position", "velocity", "spin", "mean_spin")
-    arrays = {name: None if (one := getattr(moved, name)) is None else one[:, :count] for name in names}
+    arrays: dict[str, Any] = {name: None if (one := getattr(moved, name)) is None else one[:, :count] for name in names}
     return replace(moved, **arrays, radius=motion.radius[:count], walkers=motion.walkers[:1])
 
 

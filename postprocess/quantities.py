@@ -91,10 +91,12 @@ def quantity(result: Mapping[str, Any], name: str, key: str, unit: str = "") -> 
 
 def spread(result: Mapping[str, Any], name: str, key: str, unit: str) -> Quantity:
     """The row of a mean over replicates with its standard error and extremes."""
-    error = number_of(result, f"{key}.standard_error", unit)
-    doubt = None if error is None else error.value
-    mean, smallest, largest = (number_of(result, f"{key}.{what}", unit, doubt) for what in ("mean", "smallest", "largest"))
-    return Quantity(name, mean, None if error is None else Number(error.key, error.value, error.unit, error.factor, doubt), smallest, largest)
+    known = number_of(result, f"{key}.standard_error", unit)
+    doubt = None if known is None else known.value
+    mean, error, smallest, largest = (
+        number_of(result, f"{key}.{what}", unit, doubt) for what in ("mean", "standard_error", "smallest", "largest")
+    )
+    return Quantity(name, mean, error, smallest, largest)
 
 
 def of_walkers(result: Mapping[str, Any]) -> Iterator[Quantity]:

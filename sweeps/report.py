@@ -29,8 +29,10 @@ FloatArray = npt.NDArray[np.float64]
 
 _PLACES = 3000
 """Beads times instants of each scene at most: less than in a report of one run, that more runs fit."""
-_SHOWN = ("gamma0", "sin_delta", "velocity", "rotation_1", "rotation_2", "steady", "walkers", "cycles", "climbs", "onset")
-_SHOWN += ("speed", "highest", "led_by_large", "brazil_nut_end", "merged", "parted", "status")
+_SHOWN = (
+    *("gamma0", "sin_delta", "velocity", "rotation_1", "rotation_2", "steady", "walkers", "cycles"),
+    *("climbs", "onset", "speed", "highest", "led_by_large", "brazil_nut_end", "merged", "parted", "status"),
+)
 """Columns of a sweep's table that the report shows, of those that it has, after what varies."""
 _ERRORS = {"velocity": "standard_error"}
 """Columns with the standard errors of others."""
@@ -104,7 +106,8 @@ def report_sweep(directory: Path, to: Path | None = None) -> Path:
         "points": [int(number) for number in frame["point"]],
         "has_plot": plot is not None,
     }
-    room = LARGEST - overhead() - len(fill("sweep.html.j2", "walkers.sweeps", runs={}, multiples=_multiples(curves, {}, frame, record), **values).encode()) - sum(map(len, carried.values()))
+    bare = fill("sweep.html.j2", "walkers.sweeps", runs={}, multiples=_multiples(curves, {}, frame, record), **values)
+    room = LARGEST - overhead() - len(bare.encode()) - sum(map(len, carried.values()))
     runs: dict[int, RunReport] = {}
     for number in _spread_out(list(finished)):
         run = RunReport(finished[number], f"point-{number}", _PLACES)
@@ -125,7 +128,7 @@ def report_sweep(directory: Path, to: Path | None = None) -> Path:
 
 
 def _spread_out(numbers: list[int]) -> list[int]:
-    """Numbers in an order of which any begin is spread over all: both ends, the middle, halfway between, …"""
+    """Numbers in an order of which any begin is spread over all: both ends, the middle, and so on."""
     order: list[int] = []
     count = len(numbers)
     parts = 1
@@ -199,17 +202,22 @@ def _overview(frame: pd.DataFrame, record: SweepRecord) -> Model | None:
         f"{label} against {x}, with the standard error", f"{x} ({units[x]})" if units[x] else x, label, height=380
     )
     known = frame[frame[result].notna()]
-    groups = known.groupby([known[name].astype(str) for name in others], sort=False) if others else [((), known)]
-    groups = list(groups)
+    groups: list[tuple[Any, pd.DataFrame]] = [((), known)]
+    if others:
+        groups = list(known.groupby([known[name].astype(str) for name in others], sort=False))
     for number, (key, part) in enumerate(groups):
         ordered = part.sort_values(x)
         along, values = ordered[x].to_numpy(float), ordered[result].to_numpy(float) * factor
-        legend = {"legend_label": ", ".join(map(str, key))} if key and len(groups) <= _MOST_LEGENDS else {}
+        legend: dict[str, Any] = (
+            {"legend_label": ", ".join(map(str, key))} if key and len(groups) <= _MOST_LEGENDS else {}
+        )
         colour = COLOURS[number % len(COLOURS)]
         plot.line(along, values, color=colour, line_alpha=0.4, **legend)
         plot.scatter(along, values, color=colour, size=7, **legend)
         if result in _ERRORS:
             error_bars(plot, along, values, ordered[_ERRORS[result]].to_numpy(float) * factor)
+    if plot.legend:
+        plot.legend.title = ", ".join(f"{name} ({units[name]})" if units[name] else name for name in others)
     return with_legend(plot)
 
 
@@ -233,8 +241,9 @@ def _multiples(
     every = [curve for one in curves.values() for curve in one]
     if not every:
         return {"pictures": []}
-    low, high = (np.array([pick(x) for x in (np.concatenate(axis) for axis in zip(*every, strict=True))]) for pick in (np.min, np.max))
-    low[0], low[1] = min(low[0], 0.0), min(low[1], 0.0)
+    time, height = (np.concatenate(values) for values in zip(*every, strict=True))
+    low = np.array([min(time.min(), 0.0), min(height.min(), 0.0)])
+    high = np.array([time.max(), height.max()])
     span = np.where(high > low, high - low, 1.0)
 
     def drawn(time: FloatArray, values: FloatArray) -> str:
@@ -263,6 +272,9 @@ def _names(frame: pd.DataFrame, record: SweepRecord) -> Iterator[tuple[int, str]
     """What each point is, in words: the values that vary."""
     units = frame.attrs["units"]
     for _, row in frame.iterrows():
-        values = [f"{row[name]:g}" if isinstance(row[name], (int, float)) else str(row[name]) for name in _varied(record, frame)]
+        values = [
+            f"{row[name]:g}" if isinstance(row[name], (int, float)) else str(row[name])
+            for name in _varied(record, frame)
+        ]
         told = [f"{value} {units[name]}".strip() for value, name in zip(values, _varied(record, frame), strict=True)]
         yield int(row["point"]), f"point {row['point']}: {', '.join(told)}"

@@ -10,7 +10,7 @@ import base64
 import json
 import re
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
@@ -77,7 +77,9 @@ def write_page(path: Path, title: str, body: str, carried: Mapping[str, str]) ->
 
 def overhead() -> int:
     """Bytes of a page's libraries and scripts."""
-    return sum(map(len, (_library("bokeh"), _library("k3d"), _unpacker(), _read("player.js"), _read("report.css")))) + 2000
+    return (
+        sum(map(len, (_library("bokeh"), _library("k3d"), _unpacker(), _read("player.js"), _read("report.css")))) + 2000
+    )
 
 
 def fill(template: str, package: str = "walkers.postprocess.report", **values: Any) -> str:

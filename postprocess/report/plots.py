@@ -51,10 +51,11 @@ def plots_of(directory: Path) -> Model | None:
 
 def new_plot(title: str, x: str, y: str, *, height: int = 300, **options: Any) -> Figure:
     """An empty plot as wide as the page."""
+    from bokeh.models.annotations import Title
     from bokeh.plotting import figure
 
     plot = figure(
-        title=title,
+        title=Title(text=title, text_font_size="14px"),
         x_axis_label=x,
         y_axis_label=y,
         height=height,
@@ -65,7 +66,6 @@ def new_plot(title: str, x: str, y: str, *, height: int = 300, **options: Any) -
     )
     plot.toolbar.logo = None
     plot.toolbar.active_scroll = None  # the wheel scrolls the page
-    plot.title.text_font_size = "14px"
     return plot
 
 
@@ -76,20 +76,20 @@ def with_legend(plot: Figure) -> Figure:
         plot.legend.click_policy = "hide"
         plot.legend.label_text_font_size = "11px"
         plot.legend.spacing = 0
-        plot.legend.padding = 4
     return plot
 
 
 def error_bars(plot: Figure, x: Sequence[Any] | FloatArray, y: FloatArray, error: FloatArray) -> None:
     """Whiskers of one standard error."""
-    from bokeh.models import ColumnDataSource, Whisker
+    from bokeh.models import ColumnDataSource
+    from bokeh.models.annotations import Whisker
 
     known = np.isfinite(error)
-    columns = {"x": np.asarray(x)[known], "low": (y - error)[known], "high": (y + error)[known]}
+    columns: dict[str, Any] = {"x": np.asarray(x)[known], "low": (y - error)[known], "high": (y + error)[known]}
     plot.add_layout(Whisker(source=ColumnDataSource(columns), base="x", lower="low", upper="high"))
 
 
-def _label(group: Group, place: int) -> dict[str, str]:
+def _label(group: Group, place: int) -> dict[str, Any]:
     """The entry of a walker in a legend, if there is room for so many."""
     walker = group.walkers[place]
     facing = ways(uphill=group.case.goes_uphill)[int(walker.facing < 0)]
@@ -114,7 +114,7 @@ def _distances(groups: list[Group]) -> Figure:
 
 
 def _shade_settling(plot: Figure, group: Group) -> None:
-    from bokeh.models import BoxAnnotation
+    from bokeh.models.annotations import BoxAnnotation
 
     run = group.case.run
     settled = run.settling_cycles / group.case.drive.frequency
@@ -138,9 +138,15 @@ def _paths(groups: list[Group]) -> Figure:
 
 
 def _velocities(directory: Path) -> Figure:
+
+    from bokeh.models import BasicTicker
+
     table = read_table(directory, "walkers")
     plot = new_plot(
-        "Velocity of each walker with the standard error of its fit", "number of the walker", "velocity (mm/s)", height=240
+        "Velocity of each walker with the standard error of its fit",
+        "number of the walker",
+        "velocity (mm/s)",
+        height=240,
     )
     number, velocity = table["walker"].to_numpy(), table["velocity"].to_numpy() * 1e3
     error_bars(plot, number, velocity, table["standard_error"].to_numpy() * 1e3)
@@ -149,11 +155,14 @@ def _velocities(directory: Path) -> Figure:
         name = ways(uphill=case_of(directory).goes_uphill)[int(facing < 0)]
         if these.any():
             plot.scatter(
-                number[these], velocity[these], marker=marker, size=9, color=colour, legend_label=f"started facing {name}"
+                number[these],
+                velocity[these],
+                marker=marker,
+                size=9,
+                color=colour,
+                legend_label=f"started facing {name}",
             )
-    plot.xaxis.ticker.desired_num_ticks = min(len(number), 10)
-    plot.xaxis.ticker.mantissas = [1, 2, 5]
-    plot.xaxis.ticker.min_interval = 1
+    plot.xaxis.ticker = BasicTicker(min_interval=1)
     return with_legend(plot)
 
 
@@ -191,7 +200,9 @@ def _pile(found: PileAnalysis) -> list[Figure]:
         return np.array([getattr(bed, name) for bed in found.beds])[thin]
 
     before = "time from the begin of the drive (s)"
-    heights = new_plot("Heights of the clusters' leading beads and of the pile's surface", before, "height (mm)", height=380)
+    heights = new_plot(
+        "Heights of the clusters' leading beads and of the pile's surface", before, "height (mm)", height=380
+    )
     heights.varea(
         time[thin], of_beds("surface_low") * 1e3, of_beds("surface_high") * 1e3, color="#5b6770", alpha=0.2,
         legend_label="surface, 10th to 90th percentile",
@@ -207,15 +218,13 @@ def _pile(found: PileAnalysis) -> list[Figure]:
             line_width=2.0 if climb.climbed else 0.7,
             legend_label=told,
         )
-    shared = {"x_range": heights.x_range, "height": 220}
+    shared: dict[str, Any] = {"x_range": heights.x_range, "height": 220}
     index = new_plot("Segregation: (z of large − z of small) / their sum", before, "Brazil-nut index", **shared)
     index.line(time[thin], of_beds("brazil_nut"), color=COLOURS[0], legend_label="all beads")
     index.line(time[thin], of_beds("brazil_nut_of_bulk"), color=COLOURS[1], legend_label="bulk alone")
     bridges = new_plot("Bridges and contacts with other beads", before, "how many a bead", **shared)
     bridges.line(time[thin], of_beds("bridges"), color=COLOURS[0], legend_label="bridges")
     bridges.line(time[thin], of_beds("contacts"), color=COLOURS[1], legend_label="contacts")
-    agitation = new_plot(
-        "Agitation, once a cycle", before, "mean square velocity (m²/s²)", y_axis_type="log", **shared
-    )
+    agitation = new_plot("Agitation, once a cycle", before, "mean square velocity (m²/s²)", y_axis_type="log", **shared)
     agitation.line(time[thin], np.maximum(of_beds("mean_square_velocity"), 1e-12), color=COLOURS[0])
     return [with_legend(plot) for plot in (heights, index, bridges, agitation)]

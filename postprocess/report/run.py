@@ -16,7 +16,7 @@ from walkers.postprocess.motion import read_motion
 from walkers.postprocess.quantities import Quantity
 from walkers.postprocess.report.page import NAME, check_report, fill, packed_plots, packed_scene, write_page
 from walkers.postprocess.report.plots import plots_of
-from walkers.postprocess.report.scene import MOST_PLACES, Scene, cameras_of, scene_of
+from walkers.postprocess.report.scene import MOST_PLACES, Scene, scene_of
 from walkers.runner.directory import MANIFEST_NAME, case_of
 from walkers.runner.files import read_json
 
@@ -192,17 +192,17 @@ def parameters_of(case: Case) -> list[Parameter]:
             )
             for one in case.origins
         ]
-    return [Parameter(key, text_of(value), "", "", "") for key, value in _flat(case.as_dict())]
+    return [Parameter(key, text_of(value), "", "", "") for key, value in flat(case.as_dict())]
 
 
-def _flat(values: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+def flat(values: Any, key: str = "") -> Iterator[tuple[str, Any]]:
     """Values of nested tables by dotted keys."""
     if isinstance(values, dict):
         for name, value in values.items():
-            yield from _flat(value, f"{key}.{name}" if key else name)
+            yield from flat(value, f"{key}.{name}" if key else name)
     elif isinstance(values, list) and values and isinstance(values[0], dict):
         for number, value in enumerate(values):
-            yield from _flat(value, f"{key}[{number}]")
+            yield from flat(value, f"{key}[{number}]")
     elif values not in (None, "", [], ()):
         yield key, values
 

@@ -113,9 +113,7 @@ def scene_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int
     return Scene(plot, float(motion.time[0]), float(motion.time[-1]), cameras, tuple(captions))
 
 
-def _thinned(
-    motion: Motion, places: int
-) -> tuple[Motion, npt.NDArray[np.int64], npt.NDArray[np.bool_], list[str]]:
+def _thinned(motion: Motion, places: int) -> tuple[Motion, npt.NDArray[np.int64], npt.NDArray[np.bool_], list[str]]:
     """The motion of fewer walkers at fewer instants, these instants and beads, and what is left out in words."""
     captions = []
     beads = np.ones(len(motion.radius), dtype=bool)
