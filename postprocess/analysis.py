@@ -214,7 +214,13 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
         ``range`` (both ends, or None) and ``logarithmic``.
     """
     return [
-        {"key": one.key, "value": one.text, **{name: getattr(one, name) for name in ("origin", "range", "logarithmic")}}
+        {
+            "key": one.key,
+            "value": one.text,
+            "origin": one.origin,
+            "range": list(one.range) if one.range else None,  # as it is read from a file
+            "logarithmic": one.logarithmic,
+        }
         for one in origins
         if one.key in unmeasured() or one.range is not None
     ]
