@@ -6,7 +6,7 @@ import threading
 import warnings
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from walkers.inputs.case import Case
+    from walkers.inputs.origins import Origin
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
 
@@ -34,10 +35,14 @@ class Run:
         The run directory.
     cached
         Whether it was there before.
+    origins
+        Where the values of the case come from by which it was asked for; None: of that by which it was made. The same
+        numbers may once have been given and once be the library's.
     """
 
     directory: Path
     cached: bool = True
+    origins: tuple[Origin, ...] | None = None
 
     @property
     def case(self) -> Case:
@@ -49,9 +54,10 @@ class Run:
     @property
     def result(self) -> dict[str, Any]:
         """The result, SI units."""
-        from walkers.postprocess.analysis import current_result
+        from walkers.postprocess.analysis import current_result, rests_on
 
-        return current_result(self.directory)
+        result = current_result(self.directory)
+        return result if self.origins is None else {**result, "rests_on": rests_on(self.origins)}
 
     @property
     def motion(self) -> Motion:
@@ -86,7 +92,7 @@ class Run:
         """The result in a notebook: a table with errors and units, warnings, the parameters folded in."""
         from walkers.postprocess.report.run import result_html
 
-        return result_html(self.directory, self.result)
+        return result_html(self.directory, self.result, self.origins)
 
     def plot(self, to: Path | None = None) -> Pictures:
         """Draw its figures, see `walkers.postprocess.analysis.plot_run`: a list of paths, which a notebook shows."""
@@ -115,7 +121,7 @@ class Run:
         """Write one HTML file to mail, see `walkers.postprocess.report.run.report_run`."""
         from walkers.postprocess.report.run import report_run
 
-        return report_run(self.directory, to)
+        return report_run(self.directory, to, self.origins)
 
     def vtk(self, to: Path | None = None, **options: Any) -> Path:
         """Write it for ParaView, see `walkers.postprocess.paraview.write_vtk`."""
@@ -190,7 +196,7 @@ def run(
     there = finished_place(out, place.name)
     if there is not None and not force:
         current_result(there)
-        return Run(there)
+        return Run(there, origins=case.origins)
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
     threading.Thread(target=_load_postprocess, daemon=True).start()
@@ -199,7 +205,7 @@ def run(
         made = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
     if made.busy:
         raise RunBusy(unfinished(place))
-    return Run(made.runs[place.name].directory, cached=place.name in made.found)
+    return Run(made.runs[place.name].directory, cached=place.name in made.found, origins=case.origins)
 
 
 def _load_postprocess() -> None:
@@ -208,13 +214,14 @@ def _load_postprocess() -> None:
     import walkers.postprocess.walking  # noqa: F401
 
 
-def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
+def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     """Find a finished run.
 
     Parameters
     ----------
     run
-        A run directory; or a case (file or shipped name), whose run with the installed engine is looked up in ``out``.
+        A run directory; or a case (resolved, file or shipped name), whose run with the installed engine is looked up in
+        ``out``.
     out
         Folder of the run directories.
 
@@ -225,27 +232,28 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
     runner.EngineFailure
         If a case is given and there is no engine to look it up for.
     """
+    from walkers.inputs.reading import load_case
     from walkers.runner.directory import finished_run
 
-    path = Path(run)
-    if path.is_dir():
-        if finished_run(path) is None:
+    if isinstance(run, (str, Path)) and Path(run).is_dir():
+        if finished_run(Path(run)) is None:
             told = "not a finished run: expected a folder with a manifest.json"
             raise InputError(str(run), [Problem("", None, told)])
-        return _readable(path)
-    there = _place_of(path, out)
+        return _readable(Path(run))
+    case = load_case(run) if isinstance(run, (str, Path)) else run
+    name = run if isinstance(run, (str, Path)) else case.name
+    there = _place_of(case, out)
     if there is None or finished_run(there) is None:
-        raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
-    return _readable(there)
+        raise InputError(str(name), [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
+    return replace(_readable(there), origins=case.origins)
 
 
-def _place_of(case: Path, out: Path) -> Path | None:
-    from walkers.inputs.reading import load_case
+def _place_of(case: Case, out: Path) -> Path | None:
     from walkers.runner.binary import find_engine
     from walkers.runner.directory import run_place
     from walkers.runner.ensemble import finished_place
 
-    return finished_place(out, run_place(load_case(case), find_engine(), out).name)
+    return finished_place(out, run_place(case, find_engine(), out).name)
 
 
 def _readable(directory: Path) -> Run:

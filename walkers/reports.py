@@ -37,7 +37,6 @@ def report(what: str | Path, to: Path | None = None, out: Path = DEFAULT_OUT) ->
     from walkers.calibration.page import report_calibration
     from walkers.calibration.report import RECORD_NAME as CALIBRATION
     from walkers.postprocess.report.page import check_report
-    from walkers.postprocess.report.run import report_run
     from walkers.sweeps.record import RECORD_NAME as SWEEP
     from walkers.sweeps.report import report_sweep
 
@@ -48,4 +47,4 @@ def report(what: str | Path, to: Path | None = None, out: Path = DEFAULT_OUT) ->
             return report_calibration(place, to)
         if (place / SWEEP).is_file():
             return report_sweep(place, to)
-    return report_run(find_run(what, out).directory, to)
+    return find_run(what, out).report(to)

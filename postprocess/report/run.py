@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from walkers.inputs.case import Case
-from walkers.inputs.origins import text_of
+from walkers.inputs.origins import Origin, text_of
 from walkers.postprocess.analysis import analyses_in, current_result, quantities_of, warnings_of
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.quantities import Quantity
@@ -47,11 +47,14 @@ class RunReport:
         Of its section in the page.
     places
         Beads times instants of its scene at most.
+    origins
+        Where the values of the case come from; None: as the run recorded it.
     """
 
     directory: Path
     id: str = "run"
     places: int = MOST_PLACES
+    origins: tuple[Origin, ...] | None = None
     result: dict[str, Any] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -90,7 +93,12 @@ class RunReport:
     @property
     def parameters(self) -> list[Parameter]:
         """The values of the case and where they come from."""
-        return parameters_of(self.case)
+        return parameters_of(self.case, self.origins)
+
+    @property
+    def guessed(self) -> list[Parameter]:
+        """What of them is neither measured nor calibrated."""
+        return guessed_of(self.case, self.origins)
 
     @cached_property
     def _manifest(self) -> dict[str, Any]:
@@ -139,7 +147,7 @@ class RunReport:
         return packed if plots is None else {**packed, f"plots-{self.id}": packed_plots(plots)}
 
 
-def report_run(directory: Path, to: Path | None = None) -> Path:
+def report_run(directory: Path, to: Path | None = None, origins: tuple[Origin, ...] | None = None) -> Path:
     """Write the report of a run: one HTML file to mail, which needs no network.
 
     Parameters
@@ -148,6 +156,8 @@ def report_run(directory: Path, to: Path | None = None) -> Path:
         A run directory.
     to
         The file; ``report.html`` in the run directory if None.
+    origins
+        Where the values of the case come from; None: as the run recorded it.
 
     Returns
     -------
@@ -163,7 +173,7 @@ def report_run(directory: Path, to: Path | None = None) -> Path:
     """
     path = to or directory / NAME
     check_report(path)
-    run = RunReport(directory)
+    run = RunReport(directory, origins=origins)
     return write_page(path, run.title, fill("run.html.j2", run=run), run.carried)
 
 
@@ -179,20 +189,22 @@ def summary_of(case: Case) -> str:
     return f"{', '.join(bodies)} {boundary} of {case.boundary.material}, {case.liquid.name}; {case.drive.described()}."
 
 
-def parameters_of(case: Case) -> list[Parameter]:
+def parameters_of(case: Case, origins: tuple[Origin, ...] | None = None) -> list[Parameter]:
     """The values of a case, each with where it comes from; of runs that did not keep this, the values in SI units."""
-    if case.origins:
-        return [
-            Parameter(
-                one.key,
-                one.text,
-                _ORIGINS.get(one.origin, one.origin),
-                one.source,
-                " … ".join(text_of(end) for end in one.range) if one.range else "",
-            )
-            for one in case.origins
-        ]
+    known = case.origins if origins is None else origins
+    if known:
+        return [_parameter(one) for one in known]
     return [Parameter(key, text_of(value), "", "", "") for key, value in flat(case.as_dict())]
+
+
+def guessed_of(case: Case, origins: tuple[Origin, ...] | None = None) -> list[Parameter]:
+    """The values of a case that are neither measured nor calibrated."""
+    return [_parameter(one) for one in (case.origins if origins is None else origins) if one.guessed]
+
+
+def _parameter(one: Origin) -> Parameter:
+    ends = " … ".join(text_of(end) for end in one.range) if one.range else ""
+    return Parameter(one.key, one.text, _ORIGINS.get(one.origin, one.origin), one.source, ends)
 
 
 def flat(values: Any, key: str = "") -> Iterator[tuple[str, Any]]:
@@ -207,7 +219,7 @@ def flat(values: Any, key: str = "") -> Iterator[tuple[str, Any]]:
         yield key, values
 
 
-def result_html(directory: Path, result: dict[str, Any]) -> str:
+def result_html(directory: Path, result: dict[str, Any], origins: tuple[Origin, ...] | None = None) -> str:
     """A result as a piece of HTML: a table with errors and units, warnings, and the parameters folded in."""
     case = case_of(directory)
     headline = [line for one in analyses_in(result) for line in one.lines(result)][:1]
@@ -216,6 +228,7 @@ def result_html(directory: Path, result: dict[str, Any]) -> str:
         headline=headline[0] if headline else case.name,
         warnings=warnings_of(result),
         quantities=quantities_of(result),
-        parameters=parameters_of(case),
+        guessed=guessed_of(case, origins),
+        parameters=parameters_of(case, origins),
         run=directory.name,
     )
