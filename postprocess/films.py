@@ -175,10 +175,13 @@ class _Caption:
     """What is written into each picture: time, slow motion, the drive, a scale bar."""
 
     def __init__(self, motion: Motion, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]) -> None:
+        from matplotlib import get_data_path
         from PIL import ImageFont
 
+        # Pillow's own letters have no × and no ².
+        font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
         self._size, self._letters = size, size[1] // _LETTERS
-        self._large, self._small = (ImageFont.load_default(round(share * self._letters)) for share in (1.3, 0.9))
+        self._large, self._small = (ImageFont.truetype(font, round(share * self._letters)) for share in (1.2, 0.85))
         between = float(np.diff(times.time).max()) if len(times.time) > 1 else 1.0
         self._decimals = max(0, ceil(-log10(between) - 1e-9))
         self._bar = round_below(size[0] / 5.0 / pixels_per_mm)
