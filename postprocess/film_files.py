@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 SUFFIXES = (".mp4", ".gif")
-_COLOURS = 96
+_COLOURS = 40
 """In a GIF."""
 
 

@@ -68,7 +68,7 @@ def film_times(
         If nothing of the run is between begin and end.
     """
     last = float(motion.time[-1])
-    if not (begin < last and begin < (last if end is None else end)):
+    if not (0.0 <= begin < last and begin < (last if end is None else end)):
         message = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --from before --until"
         raise InputError("--from, --until", [Problem("", None, message)])
     end = last if end is None else min(end, last)

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.film_files import check_film, write_film
 from walkers.postprocess.film_stage import Stage
 from walkers.postprocess.film_times import FilmTimes, film_times, positions_at, round_below
@@ -30,6 +31,8 @@ _SAMPLES = 6
 """Pictures from which a GIF takes its colours."""
 _LETTERS = 24
 """Of them, one below the other, would fill a picture."""
+_LEAST_LETTERS = 15
+"""Pixels."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,20 @@ def parse_size(text: str) -> tuple[int, int]:
     raise InputError("--size", [Problem("", None, expected)])
 
 
+def parse_time(option: str, text: str) -> float:
+    """Read a physical time that an option gives, such as ``0.1 s``.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    try:
+        return parse_quantity(text, DURATION)
+    except ValueError as error:
+        raise InputError(option, [Problem("", None, f'{text!r}: expected a time such as "0.1 s"')]) from error
+
+
 def _shown(motion: Motion, walker: int | None) -> Motion:
     """The motion of one walker where they are independent, else all of it."""
     count = len(motion.walkers)
@@ -180,7 +197,7 @@ class _Caption:
 
         # Pillow's own letters have no × and no ².
         font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
-        self._size, self._letters = size, size[1] // _LETTERS
+        self._size, self._letters = size, max(_LEAST_LETTERS, size[1] // _LETTERS)
         self._large, self._small = (ImageFont.truetype(font, round(share * self._letters)) for share in (1.2, 0.85))
         between = float(np.diff(times.time).max()) if len(times.time) > 1 else 1.0
         self._decimals = max(0, ceil(-log10(between) - 1e-9))
