@@ -110,7 +110,8 @@ def positions_at(motion: Motion, frame: int, share: float) -> FloatArray:
     from scipy.interpolate import CubicHermiteSpline
 
     if share == 0.0:
-        return motion.position[frame]
+        here: FloatArray = motion.position[frame]
+        return here
     ends = slice(frame, frame + 2)
     time = motion.time[ends]
     cubic = CubicHermiteSpline(time, motion.position[ends], motion.velocity[ends])

@@ -1,7 +1,7 @@
 """Films of runs: beads that are seen to roll, with the physical time, the slow motion and a scale in the picture.
 
-The camera rests in the laboratory, so that the boundary is seen to shake; films whose pictures are half a cycle apart or
-more show one phase of the drive, as a stroboscope does.
+The camera rests in the laboratory, so that the boundary is seen to shake; films whose pictures are half a cycle apart
+or more show one phase of the drive, as a stroboscope does.
 """
 
 from __future__ import annotations
@@ -158,10 +158,16 @@ def _shown(motion: Motion, walker: int | None) -> Motion:
         raise InputError("--walker", [Problem("", None, f"{walker}: expected less than {count}, the run's walkers")])
     one = motion.walkers[walker or 0]
     beads = np.array(one.beads) - motion.first_id
-    names = ("position", "velocity", "spin", "mean_spin")
-    arrays = {name: None if getattr(motion, name) is None else getattr(motion, name)[:, beads] for name in names}
     placed = replace(one, beads=tuple(range(motion.first_id, motion.first_id + len(beads))))
-    return replace(motion, **arrays, radius=motion.radius[beads], walkers=(placed,))
+    return replace(
+        motion,
+        position=motion.position[:, beads],
+        velocity=motion.velocity[:, beads],
+        spin=motion.spin[:, beads],
+        mean_spin=None if motion.mean_spin is None else motion.mean_spin[:, beads],
+        radius=motion.radius[beads],
+        walkers=(placed,),
+    )
 
 
 class _Film:
