@@ -13,10 +13,10 @@ from walkers.postprocess.scene import Picture
 from walkers.runner.files import beside
 
 if TYPE_CHECKING:
-    from PIL.Image import Image
+    from PIL import Image
 
 SUFFIXES = (".mp4", ".gif")
-_COLOURS = 96
+_COLOURS = 40
 """In a GIF."""
 
 
@@ -105,7 +105,7 @@ def _write_gif(path: Path, pictures: Iterator[Picture], fps: int, samples: Seque
 
     palette = Image.fromarray(np.concatenate(samples)).quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
 
-    def reduced(picture: Picture) -> Image:
+    def reduced(picture: Picture) -> Image.Image:
         return Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
 
     first = reduced(next(pictures))

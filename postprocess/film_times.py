@@ -68,7 +68,7 @@ def film_times(
         If nothing of the run is between begin and end.
     """
     last = float(motion.time[-1])
-    if not (begin < last and begin < (last if end is None else end)):
+    if not (0.0 <= begin < last and begin < (last if end is None else end)):
         message = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --from before --until"
         raise InputError("--from, --until", [Problem("", None, message)])
     end = last if end is None else min(end, last)
@@ -110,7 +110,8 @@ def positions_at(motion: Motion, frame: int, share: float) -> FloatArray:
     from scipy.interpolate import CubicHermiteSpline
 
     if share == 0.0:
-        return motion.position[frame]
+        here: FloatArray = motion.position[frame]
+        return here
     ends = slice(frame, frame + 2)
     time = motion.time[ends]
     cubic = CubicHermiteSpline(time, motion.position[ends], motion.velocity[ends])

@@ -1,7 +1,7 @@
 """Films of runs: beads that are seen to roll, with the physical time, the slow motion and a scale in the picture.
 
-The camera rests in the laboratory, so that the boundary is seen to shake; films whose pictures are half a cycle apart or
-more show one phase of the drive, as a stroboscope does.
+The camera rests in the laboratory, so that the boundary is seen to shake; films whose pictures are half a cycle apart
+or more show one phase of the drive, as a stroboscope does.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.film_files import check_film, write_film
 from walkers.postprocess.film_stage import Stage
 from walkers.postprocess.film_times import FilmTimes, film_times, positions_at, round_below
@@ -30,6 +31,8 @@ _SAMPLES = 6
 """Pictures from which a GIF takes its colours."""
 _LETTERS = 24
 """Of them, one below the other, would fill a picture."""
+_LEAST_LETTERS = 15
+"""Pixels."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,20 @@ def parse_size(text: str) -> tuple[int, int]:
     raise InputError("--size", [Problem("", None, expected)])
 
 
+def parse_time(option: str, text: str) -> float:
+    """Read a physical time that an option gives, such as ``0.1 s``.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    try:
+        return parse_quantity(text, DURATION)
+    except ValueError as error:
+        raise InputError(option, [Problem("", None, f'{text!r}: expected a time such as "0.1 s"')]) from error
+
+
 def _shown(motion: Motion, walker: int | None) -> Motion:
     """The motion of one walker where they are independent, else all of it."""
     count = len(motion.walkers)
@@ -141,10 +158,16 @@ def _shown(motion: Motion, walker: int | None) -> Motion:
         raise InputError("--walker", [Problem("", None, f"{walker}: expected less than {count}, the run's walkers")])
     one = motion.walkers[walker or 0]
     beads = np.array(one.beads) - motion.first_id
-    names = ("position", "velocity", "spin", "mean_spin")
-    arrays = {name: None if getattr(motion, name) is None else getattr(motion, name)[:, beads] for name in names}
     placed = replace(one, beads=tuple(range(motion.first_id, motion.first_id + len(beads))))
-    return replace(motion, **arrays, radius=motion.radius[beads], walkers=(placed,))
+    return replace(
+        motion,
+        position=motion.position[:, beads],
+        velocity=motion.velocity[:, beads],
+        spin=motion.spin[:, beads],
+        mean_spin=None if motion.mean_spin is None else motion.mean_spin[:, beads],
+        radius=motion.radius[beads],
+        walkers=(placed,),
+    )
 
 
 class _Film:
@@ -175,10 +198,13 @@ class _Caption:
     """What is written into each picture: time, slow motion, the drive, a scale bar."""
 
     def __init__(self, motion: Motion, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]) -> None:
+        from matplotlib import get_data_path
         from PIL import ImageFont
 
-        self._size, self._letters = size, size[1] // _LETTERS
-        self._large, self._small = (ImageFont.load_default(round(share * self._letters)) for share in (1.3, 0.9))
+        # Pillow's own letters have no × and no ².
+        font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+        self._size, self._letters = size, max(_LEAST_LETTERS, size[1] // _LETTERS)
+        self._large, self._small = (ImageFont.truetype(font, round(share * self._letters)) for share in (1.2, 0.85))
         between = float(np.diff(times.time).max()) if len(times.time) > 1 else 1.0
         self._decimals = max(0, ceil(-log10(between) - 1e-9))
         self._bar = round_below(size[0] / 5.0 / pixels_per_mm)

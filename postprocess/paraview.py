@@ -208,7 +208,7 @@ def boundary_of(motion: Motion) -> pv.PolyData:
     low, high = motion.position.min(axis=(0, 1)) - margin, motion.position.max(axis=(0, 1)) + margin
     half, top = boundary.inner_width / 2.0, boundary.top
     if boundary.closed:
-        low, high = np.array([-half, -half, low[2]]), np.array([half, half, top])
+        low, high = np.array([-half, -half, min(low[2], 0.0)]), np.array([half, half, top])
     faces = boundary.faces()
     planes = [(np.array(face.centroid), np.array(face.normal)) for face in faces]
     edges = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]

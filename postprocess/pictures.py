@@ -104,9 +104,7 @@ def _scene(group: Group, walker: int, images: int, size: tuple[int, int]) -> pv.
     return plotter
 
 
-def top_view(
-    group: Group, walker: int, frame: int, along: tuple[float, float], across: tuple[float, float]
-) -> Picture:
+def top_view(group: Group, walker: int, frame: int, along: tuple[float, float], across: tuple[float, float]) -> Picture:
     """One walker seen from above, as a stroboscope shows it.
 
     Parameters

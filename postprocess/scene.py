@@ -24,6 +24,8 @@ GLASS = ("#8c9aa5", "#c9d2d8")
 FLOOR = "#c9d2d8"
 _PALE = 0.72
 """White in the paler lunes of a bead that is seen to roll."""
+_BRIGHTEST = 150.0
+"""Mean of red, green and blue in the darker ones."""
 _LUNES = 6
 """Of two colours in turn, about an axis: a beach ball, whose turning shows from every side."""
 _SINGLE, _FEW, _MANY = 10, 100, 500
@@ -120,6 +122,8 @@ class Beads:
         rgb = np.array([[pv.Color(name).int_rgb for name in names] for names in (GLASS, RUBY)], dtype=np.float64)
         plain = rgb[chosen.astype(int), (~self._large).astype(int)]
         pale = plain + _PALE * (255.0 - plain)
+        if self._pale.any():
+            plain = plain * np.minimum(1.0, _BRIGHTEST / plain.mean(axis=1))[:, None]
         colours = np.where(self._pale[None, :, None], pale[:, None], plain[:, None])
         self._mesh.cell_data["colour"] = colours.reshape(-1, 3).round().astype(np.uint8)
 

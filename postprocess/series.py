@@ -212,5 +212,3 @@ def seconds_apart(text: str, directory: Path) -> float:
     except (ValueError, ZeroDivisionError):
         pass
     raise InputError("--interval", [Problem("", None, f'{text!r}: expected a time such as "2 s", or "T/4" of a cycle')])
-
-

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from walkers.inputs.case import Case
     from walkers.inputs.origins import Origin
+    from walkers.postprocess.films import FilmOptions
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
 
@@ -128,6 +129,18 @@ class Run:
         from walkers.postprocess.paraview import write_vtk
 
         return write_vtk(self.directory, destination=to, **options)
+
+    def film(
+        self,
+        to: Path | None = None,
+        options: FilmOptions | None = None,
+        *,
+        on_progress: Callable[[int, int], None] | None = None,
+    ) -> Path:
+        """Film it, see `walkers.postprocess.films.render_film`."""
+        from walkers.postprocess.films import render_film
+
+        return render_film(self.directory, to, options, on_progress=on_progress)
 
     def render(self, to: Path | None = None, *, images: int = 6) -> Pictures:
         """Render pictures of it, see `walkers.postprocess.pictures.render_run`: paths, which a notebook shows."""

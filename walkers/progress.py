@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import TYPE_CHECKING, TypeVar
@@ -37,6 +38,14 @@ def progress_of_sweep(name: str) -> Iterator[Callable[[SweepProgress], None]]:
 def shown_if(wanted: bool | None, progress: AbstractContextManager[T]) -> AbstractContextManager[T | None]:
     """A progress if it is wanted, or if nobody says and this is a notebook; else what gives None."""
     return progress if (in_notebook() if wanted is None else wanted) else nullcontext()
+
+
+@contextmanager
+def progress_of_film(name: str) -> Iterator[Callable[[int, int], None]]:
+    """Yield a function that shows how many pictures of a film are made, of how many."""
+    begin = time.monotonic()
+    with _shown(name) as show:
+        yield lambda made, count: show(count, made, f"{made} of {count} pictures", time.monotonic() - begin)
 
 
 @contextmanager
