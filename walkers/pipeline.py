@@ -6,7 +6,7 @@ import threading
 import warnings
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,7 +43,7 @@ class Run:
 
     directory: Path
     cached: bool = True
-    origins: tuple[Origin, ...] | None = None
+    origins: tuple[Origin, ...] | None = field(default=None, repr=False)
 
     @property
     def case(self) -> Case:
