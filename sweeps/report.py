@@ -63,7 +63,7 @@ class Multiple:
     opens: bool
 
 
-def report_sweep(directory: Path, to: Path | None = None) -> Path:
+def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARGEST) -> Path:
     """Write the report of a sweep: one HTML file to mail, which needs no network.
 
     The table has all points. Whole runs, with parameters, results, plots and beads to be played, are taken along while
@@ -75,11 +75,13 @@ def report_sweep(directory: Path, to: Path | None = None) -> Path:
         A sweep's directory, such as ``runs/fig2``.
     to
         The file; ``report.html`` in that directory if None.
+    largest
+        Bytes that it may have.
 
     Returns
     -------
     Path
-        The file, less than 5 MB.
+        The file.
 
     Raises
     ------
@@ -107,7 +109,7 @@ def report_sweep(directory: Path, to: Path | None = None) -> Path:
         "has_plot": plot is not None,
     }
     bare = fill("sweep.html.j2", "walkers.sweeps", runs={}, multiples=_multiples(curves, {}, frame, record), **values)
-    room = LARGEST - overhead() - len(bare.encode()) - sum(map(len, carried.values()))
+    room = largest - overhead() - len(bare.encode()) - sum(map(len, carried.values()))
     runs: dict[int, RunReport] = {}
     for number in _spread_out(list(finished)):
         run = RunReport(finished[number], f"point-{number}", _PLACES)
