@@ -232,15 +232,15 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
     ]
 
 
-def _lines_of_rest(result: Mapping[str, Any]) -> list[str]:
-    """What of a result is guessed, what calibrated, what only the case says."""
+def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What a result rests on (`rests_on`) as text: guessed, only said by the case, calibrated."""
     lines = []
     for head, meaning, chosen in (
         ("guessed", "", lambda one: one["range"] is not None and one["origin"] != "calibrated"),
         ("taken", " (as the case says; nobody measured them)", lambda one: one["range"] is None),
         ("calibrated", "", lambda one: one["origin"] == "calibrated"),
     ):
-        found = [f"{one['key'].split('.', 1)[1]} {one['value']}" for one in result["rests_on"] if chosen(one)]
+        found = [f"{one['key'].split('.', 1)[1]} {one['value']}" for one in rests if chosen(one)]
         if found:
             lines += textwrap.wrap(
                 ", ".join(found) + meaning,
@@ -271,7 +271,7 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
     if cached:
         lines[0] += " (already run)"
     warnings = [f"  warning: {warning}" for warning in warnings_of(result)]
-    return "\n".join([*lines, *_lines_of_rest(result), *warnings, f"  run        {directory}"])
+    return "\n".join([*lines, *lines_of_rest(result["rests_on"]), *warnings, f"  run        {directory}"])
 
 
 def warnings_of(result: Mapping[str, Any]) -> list[str]:
