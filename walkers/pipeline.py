@@ -92,6 +92,12 @@ class Run:
 
         return write_vtk(self.directory, destination=to, **options)
 
+    def paraview(self, to: Path | None = None, **options: Any) -> Path:
+        """Write it with a script for ParaView, see `walkers.postprocess.paraview_script.write_paraview`."""
+        from walkers.postprocess.paraview_script import write_paraview
+
+        return write_paraview(self.directory, to, **options)
+
     def film(
         self,
         to: Path | None = None,
