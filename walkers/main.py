@@ -15,7 +15,7 @@ from typing import Any, NoReturn, TextIO
 import typer
 
 COMMANDS = (
-    *("show", "deck", "run", "result", "plot", "render", "film", "vtk", "paraview", "theory"),
+    *("show", "deck", "run", "result", "plot", "render", "film", "vtk", "paraview", "export", "theory"),
     *("sweep", "status", "table", "climb", "figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"),
 )
 """Each the function ``command`` of a module of `walkers.commands`, in the order of ``walkers --help``."""

@@ -98,6 +98,12 @@ class Run:
 
         return write_paraview(self.directory, to, **options)
 
+    def export(self, to: Path, *, every: int = 1) -> Path:
+        """Write its trajectory for other programs, see `walkers.postprocess.trajectory_files.write_trajectory`."""
+        from walkers.postprocess.trajectory_files import write_trajectory
+
+        return write_trajectory(self.directory, to, every=every)
+
     def film(
         self,
         to: Path | None = None,
