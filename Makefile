@@ -6,7 +6,7 @@ WALKERS := .venv/bin/walkers
 OUT ?= runs
 CASE ?= fig1b
 PILE ?= pile-small
-FILM ?= 480p
+FILM ?= 360p
 SWEEP ?= fig2
 CALIBRATION ?= ruby
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from math import cos, pi, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,17 +11,12 @@ from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.film_times import round_below
 from walkers.postprocess.motion import Motion
 from walkers.postprocess.paraview import boundary_of, lines_between
-from walkers.postprocess.scene import Beads, Picture, new_plotter
+from walkers.postprocess.scene import Beads, Picture, camera_axes, new_plotter
 
 if TYPE_CHECKING:
     import pyvista as pv
 
 _GROUND, _LINES, _WALL, _EDGE = "#e3e8eb", "#bcc6cd", "#eef1f3", "#5a6670"
-_ELEVATION_OF_ONE, _ELEVATION = radians(35.0), radians(60.0)
-"""From which a level floor is seen: with one walker on it, and with several."""
-_ASIDE = radians(25.0)
-"""From the normal of a steep wall, to which it is seen."""
-_STEEP = pi / 4.0
 _AROUND = 1.2
 """Height and width of the picture over those of what the beads reach."""
 _SHADOW = 0.4
@@ -120,30 +114,6 @@ class Stage:
         drawn.prop.culling = "back"
         edges = walls.extract_feature_edges(feature_angle=30.0)
         return [drawn, self._plotter.add_mesh(edges, color=_EDGE, line_width=2, lighting=False)]
-
-
-def camera_axes(motion: Motion) -> FloatArray:
-    """Unit vectors to the right and up in the picture and toward the camera, in the boundary's frame, as rows.
-
-    Containers are seen from the side, floors from above and from the right of the drive axis, steep walls from a little
-    aside; up in the picture is up against gravity.
-    """
-    case = motion.case
-    across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
-    uphill = np.array([cos(case.boundary.uphill), sin(case.boundary.uphill), 0.0])
-    if case.boundary.closed:
-        toward = np.array([0.0, -1.0, 0.0])
-    elif case.boundary.tilt < _STEEP:
-        elevation = _ELEVATION_OF_ONE if len(motion.walkers) == 1 else _ELEVATION
-        toward = np.array([0.0, 0.0, sin(elevation)]) - cos(elevation) * across
-    else:
-        toward = np.array([0.0, 0.0, cos(_ASIDE)]) + sin(_ASIDE) * np.cross(uphill, [0.0, 0.0, 1.0])
-    against = -np.array(case.gravity_vector)
-    if not against.any():
-        against = np.array([0.0, 0.0, 1.0])
-    up = against - (against @ toward) * toward
-    up /= np.linalg.norm(up)
-    return np.array([np.cross(up, toward), up, toward])
 
 
 class _Shadows:

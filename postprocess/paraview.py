@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 FOLDER_NAME = "vtk"
 COLLECTION_NAME = "walkers.pvd"
+SCRIPT_NAME = "show.py"
 _END_OF_VTK = b"</VTKFile>\n"
 
 
@@ -146,7 +147,7 @@ def _check_replaceable(place: Path) -> None:
         raise InputError(str(place), [Problem("", None, f"{expected}; it is a file")])
     ours = (".vtp", ".vtu", Path(COLLECTION_NAME).suffix)
     for path in place.iterdir():
-        if path.suffix not in ours:
+        if path.suffix not in ours and path.name != SCRIPT_NAME:
             raise InputError(str(place), [Problem("", None, f"{expected}; it holds {path.name}")])
 
 

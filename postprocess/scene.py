@@ -1,9 +1,10 @@
-"""What pictures and films are made of: a window off-screen, beads as one mesh, their colours."""
+"""What pictures and films are made of: a window off-screen, the camera's place, beads as one mesh, their colours."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Collection, Sequence
+from math import cos, pi, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,11 @@ _BRIGHTEST = 150.0
 """Mean of red, green and blue in the darker ones."""
 _LUNES = 6
 """Of two colours in turn, about an axis: a beach ball, whose turning shows from every side."""
+_ELEVATION_OF_ONE, _ELEVATION = radians(35.0), radians(60.0)
+"""From which a level floor is seen: with one walker on it, and with several."""
+_ASIDE = radians(25.0)
+"""From the normal of a steep wall, to which it is seen."""
+_STEEP = pi / 4.0
 _SINGLE, _FEW, _MANY = 10, 100, 500
 """Beads from which on spheres are drawn coarser; a lune's edges are edges of their cells."""
 
@@ -51,6 +57,30 @@ def pointed_out(motion: Motion) -> Callable[[int], set[int]]:
     found = analyse(motion)
     climbing = [track for track, climb in zip(found.tracks, found.climbs, strict=True) if climb.climbed]
     return lambda frame: walkers | {bead for track in climbing for bead in track.members_at(frame)}
+
+
+def camera_axes(motion: Motion) -> FloatArray:
+    """Unit vectors to the right and up in the picture and toward the camera, in the boundary's frame, as rows.
+
+    Containers are seen from the side, floors from above and from the right of the drive axis, steep walls from a little
+    aside; up in the picture is up against gravity.
+    """
+    case = motion.case
+    across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
+    uphill = np.array([cos(case.boundary.uphill), sin(case.boundary.uphill), 0.0])
+    if case.boundary.closed:
+        toward = np.array([0.0, -1.0, 0.0])
+    elif case.boundary.tilt < _STEEP:
+        elevation = _ELEVATION_OF_ONE if len(motion.walkers) == 1 else _ELEVATION
+        toward = np.array([0.0, 0.0, sin(elevation)]) - cos(elevation) * across
+    else:
+        toward = np.array([0.0, 0.0, cos(_ASIDE)]) + sin(_ASIDE) * np.cross(uphill, [0.0, 0.0, 1.0])
+    against = -np.array(case.gravity_vector)
+    if not against.any():
+        against = np.array([0.0, 0.0, 1.0])
+    up = against - (against @ toward) * toward
+    up /= np.linalg.norm(up)
+    return np.array([np.cross(up, toward), up, toward])
 
 
 class Beads:

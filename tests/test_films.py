@@ -14,11 +14,12 @@ from tests.conftest import call
 from walkers.inputs import InputError
 from walkers.postprocess import read_motion
 from walkers.postprocess.analysis import current_result
-from walkers.postprocess.film_stage import Stage, camera_axes
+from walkers.postprocess.film_stage import Stage
 from walkers.postprocess.film_times import film_times, positions_at, round_below
 from walkers.postprocess.films import parse_size, told_speed
 from walkers.postprocess.motion import Motion
 from walkers.postprocess.rolling import turns_of
+from walkers.postprocess.scene import camera_axes
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from typing import Any, NoReturn, TextIO
 import typer
 
 COMMANDS = (
-    *("show", "deck", "run", "result", "plot", "render", "film", "vtk", "theory"),
+    *("show", "deck", "run", "result", "plot", "render", "film", "vtk", "paraview", "export", "theory"),
     *("sweep", "status", "table", "climb", "figures", "model-terms", "calibrate", "report"),
     *("audit", "crosscheck", "validate"),
 )

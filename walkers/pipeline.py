@@ -130,6 +130,18 @@ class Run:
 
         return write_vtk(self.directory, destination=to, **options)
 
+    def paraview(self, to: Path | None = None, **options: Any) -> Path:
+        """Write it with a script for ParaView, see `walkers.postprocess.paraview_script.write_paraview`."""
+        from walkers.postprocess.paraview_script import write_paraview
+
+        return write_paraview(self.directory, to, **options)
+
+    def export(self, to: Path, *, every: int = 1) -> Path:
+        """Write its trajectory for other programs, see `walkers.postprocess.trajectory_files.write_trajectory`."""
+        from walkers.postprocess.trajectory_files import write_trajectory
+
+        return write_trajectory(self.directory, to, every=every)
+
     def film(
         self,
         to: Path | None = None,
