@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 from walkers.inputs.case import Case
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
+from walkers.runner.manifest import record_tables
 
 if TYPE_CHECKING:  # how far a sweep is can be told without numpy
     import numpy.typing as npt
@@ -164,12 +165,15 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
         "goes_uphill": case.goes_uphill,
         "truncated": motion.truncated,
     }
+    written: list[str] = []
     for one in analyses_of(case):
         measured = one.of(motion)
         for name, columns in measured.tables.items():
             write_table(directory, name, columns)
+            written.append(name)
         result |= measured.summary
     write_json(directory / RESULT_NAME, result)
+    record_tables(directory, [RESULT_NAME, *(f"{name}.parquet" for name in written)])
     return result
 
 
