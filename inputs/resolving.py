@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from math import atan2
 
-from walkers.inputs import library
 from walkers.inputs.bodies import Placed
 from walkers.inputs.body_tables import check_bodies, mixture_of, spaced, walkers_of
 from walkers.inputs.boundary import Box, Channel, Cylinder, Groove, Plane, Shape
 from walkers.inputs.case import Case, Run
 from walkers.inputs.errors import UnusableKeyError
-from walkers.inputs.matter_tables import density_of, resolve_contact, resolve_liquid
+from walkers.inputs.matter_tables import resolve_matter
 from walkers.inputs.run_tables import resolve_drive, resolve_run
 from walkers.inputs.schema import BoundaryTable, CaseFile
 from walkers.physics.dimer import Dimer
@@ -31,10 +30,7 @@ def resolve(file: CaseFile, name: str) -> Case:
     placed = Placed(tuple((*bead.at, bead.radius) for bead in file.placed)) if file.placed else None
     if not (walkers or mixture or placed):
         raise UnusableKeyError("dimers", "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
-    pair = library.surface_pair(beads.material, boundary.material) or {}
-    density = density_of(beads.material, beads.density, file.contact)
-    liquid = resolve_liquid(file.liquid, pair)
-    contact = resolve_contact(file.contact, beads.material, "boundary.material", boundary.material)
+    density, liquid, contact, _ = resolve_matter(file)
     first = walkers[0].radii if walkers else ()
     dimer = Dimer((first[0], first[1]), density, liquid.surface_tension) if len(first) == 2 else None
     drive = resolve_drive(file.drive, boundary.drive_axis, dimer)

@@ -103,7 +103,7 @@ def _stiffness_ratio(case: Case) -> float | None:
     """Young's modulus of the simulation over that of the beads' material."""
     if case.material not in library.materials():
         return None
-    return case.contact.youngs_modulus / library.material(case.material)["youngs_modulus"]
+    return case.contact.youngs_modulus / library.material(case.material)["youngs_modulus"].value
 
 
 def describe(summary: dict[str, Any]) -> str:
