@@ -91,7 +91,7 @@ def verify_run(directory: Path, *, own: bool = False) -> Verification:
         told = f"the run's {MANIFEST_NAME}, or what it names, cannot be read ({error})"
         raise InputError(str(directory), [Problem("", None, told)]) from error
     return Verification(
-        name=directory.name,
+        name=directory.resolve().name,
         intact=len(there) - len(changed),
         changed=changed,
         missing=tuple(name for name in names if name not in there and name not in left_out),

@@ -91,6 +91,12 @@ class Run:
 
         return write_vtk(self.directory, destination=to, **options)
 
+    def archive(self, to: Path | None = None, **options: Any) -> Path:
+        """Pack it into an RO-Crate, see `walkers.archive.writing.write_archive` and its `ArchiveOptions`."""
+        from walkers.archive.writing import ArchiveOptions, write_archive
+
+        return write_archive(self.directory, to, ArchiveOptions(**options))
+
     def render(self, to: Path | None = None, *, images: int = 6) -> list[Path]:
         """Render pictures of it, see `walkers.postprocess.pictures.render_run`."""
         from walkers.postprocess.pictures import render_run
@@ -192,25 +198,42 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
     """
     from walkers.runner.directory import finished_run
 
+    place = place_of(run, out)
+    if finished_run(place) is None:
+        told = "not a finished run: expected a folder with a manifest.json"
+        raise InputError(str(run), [Problem("", None, told)])
+    return _readable(place)
+
+
+def place_of(run: str | Path, out: Path = DEFAULT_OUT, *, archives: bool = False) -> Path:
+    """Where something is: a directory as it is, for a case that of its finished run with the installed engine.
+
+    Nothing in it is read or made anew.
+
+    Parameters
+    ----------
+    run, out
+        As for `find_run`.
+    archives
+        Take a zip file for what it is, not for a case.
+
+    Raises
+    ------
+    InputError
+        If a case is given and has no finished run.
+    """
     path = Path(run)
-    if path.is_dir():
-        if finished_run(path) is None:
-            told = "not a finished run: expected a folder with a manifest.json"
-            raise InputError(str(run), [Problem("", None, told)])
-        return _readable(path)
-    there = _place_of(path, out)
-    if there is None or finished_run(there) is None:
-        raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
-    return _readable(there)
-
-
-def _place_of(case: Path, out: Path) -> Path | None:
+    if path.is_dir() or (archives and path.suffix == ".zip" and path.is_file()):
+        return path
     from walkers.inputs.reading import load_case
     from walkers.runner.binary import find_engine
     from walkers.runner.directory import run_place
     from walkers.runner.ensemble import finished_place
 
-    return finished_place(out, run_place(load_case(case), find_engine(), out).name)
+    there = finished_place(out, run_place(load_case(path), find_engine(), out).name)
+    if there is None:
+        raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
+    return there
 
 
 def _readable(directory: Path) -> Run:
@@ -225,9 +248,12 @@ def _readable(directory: Path) -> Run:
         except (OSError, ValueError, KeyError, TypeError) as error:
             problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
             raise InputError(str(directory), [problem]) from error
+    left_out = run.manifest.get("left_out", ())  # of an archive
     for segment in run.segments:
         layout = layout_of(segment)
         dump = segment / layout.bead_dump
+        if dump.relative_to(directory).as_posix() in left_out:
+            continue
         if not dump.is_file():
             raise InputError(str(directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
         if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
