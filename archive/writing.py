@@ -97,7 +97,7 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
 def _check(options: ArchiveOptions) -> None:
     if options.licence not in LICENCES:
         told = f"expected one of {', '.join(LICENCES)}"
-        raise InputError("--licence", [Problem("", options.licence, told)])
+        raise InputError("--licence", [Problem("", None, f"{told}, not {options.licence}")])
     for author in options.authors:
         if not author.name.strip():
             raise InputError("--author", [Problem("", None, "expected a name")])
