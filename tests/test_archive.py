@@ -221,7 +221,8 @@ def test_an_archive_without_dumps(run: Path, tmp_path: Path) -> None:
     call("archive", str(there), "--to", str(again), "--without-dumps", check=True)
     assert archive.read_bytes() == again.read_bytes()
     assert _issues(archive, tmp_path, Severity.REQUIRED) == []
-    assert (call("plot", str(there)).returncode, call("vtk", str(there)).returncode) == (2, 2)
+    told = call("plot", str(there))
+    assert (told.returncode, "beads.bin" in told.stderr) == (1, True)
 
 
 def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
