@@ -122,6 +122,8 @@ class Sweep:
         The points: one value a key.
     descent
         How the points depend on each other, if they do.
+    file
+        Tables of the sweep file.
     """
 
     name: str
@@ -133,6 +135,7 @@ class Sweep:
     units: tuple[str | None, ...]
     rows: Sequence[tuple[Value, ...]]
     descent: Descent | None
+    file: Mapping[str, Any]
 
     def cases(self) -> Iterator[Case]:
         """The case of each point, resolved.
@@ -237,6 +240,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         units=units,
         rows=rows,
         descent=descent,
+        file=document,
     )
 
 

@@ -19,6 +19,7 @@ from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
+from walkers.runner.manifest import record_tables
 
 if TYPE_CHECKING:  # how far a sweep is can be told without numpy
     import numpy.typing as npt
@@ -172,12 +173,15 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
         "truncated": motion.truncated,
         "rests_on": rests_on(case.origins),
     }
+    written: list[str] = []
     for one in analyses_of(case):
         measured = one.of(motion)
         for name, columns in measured.tables.items():
             write_table(directory, name, columns)
+            written.append(name)
         result |= measured.summary
     write_json(directory / RESULT_NAME, result)
+    record_tables(directory, [RESULT_NAME, *(f"{name}.parquet" for name in written)])
     return result
 
 

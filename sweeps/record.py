@@ -51,6 +51,8 @@ class SweepRecord:
         How the points depend on each other, if they do.
     analyses
         Names of the analyses that mean something for its cases.
+    file
+        Tables of the sweep file; empty for one that was recorded before they were.
     """
 
     directory: Path
@@ -62,6 +64,7 @@ class SweepRecord:
     runs: Sequence[str]
     descent: Descent | None
     analyses: Sequence[str]
+    file: Mapping[str, Any]
 
     @property
     def out(self) -> Path:
@@ -92,6 +95,7 @@ def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Pat
         runs=[run_place(case, engine, out).name for case in cases],
         descent=sweep.descent,
         analyses=names,
+        file=sweep.file,
     )
 
 
@@ -109,6 +113,7 @@ def write_record(record: SweepRecord) -> None:
             "format": _FORMAT,
             "name": record.name,
             "title": record.title,
+            "file": dict(record.file),
             "units": dict(record.units),
             "descent": vars(descent) if descent else None,
             "analyses": list(record.analyses),
@@ -143,6 +148,7 @@ def read_record(directory: str | Path) -> SweepRecord:
             runs=[point["run"] for point in points],
             descent=_descent(contents["descent"]),
             analyses=contents["analyses"],
+            file=contents.get("file", {}),
         )
     except FileNotFoundError as error:
         told = f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"

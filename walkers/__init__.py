@@ -26,7 +26,7 @@ __all__ = ["Run", "find_run", "load", "load_case", "run", "sweep"]
 
 _PACKAGES = (
     *("physics", "inputs", "templates", "runner", "postprocess"),
-    *("sweeps", "audit", "theory", "paper", "calibration"),
+    *("sweeps", "archive", "audit", "theory", "paper", "calibration"),
 )
 
 

@@ -17,6 +17,7 @@ import typer
 COMMANDS = (
     *("show", "deck", "run", "result", "plot", "vtk", "render", "theory"),
     *("sweep", "status", "table", "climb", "figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"),
+    *("verify", "archive"),
 )
 """Each the function ``command`` of a module of `walkers.commands`, in the order of ``walkers --help``."""
 

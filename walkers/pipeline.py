@@ -97,6 +97,12 @@ class Run:
 
         return write_vtk(self.directory, destination=to, **options)
 
+    def archive(self, to: Path | None = None, **options: Any) -> Path:
+        """Pack it into an RO-Crate, see `walkers.archive.writing.write_archive` and its `ArchiveOptions`."""
+        from walkers.archive.writing import ArchiveOptions, write_archive
+
+        return write_archive(self.directory, to, ArchiveOptions(**options))
+
     def render(self, to: Path | None = None, *, images: int = 6) -> list[Path]:
         """Render pictures of it, see `walkers.postprocess.pictures.render_run`."""
         from walkers.postprocess.pictures import render_run
@@ -200,25 +206,50 @@ def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     from walkers.inputs.reading import load_case
     from walkers.runner.directory import finished_run
 
-    if isinstance(run, (str, Path)) and Path(run).is_dir():
-        if finished_run(Path(run)) is None:
-            told = "not a finished run: expected a folder with a manifest.json"
-            raise InputError(str(run), [Problem("", None, told)])
-        return _readable(Path(run))
-    case = load_case(run) if isinstance(run, (str, Path)) else run
-    name = run if isinstance(run, (str, Path)) else case.name
-    there = _place_of(case, out)
-    if there is None or finished_run(there) is None:
-        raise InputError(str(name), [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
-    return replace(_readable(there), origins=case.origins)
+    place, origins = place_of(run, out), None
+    if finished_run(place) is None:
+        told = "not a finished run: expected a folder with a manifest.json"
+        raise InputError(str(run), [Problem("", None, told)])
+    if not isinstance(run, (str, Path)):
+        origins = run.origins
+    elif not Path(run).is_dir():
+        origins = load_case(run).origins
+    return replace(_readable(place), origins=origins)
 
 
-def _place_of(case: Case, out: Path) -> Path | None:
+def place_of(run: Case | str | Path, out: Path = DEFAULT_OUT, *, archives: bool = False) -> Path:
+    """Where something is: a directory as it is, for a case that of its finished run with the installed engine.
+
+    Nothing in it is read or made anew.
+
+    Parameters
+    ----------
+    run, out
+        As for `find_run`.
+    archives
+        Take a zip file for what it is, not for a case.
+
+    Raises
+    ------
+    InputError
+        If a case is given and has no finished run.
+    """
+    from walkers.inputs.reading import load_case
     from walkers.runner.binary import find_engine
     from walkers.runner.directory import run_place
     from walkers.runner.ensemble import finished_place
 
-    return finished_place(out, run_place(case, find_engine(), out).name)
+    if isinstance(run, (str, Path)):
+        path = Path(run)
+        if path.is_dir() or (archives and path.suffix == ".zip" and path.is_file()):
+            return path
+        case, name = load_case(path), str(run)
+    else:
+        case, name = run, run.name
+    there = finished_place(out, run_place(case, find_engine(), out).name)
+    if there is None:
+        raise InputError(name, [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
+    return there
 
 
 def _readable(directory: Path) -> Run:
@@ -233,9 +264,12 @@ def _readable(directory: Path) -> Run:
         except (OSError, ValueError, KeyError, TypeError) as error:
             problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
             raise InputError(str(directory), [problem]) from error
+    left_out = run.manifest.get("left_out", ())  # of an archive
     for segment in run.segments:
         layout = layout_of(segment)
         dump = segment / layout.bead_dump
+        if dump.relative_to(directory).as_posix() in left_out:
+            continue
         if not dump.is_file():
             raise InputError(str(directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
         if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
