@@ -1,4 +1,4 @@
-"""Start many engines, several at a time, and count those that never started: what docs/runs.md states of starts."""
+"""Start many engines, several at a time, and count those that never started: what docs/reference/runs.md states of them."""
 
 from __future__ import annotations
 
