@@ -1,4 +1,4 @@
-"""Start many engines, several at a time, and count those that never started: what docs/reference/runs.md states of them."""
+"""Start many engines, several at a time, and count those that never started (docs/reference/runs.md)."""
 
 from __future__ import annotations
 
