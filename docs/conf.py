@@ -22,7 +22,7 @@ version = release = metadata.version("granular-walkers")
 extensions = [
     *("myst_nb", "numpydoc", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode"),
     *("sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex", "sphinxcontrib.typer"),
-    *("mathml", "generated"),  # docs/_ext
+    *("docstrings", "generated", "mathml"),  # docs/_ext
 ]
 exclude_patterns = ["_ext", "_templates", "examples", "**/.ipynb_checkpoints", "gallery/**.ipynb"]
 templates_path = ["_templates"]
@@ -81,5 +81,5 @@ sphinx_gallery_conf = {
     "plot_gallery": True,
     "image_srcset": ["2x"],
 }
-# Sphinx cannot store this dictionary's functions between builds, and says so.
-suppress_warnings = ["config.cache"]
+# Two classes of different packages may have one name: an annotation that says it is left without a link.
+suppress_warnings = ["ref.python"]

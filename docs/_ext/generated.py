@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 import types
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -31,7 +32,7 @@ program = _program([])
 
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 _KINDS = {"materials": "Materials", "liquids": "Liquids"}
-_UNITS = {"density": "kg/m³", "youngs_modulus": "Pa", "surface_tension": "N/m", "kinematic_viscosity": "m²/s"}
+_PAGE = re.compile(r"docs/(\S+?\.md)")
 
 
 def _table(heads: Sequence[str], rows: Iterator[Sequence[str]]) -> str:
@@ -153,7 +154,7 @@ def _library() -> str:
 
 
 def _sourced(entries: Mapping[str, Any]) -> str:
-    rows = ((f"`{key}`", str(one["value"]), one["source"]) for key, one in entries.items())
+    rows = ((f"`{key}`", str(one["value"]), _PAGE.sub(r"[docs/\1](../../\1)", one["source"])) for key, one in entries.items())
     return _table(["", "value", "source"], rows)
 
 
