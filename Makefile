@@ -78,6 +78,11 @@ docs-validation: setup ## Write docs/explanation/validation.md and its pictures
 docs-figures: setup ## Write the figures and the comparison that docs/ shows
 	@$(WALKERS) figures --out $(OUT) --to docs/figures
 
+.PHONY: docs
+docs: engine .venv/ready-docs ## Build the documentation into build/site, to be opened from disk; runs its examples
+	@.venv/bin/python -m sphinx -q -W --keep-going -d build/doctrees docs build/site
+	@echo "open build/site/index.html"
+
 .PHONY: bench
 bench: setup ## Measure what docs/explanation/performance.md states
 	.venv/bin/python tests/benchmark.py
@@ -100,7 +105,7 @@ bench-piles: setup ## Measure what docs/explanation/performance.md states of pil
 
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/api docs/reference/generated
 
 .PHONY: setup
 setup: engine .venv/ready ## Install what is missing: liggghts (apt-get) and .venv

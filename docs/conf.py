@@ -20,8 +20,8 @@ project_copyright = author
 version = release = metadata.version("granular-walkers")
 
 extensions = [
-    *("myst_nb", "numpydoc", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode"),
-    *("sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex", "sphinxcontrib.typer"),
+    *("numpydoc", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode", "sphinxcontrib.typer"),
+    *("myst_nb", "sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex"),
     *("docstrings", "generated", "mathml"),  # docs/_ext
 ]
 exclude_patterns = ["_ext", "_templates", "examples", "**/.ipynb_checkpoints", "gallery/**.ipynb"]
@@ -41,6 +41,7 @@ nb_merge_streams = True
 html_math_renderer = "mathml"
 html_theme = "pydata_sphinx_theme"
 html_title = "granular-walkers"
+html_context = {"default_mode": "auto"}
 html_static_path = ["_static"]
 html_css_files = ["walkers.css"]
 html_show_sourcelink = False
@@ -50,6 +51,7 @@ html_theme_options = {
     "navbar_end": ["theme-switcher"],
     "header_links_before_dropdown": 6,
     "show_nav_level": 1,
+    "show_toc_level": 2,
     "navigation_depth": 3,
     "footer_start": ["copyright"],
     "footer_end": [],

@@ -12,10 +12,14 @@ from sphinx.application import Sphinx
 _LITERAL = re.compile(r"(``.*?``)")
 
 
-def _readable(_app: Sphinx, _what: str, _name: str, _it: Any, _options: Any, lines: list[str]) -> None:
+def _readable(_app: Sphinx, what: str, _name: str, _it: Any, _options: Any, lines: list[str]) -> None:
     """Show indented lines before the first section as they stand, and take no |x| for a substitution."""
     sections = (number - 1 for number, line in enumerate(lines) if set(line.strip()) == {"-"})
     head = next(sections, len(lines))
+    if what == "module" and head < len(lines):  # a heading would take all that the module has below itself
+        references = [f"| {line}" if line.strip() else "" for line in lines[head + 2 :]]
+        lines[head:] = [f".. rubric:: {lines[head]}", "", *references]
+        head = len(lines)
     text: list[str] = []
     literal = False
     for number, line in enumerate(lines):

@@ -1,4 +1,4 @@
-"""Pages of the reference that the program writes: keys, tables, the library, what is shipped; in reference/generated/."""
+"""Pages of the reference that the program writes, in reference/generated/: keys, tables, the library, shipped files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from sphinx.application import Sphinx
 from sphinx.config import Config
 
 import walkers.inputs
-from walkers.inputs import library
 from walkers.inputs.reading import read_toml
 from walkers.inputs.schema import AUTO, CaseFile
 from walkers.main import _program
@@ -37,7 +36,8 @@ _PAGE = re.compile(r"docs/(\S+?\.md)")
 
 def _table(heads: Sequence[str], rows: Iterator[Sequence[str]]) -> str:
     """A table of Markdown."""
-    lines = [heads, ["---"] * len(heads), *([cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in rows)]
+    cells = ([cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in rows)
+    lines = [heads, ["---"] * len(heads), *cells]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
@@ -102,7 +102,7 @@ def _default(field: FieldInfo) -> str:
 
 def _keys() -> str:
     """Every key of a case file with what it expects, read off the models that check it."""
-    text = ["# Keys, as the program checks them\n", "What each key means is told in [](../cases.md). Defaults are in SI units.\n"]
+    text = ["# Keys, as the program checks them\n\nWhat each means is in [](../cases.md). Defaults are in SI units.\n"]
 
     def add(model: type[BaseModel], name: str) -> None:
         hints = get_type_hints(model, include_extras=True)
@@ -149,13 +149,16 @@ def _library() -> str:
             text += f"\n### {name}\n\n{_sourced(entries)}"
     text += "\n## Surfaces that touch\n"
     for entry in contents["surface_pairs"]:
-        text += f"\n### {' on '.join(entry['materials'])}\n\n{_sourced({k: v for k, v in entry.items() if k != 'materials'})}"
+        numbers = {key: one for key, one in entry.items() if key != "materials"}
+        text += f"\n### {' on '.join(entry['materials'])}\n\n{_sourced(numbers)}"
     return text
 
 
 def _sourced(entries: Mapping[str, Any]) -> str:
-    rows = ((f"`{key}`", str(one["value"]), _PAGE.sub(r"[docs/\1](../../\1)", one["source"])) for key, one in entries.items())
-    return _table(["", "value", "source"], rows)
+    linked = {key: _PAGE.sub(r"[docs/\1](../../\1)", one["source"]) for key, one in entries.items()}
+    return _table(
+        ["", "value", "source"], ((f"`{key}`", str(one["value"]), linked[key]) for key, one in entries.items())
+    )
 
 
 def _shipped() -> str:

@@ -2,9 +2,9 @@
 The pull of a bridge, against the Young–Laplace equation
 ========================================================
 
-The engine pulls beads together by Soulié's formula :cite:p:`soulie2006`, which was fitted to solutions of the Young–Laplace
-equation. Here that equation is solved again, for the bridges of Fig. 1b's walker, and the formula drawn beside it, up to the
-gap at which each says that the bridge breaks.
+The engine pulls beads together by Soulié's formula :cite:p:`soulie2006`, which was fitted to solutions of the
+Young–Laplace equation. Here that equation is solved again, for the bridges of Fig. 1b's walker, and the formula drawn
+beside it, up to the gap at which each says that the bridge breaks.
 """
 
 from math import inf
@@ -38,10 +38,12 @@ for colour, (name, bridge) in zip(("C0", "C1"), bridges.items(), strict=True):
     axes.plot(1e6 * exact.gaps, pull * exact.forces, color=colour, label=f"{name}: Young–Laplace")
     axes.plot(1e6 * gaps, pull * formula, "--", color=colour, label=f"{name}: the engine's formula")
     axes.plot(1e6 * np.array([end, exact.rupture]), [0.0, 0.0], "|", color=colour, ms=14)
-    print(f"{name}: at contact {formula[0] / exact.forces[0]:.3f} of it, breaks at {end / exact.rupture:.3f} of its gap")
+    print(
+        f"{name}: {formula[0] / exact.forces[0]:.3f} of it at contact, {end / exact.rupture:.3f} of its gap at rupture"
+    )
 axes.set(xlabel="gap (µm)", ylabel="pull (µN)", ylim=(0.0, None))
 axes.legend()
 plt.show()
 
 # %%
-# How the laws of others compare, and what the difference does to walkers, is in the chapter on bridges of the validation.
+# How the laws of others compare, and what the difference does to walkers, is in the :doc:`/explanation/validation`.

@@ -2,8 +2,8 @@
 A climber comes upright
 =======================
 
-A large bead above two small ones side by side, with one more below, on a wall that is shaken vertically. Six of them begin up
-to 10° off the vertical. A dimer would turn over; these touch the wall on triangles, come upright and climb.
+A large bead above two small ones side by side, with one more below, on a wall that is shaken vertically. Six of them
+begin up to 10° off the vertical. A dimer would turn over; these touch the wall on triangles, come upright and climb.
 """
 
 import matplotlib.pyplot as plt

@@ -33,4 +33,5 @@ axes.legend()
 plt.show()
 
 # %%
-# At the largest asymmetry the engine stays below the published value: no set of parameters gives it together with the rest.
+# At the largest asymmetry the engine stays below the published value, which no set of parameters gives together with the
+# rest: :doc:`/explanation/calibration`.

@@ -2,8 +2,8 @@
 The gait of a walker
 ====================
 
-What the beads of Fig. 4b's walker do in two cycles of the drive: how fast the walker goes, how fast each bead rotates, and
-which contacts are open. Driven so hard, its beads part in every cycle, and come together again.
+What the beads of Fig. 4b's walker do in two cycles of the drive: how fast the walker goes, how fast each bead rotates,
+and which contacts are open. Driven so hard, its beads part in every cycle, and come together again.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Velocity against the drive
 ==========================
 
-Fig. 1b's walker, shaken at 80 Hz from 1 to 9 g: the engine, and beside it the theory with Coulomb friction and the drag of
-the bridges, computed in another way, into which nothing is fitted; and with friction alone.
+Fig. 1b's walker, shaken at 80 Hz from 1 to 9 g: the engine, and beside it the theory with Coulomb friction and the drag
+of the bridges, computed in another way, into which nothing is fitted; and with friction alone.
 """
 
 from pathlib import Path
@@ -34,7 +34,9 @@ print(table[["drive.peak_acceleration", "gamma0", "velocity", "rotation_1", "ste
 points = [walkers.Run(Path(place)).case for place in table["run"]]
 figure, axes = plt.subplots(figsize=(7, 4.5))
 x, mean, low, high = (table[key] for key in ("drive.peak_acceleration", "velocity", "smallest", "largest"))
-axes.errorbar(x, 1e3 * mean, 1e3 * np.array([mean - low, high - mean]), fmt="o", label="engine, mean and range of 6 walkers")
+axes.errorbar(
+    x, 1e3 * mean, 1e3 * np.array([mean - low, high - mean]), fmt="o", label="engine, mean and range of 6 walkers"
+)
 axes.plot(x, 1e3 * motion_of(*points).velocity, color="0.2", label="theory: Coulomb friction, drag of bridges and film")
 axes.plot(x, 1e3 * motion_of(*points, viscous=False).velocity, ":", color="0.5", label="theory: Coulomb friction alone")
 axes.set(xlabel="peak acceleration (g)", ylabel="velocity (mm/s)", ylim=(0.0, 13.0))
