@@ -33,5 +33,5 @@ axes.legend()
 plt.show()
 
 # %%
-# At the largest asymmetry the engine stays below the published value, which no set of parameters gives together with the
-# rest: :doc:`/explanation/calibration`.
+# At the largest asymmetry the engine stays below the published value, which no set of parameters gives together with
+# the rest: :doc:`/explanation/calibration`.
