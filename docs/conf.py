@@ -36,6 +36,8 @@ myst_links_external_new_tab = False
 # Notebooks are shown as they were executed when they were committed.
 nb_execution_mode = "off"
 nb_merge_streams = True
+nb_ipywidgets_js = {}  # would come from the network: what a widget shows, a picture shows here
+nb_mime_priority_overrides = [("html", "application/vnd.jupyter.widget-view+json", None)]
 
 # Nothing comes from the network: formulas become MathML, which browsers draw by themselves.
 html_math_renderer = "mathml"
