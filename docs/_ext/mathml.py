@@ -5,6 +5,7 @@ Systems have a font for mathematics, but for bare Linux ones: the STIX fonts tha
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,13 @@ from sphinx.util.fileutil import copy_asset
 LOG = logging.getLogger(__name__)
 
 
+# LaTeX takes 4 and 3 of \frac43, the converter 43 and what comes next.
+_AMBIGUOUS = re.compile(r"\\[dt]?frac\s*\d|[\^_]\d\d|\\sqrt\s*\d\d")
+
+
 def _mathml(node: nodes.Element, *, block: bool) -> str:
+    if _AMBIGUOUS.search(node.astext()):
+        LOG.warning("formula %r: write braces around the numbers", node.astext(), location=node)
     try:
         return tex2mathml(node.astext(), as_block=block)
     except MathError as error:
