@@ -82,6 +82,7 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "show_memory": False,
     "min_reported_time": 1000,
+    "write_computation_times": False,  # its table of times would load scripts from the network
     "plot_gallery": True,
     "image_srcset": ["2x"],
 }
