@@ -581,7 +581,7 @@ def test_a_set_that_loses_its_beads_is_told_and_not_run_again(tmp_path: Path) ->
 
 
 def test_the_example_of_the_docs_can_be_read(tmp_path: Path) -> None:
-    page = (Path(__file__).parents[1] / "docs" / "calibration.md").read_text()
+    page = (Path(__file__).parents[1] / "docs" / "explanation" / "calibration.md").read_text()
     document = tomllib.loads(page.split("```toml\n")[1].split("```")[0])
     found = read_calibration(document, source="docs", name="docs", folder=tmp_path)
     assert [one.group for one in found.observations] == ["fig2", "fig4a"]

@@ -1,4 +1,4 @@
-"""The second engine's chapter of docs/validation.md: cases of all kinds in both engines, and other laws."""
+"""The second engine's chapter of docs/explanation/validation.md: cases of all kinds in both engines, and other laws."""
 
 from __future__ import annotations
 
