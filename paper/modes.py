@@ -77,7 +77,7 @@ def fig_modes(sources: Sources) -> Figure:
         here = modes == mode
         place = table["sin_delta"][here], table["gamma0"][here]
         look = {"color": colour} if marker == "x" else {"fc": colour, "ec": "0.1"}
-        kinds.scatter(*place, marker=marker, s=20, lw=0.5, label=f"{name} ({here.sum()})", **look)
+        kinds.scatter(*place, marker=marker, s=36 if marker == "*" else 20, lw=0.5, label=f"{name} ({here.sum()})", **look)
     _borders(kinds, float(table["gamma0"].max()))
     kinds.set(ylabel=r"dimensionless peak force $\Gamma_0$", ylim=(0.0, None), title="modes in the engine")
     _speeds(speeds, table)
@@ -92,7 +92,7 @@ def fig_modes(sources: Sources) -> Figure:
 
 
 def _speeds(axes: Axes, table: pd.DataFrame) -> None:
-    """Velocities as colours, between the slowest 2 % and the fastest: few walkers that run are not to darken the rest."""
+    """Velocities as colours, the slowest 2 % and the fastest 5 % beyond the scale: few are not to darken the rest."""
     speed = table["velocity"].to_numpy() * 1e3
     low, high = (float(np.nanpercentile(speed, share)) for share in (2.0, 95.0))
     drawn = axes.scatter(

@@ -7,13 +7,14 @@ tables, results, text and figures, and sweeps of columns, follows.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from walkers.inputs.case import Case
+from walkers.postprocess.drawing import check_formats
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
 
@@ -104,9 +105,9 @@ class Analysis(ABC):
         del motion
         return lambda _: {}
 
-    def plot(self, directory: Path, destination: Path) -> list[Path]:
-        """Draw its figures of a run into a folder."""
-        del directory, destination
+    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
+        """Draw its figures of a run into a folder, in each of some formats."""
+        del directory, destination, formats
         return []
 
 
@@ -217,7 +218,7 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
     return "\n".join([*lines, *(f"  warning: {warning}" for warning in warnings), f"  run        {directory}"])
 
 
-def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
+def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:
     """Draw the figures of a run.
 
     Parameters
@@ -226,14 +227,22 @@ def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
         A run directory.
     destination
         Folder for the pictures; the run directory itself if None.
+    formats
+        Of `walkers.postprocess.drawing.FORMATS`.
 
     Returns
     -------
     list of Path
-        Of walkers ``walk.png`` and, if the run was sampled at least eight times a cycle, ``gait.png``; of piles
-        ``climb.png``.
+        Of walkers ``walk`` and, if the run was sampled at least eight times a cycle, ``gait``; of piles ``climb``; each
+        in all formats.
+
+    Raises
+    ------
+    InputError
+        If there is no such format.
     """
+    check_formats(formats)
     destination = destination or directory
     destination.mkdir(parents=True, exist_ok=True)
     case = case_of(directory)
-    return [path for one in analyses_of(case) for path in one.plot(directory, destination)]
+    return [path for one in analyses_of(case) for path in one.plot(directory, destination, formats)]
