@@ -42,7 +42,9 @@ def fig_alignment(sources: Sources) -> Figure:
     axes["asymmetric"].set_title("asymmetric: along the axis, ψ = 0, ±180°, …")
     axes["symmetric"].set_title("symmetric: across the axis, ψ = ±90°")
     handles, labels = axes["asymmetric"].get_legend_handles_labels()
-    figure.legend(handles, labels, title="(a) to (c): started at an angle of", loc="outside lower center", ncols=len(labels))
+    figure.legend(
+        handles, labels, title="(a) to (c): started at an angle of", loc="outside lower center", ncols=len(labels)
+    )
     asymmetric = table[shown["asymmetric"]]
     for _, row in asymmetric[asymmetric["dimers.angle"].isin(_BEGINNINGS)].iterrows():
         _beginning(axes["beginning"], sources.trajectory(row["run"]), row["dimers.angle"])

@@ -77,7 +77,8 @@ def fig_modes(sources: Sources) -> Figure:
         here = modes == mode
         place = table["sin_delta"][here], table["gamma0"][here]
         look = {"color": colour} if marker == "x" else {"fc": colour, "ec": "0.1"}
-        kinds.scatter(*place, marker=marker, s=36 if marker == "*" else 20, lw=0.5, label=f"{name} ({here.sum()})", **look)
+        size = 36.0 if marker == "*" else 20.0
+        kinds.scatter(*place, marker=marker, s=size, lw=0.5, label=f"{name} ({here.sum()})", **look)
     _borders(kinds, float(table["gamma0"].max()))
     kinds.set(ylabel=r"dimensionless peak force $\Gamma_0$", ylim=(0.0, None), title="modes in the engine")
     _speeds(speeds, table)

@@ -1,4 +1,4 @@
-"""What would spoil a figure in print, found by drawing it: text over text, ticks or data, legends over data, small print."""
+"""What would spoil a figure in print, found by drawing it: texts over each other, over ticks or data, small print."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.collections import Collection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.lines import Line2D
 from matplotlib.path import Path
 from matplotlib.text import Text
-from matplotlib.transforms import Affine2D, Bbox
+from matplotlib.transforms import Affine2D, Bbox, BboxTransformTo
 
 COLUMNS = (3.4, 7.0)
 """Widths of a figure in one and in two columns of a journal, inches."""
@@ -65,7 +64,7 @@ def _box_of(text: Text, renderer: RendererAgg, shrunk: float, space: float) -> _
         text.set_rotation(0.0)
         size = text.get_window_extent(renderer).size
         text.set_rotation(angle)
-    width, height = np.maximum(size + (space, -2.0 * shrunk), 1.0)
+    width, height = np.maximum(size + np.array([space, -2.0 * shrunk]), 1.0)
     x, y = (extent.p0 + extent.p1) / 2.0
     turned = Affine2D().scale(width, height).rotate_deg(angle).translate(x, y)
     return _Box(text.get_text(), turned.transform_path(_UNIT))
@@ -117,12 +116,17 @@ def _covers(box: _Box, axes: Axes) -> bool:
     return False
 
 
-def _tick_marks(axes: Axes) -> Iterator[Bbox]:
-    for mark in (*axes.xaxis.get_ticklines(), *axes.yaxis.get_ticklines()):
-        if isinstance(mark, Line2D) and mark.get_visible() and axes.axison:
-            extent = mark.get_window_extent()
-            if extent.width + extent.height > 0.0 and axes.bbox.padded(1.0).overlaps(extent):
-                yield extent
+def _tick_marks(axes: Axes) -> Iterator[_Box]:
+    for axis in (axes.xaxis, axes.yaxis) if axes.axison else ():
+        low, high = sorted(axis.get_view_interval())
+        for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
+            if low <= tick.get_loc() <= high:
+                marks = (mark for mark in (tick.tick1line, tick.tick2line) if mark.get_visible())
+                yield from (_rectangle("tick", mark.get_window_extent()) for mark in marks)
+
+
+def _rectangle(what: str, box: Bbox) -> _Box:
+    return _Box(what, Path.unit_rectangle().transformed(BboxTransformTo(box)))
 
 
 def overlaps(figure: Figure) -> list[str]:
@@ -136,28 +140,27 @@ def overlaps(figure: Figure) -> list[str]:
     written = {id(text) for legend in legends for text in legend.findobj(Text)}
     free = [box for key, box in zip(recorder.texts, boxes, strict=True) if key not in written]
     frames = [
-        _Box("legend " + "; ".join(text.get_text() for text in legend.get_texts()), Affine2D().transform_path(
-            Path([*legend.get_window_extent(recorder).padded(-shrunk).corners()[[0, 1, 3, 2]],
-                  legend.get_window_extent(recorder).padded(-shrunk).corners()[0]], closed=True)))
+        _rectangle(
+            "legend " + "; ".join(text.get_text() for text in legend.get_texts()),
+            legend.get_window_extent(recorder).padded(-shrunk),
+        )
         for legend in legends
-    ]  # fmt: skip
+    ]
     found = [f"{one.what!r} over {other.what!r}" for one, other in combinations(boxes, 2) if one.meets(other)]
     found += [f"{one.what!r} over {frame.what!r}" for one in free for frame in frames if one.meets(frame)]
     found += [f"{one.what!r} over {other.what!r}" for one, other in combinations(frames, 2) if one.meets(other)]
     for axes in _all_axes(figure):
         if not axes.get_visible():
             continue
-        marks = [_Box("", Path(mark.corners()[[0, 1, 3, 2]], closed=False)) for mark in _tick_marks(axes)]
+        marks = list(_tick_marks(axes))
         for box in (*free, *frames):
             if _covers(box, axes):
                 found.append(f"{box.what!r} over data")
             if any(box.meets(mark) for mark in marks):
                 found.append(f"{box.what!r} over a tick")
     page = figure.bbox.padded(shrunk + space)
-    inside = [page.fully_containsx(box.extents.x0) and page.fully_containsx(box.extents.x1)
-              and page.fully_containsy(box.extents.y0) and page.fully_containsy(box.extents.y1)
-              for box in (*boxes, *frames)]  # fmt: skip
-    return found + [f"{box.what!r} is cut off" for box, whole in zip((*boxes, *frames), inside, strict=True) if not whole]
+    outside = [box for box in (*boxes, *frames) if (box.extents.p0 < page.p0).any() or (box.extents.p1 > page.p1).any()]
+    return found + [f"{box.what!r} is cut off" for box in outside]
 
 
 def small_print(figure: Figure) -> list[str]:
