@@ -30,13 +30,16 @@ if TYPE_CHECKING:
 def draw(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
     """Write ``corner.png``, ``predictions.png``, ``sobol.png`` and, if the file has any, ``bands.png``."""
     sources = [Path(run).name for run in found.predictive.table["run"]]
-    figures = {"corner": _corner(found), "predictions": _predictions(rows), "sobol": _sobol(found)}
-    if found.calibration.file.bands:
-        figures["bands"] = _bands(found)
     files = []
-    for name, figure in figures.items():
+    for name, figure in figures_of(found, rows).items():
         files += save_figure(figure, to / f"{name}.png", sources, title=f"{found.calibration.file.title}: {name}")
     return files
+
+
+def figures_of(found: Outcome, rows: list[Row]) -> dict[str, Figure]:
+    """The figures of a calibration by name."""
+    figures = {"corner": _corner(found), "predictions": _predictions(rows), "sobol": _sobol(found)}
+    return figures | ({"bands": _bands(found)} if found.calibration.file.bands else {})
 
 
 @styled
@@ -64,14 +67,33 @@ def _corner(found: Outcome) -> Figure:
         truth_color="C1",
         quantiles=[0.05, 0.5, 0.95],
         label_kwargs={"fontsize": 7},
-        max_n_ticks=3 if len(parameters) > 4 else 5,
         plot_datapoints=False,
         smooth=1.0,
         bins=24,
         hist_kwargs={"linewidth": 0.8},
         contour_kwargs={"linewidths": 0.6},
     )
+    _make_room(figure)
     return figure
+
+
+def _make_room(figure: Figure) -> None:
+    """Few ticks, none at a corner, and labels as far from the panels as the ticks ask for, not as panels are wide."""
+    from matplotlib.ticker import MaxNLocator
+    from matplotlib.transforms import ScaledTranslation
+
+    edge = 1.0 / TWO_COLUMNS
+    figure.subplots_adjust(left=edge, bottom=edge, right=0.99, top=0.99, wspace=0.1, hspace=0.1)
+    away = -26.0 / 72.0
+    for panel in figure.axes:
+        panel.grid(visible=False)
+        beneath, beside = (ScaledTranslation(*way, figure.dpi_scale_trans) for way in ((0.0, away), (away, 0.0)))
+        panel.xaxis.set_label_coords(0.5, 0.0, transform=panel.transAxes + beneath)
+        panel.yaxis.set_label_coords(0.0, 0.5, transform=panel.transAxes + beside)
+        for axis in (panel.xaxis, panel.yaxis):
+            locator = axis.get_major_locator()
+            if isinstance(locator, MaxNLocator):
+                locator.set_params(nbins=3, prune="both")
 
 
 @styled

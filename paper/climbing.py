@@ -94,10 +94,8 @@ def fig_zoo(sources: Sources) -> Figure:
     for one, (group, row, corner) in zip(axes.flat, entries, strict=False):
         _draw_cluster(one, group, corner=corner)
         speed = float(row["axial_velocity"].iloc[0])
-        place = ", in a corner" if corner else ""
-        one.set_title(
-            f"{KINDS[int(kinds(row)[0])].replace(' upright', '')}{place}\n{_rounded(speed * 1e3)} mm/s", size=7
-        )
+        told = KINDS[int(kinds(row)[0])] + ("\nin a corner" if corner else "")
+        one.set_title(f"{told}\n{_rounded(speed * 1e3)} mm/s", size=7)
     letter_panels(axes.flat[: len(entries)])
     _scale(axes.flat[0])
     return figure

@@ -118,8 +118,8 @@ def legend_below(axes: Axes, lines: int = 2, **options: Any) -> Legend:
     from matplotlib.transforms import ScaledTranslation
 
     down = ScaledTranslation(0.0, -(6.0 + 12.0 * lines) / 72.0, axes.figure.dpi_scale_trans)
-    place = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": axes.transAxes + down}
-    return axes.legend(**place, borderaxespad=0.0, **options)
+    options |= {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": axes.transAxes + down, "borderaxespad": 0.0}
+    return axes.legend(loc="upper center", **options)
 
 
 def check_formats(formats: Sequence[str]) -> None:

@@ -217,6 +217,7 @@ def fig_spin(measured: Measured) -> Figure:
         for axes, values in zip((surface, turn), tests.reduced_rebound(found), strict=True):
             axes.plot(incidence, values, label=f"engine, {wall}", **_WALL_STYLES[wall])
     surface.set(xlabel="s/(μ vₙ)", ylabel="s′/(μ vₙ′)", title="test 5: steel, elastic", xlim=(0.0, 13.2))
+    surface.set_ylim(top=7.0)  # of what is shown
     turn.set(xlabel="s/(μ vₙ)", ylabel="-Rω′/(μ vₙ)", title="test 5: steel, elastic", xlim=(0.0, 13.2))
     legend_below(surface, ncols=2)
     six.plot(*published.SPIN_ALLOY_BETA.T, label="simulated, aluminium alloy", **_SIMULATED)

@@ -429,7 +429,7 @@ _HIGHEST = 2.0
 def figure() -> Figure:
     """Force against gap by Young–Laplace and by the laws, and their differences, between beads and at a wall."""
     panels = (
-        ("between beads of 0.3 and 0.2 mm", Condition("0.3/0.2 mm", *PAIRS[0], *shipped())),
+        ("beads of 0.3 and 0.2 mm", Condition("0.3/0.2 mm", *PAIRS[0], *shipped())),
         ("bead on wall", Condition(*_flat(WALL), *shipped())),
         ("bead on wall", Condition(*_flat(WALL), *PILES)),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -12,6 +12,9 @@ Run = Annotated[str, typer.Argument(metavar="RUN", help="A run directory, or a c
 Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
 EngineName = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
 AllowFailedAudit = Annotated[bool, typer.Option("--allow-failed-audit", help="Run on an engine that failed its audit.")]
+Formats = Annotated[
+    list[Literal["png", "svg", "pdf"]] | None, typer.Option("--format", help="Format of the figures; may be repeated.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, SI units.")]
 
 
