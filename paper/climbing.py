@@ -28,7 +28,7 @@ STAYS = 5e-5
 """m/s; what is slower stays where it is: no more than a tenth of a radius in a second."""
 _SPEEDS = (-10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0)
 """mm/s, on the scale of colours."""
-_COLUMNS = 6
+_COLUMNS = 5
 """Clusters side by side."""
 
 
@@ -88,7 +88,7 @@ def fig_zoo(sources: Sources) -> Figure:
     """Each cluster as it is after a second, above its speed and what it does."""
     entries = [(*point, sweep == "zoo-corner") for sweep in ("zoo", "zoo-corner") for point in _points(sources, sweep)]
     rows = -(-len(entries) // _COLUMNS)
-    figure, axes = new_figure(TWO_COLUMNS, 1.85 * rows + 0.2, nrows=rows, ncols=_COLUMNS, squeeze=False)
+    figure, axes = new_figure(TWO_COLUMNS, 1.74 * rows, nrows=rows, ncols=_COLUMNS, squeeze=False)
     for one in axes.flat:
         one.set_axis_off()
     for one, (group, row, corner) in zip(axes.flat, entries, strict=False):
@@ -130,4 +130,4 @@ def _draw_cluster(axes: Axes, group: Group, *, corner: bool) -> None:
             axes.add_patch(Circle((-y, x), radius, lw=0.8, **look))
     if corner:
         axes.axvline(0.0, color="0.8", lw=0.8, zorder=0)
-    axes.set(xlim=(-1.5, 1.5), ylim=(-2.1, 1.9), aspect="equal")
+    axes.set(xlim=(-1.5, 1.5), ylim=(-2.15, 2.15), aspect="equal")

@@ -74,9 +74,9 @@ def letter_panels(panels: Iterable[Axes]) -> None:
     """Put (a), (b), … before the titles of panels, which move to the left; after z come aa, ab, …."""
     letters = chain(ascii_lowercase, map("".join, product(ascii_lowercase, repeat=2)))
     for panel, letter in zip(panels, letters, strict=False):
-        title = panel.get_title()
+        title, size = panel.get_title(), panel.title.get_fontsize()
         panel.set_title("")
-        panel.set_title(f"({letter}) {title}".rstrip(), loc="left")
+        panel.set_title(f"({letter}) {title}".rstrip(), loc="left", fontsize=size)
 
 
 def series_look(number: int) -> dict[str, Any]:

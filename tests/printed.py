@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,11 +33,21 @@ class _Recorder(RendererAgg):
 
     def __init__(self, figure: Figure) -> None:
         super().__init__(*figure.bbox.size, figure.dpi)
-        self.texts: dict[int, Text] = {}
+        self.groups: set[str | None] = set()
 
-    def draw_text(self, *given: Any, mtext: Text | None = None, **options: Any) -> None:
-        if mtext is not None and mtext.get_text().strip():
-            self.texts[id(mtext)] = mtext
+    def open_group(self, s: str, gid: str | None = None) -> None:
+        self.groups.add(gid)
+
+
+def _drawn(figure: Figure) -> tuple[_Recorder, list[Text]]:
+    """The texts that are seen, and what has drawn them."""
+    figure.draw_without_rendering()
+    texts = figure.findobj(Text)
+    for number, text in enumerate(texts):
+        text.set_gid(f"text {number}")
+    recorder = _Recorder(figure)
+    figure.draw(recorder)
+    return recorder, [text for text in texts if text.get_gid() in recorder.groups and text.get_text().strip()]
 
 
 @dataclass(frozen=True)
@@ -131,14 +140,12 @@ def _rectangle(what: str, box: Bbox) -> _Box:
 
 def overlaps(figure: Figure) -> list[str]:
     """Texts over texts, ticks, legends and data, legends over data, and what is cut off at the figure's edge."""
-    figure.draw_without_rendering()
-    recorder = _Recorder(figure)
-    figure.draw(recorder)
+    recorder, texts = _drawn(figure)
     shrunk, space = _TOLERANCE * figure.dpi / 72.0, _SPACE * figure.dpi / 72.0
-    boxes = [_box_of(text, recorder, shrunk, space) for text in recorder.texts.values()]
+    boxes = [_box_of(text, recorder, shrunk, space) for text in texts]
     legends = [legend for legend in figure.findobj(Legend) if legend.get_visible()]
     written = {id(text) for legend in legends for text in legend.findobj(Text)}
-    free = [box for key, box in zip(recorder.texts, boxes, strict=True) if key not in written]
+    free = [box for text, box in zip(texts, boxes, strict=True) if id(text) not in written]
     frames = [
         _rectangle(
             "legend " + "; ".join(text.get_text() for text in legend.get_texts()),
@@ -165,9 +172,7 @@ def overlaps(figure: Figure) -> list[str]:
 
 def small_print(figure: Figure) -> list[str]:
     """Texts below `LEAST_SIZE`."""
-    recorder = _Recorder(figure)
-    figure.draw(recorder)
-    sizes = {text.get_text(): float(text.get_fontsize()) for text in recorder.texts.values()}
+    sizes = {text.get_text(): float(text.get_fontsize()) for text in _drawn(figure)[1]}
     return [f"{told!r} has {size:g} pt" for told, size in sizes.items() if size < LEAST_SIZE - 1e-9]
 
 
