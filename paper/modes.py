@@ -100,7 +100,7 @@ def _speeds(axes: Axes, table: pd.DataFrame) -> None:
         table["sin_delta"], table["gamma0"], c=speed, marker="s", s=26, cmap="viridis", vmin=min(low, 0.0), vmax=high
     )
     axes.set_title("velocity in the engine")
-    axes.figure.colorbar(drawn, ax=axes, label="mm/s", extend="both", location="right")
+    axes.figure.colorbar(drawn, ax=axes, label="velocity (mm/s)", extend="both", location="right")
 
 
 def _borders(axes: Axes, top: float) -> None:

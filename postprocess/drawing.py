@@ -183,6 +183,9 @@ def save_figure(
         "svg": {"Title": name, "Source": runs, "Creator": _MAKER, "Date": None},
         "pdf": {"Title": name, "Subject": f"Source: {runs}", "Creator": _MAKER, "CreationDate": None},
     }
+    # Laid out once, for all formats: a layout begins where the last one ended, and would be another each time.
+    styled(figure.draw_without_rendering)()
+    figure.set_layout_engine("none")
     written = []
     for form in dict.fromkeys(formats):
         place = path.with_suffix(f".{form}")

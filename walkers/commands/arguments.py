@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -13,7 +13,7 @@ Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.
 EngineName = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
 AllowFailedAudit = Annotated[bool, typer.Option("--allow-failed-audit", help="Run on an engine that failed its audit.")]
 Formats = Annotated[
-    list[Literal["png", "svg", "pdf"]] | None, typer.Option("--format", help="Format of the figures; may be repeated.")
+    list[str] | None, typer.Option("--format", help="Of the figures: png, svg or pdf; may be repeated.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, SI units.")]
 
