@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin
+from walkers.postprocess.drawing import check_formats
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import record_tables
@@ -112,9 +113,9 @@ class Analysis(ABC):
         del motion
         return lambda _: {}
 
-    def plot(self, directory: Path, destination: Path) -> list[Path]:
-        """Draw its figures of a run into a folder."""
-        del directory, destination
+    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
+        """Draw its figures of a run into a folder, in each of some formats."""
+        del directory, destination, formats
         return []
 
 
@@ -275,7 +276,7 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
     return "\n".join([*told, f"  run        {directory}"])
 
 
-def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
+def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:
     """Draw the figures of a run.
 
     Parameters
@@ -284,14 +285,22 @@ def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
         A run directory.
     destination
         Folder for the pictures; the run directory itself if None.
+    formats
+        Of `walkers.postprocess.drawing.FORMATS`.
 
     Returns
     -------
     list of Path
-        Of walkers ``walk.png`` and, if the run was sampled at least eight times a cycle, ``gait.png``; of piles
-        ``climb.png``.
+        Of walkers ``walk`` and, if the run was sampled at least eight times a cycle, ``gait``; of piles ``climb``; each
+        in all formats.
+
+    Raises
+    ------
+    InputError
+        If there is no such format.
     """
+    check_formats(formats)
     destination = destination or directory
     destination.mkdir(parents=True, exist_ok=True)
     case = case_of(directory)
-    return [path for one in analyses_of(case) for path in one.plot(directory, destination)]
+    return [path for one in analyses_of(case) for path in one.plot(directory, destination, formats)]

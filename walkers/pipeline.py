@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -85,11 +85,11 @@ class Run:
 
         return describe_result(self.directory, self.result, cached=self.cached)
 
-    def plot(self, to: Path | None = None) -> list[Path]:
+    def plot(self, to: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:
         """Draw its figures, see `walkers.postprocess.analysis.plot_run`."""
         from walkers.postprocess.analysis import plot_run
 
-        return plot_run(self.directory, to)
+        return plot_run(self.directory, to, formats)
 
     def vtk(self, to: Path | None = None, **options: Any) -> Path:
         """Write it for ParaView, see `walkers.postprocess.paraview.write_vtk`."""

@@ -15,6 +15,9 @@ Run = Annotated[str, typer.Argument(metavar="RUN", help="A run directory, or a c
 Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
 EngineName = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
 AllowFailedAudit = Annotated[bool, typer.Option("--allow-failed-audit", help="Run on an engine that failed its audit.")]
+Formats = Annotated[
+    list[str] | None, typer.Option("--format", help="Of the figures: png, svg or pdf; may be repeated.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, SI units.")]
 
 Set = Annotated[
