@@ -19,7 +19,8 @@ from walkers.postprocess.analysis import plot_run
 from walkers.postprocess.drawing import legend_below, new_figure, series_look, styled
 from walkers.postprocess.figures import _gait_figure, _walk_figure
 from walkers.postprocess.paraview import write_vtk
-from walkers.postprocess.pictures import _panels, _scale, render_run
+from walkers.postprocess.pictures import render_run
+from walkers.postprocess.series import _panels
 
 
 @pytest.fixture(scope="module")
@@ -238,9 +239,3 @@ def test_no_picture_or_label_of_a_series_is_cut(count: int, wide: float, tall: f
     drawn = [panel.get_window_extent() for panel in panels]
     np.testing.assert_allclose([box.width / box.height for box in drawn], wide / tall)
     assert max(width / 20.0, height / 12.0) > 0.75 or drawn[0].height / figure.dpi >= 4.99
-
-
-def test_a_scale_has_three_marks_or_more() -> None:
-    assert _scale(15.6) == [("0", 0.0), *[(f"{mark} mm", pytest.approx(mark / 15.6)) for mark in (5, 10, 15)]]
-    for tall in (0.4, 1.0, 4.1, 9.9, 38.0):
-        assert 4 <= len(_scale(tall)) <= 10

@@ -15,7 +15,7 @@ from typing import Any, NoReturn, TextIO
 import typer
 
 COMMANDS = (
-    *("show", "deck", "run", "result", "plot", "vtk", "render", "theory"),
+    *("show", "deck", "run", "result", "plot", "render", "film", "vtk", "paraview", "export", "theory"),
     *("sweep", "status", "table", "climb", "figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"),
     *("verify", "archive"),
 )

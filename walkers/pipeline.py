@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from walkers.inputs.case import Case
     from walkers.inputs.origins import Origin
+    from walkers.postprocess.films import FilmOptions
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
 
@@ -102,6 +103,30 @@ class Run:
         from walkers.archive.writing import ArchiveOptions, write_archive
 
         return write_archive(self.directory, to, ArchiveOptions(**options))
+
+    def paraview(self, to: Path | None = None, **options: Any) -> Path:
+        """Write it with a script for ParaView, see `walkers.postprocess.paraview_script.write_paraview`."""
+        from walkers.postprocess.paraview_script import write_paraview
+
+        return write_paraview(self.directory, to, **options)
+
+    def export(self, to: Path, *, every: int = 1) -> Path:
+        """Write its trajectory for other programs, see `walkers.postprocess.trajectory_files.write_trajectory`."""
+        from walkers.postprocess.trajectory_files import write_trajectory
+
+        return write_trajectory(self.directory, to, every=every)
+
+    def film(
+        self,
+        to: Path | None = None,
+        options: FilmOptions | None = None,
+        *,
+        on_progress: Callable[[int, int], None] | None = None,
+    ) -> Path:
+        """Film it, see `walkers.postprocess.films.render_film`."""
+        from walkers.postprocess.films import render_film
+
+        return render_film(self.directory, to, options, on_progress=on_progress)
 
     def render(self, to: Path | None = None, *, images: int = 6) -> list[Path]:
         """Render pictures of it, see `walkers.postprocess.pictures.render_run`."""

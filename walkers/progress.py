@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -29,6 +30,14 @@ def progress_of_sweep(name: str) -> Iterator[Callable[[SweepProgress], None]]:
         yield lambda progress: show(
             progress.points, progress.done + progress.failed, _words_of_sweep(progress), progress.elapsed
         )
+
+
+@contextmanager
+def progress_of_film(name: str) -> Iterator[Callable[[int, int], None]]:
+    """Yield a function that shows how many pictures of a film are made, of how many."""
+    begin = time.monotonic()
+    with _shown(name) as show:
+        yield lambda made, count: show(count, made, f"{made} of {count} pictures", time.monotonic() - begin)
 
 
 @contextmanager
