@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import textwrap
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # how far a sweep is can be told without numpy
     import numpy.typing as npt
 
     from walkers.postprocess.motion import Bridges, Motion
+    from walkers.postprocess.quantities import Quantity
 
 RESULT_NAME = "result.json"
 _WIDTH = 110
@@ -102,6 +103,11 @@ class Analysis(ABC):
     @abstractmethod
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """What it found, as text: mm, mm/s, degrees."""
+
+    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
+        """Its numbers as rows of a table, with errors and units."""
+        del result
+        return ()
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What a reader of the result should know."""
@@ -267,13 +273,21 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
     """
     found = analyses_in(result)
     lines = [line for one in found for line in one.lines(result)] or [f"{result['case']}: {result['drive']}"]
-    warnings = [warning for one in found for warning in one.warnings(result)]
-    if result["truncated"]:
-        warnings.append("the dump ends within a frame")
     if cached:
         lines[0] += " (already run)"
-    told = [*lines, *lines_of_rest(result["rests_on"]), *(f"  warning: {warning}" for warning in warnings)]
-    return "\n".join([*told, f"  run        {directory}"])
+    warnings = [f"  warning: {warning}" for warning in warnings_of(result)]
+    return "\n".join([*lines, *lines_of_rest(result["rests_on"]), *warnings, f"  run        {directory}"])
+
+
+def warnings_of(result: Mapping[str, Any]) -> list[str]:
+    """What a reader of a result should know."""
+    warnings = [warning for one in analyses_in(result) for warning in one.warnings(result)]
+    return [*warnings, "the dump ends within a frame"] if result["truncated"] else warnings
+
+
+def quantities_of(result: Mapping[str, Any]) -> list[Quantity]:
+    """The numbers of a result as rows of a table."""
+    return [row for one in analyses_in(result) for row in one.quantities(result)]
 
 
 def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:

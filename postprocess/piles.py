@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
@@ -29,6 +29,7 @@ from walkers.postprocess.clusters import (
 )
 from walkers.postprocess.events import Event, events_of
 from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
+from walkers.postprocess.quantities import Quantity, of_piles
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -212,6 +213,10 @@ class Pile(Analysis):
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Did it climb, when, how fast, who led."""
         return _lines(result)
+
+    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
+        """The same as rows of a table."""
+        return of_piles(result)
 
     def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
         """Cluster and track of each bead, the liquid in its bridges (m³), and whether it climbs."""

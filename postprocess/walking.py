@@ -21,6 +21,7 @@ from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, averages, gait, settled_samples, walk
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
 from walkers.postprocess.posture import describe_posture, posture_summary, postures, turned_over_at, ways
+from walkers.postprocess.quantities import Quantity, of_walkers
 from walkers.postprocess.tables import WALKERS, described
 
 SEPARATED = 0.1
@@ -157,6 +158,10 @@ class Walking(Analysis):
             radii = "/".join(f"{radius * 1e3:g}" for radius in make["radii"])
             lines.append(f"  of {radii} mm  {_speed(make['velocity']['mean'])} mm/s; {_steady(make)}")
         return lines
+
+    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
+        """The same as rows of a table."""
+        return of_walkers(result)
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What makes the velocity doubtful."""

@@ -1,9 +1,9 @@
 """Wet granular walkers, simulated with LIGGGHTS: the one public name of the project.
 
 `load_case` reads a case, `run` takes it to its result as ``walkers run`` does, `find_run` finds a finished run, `sweep`
-makes all points of a sweep, `load` gives its table. The folders of the project are packages below: `physics` (laws),
-`inputs` (cases), `templates` (decks), `runner` (run directories), `postprocess` (what runs mean), and on them `sweeps`,
-`audit`, `theory`, `paper` and `calibration`.
+makes all points of a sweep, `load` gives its table, `report` writes a file to mail. The folders of the project are
+packages below: `physics` (laws), `inputs` (cases), `templates` (decks), `runner` (run directories), `postprocess` (what
+runs mean), and on them `sweeps`, `audit`, `theory`, `paper` and `calibration`.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from walkers.pipeline import DEFAULT_OUT, Run, find_run, run
+from walkers.reports import report
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from walkers.inputs.case import Case
 
-__all__ = ["Run", "find_run", "load", "load_case", "run", "sweep"]
+__all__ = ["Run", "find_run", "load", "load_case", "report", "run", "sweep"]
 
 
 _PACKAGES = (
@@ -62,6 +63,7 @@ def sweep(
     *,
     jobs: int | None = None,
     changes: Mapping[str, Any] | None = None,
+    progress: bool | None = None,
 ) -> pd.DataFrame:
     """Make the runs of a sweep that are missing, on this machine, and give its table.
 
@@ -75,6 +77,8 @@ def sweep(
         Decks at once; all cores if left out.
     changes
         Values put beside those of its ``[set]``, by dotted keys.
+    progress
+        Show how far it is; if None, in notebooks.
 
     Returns
     -------
@@ -92,11 +96,14 @@ def sweep(
     {'liquid.name': ['Si AK5', 'Si AK10'], 'status': ['finished', 'finished']}
     """
     from walkers.inputs.sweep import load_sweep
+    from walkers.progress import progress_of_sweep, shown_if
     from walkers.sweeps.run import run_sweep
     from walkers.sweeps.scheduler import Options
     from walkers.sweeps.site import cores_here
 
-    record, _ = run_sweep(load_sweep(sweep, changes), Path(out), Options(jobs or cores_here()))
+    read = load_sweep(sweep, changes)
+    with shown_if(progress, progress_of_sweep(read.name)) as advance:
+        record, _ = run_sweep(read, Path(out), Options(jobs or cores_here()), on_progress=advance)
     return load(record.directory)
 
 

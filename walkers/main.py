@@ -16,8 +16,8 @@ import typer
 
 COMMANDS = (
     *("show", "deck", "run", "result", "plot", "render", "film", "vtk", "paraview", "export", "theory"),
-    *("sweep", "status", "table", "climb", "figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"),
-    *("verify", "archive"),
+    *("sweep", "status", "table", "climb", "figures", "model-terms", "calibrate", "report"),
+    *("verify", "archive", "audit", "crosscheck", "validate"),
 )
 """Each the function ``command`` of a module of `walkers.commands`, in the order of ``walkers --help``."""
 

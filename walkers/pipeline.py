@@ -5,13 +5,16 @@ from __future__ import annotations
 import threading
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.notebook import Pictures
 
 if TYPE_CHECKING:
+    import k3d
     import pandas as pd
 
     from walkers.inputs.case import Case
@@ -40,7 +43,7 @@ class Run:
 
     directory: Path
     cached: bool = True
-    origins: tuple[Origin, ...] | None = None
+    origins: tuple[Origin, ...] | None = field(default=None, repr=False)
 
     @property
     def case(self) -> Case:
@@ -86,11 +89,40 @@ class Run:
 
         return describe_result(self.directory, self.result, cached=self.cached)
 
-    def plot(self, to: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:
-        """Draw its figures, see `walkers.postprocess.analysis.plot_run`."""
+    def _repr_html_(self) -> str:
+        """The result in a notebook: a table with errors and units, warnings, the parameters folded in."""
+        from walkers.postprocess.report.run import result_html
+
+        return result_html(self.directory, self.result, self.origins)
+
+    def plot(self, to: Path | None = None, formats: Sequence[str] = ("png",)) -> Pictures:
+        """Draw its figures, see `walkers.postprocess.analysis.plot_run`: a list of paths, which a notebook shows."""
         from walkers.postprocess.analysis import plot_run
 
-        return plot_run(self.directory, to, formats)
+        return Pictures(plot_run(self.directory, to, formats))
+
+    def view(self, *, height: int = 480) -> k3d.Plot:
+        """Its beads in three dimensions, for a notebook; see `walkers.postprocess.report.scene.scene_of`.
+
+        Parameters
+        ----------
+        height
+            Pixels.
+
+        Examples
+        --------
+        >>> len(walkers.run("fig1b", tmp).view().objects)  # twelve beads, the floor, the lines on it
+        14
+        """
+        from walkers.postprocess.report.scene import scene_of
+
+        return scene_of(self.directory, height=height).plot
+
+    def report(self, to: Path | None = None) -> Path:
+        """Write one HTML file to mail, see `walkers.postprocess.report.run.report_run`."""
+        from walkers.postprocess.report.run import report_run
+
+        return report_run(self.directory, to, self.origins)
 
     def vtk(self, to: Path | None = None, **options: Any) -> Path:
         """Write it for ParaView, see `walkers.postprocess.paraview.write_vtk`."""
@@ -128,11 +160,11 @@ class Run:
 
         return render_film(self.directory, to, options, on_progress=on_progress)
 
-    def render(self, to: Path | None = None, *, images: int = 6) -> list[Path]:
-        """Render pictures of it, see `walkers.postprocess.pictures.render_run`."""
+    def render(self, to: Path | None = None, *, images: int = 6) -> Pictures:
+        """Render pictures of it, see `walkers.postprocess.pictures.render_run`: paths, which a notebook shows."""
         from walkers.postprocess.pictures import render_run
 
-        return render_run(self.directory, to, images=images)
+        return Pictures(render_run(self.directory, to, images=images))
 
 
 def run(
@@ -141,7 +173,7 @@ def run(
     *,
     engine: str | None = None,
     force: bool = False,
-    on_progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[Progress], None] | bool | None = None,
     time_limit: float | None = None,
     allow_failed_audit: bool = False,
 ) -> Run:
@@ -157,8 +189,8 @@ def run(
         Name or path of the binary; see `walkers.runner.find_engine`.
     force
         Run again; the old run is replaced only by a finished one.
-    on_progress
-        Called a few times a second while the engine runs.
+    progress
+        Whether to show how far the run is; if None, in notebooks. Or what is called a few times a second meanwhile.
     time_limit
         Wall time in s that the engine may take, for each segment of the run.
     allow_failed_audit
@@ -182,6 +214,7 @@ def run(
     """
     from walkers.inputs.reading import load_case
     from walkers.postprocess.analysis import current_result
+    from walkers.progress import progress_of, shown_if
     from walkers.runner.binary import find_engine
     from walkers.runner.directory import run_place, unfinished
     from walkers.runner.ensemble import finished_place
@@ -198,7 +231,9 @@ def run(
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
     threading.Thread(target=_load_postprocess, daemon=True).start()
-    made = make_runs([case], out, binary, force=force, on_progress=on_progress, time_limit=time_limit)
+    watch = nullcontext(progress) if callable(progress) else shown_if(progress, progress_of(case.name))
+    with watch as advance:
+        made = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
     if made.busy:
         raise RunBusy(unfinished(place))
     return Run(made.runs[place.name].directory, cached=place.name in made.found, origins=case.origins)

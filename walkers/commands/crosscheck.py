@@ -75,7 +75,7 @@ def command(
 
     def make(one: Resolved, folder: Path) -> Run:
         with progress_of(one.name) as advance:
-            return run(one, folder, engine=engine, on_progress=advance, allow_failed_audit=allow_failed_audit)
+            return run(one, folder, engine=engine, progress=advance, allow_failed_audit=allow_failed_audit)
 
     found: Comparison | PileComparison | YadeComparison
     if program:

@@ -57,7 +57,7 @@ def command(
                     out,
                     engine=engine,
                     force=force,
-                    on_progress=advance,
+                    progress=advance,
                     time_limit=limit,
                     allow_failed_audit=allow_failed_audit,
                 )
