@@ -84,7 +84,7 @@ def save_figure(
     sources
         Names of the run directories that it shows, written into the file: they end in the hash of case and engine.
     formats
-        ``png``, ``svg``.
+        ``png``, ``svg``, ``pdf``.
     title
         Written into the file.
 
@@ -97,6 +97,7 @@ def save_figure(
     extra: dict[str, dict[str, str | None]] = {
         "png": {"Software": "granular-walkers"},
         "svg": {"Creator": "granular-walkers", "Date": None},
+        "pdf": {"Creator": "granular-walkers", "CreationDate": None, "Source": None},  # it knows no source
     }
     written = []
     for form in formats:

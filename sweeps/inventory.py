@@ -153,9 +153,7 @@ def _run(path: Path, out: Path, *, whole: bool = True) -> Entry | None:
     if finished:
         modified = (path / MANIFEST_NAME).stat().st_mtime
         return Entry(name, case_name, "finished", path, place, modified, size, parameters, **_outcome(path))
-    status, failure = "running" if is_locked(place) else "interrupted", {}
-    if status == "interrupted":
-        status, failure = _failure(path)
+    status, failure = ("running", {}) if is_locked(place) else _failure(path)
     return Entry(name, case_name, status, path, place, newest, size, parameters, **failure)
 
 
@@ -289,14 +287,14 @@ def seconds_of(age: str) -> float:
     try:
         return parse_quantity(age, AGE)
     except ValueError as error:
-        raise InputError("--older-than", [Problem("", f'"{age}"', str(error))]) from error
+        raise InputError("--older-than", [Problem("", None, f'"{age}": {error}')]) from error
 
 
 def _condition(text: str, entries: Sequence[Entry]) -> tuple[str, str]:
     key, equals, value = (part.strip() for part in text.partition("="))
     if not (key and equals and value):
         told = 'expected KEY=VALUE, such as "drive.frequency=80 Hz"'
-        raise InputError("--where", [Problem("", f'"{text}"', told)])
+        raise InputError("--where", [Problem("", None, f'"{text}": {told}')])
     runs = [entry for entry in entries if not entry.is_sweep]
     if runs and not any(has_key(run.parameters, key) for run in runs):
         known = ", ".join(dict.fromkeys(one for run in runs for one in run.parameters))

@@ -16,7 +16,21 @@ import typer
 
 COMMANDS = (
     *("show", "deck", "run", "result", "plot", "vtk", "render", "theory"),
-    *("sweep", "status", "table", "climb", "figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"),
+    *(
+        "sweep",
+        "status",
+        "table",
+        "climb",
+        "compare",
+        "list",
+        "clean",
+        "figures",
+        "model-terms",
+        "calibrate",
+        "audit",
+        "crosscheck",
+        "validate",
+    ),
 )
 """Each the function ``command`` of a module of `walkers.commands`, in the order of ``walkers --help``."""
 

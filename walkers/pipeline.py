@@ -179,7 +179,8 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
     Parameters
     ----------
     run
-        A run directory; or a case (file or shipped name), whose run with the installed engine is looked up in ``out``.
+        A run directory, or its name in ``out``, alone or in an ensemble; or a case (file or shipped name), whose run
+        with the installed engine is looked up there.
     out
         Folder of the run directories.
 
@@ -191,6 +192,7 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
         If a case is given and there is no engine to look it up for.
     """
     from walkers.runner.directory import finished_run
+    from walkers.runner.ensemble import finished_place
 
     path = Path(run)
     if path.is_dir():
@@ -198,10 +200,22 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
             told = "not a finished run: expected a folder with a manifest.json"
             raise InputError(str(run), [Problem("", None, told)])
         return _readable(path)
+    if path.name == str(run) and (named := finished_place(out, path.name)) is not None:
+        return _readable(named)
     there = _place_of(path, out)
     if there is None or finished_run(there) is None:
         raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
     return _readable(there)
+
+
+def find_sweep(sweep: str | Path, out: Path = DEFAULT_OUT) -> Path | None:
+    """The directory of a sweep, given itself or its name in the folder ``out``; None if there is none."""
+    from walkers.sweeps.record import RECORD_NAME
+
+    for path in (Path(sweep), out / sweep):
+        if (path / RECORD_NAME).is_file():
+            return path
+    return None
 
 
 def _place_of(case: Path, out: Path) -> Path | None:

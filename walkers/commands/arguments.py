@@ -9,9 +9,16 @@ import typer
 
 Case = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the name of a shipped case such as fig1b.")]
 Run = Annotated[str, typer.Argument(metavar="RUN", help="A run directory, or a case whose run is looked up in --out.")]
+RunOrSweep = Annotated[
+    str, typer.Argument(metavar="RUN|SWEEP", help="A run or a sweep: its directory, its name in --out, or a case.")
+]
 Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
 EngineName = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
 AllowFailedAudit = Annotated[bool, typer.Option("--allow-failed-audit", help="Run on an engine that failed its audit.")]
+CaseName = Annotated[str | None, typer.Option("--case", metavar="NAME", help="Only what is of the case of this name.")]
+OlderThan = Annotated[
+    str | None, typer.Option("--older-than", metavar="AGE", help="Only what is older than this, such as 7d or 12h.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, SI units.")]
 
 
