@@ -18,6 +18,7 @@ from walkers.inputs.library import suggestion
 from walkers.sweeps.record import SweepRecord
 
 SEEDS = ("run.seed", "seed")
+_SYMBOLS = {"gamma0": "Γ0", "sin_delta": "sin δ", "mass_asymmetry": "μ"}
 _LEAST_ASYMMETRIES = 3
 """Different radii are shown by sin δ from so many on."""
 
@@ -126,8 +127,9 @@ def _category(columns: dict[str, list[Any]], record: SweepRecord) -> Factor:
         others = [one for one in shown if one != key]
         if others and _count([columns[one] for one in others]) == whole:
             shown = others
-    texts = [" ".join(_text(part) for part in row) for row in zip(*(columns[key] for key in shown), strict=True)]
-    label = ", ".join(with_unit(readable_key(key), record.units[key] or "") for key in shown)
+    told = [[f"{_text(value)} {record.units[key] or ''}".strip() for value in columns[key]] for key in shown]
+    texts = [", ".join(row) for row in zip(*told, strict=True)]
+    label = ", ".join(readable_key(key) for key in shown)
     rest = tuple(key for key in columns if key not in shown)
     return Factor((*shown, *rest), label + _with(rest), texts, False)
 
@@ -145,8 +147,10 @@ def _with(keys: Sequence[str]) -> str:
 
 
 def readable_key(key: str) -> str:
-    """A dotted key as words: ``peak acceleration``, ``friction bead wall``, ``liquid``."""
+    """A dotted key or a column as words: ``peak acceleration``, ``friction bead wall``, ``liquid``, ``Γ0``."""
     table, _, name = key.partition(".")
+    if (name or table) in _SYMBOLS:
+        return _SYMBOLS[name or table]
     words = table.partition("[")[0] if name in ("name", "material") else (name or table)
     return words.replace(".", " ").replace("_", " ")
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.readable import readable_unit
 from walkers.postprocess.drawing import new_figure, plain_text, styled
-from walkers.sweeps.factors import SEEDS, Factor, by_asymmetry, factors_of, find_name, with_unit
+from walkers.sweeps.factors import SEEDS, Factor, by_asymmetry, factors_of, find_name, readable_key, with_unit
 from walkers.sweeps.record import SweepRecord
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def drawn_column(table: pd.DataFrame, name: str, theory: Mapping[str, FloatArray
     if name in _ERRORS:
         errors = table[_ERRORS[name]].to_numpy(dtype=float, na_value=np.nan) / size
     predicted = {model: numbers / size for model, numbers in (theory or {}).items()}
-    return Drawn(with_unit(name.replace("_", " "), unit), values, errors, predicted)
+    return Drawn(with_unit(readable_key(name), unit), values, errors, predicted)
 
 
 def _numbers(table: pd.DataFrame, name: str, option: str) -> FloatArray:
@@ -201,7 +201,7 @@ def _along(factors: Sequence[Factor], record: SweepRecord, points: npt.NDArray[A
 
 def _of_column(table: pd.DataFrame, name: str, option: str) -> Factor:
     unit, size = readable_unit(table.attrs["units"].get(name, ""))
-    label = with_unit(name.replace("_", " "), unit)
+    label = with_unit(readable_key(name), unit)
     if table[name].map(lambda value: isinstance(value, str)).all() and len(table):
         return Factor((name,), label, list(table[name]), False)
     values = [float(value) for value in _numbers(table, name, option) / size]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from walkers.inputs.case import Case
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
+    from walkers.sweeps.comparison import Side
 
 DEFAULT_OUT = Path("runs")
 
@@ -206,6 +208,42 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
     if there is None or finished_run(there) is None:
         raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
     return _readable(there)
+
+
+def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:
+    """A run, or a case with its run if it has one, for `walkers.sweeps.comparison.compare_runs`.
+
+    Parameters
+    ----------
+    run
+        A run directory, also of a run that is not finished; its name in ``out``; or a case (file or shipped name).
+    out
+        Folder of the run directories.
+
+    Raises
+    ------
+    InputError
+        If it is none of them.
+    """
+    from walkers.inputs.reading import load_case
+    from walkers.runner.directory import CASE_NAME, case_of, finished_run
+    from walkers.runner.ensemble import finished_place
+    from walkers.runner.failures import EngineMissing
+    from walkers.sweeps.comparison import Side
+
+    path = Path(run)
+    directory = (
+        path if (path / CASE_NAME).is_file() else finished_place(out, path.name) if path.name == str(run) else None
+    )
+    if directory is not None:
+        try:
+            return Side(directory.name, case_of(directory), directory if finished_run(directory) else None)
+        except (OSError, ValueError) as error:
+            raise InputError(str(run), [Problem("", None, f"its case cannot be read ({error})")]) from error
+    case, there = load_case(run), None
+    with suppress(EngineMissing):
+        there = _place_of(path, out)
+    return Side(str(run), case, there)
 
 
 def find_sweep(sweep: str | Path, out: Path = DEFAULT_OUT) -> Path | None:

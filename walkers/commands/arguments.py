@@ -12,6 +12,9 @@ Run = Annotated[str, typer.Argument(metavar="RUN", help="A run directory, or a c
 RunOrSweep = Annotated[
     str, typer.Argument(metavar="RUN|SWEEP", help="A run or a sweep: its directory, its name in --out, or a case.")
 ]
+Runs = Annotated[
+    list[str] | None, typer.Argument(metavar="[RUN|SWEEP]...", help="Runs and sweeps: names in --out, or directories.")
+]
 Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
 EngineName = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
 AllowFailedAudit = Annotated[bool, typer.Option("--allow-failed-audit", help="Run on an engine that failed its audit.")]
