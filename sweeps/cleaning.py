@@ -18,7 +18,7 @@ from walkers.runner.ensemble import FOLDER
 from walkers.runner.locks import is_locked, locked
 from walkers.sweeps.inventory import Entry, inventory, select
 from walkers.sweeps.listing import age_text, aligned, bytes_text
-from walkers.sweeps.record import RECORD_NAME
+from walkers.sweeps.record import RECORD_NAME, read_record
 
 _LOCK = re.compile(r".+-[0-9a-f]{12}\.lock")
 LEFTOVERS = ("interrupted", "failed")
@@ -125,9 +125,12 @@ def plan_cleaning(
     Raises
     ------
     InputError
-        If there is no such run or sweep, or no such age.
+        If there is no such run or sweep, or no such age; or if finished runs are to go and a sweep cannot be read.
     """
     entries = inventory(out)
+    if finished or given:
+        for sweep_file in out.glob(f"*/{RECORD_NAME}"):
+            read_record(sweep_file.parent)  # of one that cannot be read nobody knows which runs it has
     sweeps_of: dict[str, list[str]] = {}
     for sweep in entries:
         for run in sweep.runs if sweep.is_sweep else ():

@@ -85,7 +85,8 @@ def short_names(keys: Sequence[str]) -> list[str]:
     names = []
     for key in keys:
         parts = key.split(".")
-        endings = [".".join(parts[start:]) for start in reversed(range(len(parts)))]
+        last = 2 if parts[-1] == "name" else 1
+        endings = [".".join(parts[start:]) for start in reversed(range(len(parts) + 1 - last))]
         others = [other for other in keys if other != key]
         names.append(next(end for end in endings if not any(f".{other}".endswith(f".{end}") for other in others)))
     return names

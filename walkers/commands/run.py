@@ -8,10 +8,9 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import AllowFailedAudit, EngineName, Json, Out, check_out
+from walkers.commands.arguments import AllowFailedAudit, Cases, EngineName, Json, Out, check_out
 from walkers.pipeline import DEFAULT_OUT
 
-Cases = Annotated[list[str], typer.Argument(metavar="CASE...", help="Case files, or names of shipped cases.")]
 Force = Annotated[bool, typer.Option("--force", help="Run again even if the run is there.")]
 Limit = Annotated[
     float | None, typer.Option("--limit", min=0.0, help="Stop a run (of a pile: a segment) after this many seconds.")
