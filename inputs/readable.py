@@ -54,7 +54,8 @@ _FOLLOWS: Mapping[str, tuple[str, ...] | None] = {
     "beads.density": ("beads.material",),
 }
 """Values that may follow from others: from those of these keys, or (None) from any."""
-_NOT_COMPARED = ("name", "title")
+_NOT_COMPARED = ("name", "title", "document", "recorded")
+"""What does not determine a run."""
 
 
 def flattened(case: Mapping[str, Any]) -> dict[str, Any]:

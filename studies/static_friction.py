@@ -84,12 +84,12 @@ def shipped() -> dict[str, float]:
     assert prism is not None and slide is not None and beads is not None, "the library has ruby's surface pairs"
     same = ("rolling_friction", "viscosity_ratio", "minimum_separation_ratio", "volume_fraction")
     return {
-        "friction_wall": prism["friction"],
-        "friction_slide": slide["friction"],
-        "friction_bead": beads["friction"],
-        **{name: prism[name] for name in same},
-        "film_drag": prism["film_drag_ratio"],
-        "contact_angle": degrees(prism["contact_angle"]),
+        "friction_wall": prism["friction"].value,
+        "friction_slide": slide["friction"].value,
+        "friction_bead": beads["friction"].value,
+        **{name: prism[name].value for name in same},
+        "film_drag": prism["film_drag_ratio"].value,
+        "contact_angle": degrees(prism["contact_angle"].value),
         "restitution": contact.restitution,
     }
 

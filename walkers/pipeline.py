@@ -6,7 +6,7 @@ import threading
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from walkers.inputs.case import Case
+    from walkers.inputs.origins import Origin
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
     from walkers.sweeps.comparison import Side
@@ -33,10 +34,14 @@ class Run:
         The run directory.
     cached
         Whether it was there before.
+    origins
+        Where the values of the case come from by which it was asked for; None: of that by which it was made. The same
+        numbers may once have been given and once be the library's.
     """
 
     directory: Path
     cached: bool = True
+    origins: tuple[Origin, ...] | None = None
 
     @property
     def case(self) -> Case:
@@ -48,9 +53,10 @@ class Run:
     @property
     def result(self) -> dict[str, Any]:
         """The result, SI units."""
-        from walkers.postprocess.analysis import current_result
+        from walkers.postprocess.analysis import current_result, rests_on
 
-        return current_result(self.directory)
+        result = current_result(self.directory)
+        return result if self.origins is None else {**result, "rests_on": rests_on(self.origins)}
 
     @property
     def motion(self) -> Motion:
@@ -159,14 +165,14 @@ def run(
     there = finished_place(out, place.name)
     if there is not None and not force:
         current_result(there)
-        return Run(there)
+        return Run(there, origins=case.origins)
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
     threading.Thread(target=_load_postprocess, daemon=True).start()
     made = make_runs([case], out, binary, force=force, on_progress=on_progress, time_limit=time_limit)
     if made.busy:
         raise RunBusy(unfinished(place))
-    return Run(made.runs[place.name].directory, cached=place.name in made.found)
+    return Run(made.runs[place.name].directory, cached=place.name in made.found, origins=case.origins)
 
 
 def _load_postprocess() -> None:
@@ -175,14 +181,14 @@ def _load_postprocess() -> None:
     import walkers.postprocess.walking  # noqa: F401
 
 
-def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
+def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     """Find a finished run.
 
     Parameters
     ----------
     run
-        A run directory, or its name in ``out``, alone or in an ensemble; or a case (file or shipped name), whose run
-        with the installed engine is looked up there.
+        A run directory, or its name in ``out``, alone or in an ensemble; or a case (resolved, file or shipped name),
+        whose run with the installed engine is looked up there.
     out
         Folder of the run directories.
 
@@ -193,21 +199,22 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
     runner.EngineFailure
         If a case is given and there is no engine to look it up for.
     """
+    from walkers.inputs.reading import load_case
     from walkers.runner.directory import finished_run
-    from walkers.runner.ensemble import finished_place
 
-    path = Path(run)
-    if path.is_dir():
-        if finished_run(path) is None:
+    if isinstance(run, (str, Path)) and Path(run).is_dir():
+        if finished_run(Path(run)) is None:
             told = "not a finished run: expected a folder with a manifest.json"
             raise InputError(str(run), [Problem("", None, told)])
-        return _readable(path)
-    if path.name == str(run) and (named := finished_place(out, path.name)) is not None:
+        return _readable(Path(run))
+    if isinstance(run, (str, Path)) and (named := _named(run, out)) is not None:
         return _readable(named)
-    there = _place_of(path, out)
+    case = load_case(run) if isinstance(run, (str, Path)) else run
+    name = run if isinstance(run, (str, Path)) else case.name
+    there = _place_of(case, out)
     if there is None or finished_run(there) is None:
-        raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
-    return _readable(there)
+        raise InputError(str(name), [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
+    return replace(_readable(there), origins=case.origins)
 
 
 def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:
@@ -227,14 +234,10 @@ def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:
     """
     from walkers.inputs.reading import load_case
     from walkers.runner.directory import CASE_NAME, case_of, finished_run
-    from walkers.runner.ensemble import finished_place
     from walkers.runner.failures import EngineMissing
     from walkers.sweeps.comparison import Side
 
-    path = Path(run)
-    directory = (
-        path if (path / CASE_NAME).is_file() else finished_place(out, path.name) if path.name == str(run) else None
-    )
+    directory = Path(run) if (Path(run) / CASE_NAME).is_file() else _named(run, out)
     if directory is not None:
         try:
             return Side(directory.name, case_of(directory), directory if finished_run(directory) else None)
@@ -242,7 +245,7 @@ def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:
             raise InputError(str(run), [Problem("", None, f"its case cannot be read ({error})")]) from error
     case, there = load_case(run), None
     with suppress(EngineMissing):
-        there = _place_of(path, out)
+        there = _place_of(case, out)
     return Side(str(run), case, there)
 
 
@@ -256,13 +259,19 @@ def find_sweep(sweep: str | Path, out: Path = DEFAULT_OUT) -> Path | None:
     return None
 
 
-def _place_of(case: Path, out: Path) -> Path | None:
-    from walkers.inputs.reading import load_case
+def _named(run: str | Path, out: Path) -> Path | None:
+    """The directory of the finished run of this name in a folder, alone or in an ensemble."""
+    from walkers.runner.ensemble import finished_place
+
+    return finished_place(out, str(run)) if Path(run).name == str(run) else None
+
+
+def _place_of(case: Case, out: Path) -> Path | None:
     from walkers.runner.binary import find_engine
     from walkers.runner.directory import run_place
     from walkers.runner.ensemble import finished_place
 
-    return finished_place(out, run_place(load_case(case), find_engine(), out).name)
+    return finished_place(out, run_place(case, find_engine(), out).name)
 
 
 def _readable(directory: Path) -> Run:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from walkers import completion
+
+if TYPE_CHECKING:
+    from walkers.inputs.case import Case as ResolvedCase
 
 Case = Annotated[
     str,
@@ -69,6 +72,21 @@ OlderThan = Annotated[
     str | None, typer.Option("--older-than", metavar="AGE", help="Only what is older than this, such as 7d or 12h.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, SI units.")]
+
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Another value than the file's, such as drive.frequency=70Hz; repeatable."
+    ),
+]
+
+
+def load(case: str, settings: list[str] | None) -> ResolvedCase:
+    """A case with values put beside its file."""
+    from walkers.inputs.changes import settings_of
+    from walkers.inputs.reading import load_case
+
+    return load_case(case, settings_of(settings or ()))
 
 
 def refuse(option: str, wrong: bool, told: str) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import AllowFailedAudit, EngineName, Out, SweepFile, check_out, refuse
+from walkers.commands.arguments import AllowFailedAudit, EngineName, Out, Set, SweepFile, check_out, refuse
 from walkers.pipeline import DEFAULT_OUT
 
 Jobs = Annotated[int | None, typer.Option("-j", "--jobs", min=1, help="Decks at once; all cores if left out.")]
@@ -21,6 +21,7 @@ Limit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Stop an e
 
 def command(
     sweep: SweepFile,
+    settings: Set = None,
     out: Out = DEFAULT_OUT,
     jobs: Jobs = None,
     site: SitePath = None,
@@ -31,6 +32,7 @@ def command(
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Run the points of a sweep that are missing, on all cores or on a cluster; exit status 1 if any failed."""
+    from walkers.inputs.changes import settings_of
     from walkers.inputs.sweep import load_sweep
     from walkers.progress import progress_of_sweep
     from walkers.sweeps.run import plan_sweep, run_sweep
@@ -38,7 +40,7 @@ def command(
     from walkers.sweeps.site import cores_here, load_site
     from walkers.sweeps.summary import describe_status
 
-    loaded = load_sweep(sweep)
+    loaded = load_sweep(sweep, settings_of(settings or ()))
     check_out(out)
     refuse("--jobs", jobs is not None and site is not None, "a site says by itself how many decks run at once")
     if len(loaded.rows) > _MANY:
