@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isnan, nan
+from math import isnan
 from typing import Any
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
+from walkers.sweeps.columns import derived_columns
 from walkers.sweeps.record import SweepRecord
 
 SEEDS = ("run.seed", "seed")
@@ -53,6 +54,12 @@ class Factor:
         """The different values: numbers in ascending order, texts in that of the sweep."""
         different = dict.fromkeys(self.values)
         return sorted(different) if self.is_number else list(different)
+
+    @property
+    def name(self) -> str:
+        """The label without the unit and without what else varies with it."""
+        first = self.label.partition("\n")[0]
+        return first.removesuffix(f" ({self.unit})") if self.unit else first
 
     def told(self, level: Any) -> str:
         """A level as text, with its unit."""
@@ -119,7 +126,8 @@ def _number(key: str, values: Sequence[float], record: SweepRecord, *, sample: b
 
 def _category(columns: dict[str, list[Any]], record: SweepRecord) -> Factor:
     """A factor of texts: of as few of the keys as tell its levels apart."""
-    whole, shown = _count(columns.values()), []
+    whole = _count(columns.values())
+    shown: list[str] = []
     for key in columns:
         if _count([columns[one] for one in shown]) < whole if shown else True:
             shown.append(key)
@@ -160,21 +168,20 @@ def with_unit(words: str, unit: str) -> str:
     return f"{words} ({unit})" if unit else words
 
 
-def by_asymmetry(factor: Factor, record: SweepRecord) -> Factor | None:
-    """A factor that is one of several pairs of radii as numbers, by sin δ; None if it is none."""
-    from walkers.sweeps.columns import derived_columns
-
+def by_asymmetry(factor: Factor, record: SweepRecord, points: Sequence[int]) -> Factor | None:
+    """A factor of these points that is one of several pairs of radii as numbers, by sin δ; None if it is none."""
     names = list(derived_columns(record.analyses))
     if factor.is_number or not any(key.endswith("radii") for key in factor.keys) or "sin_delta" not in names:
         return None
-    sines = [
-        float(nan if row[names.index("sin_delta")] is None else row[names.index("sin_delta")]) for row in record.derived
-    ]
+    place = names.index("sin_delta")
+    sines = [record.derived[point][place] for point in points]
+    if any(sine is None or isnan(sine) for sine in sines):  # of clusters
+        return None
     levels = {(text, round(sine, 12)) for text, sine in zip(factor.values, sines, strict=True)}
     one_each = len(levels) == len({sine for _, sine in levels}) == len(factor.levels)
-    if not one_each or len(levels) < _LEAST_ASYMMETRIES or any(map(isnan, sines)):
+    if not one_each or len(levels) < _LEAST_ASYMMETRIES:
         return None
-    return Factor(factor.keys, "asymmetry sin δ", sines, True)
+    return Factor(factor.keys, "asymmetry sin δ", [float(sine) for sine in sines], True)
 
 
 def find_name(option: str, wanted: str, names: Iterable[str]) -> str:

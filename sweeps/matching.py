@@ -99,7 +99,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Swee
         If they vary other keys, have no finished point in common, or not that column.
     """
     from walkers.sweeps.factors import find_name
-    from walkers.sweeps.figure import default_column
+    from walkers.sweeps.figure_layout import default_column
 
     records, source = (read_record(first), read_record(second)), f"{first}, {second}"
     if dict(records[0].units) != dict(records[1].units):
@@ -135,7 +135,7 @@ def _finished(
 ) -> dict[str, tuple[tuple[Any, ...], Mapping[str, Any]]]:
     """The finished points of a sweep by the text of their values: the values, in the order of the keys, and the row."""
     order = [list(record.units).index(key) for key in keys]
-    found = {}
+    found: dict[str, tuple[tuple[Any, ...], Mapping[str, Any]]] = {}
     for row in table[table["status"] == "finished"].to_dict("records"):
         values = tuple(record.values[row["point"]][place] for place in order)
         found[repr(values)] = (values, {str(name): value for name, value in row.items()})

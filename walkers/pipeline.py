@@ -205,6 +205,8 @@ def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     if isinstance(run, (str, Path)) and Path(run).is_dir():
         if finished_run(Path(run)) is None:
             told = "not a finished run: expected a folder with a manifest.json"
+            if find_sweep(run) is not None:
+                told = "a sweep's directory: walkers plot, table and status take it, this takes one of its runs"
             raise InputError(str(run), [Problem("", None, told)])
         return _readable(Path(run))
     if isinstance(run, (str, Path)) and (named := _named(run, out)) is not None:

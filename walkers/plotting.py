@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,7 +97,8 @@ def sweep_figure(
     InputError
         If it is no sweep's directory, no point is finished, or there is no such column.
     """
-    from walkers.sweeps.figure import draw, drawn_column, layout_of
+    from walkers.sweeps.figure import draw
+    from walkers.sweeps.figure_layout import drawn_column, layout_of
     from walkers.sweeps.record import read_record
     from walkers.sweeps.table import load
 
@@ -104,7 +107,7 @@ def sweep_figure(
     done = _finished(str(directory), table, column)
     layout = layout_of(record, done, x=x, hue=hue, panels=panels)
     if layout.untold:
-        _tell(f"not told apart: {'; '.join(label.partition(chr(10))[0] for label in layout.untold)}")
+        _tell(f"not told apart: {'; '.join(layout.untold)}")
     predicted = _predicted(done, column) if theory else {}
     title = record.title or record.name
     return draw(layout, drawn_column(done, column, predicted), title=title, log=log)
@@ -112,7 +115,7 @@ def sweep_figure(
 
 def _column(table: pd.DataFrame, wanted: str | None) -> str:
     from walkers.sweeps.factors import find_name
-    from walkers.sweeps.figure import default_column
+    from walkers.sweeps.figure_layout import default_column
 
     return find_name("--y", wanted, table.columns) if wanted else default_column(table)
 
@@ -120,7 +123,7 @@ def _column(table: pd.DataFrame, wanted: str | None) -> str:
 def _finished(source: str, table: pd.DataFrame, column: str) -> pd.DataFrame:
     """The rows that have a result, and a word on the others."""
     done = table[table["status"] == "finished"]
-    counts = {status: int(number) for status, number in table["status"].value_counts().items() if status != "finished"}
+    counts = Counter(status for status in table["status"] if status != "finished")
     if done.empty:
         raise InputError(source, [Problem("", None, f"no point is finished ({_listed(counts) or 'there is none'})")])
     if counts:
@@ -130,7 +133,7 @@ def _finished(source: str, table: pd.DataFrame, column: str) -> pd.DataFrame:
     return done
 
 
-def _listed(counts: dict[str, int]) -> str:
+def _listed(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{number} {status}" for status, number in counts.items())
 
 
