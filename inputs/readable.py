@@ -140,18 +140,21 @@ def differing(cases: Sequence[Mapping[str, Any]]) -> list[str]:
     keys = dict.fromkeys(key for case in cases for key in case)
     values = {key: [_comparable(case.get(key)) for case in cases] for key in keys}
     varied = [key for key, column in values.items() if len(set(column)) > 1]
-    plain = [key for key in varied if key not in _FOLLOWS and not key.endswith(".spacing")]
+    found = [key for key in varied if key not in _FOLLOWS and not key.endswith(".spacing")]
 
-    def follows(key: str) -> bool:
-        named = _FOLLOWS.get(key)
-        parents = plain if named is None else [one for one in named if one in varied]
+    def follows(key: str, parents: Sequence[str]) -> bool:
         of_parents: dict[tuple[Hashable, ...], Hashable] = {}
         for number, value in enumerate(values[key]):
-            if of_parents.setdefault(tuple(values[parent][number] for parent in parents), value) != value:
+            if of_parents.setdefault(tuple(values[one][number] for one in parents if one in values), value) != value:
                 return False
         return True
 
-    return [key for key in varied if key in plain or not follows(key)]
+    # Those of known parents first: one that does not follow from them may be what others follow from.
+    for key in sorted((key for key in varied if key not in found), key=lambda key: _FOLLOWS.get(key) is None):
+        named = _FOLLOWS.get(key)
+        if not follows(key, found if named is None else named):
+            found.append(key)
+    return sorted(found, key=varied.index)
 
 
 def _comparable(value: Any) -> Hashable:

@@ -197,9 +197,12 @@ def _joined(factors: Sequence[Factor]) -> Factor:
     """Several factors as one."""
     if len(factors) == 1:
         return factors[0]
-    texts = [
-        ", ".join(factor.told(level) for factor, level in zip(factors, row, strict=True))
-        for row in zip(*(factor.values for factor in factors), strict=True)
-    ]
+
+    def told(factor: Factor, level: Any) -> str:
+        bare = factor.is_number and not factor.unit
+        return f"{factor.name} = {factor.told(level)}" if bare else factor.told(level)
+
+    rows = zip(*(factor.values for factor in factors), strict=True)
+    texts = [", ".join(told(factor, level) for factor, level in zip(factors, row, strict=True)) for row in rows]
     keys = tuple(key for factor in factors for key in factor.keys)
     return Factor(keys, ", ".join(factor.name for factor in factors), texts, False)
