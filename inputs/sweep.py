@@ -38,6 +38,7 @@ from walkers.inputs.axes import (
 from walkers.inputs.case import Case
 from walkers.inputs.changes import changed, check_key
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.kinds import check_kind
 from walkers.inputs.messages import quoted, validated
 from walkers.inputs.reading import find_input, read_toml, resolve_case, shipped_cases
 from walkers.inputs.schema import Whole
@@ -175,6 +176,7 @@ def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) ->
     InputError
         If there is no such file or anything in it cannot be used. Its points are checked by `Sweep.cases`.
     """
+    check_kind(sweep, "sweep")
     path = find_input(sweep, shipped_sweeps(), "sweep")
     document, name = read_toml(path), path.stem
     if changes:

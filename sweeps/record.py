@@ -6,7 +6,7 @@ being made is read from them and from nowhere else.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
@@ -186,9 +186,23 @@ class PointState:
     lost: int = 0
 
 
-def states(record: SweepRecord) -> list[PointState]:
-    """What has become of each point, as the run directories say."""
-    finished = finished_places(record.out)
+def states(
+    record: SweepRecord,
+    finished: Mapping[str, Path] | None = None,
+    velocity: Callable[[Path], float] | None = None,
+) -> list[PointState]:
+    """What has become of each point, as the run directories say.
+
+    Parameters
+    ----------
+    record
+        The sweep.
+    finished
+        From the names of the finished runs of its folder to their directories, for who knows them already.
+    velocity
+        What gives the mean velocity (m/s) of a finished run, by which descents end; `velocity_of` if left out.
+    """
+    finished = finished_places(record.out) if finished is None else finished
     found = [_state(record.out / run, finished.get(run)) for run in record.runs]
     if record.descent is None:
         return found
@@ -199,7 +213,7 @@ def states(record: SweepRecord) -> list[PointState]:
                 found[number] = PointState("not needed")
             directory = found[number].directory
             if found[number].status == "finished" and directory is not None:
-                stopped = record.descent.at_rest(velocity_of(directory))
+                stopped = record.descent.at_rest((velocity or velocity_of)(directory))
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from walkers.postprocess.films import FilmOptions
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
+    from walkers.sweeps.comparison import Side
 
 DEFAULT_OUT = Path("runs")
 
@@ -251,8 +252,8 @@ def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     Parameters
     ----------
     run
-        A run directory; or a case (resolved, file or shipped name), whose run with the installed engine is looked up in
-        ``out``.
+        A run directory, or its name in ``out``, alone or in an ensemble; or a case (resolved, file or shipped name),
+        whose run with the installed engine is looked up there.
     out
         Folder of the run directories.
 
@@ -266,15 +267,16 @@ def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     from walkers.inputs.reading import load_case
     from walkers.runner.directory import finished_run
 
-    place, origins = place_of(run, out), None
+    place = place_of(run, out)
     if finished_run(place) is None:
         told = "not a finished run: expected a folder with a manifest.json"
+        if find_sweep(place) is not None:
+            told = "a sweep's directory: walkers plot, table and status take it, this takes one of its runs"
         raise InputError(str(run), [Problem("", None, told)])
     if not isinstance(run, (str, Path)):
-        origins = run.origins
-    elif not Path(run).is_dir():
-        origins = load_case(run).origins
-    return replace(_readable(place), origins=origins)
+        return replace(_readable(place), origins=run.origins)
+    by_place = Path(run).is_dir() or _named(run, out) is not None
+    return replace(_readable(place), origins=None if by_place else load_case(run).origins)
 
 
 def place_of(run: Case | str | Path, out: Path = DEFAULT_OUT, *, archives: bool = False) -> Path:
@@ -285,7 +287,7 @@ def place_of(run: Case | str | Path, out: Path = DEFAULT_OUT, *, archives: bool 
     Parameters
     ----------
     run, out
-        As for `find_run`.
+        As for `find_run`; a sweep's name too.
     archives
         Take a zip file for what it is, not for a case.
 
@@ -295,21 +297,78 @@ def place_of(run: Case | str | Path, out: Path = DEFAULT_OUT, *, archives: bool 
         If a case is given and has no finished run.
     """
     from walkers.inputs.reading import load_case
-    from walkers.runner.binary import find_engine
-    from walkers.runner.directory import run_place
-    from walkers.runner.ensemble import finished_place
 
+    name = str(run) if isinstance(run, (str, Path)) else run.name
     if isinstance(run, (str, Path)):
         path = Path(run)
         if path.is_dir() or (archives and path.suffix == ".zip" and path.is_file()):
             return path
-        case, name = load_case(path), str(run)
-    else:
-        case, name = run, run.name
-    there = finished_place(out, run_place(case, find_engine(), out).name)
+        there = _named(run, out) or (find_sweep(run, out) if not path.is_file() else None)
+        if there is not None:
+            return there
+        run = load_case(run)
+    there = _run_of(run, out)
     if there is None:
         raise InputError(name, [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
     return there
+
+
+def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:
+    """A run, or a case with its run if it has one, for `walkers.sweeps.comparison.compare_runs`.
+
+    Parameters
+    ----------
+    run
+        A run directory, also of a run that is not finished; its name in ``out``; or a case (file or shipped name).
+    out
+        Folder of the run directories.
+
+    Raises
+    ------
+    InputError
+        If it is none of them.
+    """
+    from walkers.inputs.reading import load_case
+    from walkers.runner.directory import CASE_NAME, case_of, finished_run
+    from walkers.runner.failures import EngineMissing
+    from walkers.sweeps.comparison import Side
+
+    directory = Path(run) if (Path(run) / CASE_NAME).is_file() else _named(run, out)
+    if directory is not None:
+        try:
+            return Side(directory.name, case_of(directory), directory if finished_run(directory) else None)
+        except (OSError, ValueError) as error:
+            raise InputError(str(run), [Problem("", None, f"its case cannot be read ({error})")]) from error
+    case, there = load_case(run), None
+    with suppress(EngineMissing):
+        there = _run_of(case, out)
+    return Side(str(run), case, there)
+
+
+def find_sweep(sweep: str | Path, out: Path = DEFAULT_OUT) -> Path | None:
+    """The directory of a sweep, given itself or its name in the folder ``out``; None if there is none."""
+    from walkers.sweeps.record import RECORD_NAME
+
+    for path in (Path(sweep), out / sweep):
+        if (path / RECORD_NAME).is_file():
+            return path
+    return None
+
+
+def _named(run: str | Path, out: Path) -> Path | None:
+    """The directory of the finished run of this name in a folder, alone or in an ensemble."""
+    from walkers.runner.ensemble import finished_place
+
+    return finished_place(out, str(run)) if Path(run).name == str(run) else None
+
+
+def _run_of(case: Case, out: Path) -> Path | None:
+    """The directory of a case's finished run with the installed engine."""
+    from walkers.runner.binary import find_engine
+    from walkers.runner.directory import run_place
+    from walkers.runner.ensemble import finished_place
+
+    return finished_place(out, run_place(case, find_engine(), out).name)
 
 
 def _readable(directory: Path) -> Run:
