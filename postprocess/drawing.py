@@ -132,7 +132,7 @@ def check_formats(formats: Sequence[str]) -> None:
     """
     for form in formats:
         if form not in FORMATS:
-            raise InputError("--format", [Problem("", form, f"expected one of {', '.join(FORMATS)}")])
+            raise InputError("--format", [Problem("", None, f"{form!r}: expected one of {', '.join(FORMATS)}")])
 
 
 def check_picture(path: Path, suffix: str) -> None:
