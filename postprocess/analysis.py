@@ -226,15 +226,15 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
     ]
 
 
-def _lines_of_rest(result: Mapping[str, Any]) -> list[str]:
-    """What of a result is guessed, what calibrated, what only the case says."""
+def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What a result rests on (`rests_on`) as text: guessed, only said by the case, calibrated."""
     lines = []
     for head, meaning, chosen in (
         ("guessed", "", lambda one: one["range"] is not None and one["origin"] != "calibrated"),
         ("taken", " (as the case says; nobody measured them)", lambda one: one["range"] is None),
         ("calibrated", "", lambda one: one["origin"] == "calibrated"),
     ):
-        found = [f"{one['key'].split('.', 1)[1]} {one['value']}" for one in result["rests_on"] if chosen(one)]
+        found = [f"{one['key'].split('.', 1)[1]} {one['value']}" for one in rests if chosen(one)]
         if found:
             lines += textwrap.wrap(
                 ", ".join(found) + meaning,
@@ -267,7 +267,7 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
         warnings.append("the dump ends within a frame")
     if cached:
         lines[0] += " (already run)"
-    told = [*lines, *_lines_of_rest(result), *(f"  warning: {warning}" for warning in warnings)]
+    told = [*lines, *lines_of_rest(result["rests_on"]), *(f"  warning: {warning}" for warning in warnings)]
     return "\n".join([*told, f"  run        {directory}"])
 
 

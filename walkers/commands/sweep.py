@@ -34,6 +34,7 @@ def command(
     """Run the points of a sweep that are missing, on all cores or on a cluster; exit status 1 if any failed."""
     from walkers.inputs.changes import settings_of
     from walkers.inputs.sweep import load_sweep
+    from walkers.postprocess.analysis import lines_of_rest, rests_on
     from walkers.progress import progress_of_sweep
     from walkers.sweeps.run import plan_sweep, run_sweep
     from walkers.sweeps.scheduler import Options
@@ -61,4 +62,6 @@ def command(
     for failure in failures:
         print(f"walkers: point {failure.point}, {failure.run}: {failure.message}", file=sys.stderr)
     print(describe_status(record.directory))
+    for line in lines_of_rest(rests_on(next(loaded.cases()).origins)):
+        print(line)
     return 1 if failures else 0
