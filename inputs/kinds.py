@@ -41,7 +41,7 @@ def _kind_of(name: str | Path) -> str | None:
             known = {"sweep.json": "made sweep", "manifest.json": "run", "case.json": "run"}
             return next((kind for file, kind in known.items() if (path / file).is_file()), None)
         if path.is_file():
-            return _kind_of_file(path)
+            return None if path.stem in (".", "..") else _kind_of_file(path)  # refused for its name
     from walkers.inputs.calibration import shipped_calibrations
     from walkers.inputs.reading import shipped_cases
     from walkers.inputs.sweep import shipped_sweeps

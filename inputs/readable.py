@@ -48,7 +48,7 @@ _RENAMED = {
 _SOLE = {"walkers[0].": "walkers.", "drive.harmonics[0].": "drive."}
 """Entries of lists that are told by the list's name where they are the only one."""
 _FOLLOWS: Mapping[str, tuple[str, ...] | None] = {
-    **dict.fromkeys(("run.time_step", "run.steps_per_cycle", "boundary.uphill"), None),
+    **dict.fromkeys(("run.time_step", "run.steps_per_cycle", "run.until_steady", "boundary.uphill"), None),
     **dict.fromkeys(("liquid.surface_tension", "liquid.dynamic_viscosity", "liquid.film_viscosity"), ("liquid.name",)),
     "liquid.density": ("liquid.name",),
     "beads.density": ("beads.material",),

@@ -64,8 +64,11 @@ def as_text(entries: Sequence[Entry]) -> str:
         of_case = [run for run in runs if run.case == case]
         head = [f"{case} ({len(of_case)})", "status", "result", "age", "size", *short_names(keys)]
         blocks.append(aligned([head, *(_run_cells(run, keys) for run in of_case)]))
-    total = f"{len(runs)} runs, {bytes_text(sum(run.size for run in runs))}"
-    return "\n\n".join([*blocks, total + (f"; {len(sweeps)} sweeps" if sweeps else "")])
+    counts = [(len(sweeps), "sweep"), (len(runs), "run")]
+    total = ", ".join(
+        f"{number} {kind}{'' if number == 1 else 's'}" for number, kind in counts if number or kind == "run"
+    )
+    return "\n\n".join([*blocks, f"{total}, {bytes_text(sum(run.size for run in runs))}"])
 
 
 def _sweep_cells(sweep: Entry) -> list[str]:
