@@ -81,7 +81,7 @@ def _liquid(table: LiquidTable, pair: Mapping[str, Known], choices: Choices) -> 
             choices.derive(
                 "liquid.dynamic_viscosity",
                 quantity_text(viscosity, DYNAMIC_VISCOSITY),
-                "kinematic_viscosity and density",
+                "from kinematic_viscosity and density",
             )
     if tension is None or viscosity is None:
         lacking = "surface_tension" if tension is None else "dynamic_viscosity"

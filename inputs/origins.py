@@ -195,25 +195,30 @@ def _derived(case: Case, file: CaseFile) -> Iterator[Origin]:
             yield derived(f"{key}.gap", "auto", "where the forces at rest balance")
     if file.dimers is not None and file.dimers.radii is None:
         radii = ", ".join(quantity_text(radius, LENGTH) for radius in case.walkers[0].radii)
-        yield derived("dimers.radii", radii, "mean_radius and sin_delta")
+        yield derived("dimers.radii", radii, "from mean_radius and sin_delta")
     if not file.drive.harmonics:
         axis = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}.get(drive.direction)
         yield Origin("drive.axis", axis or text_of(drive.direction), "default", f"of a {case.boundary.shape}")
         peak = quantity_text(file.drive.peak_acceleration or drive.peak_acceleration, ACCELERATION)
-        yield derived("drive.peak_acceleration", peak, "gamma0, the dimer and the liquid")
+        yield derived("drive.peak_acceleration", peak, "from gamma0, the dimer and the liquid")
     yield Origin("drive.frame", drive.frame, "default")
     yield derived(
         "run.time_step", quantity_text(run.time_step, TIME), "auto: its share of the limits, fitted into a cycle"
     )
     most = f"until steady, at most {run.cycles}" if run.until_steady else str(run.cycles)
-    yield derived("run.cycles", most, "duration" if file.run.duration else "auto")
+    yield derived(
+        "run.cycles", most, "from the duration" if file.run.duration else "walkers are looked at after 12 and 24"
+    )
     yield derived("run.settling_cycles", str(run.settling_cycles), "a third of the cycles, at most 20")
     often = str(run.samples_per_cycle) if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
-    yield Origin("run.samples_per_cycle", often, "derived", "frames_per_second" if case.loose else "20 a cycle")
-    segment = quantity_text(run.cycles_per_segment / drive.frequency, DURATION)
-    yield derived("run.segment", segment, "of loose beads; walkers run in one")
-    yield derived(
-        "run.longest_settling", quantity_text(run.longest_settling, DURATION), "of loose beads; walkers stand"
+    yield Origin(
+        "run.samples_per_cycle",
+        often,
+        "derived" if case.loose else "default",
+        "from frames_per_second" if case.loose else "",
     )
+    if case.loose:
+        yield derived("run.segment", quantity_text(run.cycles_per_segment / drive.frequency, DURATION), "about 0.5 s")
+        yield Origin("run.longest_settling", quantity_text(run.longest_settling, DURATION), "default", "of loose beads")
     if case.boundary.tilt and file.boundary.uphill == 0.0:
         yield Origin("boundary.uphill", quantity_text(0.0, ANGLE), "default", "the direction of the drive")

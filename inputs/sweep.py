@@ -11,8 +11,9 @@ drive.peak_acceleration = { linspace = ["0.5 g", "10 g", 20] }
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -43,6 +44,7 @@ from walkers.inputs.schema import Whole
 from walkers.inputs.units import Speed
 
 _SHIPPED = Path(__file__).parent / "sweeps"
+_LONGEST_NAME = 120
 
 
 class _Table(BaseModel):
@@ -121,7 +123,7 @@ class Sweep:
     descent
         How the points depend on each other, if they do.
     file
-        Tables of the sweep file.
+        Tables of the sweep file, if it is from one.
     """
 
     name: str
@@ -133,7 +135,7 @@ class Sweep:
     units: tuple[str | None, ...]
     rows: Sequence[tuple[Value, ...]]
     descent: Descent | None
-    file: Mapping[str, Any]
+    file: Mapping[str, Any] = field(default_factory=dict)
 
     def cases(self) -> Iterator[Case]:
         """The case of each point, resolved.
@@ -158,13 +160,15 @@ def shipped_sweeps() -> dict[str, Path]:
     return {path.stem: path for path in sorted(_SHIPPED.glob("*.toml"))}
 
 
-def load_sweep(sweep: str | Path) -> Sweep:
+def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) -> Sweep:
     """Read a sweep file and expand it.
 
     Parameters
     ----------
     sweep
         A TOML file, or the name of a shipped sweep such as ``fig2``.
+    changes
+        Values put beside those of its ``[set]``, by dotted keys; the sweep's name tells of them.
 
     Raises
     ------
@@ -172,7 +176,20 @@ def load_sweep(sweep: str | Path) -> Sweep:
         If there is no such file or anything in it cannot be used. Its points are checked by `Sweep.cases`.
     """
     path = find_input(sweep, shipped_sweeps(), "sweep")
-    return expand(read_toml(path), source=str(sweep), name=path.stem, folder=path.parent)
+    document, name = read_toml(path), path.stem
+    if changes:
+        try:
+            document = {**document, "set": {**flatten(document.get("set", {}), lambda _: False), **changes}}
+        except (AttributeError, UnusableAxisError) as error:
+            raise InputError(str(sweep), [Problem("set", None, f"expected a table of keys ({error})")]) from error
+        name = _name_with(name, changes)
+    return expand(document, source=str(sweep), name=name, folder=path.parent)
+
+
+def _name_with(name: str, changes: Mapping[str, Value]) -> str:
+    """Name of a sweep with changes: another one, so that its table stands beside that of the sweep without."""
+    told = ",".join(f"{key}={value}" for key, value in changes.items())
+    return re.sub(r"[^\w.+=,-]+", "_", f"{name},{told}")[:_LONGEST_NAME]
 
 
 def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Sweep:
@@ -201,6 +218,8 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         settings = flatten(file.set, lambda _: False)
         given = read_toml(base)
         for key in (*settings, *keys):
+            if key in settings and key in keys:
+                raise UnusableAxisError(key, settings[key], "varies: it cannot be set as well")
             if key == "title" and key in keys:
                 raise UnusableAxisError(key, None, "does not vary: points with other titles alone are the same run")
             check_key(key)

@@ -6,14 +6,17 @@ tables, results, text and figures, and sweeps of columns, follows.
 
 from __future__ import annotations
 
+import textwrap
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from walkers.inputs.case import Case
+from walkers.inputs.library import unmeasured
+from walkers.inputs.origins import Origin
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import record_tables
@@ -24,6 +27,7 @@ if TYPE_CHECKING:  # how far a sweep is can be told without numpy
     from walkers.postprocess.motion import Bridges, Motion
 
 RESULT_NAME = "result.json"
+_WIDTH = 110
 Columns: TypeAlias = "dict[str, npt.NDArray[Any]]"
 Described = Mapping[str, tuple[str, str]]
 """From the names of columns to their units and meanings."""
@@ -50,6 +54,8 @@ class Analysis(ABC):
         Names of the tables that it writes.
     derived, columns
         Columns of a sweep's table: what follows from a point's case, and what its run gives.
+    headlines
+        Those of `columns` that count first.
     """
 
     name: ClassVar[str]
@@ -57,6 +63,7 @@ class Analysis(ABC):
     tables: ClassVar[tuple[str, ...]]
     derived: ClassVar[Described] = {}
     columns: ClassVar[Described] = {}
+    headlines: ClassVar[tuple[str, ...]] = ()
 
     def can_show(self, result: Mapping[str, Any]) -> bool:
         """Whether a result has all that it gives."""
@@ -164,6 +171,7 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
         "drive": case.drive.described(),
         "goes_uphill": case.goes_uphill,
         "truncated": motion.truncated,
+        "rests_on": rests_on(case.origins),
     }
     written: list[str] = []
     for one in analyses_of(case):
@@ -191,12 +199,57 @@ def current_result(directory: str | Path) -> dict[str, Any]:
         result = read_result(directory)
         wanted = analyses_of(case_of(directory))
         tables = [name for one in wanted for name in one.tables]
+        result.setdefault("rests_on", [])  # of runs that did not say it
         known = result.get("analyses") == {one.name: one.version for one in wanted} and intact(directory, tables)
         if known and all(one.can_show(result) for one in wanted):
             return result
     except (OSError, ValueError):
         pass
     return tabulate(directory)
+
+
+def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
+    """What a result rests on that nobody measured, and what the case calls uncertain.
+
+    Returns
+    -------
+    list of dict
+        ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``calibrated`` or ``default``),
+        ``range`` (both ends, or None) and ``logarithmic``.
+    """
+    return [
+        {
+            "key": one.key,
+            "value": one.text,
+            "origin": one.origin,
+            "range": list(one.range) if one.range else None,  # as it is read from a file
+            "logarithmic": one.logarithmic,
+        }
+        for one in origins
+        if one.key in unmeasured() or one.range is not None
+    ]
+
+
+def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What a result rests on (`rests_on`) as text: guessed, only said by the case, calibrated."""
+    lines = []
+    for head, meaning, chosen in (
+        ("guessed", "", lambda one: one["range"] is not None and one["origin"] != "calibrated"),
+        ("taken", " (as the case says; nobody measured them)", lambda one: one["range"] is None),
+        ("calibrated", "", lambda one: one["origin"] == "calibrated"),
+    ):
+        found = [f"{one['key'].split('.', 1)[1]} {one['value']}" for one in rests if chosen(one)]
+        if found:
+            lines += textwrap.wrap(
+                ", ".join(found) + meaning,
+                _WIDTH,
+                initial_indent=f"  {head:10} ",
+                subsequent_indent=" " * 13,
+                break_on_hyphens=False,
+            )
+    if any(line.startswith("  guessed") for line in lines):
+        lines.append("             this number is worth what they are; a band instead: walkers run CASE --spread")
+    return lines
 
 
 def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool = False) -> str:
@@ -218,7 +271,8 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
         warnings.append("the dump ends within a frame")
     if cached:
         lines[0] += " (already run)"
-    return "\n".join([*lines, *(f"  warning: {warning}" for warning in warnings), f"  run        {directory}"])
+    told = [*lines, *lines_of_rest(result["rests_on"]), *(f"  warning: {warning}" for warning in warnings)]
+    return "\n".join([*told, f"  run        {directory}"])
 
 
 def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:

@@ -152,6 +152,7 @@ class Pile(Analysis):
     name = "pile"
     version = 5
     tables = ("bed", "clusters", "events", "profile")
+    headlines = ("climbs", "highest", "speed")
     derived: ClassVar[Described] = {
         "beads": ("", "number of beads"),
         "large": ("", "number of large beads"),

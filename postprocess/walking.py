@@ -41,6 +41,7 @@ class Walking(Analysis):
     name = "walking"
     version = 5
     tables = ("trajectory", "walkers", "bridges")
+    headlines = ("velocity",)
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
         "sin_delta": ("", "asymmetry parameter (R1 - R2)/(R1 + R2) of dimers"),

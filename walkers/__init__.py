@@ -8,10 +8,11 @@ makes all points of a sweep, `load` gives its table. The folders of the project 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from walkers.pipeline import DEFAULT_OUT, Run, find_run, run
 
@@ -40,20 +41,28 @@ def __getattr__(name: str) -> ModuleType:
     raise AttributeError(f"module 'walkers' has no attribute {name!r}")
 
 
-def load_case(case: str | Path) -> Case:
-    """Read and resolve a case; see `walkers.inputs.reading.load_case`.
+def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Case:
+    """Read and resolve a case, with other values than its file's; see `walkers.inputs.reading.load_case`.
 
     Examples
     --------
     >>> walkers.load_case("climber").boundary.shape
     'plane'
+    >>> walkers.load_case("fig1b", {"drive.frequency": "70 Hz"}).drive.frequency
+    70.0
     """
     from walkers.inputs.reading import load_case
 
-    return load_case(case)
+    return load_case(case, changes)
 
 
-def sweep(sweep: str | Path, out: Path = DEFAULT_OUT, *, jobs: int | None = None) -> pd.DataFrame:
+def sweep(
+    sweep: str | Path,
+    out: Path = DEFAULT_OUT,
+    *,
+    jobs: int | None = None,
+    changes: Mapping[str, Any] | None = None,
+) -> pd.DataFrame:
     """Make the runs of a sweep that are missing, on this machine, and give its table.
 
     Parameters
@@ -64,6 +73,8 @@ def sweep(sweep: str | Path, out: Path = DEFAULT_OUT, *, jobs: int | None = None
         Folder of the run directories.
     jobs
         Decks at once; all cores if left out.
+    changes
+        Values put beside those of its ``[set]``, by dotted keys.
 
     Returns
     -------
@@ -85,7 +96,7 @@ def sweep(sweep: str | Path, out: Path = DEFAULT_OUT, *, jobs: int | None = None
     from walkers.sweeps.scheduler import Options
     from walkers.sweeps.site import cores_here
 
-    record, _ = run_sweep(load_sweep(sweep), Path(out), Options(jobs or cores_here()))
+    record, _ = run_sweep(load_sweep(sweep, changes), Path(out), Options(jobs or cores_here()))
     return load(record.directory)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from walkers.inputs.case import Case
+    from walkers.inputs.origins import Origin
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
 
@@ -31,10 +32,14 @@ class Run:
         The run directory.
     cached
         Whether it was there before.
+    origins
+        Where the values of the case come from by which it was asked for; None: of that by which it was made. The same
+        numbers may once have been given and once be the library's.
     """
 
     directory: Path
     cached: bool = True
+    origins: tuple[Origin, ...] | None = None
 
     @property
     def case(self) -> Case:
@@ -46,9 +51,10 @@ class Run:
     @property
     def result(self) -> dict[str, Any]:
         """The result, SI units."""
-        from walkers.postprocess.analysis import current_result
+        from walkers.postprocess.analysis import current_result, rests_on
 
-        return current_result(self.directory)
+        result = current_result(self.directory)
+        return result if self.origins is None else {**result, "rests_on": rests_on(self.origins)}
 
     @property
     def motion(self) -> Motion:
@@ -163,14 +169,14 @@ def run(
     there = finished_place(out, place.name)
     if there is not None and not force:
         current_result(there)
-        return Run(there)
+        return Run(there, origins=case.origins)
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
     threading.Thread(target=_load_postprocess, daemon=True).start()
     made = make_runs([case], out, binary, force=force, on_progress=on_progress, time_limit=time_limit)
     if made.busy:
         raise RunBusy(unfinished(place))
-    return Run(made.runs[place.name].directory, cached=place.name in made.found)
+    return Run(made.runs[place.name].directory, cached=place.name in made.found, origins=case.origins)
 
 
 def _load_postprocess() -> None:
@@ -179,13 +185,14 @@ def _load_postprocess() -> None:
     import walkers.postprocess.walking  # noqa: F401
 
 
-def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
+def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     """Find a finished run.
 
     Parameters
     ----------
     run
-        A run directory; or a case (file or shipped name), whose run with the installed engine is looked up in ``out``.
+        A run directory; or a case (resolved, file or shipped name), whose run with the installed engine is looked up in
+        ``out``.
     out
         Folder of the run directories.
 
@@ -196,13 +203,16 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
     runner.EngineFailure
         If a case is given and there is no engine to look it up for.
     """
+    from walkers.inputs.reading import load_case
     from walkers.runner.directory import finished_run
 
-    place = place_of(run, out)
-    if finished_run(place) is None:
-        told = "not a finished run: expected a folder with a manifest.json"
-        raise InputError(str(run), [Problem("", None, told)])
-    return _readable(place)
+    if isinstance(run, (str, Path)) and Path(run).is_dir():
+        if finished_run(Path(run)) is None:
+            told = "not a finished run: expected a folder with a manifest.json"
+            raise InputError(str(run), [Problem("", None, told)])
+        return _readable(Path(run))
+    case = load_case(run) if isinstance(run, (str, Path)) else run
+    return replace(_readable(_place_of(case, out, run)), origins=case.origins)
 
 
 def place_of(run: str | Path, out: Path = DEFAULT_OUT, *, archives: bool = False) -> Path:
@@ -226,13 +236,20 @@ def place_of(run: str | Path, out: Path = DEFAULT_OUT, *, archives: bool = False
     if path.is_dir() or (archives and path.suffix == ".zip" and path.is_file()):
         return path
     from walkers.inputs.reading import load_case
+
+    return _place_of(load_case(path), out, run)
+
+
+def _place_of(case: Case, out: Path, called: Case | str | Path) -> Path:
+    """The finished run of a case, which messages call as it was asked for."""
     from walkers.runner.binary import find_engine
     from walkers.runner.directory import run_place
     from walkers.runner.ensemble import finished_place
 
-    there = finished_place(out, run_place(load_case(path), find_engine(), out).name)
+    there = finished_place(out, run_place(case, find_engine(), out).name)
     if there is None:
-        raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
+        name = called if isinstance(called, (str, Path)) else case.name
+        raise InputError(str(name), [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
     return there
 
 

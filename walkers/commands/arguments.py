@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from walkers.inputs.case import Case as ResolvedCase
 
 Case = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the name of a shipped case such as fig1b.")]
 Run = Annotated[str, typer.Argument(metavar="RUN", help="A run directory, or a case whose run is looked up in --out.")]
@@ -13,6 +16,21 @@ Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.
 EngineName = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
 AllowFailedAudit = Annotated[bool, typer.Option("--allow-failed-audit", help="Run on an engine that failed its audit.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, SI units.")]
+
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Another value than the file's, such as drive.frequency=70Hz; repeatable."
+    ),
+]
+
+
+def load(case: str, settings: list[str] | None) -> ResolvedCase:
+    """A case with values put beside its file."""
+    from walkers.inputs.changes import settings_of
+    from walkers.inputs.reading import load_case
+
+    return load_case(case, settings_of(settings or ()))
 
 
 def refuse(option: str, wrong: bool, told: str) -> None:
