@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+from walkers.archive.citation import LICENCES, PAPER, PAPER_PROPERTIES, Author
 from walkers.archive.contents import Contents, Item, PackedFolder
 from walkers.runner.provenance import PROJECT
 
@@ -28,33 +28,6 @@ PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
 _TERMS = {"sha256": "http://schema.org/sha256"}
 """Younger than that version's context."""
 ENGINE_HOME = "https://github.com/CFDEMproject/LIGGGHTS-PUBLIC"
-PAPER = "https://doi.org/10.48550/arXiv.1003.1623"
-_PAPER = {
-    "@type": "ScholarlyArticle",
-    "name": "Self-assembled granular walkers",
-    "author": "Z. S. Khan, A. Steinberger, R. Seemann, S. Herminghaus",
-    "datePublished": "2010",
-    "identifier": PAPER,
-    "url": "https://arxiv.org/abs/1003.1623",
-}
-LICENCES = {
-    "CC-BY-4.0": ("https://creativecommons.org/licenses/by/4.0/", "Creative Commons Attribution 4.0 International"),
-    "CC0-1.0": ("https://creativecommons.org/publicdomain/zero/1.0/", "Creative Commons Zero 1.0 Universal"),
-    "CC-BY-SA-4.0": (
-        "https://creativecommons.org/licenses/by-sa/4.0/",
-        "Creative Commons Attribution Share Alike 4.0 International",
-    ),
-    "BSD-3-Clause": ("https://opensource.org/license/bsd-3-clause", 'BSD 3-Clause "New" or "Revised" License'),
-}
-"""By their SPDX identifiers: addresses and names."""
-
-
-@dataclass(frozen=True)
-class Author:
-    """Somebody who made the runs: name, and ORCID (``0000-0002-1825-0097``) or None."""
-
-    name: str
-    orcid: str | None = None
 
 
 def describe_crate(
@@ -71,7 +44,7 @@ def describe_crate(
     authors
         Of the runs.
     licence
-        Key of `LICENCES`.
+        Key of `walkers.archive.citation.LICENCES`.
 
     Returns
     -------
@@ -91,7 +64,7 @@ def describe_crate(
     root["conformsTo"] = _entity(
         crate, PROFILE, {"@type": "CreativeWork", "name": "Process Run Crate", "version": PROFILE.rpartition("/")[2]}
     )
-    root["citation"] = _entity(crate, PAPER, _PAPER)
+    root["citation"] = _entity(crate, PAPER, PAPER_PROPERTIES)
     people = [_person(crate, author) for author in authors]
     if people:
         root["author"] = people

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+from walkers.archive.citation import LICENCES, PAPER, Author
 from walkers.archive.contents import Contents, Item, contents_of_run, contents_of_sweep
-from walkers.archive.crate import LICENCES, METADATA_NAME, PAPER, PREVIEW_NAME, Author, as_bytes, describe_crate
+from walkers.archive.crate import METADATA_NAME, PREVIEW_NAME, as_bytes, describe_crate
 from walkers.archive.verification import SUMS_NAME, verify
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.text import rendered
@@ -41,7 +42,7 @@ class ArchiveOptions:
     authors
         Of the runs.
     licence
-        Key of `walkers.archive.crate.LICENCES`.
+        Key of `walkers.archive.citation.LICENCES`.
     """
 
     dumps: bool = True

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -124,7 +124,7 @@ class Sweep:
     descent
         How the points depend on each other, if they do.
     file
-        Tables of the sweep file.
+        Tables of the sweep file, if it is from one.
     """
 
     name: str
@@ -136,7 +136,7 @@ class Sweep:
     units: tuple[str | None, ...]
     rows: Sequence[tuple[Value, ...]]
     descent: Descent | None
-    file: Mapping[str, Any]
+    file: Mapping[str, Any] = field(default_factory=dict)
 
     def cases(self) -> Iterator[Case]:
         """The case of each point, resolved.

@@ -22,7 +22,7 @@ from urllib3 import HTTPResponse
 
 from tests.conftest import SHORT, call, document, make_case, to_toml
 from walkers import Run, load_case
-from walkers.archive.crate import PAPER
+from walkers.archive.citation import PAPER
 from walkers.archive.writing import ArchiveOptions, ArchiveRefused, write_archive
 from walkers.inputs.reading import resolve_case
 from walkers.runner.directory import FinishedRun
