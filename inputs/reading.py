@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.errors import InputError, Problem, UnusableKeyError
+from walkers.inputs.kinds import check_kind
 from walkers.inputs.library import suggestion
 
 if TYPE_CHECKING:
@@ -56,6 +57,8 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
     >>> load_case("fig1b", {"drive.frequency": "70 Hz", "dimers.radii[1]": "0.25 mm"}).walkers[0].radii
     (0.0003, 0.00025)
     """
+    if str(case) not in shipped_cases():
+        check_kind(case, "case")
     path = find_input(case, shipped_cases(), "case")
     document = read_toml(path)
     if changes:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -38,6 +38,7 @@ from walkers.inputs.axes import (
 from walkers.inputs.case import Case
 from walkers.inputs.changes import changed, check_key
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.kinds import check_kind
 from walkers.inputs.messages import quoted, validated
 from walkers.inputs.reading import find_input, read_toml, resolve_case, shipped_cases
 from walkers.inputs.schema import Whole
@@ -122,6 +123,8 @@ class Sweep:
         The points: one value a key.
     descent
         How the points depend on each other, if they do.
+    file
+        Tables of the sweep file, if it is from one.
     """
 
     name: str
@@ -133,6 +136,7 @@ class Sweep:
     units: tuple[str | None, ...]
     rows: Sequence[tuple[Value, ...]]
     descent: Descent | None
+    file: Mapping[str, Any] = field(default_factory=dict)
 
     def cases(self) -> Iterator[Case]:
         """The case of each point, resolved.
@@ -172,6 +176,7 @@ def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) ->
     InputError
         If there is no such file or anything in it cannot be used. Its points are checked by `Sweep.cases`.
     """
+    check_kind(sweep, "sweep")
     path = find_input(sweep, shipped_sweeps(), "sweep")
     document, name = read_toml(path), path.stem
     if changes:
@@ -237,6 +242,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         units=units,
         rows=rows,
         descent=descent,
+        file=document,
     )
 
 

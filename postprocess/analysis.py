@@ -17,8 +17,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin
+from walkers.postprocess.drawing import check_formats
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
+from walkers.runner.manifest import record_tables
 
 if TYPE_CHECKING:  # how far a sweep is can be told without numpy
     import numpy.typing as npt
@@ -117,9 +119,9 @@ class Analysis(ABC):
         del motion
         return lambda _: {}
 
-    def plot(self, directory: Path, destination: Path) -> list[Path]:
-        """Draw its figures of a run into a folder."""
-        del directory, destination
+    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
+        """Draw its figures of a run into a folder, in each of some formats."""
+        del directory, destination, formats
         return []
 
 
@@ -178,12 +180,15 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
         "truncated": motion.truncated,
         "rests_on": rests_on(case.origins),
     }
+    written: list[str] = []
     for one in analyses_of(case):
         measured = one.of(motion)
         for name, columns in measured.tables.items():
             write_table(directory, name, columns)
+            written.append(name)
         result |= measured.summary
     write_json(directory / RESULT_NAME, result)
+    record_tables(directory, [RESULT_NAME, *(f"{name}.parquet" for name in written)])
     return result
 
 
@@ -285,7 +290,7 @@ def quantities_of(result: Mapping[str, Any]) -> list[Quantity]:
     return [row for one in analyses_in(result) for row in one.quantities(result) if row.value is not None]
 
 
-def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
+def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:
     """Draw the figures of a run.
 
     Parameters
@@ -294,14 +299,22 @@ def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
         A run directory.
     destination
         Folder for the pictures; the run directory itself if None.
+    formats
+        Of `walkers.postprocess.drawing.FORMATS`.
 
     Returns
     -------
     list of Path
-        Of walkers ``walk.png`` and, if the run was sampled at least eight times a cycle, ``gait.png``; of piles
-        ``climb.png``.
+        Of walkers ``walk`` and, if the run was sampled at least eight times a cycle, ``gait``; of piles ``climb``; each
+        in all formats.
+
+    Raises
+    ------
+    InputError
+        If there is no such format.
     """
+    check_formats(formats)
     destination = destination or directory
     destination.mkdir(parents=True, exist_ok=True)
     case = case_of(directory)
-    return [path for one in analyses_of(case) for path in one.plot(directory, destination)]
+    return [path for one in analyses_of(case) for path in one.plot(directory, destination, formats)]

@@ -234,11 +234,11 @@ class Pile(Analysis):
 
         return of_frame
 
-    def plot(self, directory: Path, destination: Path) -> list[Path]:
+    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
         """Heights of the clusters, their events, segregation and agitation."""
         from walkers.postprocess.figures import plot_pile
 
-        return plot_pile(directory, destination)
+        return plot_pile(directory, destination, formats)
 
 
 def _bed_columns(found: PileAnalysis) -> Columns:

@@ -6,7 +6,7 @@ smallest, with the walkers that face left and right also apart.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from math import degrees, nan, sqrt
 from pathlib import Path
 from typing import Any, ClassVar
@@ -175,11 +175,11 @@ class Walking(Analysis):
             warnings.append("walkers came close to each other and are not independent: give them more spacing")
         return warnings
 
-    def plot(self, directory: Path, destination: Path) -> list[Path]:
+    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
         """Where they went and turned, and their gait."""
         from walkers.postprocess.figures import plot_walkers
 
-        return plot_walkers(directory, destination)
+        return plot_walkers(directory, destination, formats)
 
 
 def _stacked(parts: list[Columns]) -> Columns:

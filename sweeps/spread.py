@@ -111,6 +111,10 @@ def spread_sweep(case: Case, points: int = POINTS) -> Sweep:
         units=units,
         rows=axis.rows,
         descent=None,
+        file={
+            "case": case.name,
+            "sample": [{"method": "sobol", "points": points, "seed": _SEED, "ranges": ranges}],
+        },
     )
 
 

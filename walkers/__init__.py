@@ -1,9 +1,10 @@
 """Wet granular walkers, simulated with LIGGGHTS: the one public name of the project.
 
 `load_case` reads a case, `run` takes it to its result as ``walkers run`` does, `find_run` finds a finished run, `sweep`
-makes all points of a sweep, `load` gives its table, `report` writes a file to mail. The folders of the project are
-packages below: `physics` (laws), `inputs` (cases), `templates` (decks), `runner` (run directories), `postprocess` (what
-runs mean), and on them `sweeps`, `audit`, `theory`, `paper` and `calibration`.
+makes all points of a sweep, `load` gives its table, `plot_sweep` and `sweep_figure` its figure, `report` writes a file
+to mail. The folders of the project are packages below: `physics` (laws), `inputs` (cases), `templates` (decks),
+`runner` (run directories), `postprocess` (what runs mean), and on them `sweeps`, `audit`, `theory`, `paper` and
+`calibration`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from walkers.pipeline import DEFAULT_OUT, Run, find_run, run
+from walkers.plotting import plot_sweep, sweep_figure
 from walkers.reports import report
 
 if TYPE_CHECKING:
@@ -22,12 +24,12 @@ if TYPE_CHECKING:
 
     from walkers.inputs.case import Case
 
-__all__ = ["Run", "find_run", "load", "load_case", "report", "run", "sweep"]
+__all__ = ["Run", "find_run", "load", "load_case", "plot_sweep", "report", "run", "sweep", "sweep_figure"]
 
 
 _PACKAGES = (
     *("physics", "inputs", "templates", "runner", "postprocess"),
-    *("sweeps", "audit", "theory", "paper", "calibration"),
+    *("sweeps", "archive", "audit", "theory", "paper", "calibration"),
 )
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 import warnings
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from walkers.postprocess.films import FilmOptions
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
+    from walkers.sweeps.comparison import Side
 
 DEFAULT_OUT = Path("runs")
 
@@ -95,11 +96,11 @@ class Run:
 
         return result_html(self.directory, self.result, self.origins)
 
-    def plot(self, to: Path | None = None) -> Pictures:
+    def plot(self, to: Path | None = None, formats: Sequence[str] = ("png",)) -> Pictures:
         """Draw its figures, see `walkers.postprocess.analysis.plot_run`: a list of paths, which a notebook shows."""
         from walkers.postprocess.analysis import plot_run
 
-        return Pictures(plot_run(self.directory, to))
+        return Pictures(plot_run(self.directory, to, formats))
 
     def view(self, *, height: int = 480) -> k3d.Plot:
         """Its beads in three dimensions, for a notebook; see `walkers.postprocess.report.scene.scene_of`.
@@ -129,6 +130,12 @@ class Run:
         from walkers.postprocess.paraview import write_vtk
 
         return write_vtk(self.directory, destination=to, **options)
+
+    def archive(self, to: Path | None = None, **options: Any) -> Path:
+        """Pack it into an RO-Crate, see `walkers.archive.writing.write_archive` and its `ArchiveOptions`."""
+        from walkers.archive.writing import ArchiveOptions, write_archive
+
+        return write_archive(self.directory, to, ArchiveOptions(**options))
 
     def paraview(self, to: Path | None = None, **options: Any) -> Path:
         """Write it with a script for ParaView, see `walkers.postprocess.paraview_script.write_paraview`."""
@@ -245,8 +252,8 @@ def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     Parameters
     ----------
     run
-        A run directory; or a case (resolved, file or shipped name), whose run with the installed engine is looked up in
-        ``out``.
+        A run directory, or its name in ``out``, alone or in an ensemble; or a case (resolved, file or shipped name),
+        whose run with the installed engine is looked up there.
     out
         Folder of the run directories.
 
@@ -260,20 +267,103 @@ def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     from walkers.inputs.reading import load_case
     from walkers.runner.directory import finished_run
 
-    if isinstance(run, (str, Path)) and Path(run).is_dir():
-        if finished_run(Path(run)) is None:
-            told = "not a finished run: expected a folder with a manifest.json"
-            raise InputError(str(run), [Problem("", None, told)])
-        return _readable(Path(run))
-    case = load_case(run) if isinstance(run, (str, Path)) else run
-    name = run if isinstance(run, (str, Path)) else case.name
-    there = _place_of(case, out)
-    if there is None or finished_run(there) is None:
-        raise InputError(str(name), [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
-    return replace(_readable(there), origins=case.origins)
+    place = place_of(run, out)
+    if finished_run(place) is None:
+        told = "not a finished run: expected a folder with a manifest.json"
+        if find_sweep(place) is not None:
+            told = "a sweep's directory: walkers plot, table and status take it, this takes one of its runs"
+        raise InputError(str(run), [Problem("", None, told)])
+    if not isinstance(run, (str, Path)):
+        return replace(_readable(place), origins=run.origins)
+    by_place = Path(run).is_dir() or _named(run, out) is not None
+    return replace(_readable(place), origins=None if by_place else load_case(run).origins)
 
 
-def _place_of(case: Case, out: Path) -> Path | None:
+def place_of(run: Case | str | Path, out: Path = DEFAULT_OUT, *, archives: bool = False) -> Path:
+    """Where something is: a directory as it is, for a case that of its finished run with the installed engine.
+
+    Nothing in it is read or made anew.
+
+    Parameters
+    ----------
+    run, out
+        As for `find_run`; a sweep's name too.
+    archives
+        Take a zip file for what it is, not for a case.
+
+    Raises
+    ------
+    InputError
+        If a case is given and has no finished run.
+    """
+    from walkers.inputs.reading import load_case
+
+    name = str(run) if isinstance(run, (str, Path)) else run.name
+    if isinstance(run, (str, Path)):
+        path = Path(run)
+        if path.is_dir() or (archives and path.suffix == ".zip" and path.is_file()):
+            return path
+        there = _named(run, out) or (find_sweep(run, out) if not path.is_file() else None)
+        if there is not None:
+            return there
+        run = load_case(run)
+    there = _run_of(run, out)
+    if there is None:
+        raise InputError(name, [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
+    return there
+
+
+def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:
+    """A run, or a case with its run if it has one, for `walkers.sweeps.comparison.compare_runs`.
+
+    Parameters
+    ----------
+    run
+        A run directory, also of a run that is not finished; its name in ``out``; or a case (file or shipped name).
+    out
+        Folder of the run directories.
+
+    Raises
+    ------
+    InputError
+        If it is none of them.
+    """
+    from walkers.inputs.reading import load_case
+    from walkers.runner.directory import CASE_NAME, case_of, finished_run
+    from walkers.runner.failures import EngineMissing
+    from walkers.sweeps.comparison import Side
+
+    directory = Path(run) if (Path(run) / CASE_NAME).is_file() else _named(run, out)
+    if directory is not None:
+        try:
+            return Side(directory.name, case_of(directory), directory if finished_run(directory) else None)
+        except (OSError, ValueError) as error:
+            raise InputError(str(run), [Problem("", None, f"its case cannot be read ({error})")]) from error
+    case, there = load_case(run), None
+    with suppress(EngineMissing):
+        there = _run_of(case, out)
+    return Side(str(run), case, there)
+
+
+def find_sweep(sweep: str | Path, out: Path = DEFAULT_OUT) -> Path | None:
+    """The directory of a sweep, given itself or its name in the folder ``out``; None if there is none."""
+    from walkers.sweeps.record import RECORD_NAME
+
+    for path in (Path(sweep), out / sweep):
+        if (path / RECORD_NAME).is_file():
+            return path
+    return None
+
+
+def _named(run: str | Path, out: Path) -> Path | None:
+    """The directory of the finished run of this name in a folder, alone or in an ensemble."""
+    from walkers.runner.ensemble import finished_place
+
+    return finished_place(out, str(run)) if Path(run).name == str(run) else None
+
+
+def _run_of(case: Case, out: Path) -> Path | None:
+    """The directory of a case's finished run with the installed engine."""
     from walkers.runner.binary import find_engine
     from walkers.runner.directory import run_place
     from walkers.runner.ensemble import finished_place
@@ -293,9 +383,12 @@ def _readable(directory: Path) -> Run:
         except (OSError, ValueError, KeyError, TypeError) as error:
             problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
             raise InputError(str(directory), [problem]) from error
+    left_out = run.manifest.get("left_out", ())  # of an archive
     for segment in run.segments:
         layout = layout_of(segment)
         dump = segment / layout.bead_dump
+        if dump.relative_to(directory).as_posix() in left_out:
+            continue
         if not dump.is_file():
             raise InputError(str(directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
         if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:

@@ -17,8 +17,9 @@ from walkers.postprocess.quantities import Quantity
 from walkers.postprocess.report.page import NAME, check_report, fill, packed_plots, packed_scene, write_page
 from walkers.postprocess.report.plots import plots_of
 from walkers.postprocess.report.scene import MOST_PLACES, Scene, scene_of
-from walkers.runner.directory import MANIFEST_NAME, case_of
+from walkers.runner.directory import case_of
 from walkers.runner.files import read_json
+from walkers.runner.manifest import MANIFEST_NAME
 
 
 @dataclass(frozen=True)

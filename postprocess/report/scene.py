@@ -37,7 +37,7 @@ _LANE = 1.25
 """Lengths of a walker between the lanes of independent ones."""
 _VIEW = 30.0
 """Degrees, of the camera's view."""
-_ASPECT = 1.8
+_ASPECT = 1.5
 """Width of a picture over its height, at least."""
 _RULES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Millimetres between the lines on a floor."""

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from walkers.commands.arguments import AllowFailedAudit, EngineName, Json, Out, Set, check_out, load, refuse
+from walkers.commands.arguments import AllowFailedAudit, Cases, EngineName, Json, Out, Set, check_out, load, refuse
 from walkers.pipeline import DEFAULT_OUT
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
     from walkers.sweeps.spread import Spread
 
-Cases = Annotated[list[str], typer.Argument(metavar="CASE...", help="Case files, or names of shipped cases.")]
 Force = Annotated[bool, typer.Option("--force", help="Run again even if the run is there.")]
 Limit = Annotated[
     float | None, typer.Option("--limit", min=0.0, help="Stop a run (of a pile: a segment) after this many seconds.")

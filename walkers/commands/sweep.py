@@ -8,10 +8,9 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import AllowFailedAudit, EngineName, Out, Set, check_out, refuse
+from walkers.commands.arguments import AllowFailedAudit, EngineName, Out, Set, SweepFile, check_out, refuse
 from walkers.pipeline import DEFAULT_OUT
 
-SweepFile = Annotated[str, typer.Argument(metavar="SWEEP", help="A sweep file, or a shipped sweep such as fig2.")]
 Jobs = Annotated[int | None, typer.Option("-j", "--jobs", min=1, help="Decks at once; all cores if left out.")]
 SitePath = Annotated[Path | None, typer.Option("--site", help="A site file: run on that cluster instead.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be done, and its cost; write nothing.")]
