@@ -6,6 +6,7 @@ WALKERS := .venv/bin/walkers
 OUT ?= runs
 CASE ?= fig1b
 PILE ?= pile-small
+FILM ?= 360p
 SWEEP ?= fig2
 CALIBRATION ?= ruby
 
@@ -14,11 +15,13 @@ help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 .PHONY: walker
-walker: setup ## Run the walker of Fig. 1b (or CASE=...): velocity, pictures, ParaView files
+walker: setup ## Run the walker of Fig. 1b (or CASE=...): velocity, pictures, a film, ParaView files
 	@$(WALKERS) run $(CASE) --out $(OUT)
 	@echo "pictures:"
 	@$(WALKERS) plot $(CASE) --out $(OUT) | sed 's/^/  /'
 	@$(WALKERS) render $(CASE) --out $(OUT) | sed 's/^/  /'
+	@echo "film:"
+	@$(WALKERS) film $(CASE) --size $(FILM) --out $(OUT) | sed 's/^/  /'
 	@echo "for ParaView:"
 	@$(WALKERS) vtk $(CASE) --out $(OUT) | sed 's/^/  /'
 
@@ -29,9 +32,7 @@ sweep: setup ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.tom
 
 .PHONY: pile
 pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures, a film; goes on where it was interrupted
-	@$(MAKE) --no-print-directory walker CASE=$(PILE) OUT=$(OUT)
-	@echo "film:"
-	@$(WALKERS) render $(PILE) --film --out $(OUT) | sed 's/^/  /'
+	@$(MAKE) --no-print-directory walker CASE=$(PILE) OUT=$(OUT) FILM=720p
 
 .PHONY: figures
 figures: setup ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)

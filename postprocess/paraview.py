@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 FOLDER_NAME = "vtk"
 COLLECTION_NAME = "walkers.pvd"
+SCRIPT_NAME = "show.py"
 _END_OF_VTK = b"</VTKFile>\n"
 
 
@@ -146,7 +147,7 @@ def _check_replaceable(place: Path) -> None:
         raise InputError(str(place), [Problem("", None, f"{expected}; it is a file")])
     ours = (".vtp", ".vtu", Path(COLLECTION_NAME).suffix)
     for path in place.iterdir():
-        if path.suffix not in ours:
+        if path.suffix not in ours and path.name != SCRIPT_NAME:
             raise InputError(str(place), [Problem("", None, f"{expected}; it holds {path.name}")])
 
 
@@ -208,7 +209,7 @@ def boundary_of(motion: Motion) -> pv.PolyData:
     low, high = motion.position.min(axis=(0, 1)) - margin, motion.position.max(axis=(0, 1)) + margin
     half, top = boundary.inner_width / 2.0, boundary.top
     if boundary.closed:
-        low, high = np.array([-half, -half, low[2]]), np.array([half, half, top])
+        low, high = np.array([-half, -half, min(low[2], 0.0)]), np.array([half, half, top])
     faces = boundary.faces()
     planes = [(np.array(face.centroid), np.array(face.normal)) for face in faces]
     edges = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]

@@ -1,4 +1,4 @@
-"""``walkers render``: a picture or a film of a run."""
+"""``walkers render``: a picture of a run."""
 
 from __future__ import annotations
 
@@ -10,18 +10,11 @@ import typer
 from walkers.commands.arguments import Out, Run, refuse
 from walkers.pipeline import DEFAULT_OUT
 
-Picture = Annotated[
-    Path | None, typer.Option("--to", help="The PNG or MP4 to write; in the run directory if left out.")
-]
+Picture = Annotated[Path | None, typer.Option("--to", help="The PNG to write; in the run directory if left out.")]
 Walker = Annotated[int | None, typer.Option("--walker", min=0, help="Number of a walker to show by itself.")]
 Images = Annotated[int | None, typer.Option("--images", min=1, max=20, help="How many times to show; 6 if left out.")]
 Interval = Annotated[
     str | None, typer.Option("--interval", help="Time between views of the whole, as '2 s' or 'T/4' (of a cycle).")
-]
-Film = Annotated[bool, typer.Option("--film", help="An MP4 of all samples instead.")]
-Slowdown = Annotated[
-    float | None,
-    typer.Option("--slowdown", min=0.05, max=1000.0, help="Of a film: so many times slower than in reality."),
 ]
 
 
@@ -32,22 +25,15 @@ def command(
     walker: Walker = None,
     images: Images = None,
     interval: Interval = None,
-    film: Film = False,
-    slowdown: Slowdown = None,
 ) -> None:
-    """Render a walker at several times, or views of a whole run, or film it (off-screen, no X server)."""
+    """Render a walker at several times, or views of a whole run (off-screen); for films: walkers film."""
     from walkers.pipeline import find_run
-    from walkers.postprocess.pictures import render_film, render_series, render_walker, seconds_apart
+    from walkers.postprocess.pictures import render_walker
+    from walkers.postprocess.series import render_series, seconds_apart
 
     found = find_run(run, out)
-    refuse("--interval", interval is not None and film, "has no meaning for a film")
     refuse("--interval", interval is not None and walker is not None, "is for views of the whole")
-    refuse("--images", images is not None and film, "has no meaning for a film")
-    refuse("--walker", walker is not None and film, "has no meaning for a film")
-    refuse("--slowdown", slowdown is not None and not film, "is for films (--film)")
-    if film:
-        print(render_film(found.directory, to, slowdown=slowdown or 1.0))
-    elif walker is not None:
+    if walker is not None:
         count = sum(make.replicates for make in found.case.walkers)
         refuse("--walker", not count, "the run has none")
         refuse("--walker", walker >= count, f"expected less than {count}, the run's number of walkers")

@@ -1,0 +1,113 @@
+"""Trajectories for other programs: extended XYZ (OVITO, ASE) and LAMMPS text dumps (OVITO, MDAnalysis, LAMMPS tools).
+
+Lengths are in mm, velocities in mm/s, angular velocities in rad/s, times in s: the XYZ writer has eight decimals, which
+of a length in m would be 10 nm. Places and velocities are relative to the boundary, as in
+`walkers.postprocess.Motion`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from walkers.inputs.errors import InputError, Problem
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.motion import Motion, read_motion
+from walkers.runner.files import beside
+
+_COLUMNS = ("id", "type", "mol", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
+_FORMAT = "%d %d %d" + " %.10g" * 10
+_MM = 1e3
+
+
+def write_trajectory(directory: Path, destination: Path, *, every: int = 1) -> Path:
+    """Write the motion of a run's beads while it is driven.
+
+    Parameters
+    ----------
+    directory
+        A run directory.
+    destination
+        The file to write: ``.xyz`` or ``.extxyz`` for extended XYZ, ``.lammpstrj`` for a LAMMPS text dump.
+    every
+        Take one of so many samples of the drive.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the name says none of these formats.
+    """
+    write = {".xyz": _write_xyz, ".extxyz": _write_xyz, ".lammpstrj": _write_lammps}.get(destination.suffix.lower())
+    if write is None or destination.is_dir():
+        expected = f"{destination}: expected the name of a .xyz, .extxyz or .lammpstrj file"
+        raise InputError("--to", [Problem("", None, expected)])
+    motion = read_motion(directory).driven
+    motion = motion.part(slice(None, None, every))
+    destination.parent.mkdir(parents=True, exist_ok=True)
+    with beside(destination) as new, new.open("w", encoding="ascii") as file:
+        _write(file, motion, write)
+    return destination
+
+
+def _write(file: TextIO, motion: Motion, write: Callable[[TextIO, Motion, int, FloatArray], None]) -> None:
+    box = box_of(motion)
+    for frame in range(len(motion.time)):
+        write(file, motion, frame, box)
+
+
+def box_of(motion: Motion) -> FloatArray:
+    """Corners of the box that all frames have, mm, shape (2, 3): about all beads; of a container its inner width."""
+    radius = motion.radius[:, None]
+    low, high = (motion.position - radius).min(axis=(0, 1)), (motion.position + radius).max(axis=(0, 1))
+    if motion.case.boundary.closed:
+        half = motion.case.boundary.inner_width / 2.0
+        low[:2], high[:2] = np.minimum(low[:2], -half), np.maximum(high[:2], half)
+    low[2] = min(low[2], 0.0)
+    return _MM * np.array([low, high])
+
+
+def _write_xyz(file: TextIO, motion: Motion, frame: int, box: FloatArray) -> None:
+    from ase import Atoms
+    from ase.io.extxyz import write_extxyz
+
+    beads = Atoms(["X"] * len(motion.radius), positions=_MM * motion.position[frame], cell=box[1] - box[0], pbc=False)
+    arrays = {
+        "id": np.arange(len(motion.radius)) + 1,
+        "radius": _MM * motion.radius,
+        "velo": _MM * motion.velocity[frame],
+        "omega": motion.spin[frame],
+        "walker": motion.walker_of,
+        "large": motion.large.astype(np.int64),
+    }
+    for name, values in arrays.items():
+        beads.arrays[name] = values
+    beads.info = {"Origin": box[0], "Time": float(motion.time[frame]), "units": "mm, s, rad"}
+    write_extxyz(file, [beads])
+
+
+def _write_lammps(file: TextIO, motion: Motion, frame: int, box: FloatArray) -> None:
+    count = len(motion.radius)
+    step = round(float(motion.time[frame]) / motion.case.run.time_step)
+    bounds = "".join(f"{low:.10g} {high:.10g}\n" for low, high in box.T)
+    file.write(f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n{bounds}")
+    file.write(f"ITEM: ATOMS {' '.join(_COLUMNS)}\n")
+    rows = np.column_stack(
+        [
+            np.arange(count) + 1,
+            1 + (motion.large.any() & ~motion.large),
+            motion.walker_of + 1,
+            _MM * motion.radius,
+            _MM * motion.position[frame],
+            _MM * motion.velocity[frame],
+            motion.spin[frame],
+        ]
+    )
+    np.savetxt(file, rows, fmt=_FORMAT)

@@ -1,0 +1,171 @@
+"""Films: moments and places, beads that roll, what is written, read back with ffmpeg and Pillow."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.spatial.transform import Rotation
+
+from tests.conftest import call
+from walkers.inputs import InputError
+from walkers.postprocess import read_motion
+from walkers.postprocess.analysis import current_result
+from walkers.postprocess.film_stage import Stage
+from walkers.postprocess.film_times import film_times, positions_at, round_below
+from walkers.postprocess.films import parse_size, told_speed
+from walkers.postprocess.motion import Motion
+from walkers.postprocess.rolling import turns_of
+from walkers.postprocess.scene import camera_axes
+
+
+@pytest.fixture(scope="module")
+def directory(run_directory: Callable[..., Path]) -> Path:
+    return run_directory(dimers={"replicates": 2}, run={"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 20})
+
+
+@pytest.fixture(scope="module")
+def motion(directory: Path) -> Motion:
+    return read_motion(directory).driven
+
+
+def test_beads_turn_as_far_as_the_result_says_they_roll(directory: Path, motion: Motion) -> None:
+    """The orientations' angle from the end of settling on, times the radius, is the mean rotation of the result."""
+    turns, group = turns_of(motion), motion.groups[0]
+    assert turns is not None
+    settled = motion.case.run.settling_cycles * motion.case.run.samples_per_cycle
+    rolled = []
+    for rows, walker in zip(group.rows, group.walkers, strict=True):
+        begin, end = (Rotation.from_quat(turns.turned[frame, rows]) for frame in (settled, -1))
+        angle = (end * begin.inv()).as_rotvec() @ group.across_axis
+        rolled.append(walker.facing * angle * group.radii / (motion.time[-1] - motion.time[settled]))
+    rotation = current_result(directory)["rotation"]
+    np.testing.assert_allclose(np.mean(rolled, axis=0), [rotation["bead_1"], rotation["bead_2"]], rtol=1e-3)
+
+
+def test_orientations_between_frames_join(motion: Motion) -> None:
+    turns = turns_of(motion)
+    assert turns is not None
+    np.testing.assert_allclose(turns.at(17, 1.0), turns.at(18, 0.0), atol=1e-12)
+    half = Rotation.from_matrix(turns.at(17, 0.5)) * Rotation.from_matrix(turns.at(17, 0.0)).inv()
+    np.testing.assert_allclose(half.as_rotvec(), turns.step[17] / 2.0, atol=1e-12)
+
+
+def test_spins_that_are_whole_cycles_apart_give_no_orientation(motion: Motion) -> None:
+    strobed = replace(motion.case, run=replace(motion.case.run, samples_per_cycle=1))
+    assert turns_of(replace(motion, case=strobed, mean_spin=None)) is None
+
+
+def test_places_between_frames_lie_on_the_motion(motion: Motion) -> None:
+    """Each second frame, predicted from its neighbours, to a hundredth of what it moves meanwhile."""
+    rare = motion.part(slice(None, None, 2))
+    errors = [np.abs(positions_at(rare, k, 0.5) - motion.position[2 * k + 1]).max() for k in range(20, 60)]
+    moved = np.abs(np.diff(motion.position, axis=0)).max()
+    assert max(errors) < 0.1 * moved
+    assert np.median(errors) < 0.01 * moved
+
+
+def test_pictures_are_as_far_apart_as_the_slow_motion_says(motion: Motion) -> None:
+    times = film_times(motion, fps=25, slowdown=20.0)
+    np.testing.assert_allclose(np.diff(times.time), 1.0 / 500.0, atol=1e-12)
+    assert not times.stroboscopic
+    shown = motion.time[times.frame] + times.share * np.median(np.diff(motion.time))
+    np.testing.assert_allclose(shown, times.time, atol=1e-12)
+    assert film_times(motion, fps=25).slowdown == 100.0  # 0.1 s in ten seconds
+    part = film_times(motion, 25, 20.0, 0.02, 0.05)
+    assert (part.time[0], len(part.time)) == (pytest.approx(0.02), 16)
+
+
+def test_films_in_real_time_are_stroboscopic(motion: Motion) -> None:
+    times = film_times(motion, fps=25, slowdown=1.0)
+    assert times.stroboscopic
+    cycles = times.time * motion.case.drive.frequency
+    np.testing.assert_allclose(cycles, np.round(cycles), atol=1e-9)
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0.2, None), (0.05, 0.05), (-0.1, None)])
+def test_nothing_to_show_is_refused(motion: Motion, begin: float, end: float | None) -> None:
+    with pytest.raises(InputError, match=r"expected times within the drive, 0 to 0\.1 s"):
+        film_times(motion, 25, None, begin, end)
+
+
+def test_a_scale_bar_is_as_long_as_beads_say(motion: Motion) -> None:
+    """The red of one bead, seen without perspective, is as wide and as high as its diameter in pixels."""
+    single = replace(
+        motion,
+        position=motion.position[:1, :1],
+        velocity=motion.velocity[:1, :1],
+        spin=motion.spin[:1, :1],
+        mean_spin=None,
+        radius=motion.radius[:1],
+        substrate=motion.substrate[:1],
+        walkers=(),
+    )
+    stage = Stage(single, (400, 300), rolling=False)
+    picture = stage.picture(single.position[0], np.zeros(3), None, {0}).astype(int)
+    stage.close()
+    rows, columns = np.nonzero(picture[..., 0] > 1.3 * picture[..., 1])
+    diameter = 2e3 * motion.radius[0] * stage.pixels_per_mm
+    assert np.ptp(columns) + 1 == pytest.approx(diameter, abs=2.5)
+    assert np.ptp(rows) + 1 == pytest.approx(diameter, abs=2.5)
+
+
+def test_up_in_the_picture_is_up_against_gravity(motion: Motion) -> None:
+    for degrees in (0.0, 10.0, 90.0):
+        boundary = replace(motion.case.boundary, tilt=np.radians(degrees))
+        tilted = replace(motion, case=replace(motion.case, boundary=boundary))
+        right, up, toward = axes = camera_axes(tilted)
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+        gravity = np.array(tilted.case.gravity_vector)
+        assert right @ gravity == pytest.approx(0.0, abs=1e-9)
+        assert up @ gravity < 0.0
+        assert toward[2] > 0.5  # nobody looks from below
+
+
+def test_an_mp4_shows_a_walker_that_walks_and_rolls(directory: Path, tmp_path: Path) -> None:
+    path = tmp_path / "here" / "walk.mp4"
+    done = call("film", str(directory), "--to", str(path), "--size", "360p", "--fps", "10", "--slowdown", "10")
+    assert (done.returncode, done.stdout.strip()) == (0, str(path))
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
+    assert (frames, seconds) == (11, pytest.approx(1.1, abs=0.05))
+    about, *read = imageio_ffmpeg.read_frames(str(path))
+    assert about["size"] == (640, 360)
+    pictures = [np.frombuffer(each, np.uint8).reshape(360, 640, 3).astype(int) for each in read]
+    ruby = [(one[..., 0] > 2.0 * one[..., 1]) & (one[..., 0] > 60) for one in pictures]
+    assert all(0.02 < one.mean() < 0.4 for one in ruby)
+    assert (ruby[0] != ruby[-1]).mean() > 0.01
+
+
+def test_a_gif_lasts_as_long_as_it_says(directory: Path, tmp_path: Path) -> None:
+    path = tmp_path / "walk.gif"
+    options = ["--size", "160x90", "--fps", "20", "--slowdown", "10", "--until", "0.05 s", "--walker", "1"]
+    call("film", str(directory), "--to", str(path), *options, check=True)
+    film = Image.open(path)
+    assert (film.size, film.n_frames, film.info["duration"], film.info["loop"]) == ((160, 90), 11, 50, 0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--to", "walk.avi"], "expected the name of a .mp4 or .gif file"),
+        (["--to", "walk.gif", "--fps", "30"], "expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF"),
+        (["--size", "333x201"], "expected even numbers for an MP4"),
+        (["--size", "wide"], "expected 360p, 480p, 720p, 1080p"),
+        (["--walker", "2"], "expected less than 2"),
+        (["--from", "soon"], 'expected a time such as "0.1 s"'),
+    ],
+)
+def test_what_cannot_be_filmed_is_told_in_a_line(directory: Path, options: list[str], message: str) -> None:
+    done = call("film", str(directory), *options)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert message in done.stderr
+    assert not (directory / "film.mp4").exists()
+
+
+def test_words_and_numbers() -> None:
+    assert [told_speed(slowdown) for slowdown in (20.0, 1.0, 0.5)] == ["20 × slower", "real time", "2 × faster"]
+    assert [round_below(value) for value in (33.3, 20.0, 0.99, 7.0)] == [20.0, 20.0, 0.5, 5.0]
+    assert (parse_size("720p"), parse_size("640x360")) == ((1280, 720), (640, 360))
