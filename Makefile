@@ -64,23 +64,28 @@ audit: setup ## Prove what the installed engine does, against published formulas
 	@$(WALKERS) audit
 
 .PHONY: docs-audit
-docs-audit: setup ## Write docs/engine.md from an audit of the installed engine
-	@$(WALKERS) audit --markdown docs/engine.md
+docs-audit: setup ## Write docs/explanation/engine.md from an audit of the installed engine
+	@$(WALKERS) audit --markdown docs/explanation/engine.md
 
 .PHONY: validate
 validate: setup ## Check it against published benchmarks, exact solutions and a second engine (under ten minutes)
 	@$(WALKERS) validate --out $(OUT)
 
 .PHONY: docs-validation
-docs-validation: setup ## Write docs/validation.md and its pictures
-	@$(WALKERS) validate --out $(OUT) --to docs
+docs-validation: setup ## Write docs/explanation/validation.md and its pictures
+	@$(WALKERS) validate --out $(OUT) --to docs/explanation
 
 .PHONY: docs-figures
 docs-figures: setup ## Write the figures and the comparison that docs/ shows
 	@$(WALKERS) figures --out $(OUT) --to docs/figures
 
+.PHONY: docs
+docs: engine .venv/ready-docs ## Build the documentation into build/site, to be opened from disk; runs its examples
+	@.venv/bin/python -m sphinx -q -W --keep-going -d build/doctrees docs build/site
+	@echo "open build/site/index.html"
+
 .PHONY: bench
-bench: setup ## Measure what docs/performance.md states
+bench: setup ## Measure what docs/explanation/performance.md states
 	.venv/bin/python tests/benchmark.py
 
 .PHONY: bench-accuracy
@@ -92,16 +97,16 @@ bench-starts: setup ## Start 5,000 engines, eight at a time, and count those tha
 	.venv/bin/python -m tests.benchmark_starts
 
 .PHONY: bench-sweeps
-bench-sweeps: setup ## Measure what docs/performance.md states of sweeps
+bench-sweeps: setup ## Measure what docs/explanation/performance.md states of sweeps
 	.venv/bin/python tests/benchmark_sweeps.py
 
 .PHONY: bench-piles
-bench-piles: setup ## Measure what docs/performance.md states of piles
+bench-piles: setup ## Measure what docs/explanation/performance.md states of piles
 	.venv/bin/python tests/benchmark_piles.py
 
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/api docs/reference/generated
 
 .PHONY: setup
 setup: engine .venv/ready ## Install what is missing: liggghts (apt-get) and .venv

@@ -8,7 +8,7 @@ of simulated points are given as the multiples of 5° that they are.
 
 Symbols: v_n normal speed, s velocity of the surface at the contact, ω angular velocity, R radius, μ friction, e
 restitution; primes are after the impact. "Simulated" points are the paper's own, by discrete elements; those of test 4
-that were measured are of W. A. Kharaz, D. A. Gorham, A. D. Salman, Powder Technology 120 (2001) 281-291, doi
+that were measured are of A. H. Kharaz, D. A. Gorham, A. D. Salman, Powder Technology 120 (2001) 281-291, doi
 10.1016/S0032-5910(01)00283-2; the finite elements of test 5 are as the paper shows them.
 """
 

@@ -1,4 +1,4 @@
-"""The audit's table, as text, as JSON, and as docs/engine.md."""
+"""The audit's table, as text, as JSON, and as docs/explanation/engine.md."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def as_dict(report: AuditReport) -> dict[str, Any]:
 
 
 def as_markdown(report: AuditReport) -> str:
-    """docs/engine.md: the defects, what is done about them, and what the audit measured."""
+    """docs/explanation/engine.md: the defects, what is done about them, and what the audit measured."""
     groups = {
         f"{group}. {title}": [checked for checked in report.checked if checked.check.group == group]
         for group, title in GROUPS.items()

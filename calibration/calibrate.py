@@ -92,6 +92,12 @@ class Outcome:
         values = self.space.values(self.checks["best"].unit[0])
         return dict(zip([one.name for one in self.space.parameters], map(float, values), strict=True))
 
+    def _repr_html_(self) -> str:
+        """The tables in a notebook: parameters, observations beside predictions, chains."""
+        from walkers.calibration.page import outcome_html
+
+        return outcome_html(self)
+
 
 @dataclass
 class _Engine:

@@ -12,7 +12,7 @@ from walkers.calibration.calibrate import Outcome
 from walkers.calibration.report import Row, labelled
 from walkers.calibration.waves import seen_in
 from walkers.inputs.calibration import Band
-from walkers.postprocess.drawing import new_figure, save_figure, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, save_figure, styled
 
 _AGAINST = {
     "peak_acceleration": "peak acceleration (m/s²)",
@@ -30,50 +30,76 @@ if TYPE_CHECKING:
 def draw(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
     """Write ``corner.png``, ``predictions.png``, ``sobol.png`` and, if the file has any, ``bands.png``."""
     sources = [Path(run).name for run in found.predictive.table["run"]]
-    figures = {"corner": _corner(found), "predictions": _predictions(rows), "sobol": _sobol(found)}
-    if found.calibration.file.bands:
-        figures["bands"] = _bands(found)
     files = []
-    for name, figure in figures.items():
+    for name, figure in figures_of(found, rows).items():
         files += save_figure(figure, to / f"{name}.png", sources, title=f"{found.calibration.file.title}: {name}")
     return files
 
 
+def figures_of(found: Outcome, rows: list[Row]) -> dict[str, Figure]:
+    """The figures of a calibration by name."""
+    figures = {"corner": _corner(found), "predictions": _predictions(rows), "sobol": _sobol(found)}
+    return figures | ({"bands": _bands(found)} if found.calibration.file.bands else {})
+
+
+@styled
 def _corner(found: Outcome) -> Figure:
     import corner
 
     parameters, posterior = found.space.parameters, found.posterior
     logs = np.array([one.log for one in parameters])
 
-    @styled
     def drawn(unit: FloatArray) -> FloatArray:
         values = found.space.values(unit)
         return np.where(logs, np.log10(np.where(logs, values, 1.0)), values)
 
-    figure, _ = new_figure(1.7 * len(parameters), 1.7 * len(parameters), nrows=len(parameters), ncols=len(parameters))
+    figure, _ = new_figure(TWO_COLUMNS, TWO_COLUMNS, nrows=len(parameters), ncols=len(parameters))
     # corner places its panels itself; after the constrained engine alone that would be refused.
     figure.set_layout_engine("tight")
     figure.set_layout_engine("none")
     corner.corner(
         drawn(posterior.unit),
         fig=figure,
-        labels=[("log " if one.log else "") + labelled(one) for one in parameters],
+        # A word on each line: panels of many parameters are no wider.
+        labels=["\n".join(("log " + labelled(one) if one.log else labelled(one)).split()) for one in parameters],
         range=drawn(np.array([np.zeros(len(parameters)), np.ones(len(parameters))])).T.tolist(),
         truths=drawn(found.checks["best"].unit[0]),
         truth_color="C1",
         quantiles=[0.05, 0.5, 0.95],
-        label_kwargs={"fontsize": 8},
+        label_kwargs={"fontsize": 7},
         plot_datapoints=False,
         smooth=1.0,
         bins=24,
+        hist_kwargs={"linewidth": 0.8},
+        contour_kwargs={"linewidths": 0.6},
     )
+    _make_room(figure)
     return figure
+
+
+def _make_room(figure: Figure) -> None:
+    """Few ticks, none at a corner, and labels as far from the panels as the ticks ask for, not as panels are wide."""
+    from matplotlib.ticker import MaxNLocator
+    from matplotlib.transforms import ScaledTranslation
+
+    edge = 1.0 / TWO_COLUMNS
+    figure.subplots_adjust(left=edge, bottom=edge, right=0.99, top=0.99, wspace=0.1, hspace=0.1)
+    away = -26.0 / 72.0
+    for panel in figure.axes:
+        panel.grid(visible=False)
+        beneath, beside = (ScaledTranslation(*way, figure.dpi_scale_trans) for way in ((0.0, away), (away, 0.0)))
+        panel.xaxis.set_label_coords(0.5, 0.0, transform=panel.transAxes + beneath)
+        panel.yaxis.set_label_coords(0.0, 0.5, transform=panel.transAxes + beside)
+        for axis in (panel.xaxis, panel.yaxis):
+            locator = axis.get_major_locator()
+            if isinstance(locator, MaxNLocator):
+                locator.set_params(nbins=3, prune="both")
 
 
 @styled
 def _predictions(rows: list[Row]) -> Figure:
     """Residuals in standard deviations: the engine at the best set and over the posterior, and what was held out."""
-    figure, axes = new_figure(7.6, 0.34 * len(rows) + 1.4)
+    figure, axes = new_figure(TWO_COLUMNS, 0.3 * len(rows) + 1.2)
     places = np.arange(len(rows))[::-1]
     axes.axvspan(-1.0, 1.0, color="0.9", lw=0)
     axes.axvline(0.0, color="0.4", lw=0.8)
@@ -88,7 +114,7 @@ def _predictions(rows: list[Row]) -> Figure:
     axes.set_yticks(places, [row.title for row in rows], fontsize=7)
     axes.set(xlabel="(predicted - published)/standard deviation", ylim=(-0.8, len(rows) - 0.2))
     axes.set_xscale("symlog", linthresh=3.0)
-    axes.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=2)
+    figure.legend(loc="outside upper center", ncols=2)
     return figure
 
 
@@ -107,13 +133,14 @@ def _bands(found: Outcome) -> Figure:
     """The engine over the posterior and at the best set, against what the experiments differ in."""
     bands = found.calibration.file.bands
     columns = min(len(bands), 3)
-    figure, axes = new_figure(3.3 * columns, 2.9 * -(-len(bands) // columns), nrows=-(-len(bands) // columns),
-                              ncols=columns, squeeze=False)  # fmt: skip
+    lines = -(-len(bands) // columns)
+    figure, axes = new_figure(TWO_COLUMNS, 2.3 * lines + 0.4, nrows=lines, ncols=columns, squeeze=False)
     for place, band in zip(axes.flat, bands, strict=False):
         _band(place, band, found)
     for place in axes.flat[len(bands) :]:
         place.set_visible(False)
-    axes.flat[0].legend(fontsize=7)
+    letter_panels(axes.flat[: len(bands)])
+    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 
@@ -148,13 +175,13 @@ def _band(axes: Axes, band: Band, found: Outcome) -> None:
 @styled
 def _sobol(found: Outcome) -> Figure:
     names = [one.symbol for one in found.space.parameters]
-    figure, axes = new_figure(1.0 * len(names) + 3.4, 0.28 * len(found.emulators) + 1.6)
+    figure, axes = new_figure(TWO_COLUMNS, 0.2 * len(found.emulators) + 1.6)
     total = found.sobol[1]
     image = axes.imshow(total, aspect="auto", cmap="Blues", vmin=0.0, vmax=1.0)
     for row, column in np.argwhere(np.isfinite(total)):
         colour = "w" if total[row, column] > 0.55 else "0.2"
-        axes.text(column, row, f"{total[row, column]:.2f}", ha="center", va="center", fontsize=6, color=colour)
-    axes.set_xticks(range(len(names)), names, rotation=35, ha="right", fontsize=7)
+        axes.text(column, row, f"{total[row, column]:.2f}", ha="center", va="center", fontsize=7, color=colour)
+    axes.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
     axes.set_yticks(range(len(found.emulators)), [one.observation.title for one in found.emulators], fontsize=7)
     axes.grid(visible=False)
     figure.colorbar(image, ax=axes, label="total Sobol index over the feasible part")

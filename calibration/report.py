@@ -20,6 +20,7 @@ from walkers.inputs.units import SPEED
 from walkers.runner.files import write_bytes, write_json, write_text
 
 FloatArray = npt.NDArray[np.float64]
+RECORD_NAME = "calibration.json"
 _SIGMAS = 2.0
 _NARROW, _NARROWER = 1.0 / 3.0, 2.0 / 3.0
 """A parameter is identified if the posterior's interval is less than a third of the prior's and the chains have
@@ -207,15 +208,19 @@ def write_tables(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
         samples[f"discrepancy_{group}"] = posterior.discrepancy[:, place]
     samples["log_density"] = posterior.log_density
     write_bytes(to / "posterior.parquet", samples.to_parquet(index=False))
-    write_json(to / "calibration.json", _as_dict(found, rows))
+    write_json(to / RECORD_NAME, as_dict(found, rows))
     write_text(to / "calibration.md", as_markdown(found, rows))
-    return [to / name for name in ("posterior.parquet", "calibration.json", "calibration.md")]
+    return [to / name for name in ("posterior.parquet", RECORD_NAME, "calibration.md")]
 
 
-def _as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
+def as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
+    """What ``calibration.json`` holds."""
     posterior, (checked, inside), (made, expected) = found.posterior, _inside(found), feasibility_check(found)
     contents: dict[str, object] = {
         "calibration": found.calibration.name,
+        "title": found.calibration.file.title,
+        "settings": found.calibration.file.model_dump(mode="json"),
+        "parameters": {one.name: labelled(one) for one in found.space.parameters},
         "sets": len(found.unit),
         "best": found.best,
         "intervals": intervals(found),

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.calibration.space import Space
+from walkers.inputs.axes import flatten
 from walkers.inputs.calibration import Calibration, Observation
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.schema import ALTERNATIVES
@@ -83,10 +84,12 @@ def wave_sweep(
                     )
             for key, value in point.items():
                 columns.setdefault(key, []).append(value)
+    settings = flatten(calibration.file.set, lambda _: False)
     document = {
         "title": calibration.file.title,
         "case": calibration.file.case,
-        "set": calibration.file.set,
+        # What the runs have beside it, such as twice the cycles, stands in for what is set.
+        "set": {key: value for key, value in settings.items() if key not in columns},
         "zip": [columns],
     }
     sweep = expand(document, source=calibration.source, name=name, folder=calibration.folder)

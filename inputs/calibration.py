@@ -29,6 +29,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from walkers.inputs.axes import Value, flatten
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.kinds import check_kind
 from walkers.inputs.library import suggestion
 from walkers.inputs.messages import validated
 from walkers.inputs.reading import find_input, read_toml
@@ -196,6 +197,7 @@ def load_calibration(calibration: str | Path) -> Calibration:
     InputError
         If there is no such file or anything in it cannot be used.
     """
+    check_kind(calibration, "calibration")
     path = find_input(calibration, shipped_calibrations(), "calibration")
     return read_calibration(read_toml(path), source=str(calibration), name=path.stem, folder=path.parent)
 

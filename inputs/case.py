@@ -6,9 +6,9 @@ This is what the deck is rendered from, what a run directory stores as ``case.js
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
-from math import cos, hypot, inf, sin
+from math import cos, hypot, inf, isclose, sin
 from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
@@ -16,6 +16,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from walkers.inputs.bodies import Body, Mixture, Placed, Standing, Walkers
 from walkers.inputs.boundary import Shape
 from walkers.inputs.drive import AXES, Drive, Vector
+from walkers.inputs.origins import Origin, origins_of
 from walkers.physics.matter import Contact, Liquid
 
 FIRST_ATTEMPTS = (12, 24)
@@ -70,6 +71,11 @@ class Run:
     ranks: int
 
     @property
+    def period(self) -> float:
+        """Of a cycle, s."""
+        return self.time_step * self.steps_per_cycle
+
+    @property
     def steps(self) -> int:
         """Steps of the whole drive."""
         return self.steps_per_cycle * self.cycles
@@ -112,8 +118,15 @@ class Run:
 class Case:
     """Bodies on a boundary under a drive, resolved.
 
-    Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²); ``name`` and ``title`` do not determine
-    the run and stay out of `determinants`. ``seed`` is that of all that is drawn at the start.
+    Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²). ``seed`` is that of all that is drawn at
+    the start. ``name``, ``title``, ``document`` (the tables that it was read from) and ``recorded`` (the `origins` that
+    were written down with a run) do not determine the run: they stay out of `determinants`, the latter two out of
+    comparisons too.
+
+    Raises
+    ------
+    ValueError
+        If the run is not one for the drive, whose cycles it has other steps for.
     """
 
     name: str
@@ -130,6 +143,22 @@ class Case:
     contact: Contact
     seed: int
     run: Run
+    document: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    recorded: tuple[Origin, ...] = field(default=(), compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse a drive that was changed alone: its step and sampling would be another's."""
+        period, frequency = self.run.period, self.drive.frequency
+        if period and not isclose(period * frequency, 1.0, rel_tol=1e-9):
+            raise ValueError(
+                f"drive of {frequency:g} Hz, but time step and sampling of one of {1.0 / period:g} Hz: "
+                f'use load_case("{self.name}", {{"drive.frequency": "{frequency:g} Hz"}})'
+            )
+
+    @property
+    def origins(self) -> tuple[Origin, ...]:
+        """Where each of its values comes from; empty for one that was neither read from tables nor from a run."""
+        return self.recorded or origins_of(self)
 
     def for_cycles(self, cycles: int) -> Case:
         """The same for so many cycles at a stretch, of a case whose run ends when its walkers are steady."""
@@ -236,12 +265,13 @@ class Case:
 
     def determinants(self) -> dict[str, Any]:
         """Everything that the run's outcome depends on, as plain JSON types."""
-        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude={"name", "title"})
+        left_out = {"name", "title", "document", "recorded"}
+        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=left_out)
         return values
 
     def as_dict(self) -> dict[str, Any]:
-        """The whole case as plain JSON types, SI units."""
-        values: dict[str, Any] = _adapter().dump_python(self, mode="json")
+        """The whole case as plain JSON types, SI units, with the origins of its values."""
+        values: dict[str, Any] = _adapter().dump_python(replace(self, recorded=self.origins), mode="json")
         return values
 
     @classmethod

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -35,12 +36,55 @@ def liquids() -> tuple[str, ...]:
     return tuple(_contents()["liquids"])
 
 
-def _number(key: str, entry: Mapping[str, Any]) -> float:
+@dataclass(frozen=True)
+class Known:
+    """A number of the library.
+
+    Attributes
+    ----------
+    value
+        SI.
+    text
+        As the library has it, with its unit.
+    source
+        Where it is from; ``calibrated`` if nobody measured it.
+    range
+        Ends between which a calibrated number may lie as well (5 to 95 % of the posterior), as a case would write them.
+    """
+
+    value: float
+    text: str
+    source: str
+    range: tuple[Any, Any] | None = None
+
+
+@dataclass(frozen=True)
+class Unmeasured:
+    """What nobody measures and a case may leave out: what is usual then, None if it must be said, and its range.
+
+    ``logarithmic`` says whether the range is of magnitudes; ``usual`` is SI, ``range`` as a case would write it.
+    """
+
+    usual: Known | None
+    range: tuple[Any, Any]
+    logarithmic: bool
+
+
+def _known(key: str, entry: Mapping[str, Any]) -> Known:
     value = entry["value"]
+    return Known(_number(key, value), value if isinstance(value, str) else f"{value:g}", entry["source"], _range(entry))
+
+
+def _range(entry: Mapping[str, Any]) -> tuple[Any, Any] | None:
+    return (entry["range"][0], entry["range"][1]) if "range" in entry else None
+
+
+def _number(key: str, value: Any) -> float:
     return units.parse_quantity(value, _KINDS[key]) if isinstance(value, str) else float(value)
 
 
-def material(name: str) -> dict[str, float]:
+@cache
+def material(name: str) -> Mapping[str, Known]:
     """Density (kg/m³), Young's modulus (Pa) and Poisson's ratio of a material.
 
     Raises
@@ -48,10 +92,11 @@ def material(name: str) -> dict[str, float]:
     KeyError
         If the library has no such material.
     """
-    return {key: _number(key, entry) for key, entry in _contents()["materials"][name].items()}
+    return {key: _known(key, entry) for key, entry in _contents()["materials"][name].items()}
 
 
-def liquid(name: str) -> dict[str, float]:
+@cache
+def liquid(name: str) -> Mapping[str, Known]:
     """Surface tension (N/m), kinematic viscosity (m²/s) and density (kg/m³) of a liquid.
 
     Raises
@@ -59,10 +104,11 @@ def liquid(name: str) -> dict[str, float]:
     KeyError
         If the library has no such liquid.
     """
-    return {key: _number(key, entry) for key, entry in _contents()["liquids"][name].items()}
+    return {key: _known(key, entry) for key, entry in _contents()["liquids"][name].items()}
 
 
-def surface_pair(first: str | None, second: str | None) -> dict[str, float] | None:
+@cache
+def surface_pair(first: str | None, second: str | None) -> Mapping[str, Known] | None:
     """How two wet surfaces touch, or None where the library has no value for them.
 
     ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio``, ``viscosity_ratio``,
@@ -70,18 +116,26 @@ def surface_pair(first: str | None, second: str | None) -> dict[str, float] | No
     """
     for entry in _contents()["surface_pairs"]:
         if sorted(entry["materials"]) == sorted([first or "", second or ""]):
-            return {key: _number(key, known) for key, known in entry.items() if key != "materials"}
+            return {key: _known(key, known) for key, known in entry.items() if key != "materials"}
     return None
+
+
+@cache
+def unmeasured() -> Mapping[str, Unmeasured]:
+    """What nobody measures, by the keys of a case."""
+    return {
+        key: Unmeasured(
+            _known(key.split(".")[-1], {"value": entry["usual"], "source": ""}) if "usual" in entry else None,
+            (entry["range"][0], entry["range"][1]),
+            entry.get("log", False),
+        )
+        for key, entry in _contents()["unmeasured"].items()
+    }
 
 
 def surface_pairs() -> list[tuple[str, str]]:
     """The pairs of materials whose friction the library has."""
     return [(entry["materials"][0], entry["materials"][1]) for entry in _contents()["surface_pairs"]]
-
-
-def sources(table: str, name: str) -> dict[str, str]:
-    """Source of each number of a material (``table="materials"``) or liquid (``"liquids"``)."""
-    return {key: entry["source"] for key, entry in _contents()[table][name].items()}
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

@@ -9,10 +9,12 @@ import re
 import stat
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.errors import InputError, Problem, UnusableKeyError
+from walkers.inputs.kinds import check_kind
 from walkers.inputs.library import suggestion
 
 if TYPE_CHECKING:
@@ -27,13 +29,15 @@ def shipped_cases() -> dict[str, Path]:
     return {path.stem: path for path in sorted(_SHIPPED.glob("*.toml"))}
 
 
-def load_case(case: str | Path) -> Case:
+def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Case:
     """Read and resolve a case.
 
     Parameters
     ----------
     case
         A TOML file, or the name of a shipped case such as ``fig1b``.
+    changes
+        Values put in place of the file's, by dotted keys, as a file would say them.
 
     Returns
     -------
@@ -43,16 +47,37 @@ def load_case(case: str | Path) -> Case:
     Raises
     ------
     InputError
-        If there is no such file or anything in it cannot be used.
+        If there is no such file or anything in it, or a change, cannot be used.
 
     Examples
     --------
     >>> case = load_case("fig1b")
     >>> case.walkers[0].radii, case.drive.frequency
     ((0.0003, 0.0002), 80.0)
+    >>> load_case("fig1b", {"drive.frequency": "70 Hz", "dimers.radii[1]": "0.25 mm"}).walkers[0].radii
+    (0.0003, 0.00025)
     """
+    if str(case) not in shipped_cases():
+        check_kind(case, "case")
     path = find_input(case, shipped_cases(), "case")
-    return resolve_case(read_toml(path), source=str(case), name=path.stem)
+    document = read_toml(path)
+    if changes:
+        document = _with_changes(document, changes, str(case))
+    return resolve_case(document, source=str(case), name=path.stem)
+
+
+def _with_changes(document: Mapping[str, Any], changes: Mapping[str, Any], source: str) -> dict[str, Any]:
+    from walkers.inputs.axes import UnusableAxisError
+    from walkers.inputs.changes import changed, check_key
+    from walkers.inputs.messages import quoted
+
+    try:
+        for key in changes:
+            check_key(key)
+        return changed(document, changes)
+    except UnusableAxisError as unusable:
+        value = quoted({"value": changes.get(unusable.key)}, ["value"])
+        raise InputError(source, [Problem(unusable.key, value, unusable.expected)]) from unusable
 
 
 def find_input(name: str | Path, shipped: Mapping[str, Path], kind: str) -> Path:
@@ -124,7 +149,7 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     _refuse_old_words(document, source)
     file = validated(CaseFile, document, source)
     try:
-        return resolve(file, name)
+        return replace(resolve(file, name), document=dict(document))
     except ArithmeticError as error:
         raise InputError(source, [Problem("", None, f"inconsistent values: {error}")]) from error
     except UnusableKeyError as unusable:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from math import atan2
 
-from walkers.inputs import library
+from walkers.inputs.axes import UnusableAxisError
 from walkers.inputs.bodies import Placed
 from walkers.inputs.body_tables import check_bodies, mixture_of, spaced, walkers_of
 from walkers.inputs.boundary import Box, Channel, Cylinder, Groove, Plane, Shape
 from walkers.inputs.case import Case, Run
+from walkers.inputs.changes import check_key
 from walkers.inputs.errors import UnusableKeyError
-from walkers.inputs.matter_tables import density_of, resolve_contact, resolve_liquid
+from walkers.inputs.matter_tables import resolve_matter
 from walkers.inputs.run_tables import resolve_drive, resolve_run
 from walkers.inputs.schema import BoundaryTable, CaseFile
 from walkers.physics.dimer import Dimer
@@ -25,16 +26,15 @@ def resolve(file: CaseFile, name: str) -> Case:
     UnusableKeyError
         If something is missing that the library does not know, or keys contradict each other.
     """
+    for key in file.uncertain:
+        _check_uncertain(key)
     boundary, beads = _boundary(file.boundary), file.beads
     walkers = walkers_of(file)
     mixture = mixture_of(file.mixture, boundary) if file.mixture else None
     placed = Placed(tuple((*bead.at, bead.radius) for bead in file.placed)) if file.placed else None
     if not (walkers or mixture or placed):
         raise UnusableKeyError("dimers", "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
-    pair = library.surface_pair(beads.material, boundary.material) or {}
-    density = density_of(beads.material, beads.density, file.contact)
-    liquid = resolve_liquid(file.liquid, pair)
-    contact = resolve_contact(file.contact, beads.material, "boundary.material", boundary.material)
+    density, liquid, contact, _ = resolve_matter(file)
     first = walkers[0].radii if walkers else ()
     dimer = Dimer((first[0], first[1]), density, liquid.surface_tension) if len(first) == 2 else None
     drive = resolve_drive(file.drive, boundary.drive_axis, dimer)
@@ -61,6 +61,13 @@ def resolve(file: CaseFile, name: str) -> Case:
     case = replace(case, walkers=tuple(spaced(case, number, file) for number in range(len(walkers))))
     check_bodies(case, file)
     return case
+
+
+def _check_uncertain(key: str) -> None:
+    try:
+        check_key(key)
+    except UnusableAxisError as unusable:
+        raise UnusableKeyError(f"uncertain.{unusable.key}", unusable.expected) from unusable
 
 
 def _boundary(table: BoundaryTable) -> Shape:

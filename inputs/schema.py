@@ -285,8 +285,33 @@ class EnvironmentTable(Table):
     gravity: Acceleration = 9.81
 
 
+def _ranges(value: object) -> object:
+    """Ranges by dotted keys: each two values of one unit, the smaller first."""
+    from walkers.inputs.axes import UnusableAxisError, flatten, is_axis, sampled
+
+    if not isinstance(value, dict):
+        return value
+    try:
+        given = flatten(value, is_axis)
+        ranges = {key: one if is_axis(one) else {"uniform": one} for key, one in given.items()}
+        if ranges:
+            sampled("latin-hypercube", 1, 0, ranges)
+    except UnusableAxisError as unusable:
+        told = f"{unusable.key}: {unusable.expected}".replace("{ uniform = [low, high] }", "[low, high]")
+        raise PydanticCustomError("ranges", "{expected}", {"expected": told}) from unusable
+    return ranges
+
+
+Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
+"""As a sweep's samplers take them: for each key ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``."""
+
+
 class CaseFile(Table):
-    """A case file: bodies on a boundary under a drive, with a liquid and contacts."""
+    """A case file: bodies on a boundary under a drive, with a liquid and contacts.
+
+    ``uncertain`` has, for keys whose values are guesses, the range in which the truth may lie: ``[low, high]``, or
+    ``{ loguniform = [low, high] }`` for one of magnitudes.
+    """
 
     title: str = ""
     beads: BeadsTable
@@ -300,3 +325,4 @@ class CaseFile(Table):
     contact: ContactTable = ContactTable()
     run: RunTable = RunTable()
     environment: EnvironmentTable = EnvironmentTable()
+    uncertain: Ranges = {}

@@ -11,10 +11,9 @@ drive.peak_acceleration = { linspace = ["0.5 g", "10 g", 20] }
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -37,16 +36,16 @@ from walkers.inputs.axes import (
     zipped,
 )
 from walkers.inputs.case import Case
+from walkers.inputs.changes import changed, check_key
 from walkers.inputs.errors import InputError, Problem
-from walkers.inputs.messages import quoted, suggested_key, validated
+from walkers.inputs.kinds import check_kind
+from walkers.inputs.messages import quoted, validated
 from walkers.inputs.reading import find_input, read_toml, resolve_case, shipped_cases
-from walkers.inputs.schema import ALTERNATIVES, CaseFile, Whole
+from walkers.inputs.schema import Whole
 from walkers.inputs.units import Speed
 
 _SHIPPED = Path(__file__).parent / "sweeps"
-_PART = re.compile(r"(?P<name>[^.\[\]]+)(?:\[(?P<index>\d+)\])?")
-_INDEX = re.compile(r"\[\d+\]")
-_LAST_INDEX = re.compile(r"\[\d+\][^\[]*$")
+_LONGEST_NAME = 120
 
 
 class _Table(BaseModel):
@@ -124,6 +123,8 @@ class Sweep:
         The points: one value a key.
     descent
         How the points depend on each other, if they do.
+    file
+        Tables of the sweep file, if it is from one.
     """
 
     name: str
@@ -135,6 +136,7 @@ class Sweep:
     units: tuple[str | None, ...]
     rows: Sequence[tuple[Value, ...]]
     descent: Descent | None
+    file: Mapping[str, Any] = field(default_factory=dict)
 
     def cases(self) -> Iterator[Case]:
         """The case of each point, resolved.
@@ -159,21 +161,37 @@ def shipped_sweeps() -> dict[str, Path]:
     return {path.stem: path for path in sorted(_SHIPPED.glob("*.toml"))}
 
 
-def load_sweep(sweep: str | Path) -> Sweep:
+def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) -> Sweep:
     """Read a sweep file and expand it.
 
     Parameters
     ----------
     sweep
         A TOML file, or the name of a shipped sweep such as ``fig2``.
+    changes
+        Values put beside those of its ``[set]``, by dotted keys; the sweep's name tells of them.
 
     Raises
     ------
     InputError
         If there is no such file or anything in it cannot be used. Its points are checked by `Sweep.cases`.
     """
+    check_kind(sweep, "sweep")
     path = find_input(sweep, shipped_sweeps(), "sweep")
-    return expand(read_toml(path), source=str(sweep), name=path.stem, folder=path.parent)
+    document, name = read_toml(path), path.stem
+    if changes:
+        try:
+            document = {**document, "set": {**flatten(document.get("set", {}), lambda _: False), **changes}}
+        except (AttributeError, UnusableAxisError) as error:
+            raise InputError(str(sweep), [Problem("set", None, f"expected a table of keys ({error})")]) from error
+        name = _name_with(name, changes)
+    return expand(document, source=str(sweep), name=name, folder=path.parent)
+
+
+def _name_with(name: str, changes: Mapping[str, Value]) -> str:
+    """Name of a sweep with changes: another one, so that its table stands beside that of the sweep without."""
+    told = ",".join(f"{key}={value}" for key, value in changes.items())
+    return re.sub(r"[^\w.+=,-]+", "_", f"{name},{told}")[:_LONGEST_NAME]
 
 
 def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Sweep:
@@ -202,9 +220,11 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         settings = flatten(file.set, lambda _: False)
         given = read_toml(base)
         for key in (*settings, *keys):
+            if key in settings and key in keys:
+                raise UnusableAxisError(key, settings[key], "varies: it cannot be set as well")
             if key == "title" and key in keys:
                 raise UnusableAxisError(key, None, "does not vary: points with other titles alone are the same run")
-            _check_key(key)
+            check_key(key)
         tables = changed(given, settings)
         changed(tables, dict(zip(keys, rows[0], strict=True)))
     except UnusableAxisError as unusable:
@@ -222,6 +242,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         units=units,
         rows=rows,
         descent=descent,
+        file=document,
     )
 
 
@@ -233,14 +254,6 @@ def _base(case: str, source: str, folder: Path) -> Path:
         raise InputError(source, [Problem("case", f'"{case[:40]}…"', f"cannot be read: {error.strerror}")]) from error
     except InputError as error:
         raise InputError(source, [Problem("case", f'"{case}"', error.problems[0].expected)]) from error
-
-
-def _check_key(key: str) -> None:
-    if "" in key.split("."):
-        raise UnusableAxisError(key, None, "is no key of a case")
-    unknown = suggested_key(_INDEX.sub("", key), CaseFile)
-    if unknown is not None:
-        raise UnusableAxisError(key, None, unknown)
 
 
 def _points(
@@ -272,57 +285,3 @@ def _descending(table: DescendTable) -> list[Value]:
         )
     number = int((start - to) / step + 1e-9) + 1
     return [written(start - step * count, unit) for count in range(number)]
-
-
-def changed(document: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[str, Any]:
-    """A case's tables with dotted keys (``dimers.radii[0]`` for one of a list) given other values.
-
-    Raises
-    ------
-    UnusableAxisError
-        If there is no such place in a list.
-
-    What a new value stands for in other words (`walkers.inputs.schema.ALTERNATIVES`) goes, unless it changes too.
-    """
-    changed_document = copy.deepcopy(dict(document))
-    for key in changes:
-        for other in ALTERNATIVES.get(key, ()):
-            if other not in changes:
-                _remove(changed_document, other)
-    for key, value in changes.items():
-        _put(changed_document, key, value)
-    return changed_document
-
-
-def _remove(document: dict[str, Any], key: str) -> None:
-    *tables, name = key.split(".")
-    table: Any = document
-    for part in tables:
-        table = table.get(part) if isinstance(table, dict) else None
-    if isinstance(table, dict):
-        table.pop(name, None)
-
-
-def _put(document: dict[str, Any], key: str, value: Value) -> None:
-    """Give the place of a dotted key, such as ``drive.harmonics[1].phase``, another value."""
-    *tables, last = [(match["name"], match["index"]) for match in _PART.finditer(key)]
-    table: Any = document
-    for name, index in tables:
-        table = table.setdefault(name, {}) if index is None else _entry(table, name, int(index), key, value)
-        if isinstance(table, list):
-            raise UnusableAxisError(key, value, f"{name} is a list: say which one, such as {name}[0]")
-        if not isinstance(table, dict):  # the base case is wrong there, which its own check tells
-            return
-    name, index = last
-    if index is None:
-        table[name] = value
-    else:
-        _entry(table, name, int(index), key, value)
-        table[name] = [value if place == int(index) else one for place, one in enumerate(table[name])]
-
-
-def _entry(table: dict[str, Any], name: str, index: int, key: str, value: Value) -> Any:
-    entries = table.get(name)
-    if not isinstance(entries, list) or index >= len(entries):
-        raise UnusableAxisError(key, value, f"the base case has no {_LAST_INDEX.sub('', key)} of that length")
-    return entries[index]

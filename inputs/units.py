@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from math import pi
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
@@ -156,6 +156,19 @@ def split_quantity(text: str) -> tuple[float, str]:
     return float(match["number"]), match["unit"].strip()
 
 
+def quantity_text(value: float, kind: Kind) -> str:
+    """A number of SI units in the unit of the kind's example, as a case could say it."""
+    unit = _NUMBER_AND_UNIT.fullmatch(kind.example)["unit"]  # type: ignore[index]
+    return f"{value / _USUAL[unit][1]:.6g} {unit}"
+
+
+def kind_in(annotation: Any) -> Kind | None:
+    """The kind of quantity that a field of a table holds, or None."""
+    if isinstance(annotation, Kind):
+        return annotation
+    return next((kind for one in get_args(annotation) if (kind := kind_in(one)) is not None), None)
+
+
 def _validator(kind: Kind, *, positive: bool, zero: bool) -> Any:
     def validate(value: object) -> float:
         if not isinstance(value, str):
@@ -186,19 +199,19 @@ KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0)
 DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4)
 MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3)
 
-Length = Annotated[float, _validator(LENGTH, positive=True, zero=False)]
-Radius = Annotated[float, _validator(RADIUS, positive=True, zero=False)]
-SignedLength = Annotated[float, _validator(LENGTH, positive=False, zero=True)]
-Frequency = Annotated[float, _validator(FREQUENCY, positive=True, zero=False)]
-Acceleration = Annotated[float, _validator(ACCELERATION, positive=True, zero=True)]
-Speed = Annotated[float, _validator(SPEED, positive=True, zero=False)]
-Time = Annotated[float, _validator(TIME, positive=True, zero=False)]
-Duration = Annotated[float, _validator(DURATION, positive=True, zero=False)]
-NonNegativeDuration = Annotated[float, _validator(DURATION, positive=True, zero=True)]
-Angle = Annotated[float, _validator(ANGLE, positive=False, zero=True)]
-NonNegativeAngle = Annotated[float, _validator(ANGLE, positive=True, zero=True)]
-Density = Annotated[float, _validator(DENSITY, positive=True, zero=False)]
-SurfaceTension = Annotated[float, _validator(SURFACE_TENSION, positive=True, zero=False)]
-KinematicViscosity = Annotated[float, _validator(KINEMATIC_VISCOSITY, positive=True, zero=True)]
-DynamicViscosity = Annotated[float, _validator(DYNAMIC_VISCOSITY, positive=True, zero=True)]
-Modulus = Annotated[float, _validator(MODULUS, positive=True, zero=False)]
+Length = Annotated[float, LENGTH, _validator(LENGTH, positive=True, zero=False)]
+Radius = Annotated[float, RADIUS, _validator(RADIUS, positive=True, zero=False)]
+SignedLength = Annotated[float, LENGTH, _validator(LENGTH, positive=False, zero=True)]
+Frequency = Annotated[float, FREQUENCY, _validator(FREQUENCY, positive=True, zero=False)]
+Acceleration = Annotated[float, ACCELERATION, _validator(ACCELERATION, positive=True, zero=True)]
+Speed = Annotated[float, SPEED, _validator(SPEED, positive=True, zero=False)]
+Time = Annotated[float, TIME, _validator(TIME, positive=True, zero=False)]
+Duration = Annotated[float, DURATION, _validator(DURATION, positive=True, zero=False)]
+NonNegativeDuration = Annotated[float, DURATION, _validator(DURATION, positive=True, zero=True)]
+Angle = Annotated[float, ANGLE, _validator(ANGLE, positive=False, zero=True)]
+NonNegativeAngle = Annotated[float, ANGLE, _validator(ANGLE, positive=True, zero=True)]
+Density = Annotated[float, DENSITY, _validator(DENSITY, positive=True, zero=False)]
+SurfaceTension = Annotated[float, SURFACE_TENSION, _validator(SURFACE_TENSION, positive=True, zero=False)]
+KinematicViscosity = Annotated[float, KINEMATIC_VISCOSITY, _validator(KINEMATIC_VISCOSITY, positive=True, zero=True)]
+DynamicViscosity = Annotated[float, DYNAMIC_VISCOSITY, _validator(DYNAMIC_VISCOSITY, positive=True, zero=True)]
+Modulus = Annotated[float, MODULUS, _validator(MODULUS, positive=True, zero=False)]

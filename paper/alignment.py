@@ -12,7 +12,7 @@ from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.paper import dimers, published
 from walkers.paper.sources import Sources
-from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 from walkers.theory.mathieu import Alignment, alignment, is_stable, turning
 
 if TYPE_CHECKING:
@@ -33,33 +33,45 @@ _SMALL = 0.15
 def fig_alignment(sources: Sources) -> Figure:
     """ψ(t) of asymmetric and symmetric dimers, its beginning beside theory, and the chart of stability."""
     table = sources.finished("alignment")
-    figure, axes = new_figure(9.6, 7.0, mosaic=[["asymmetric", "symmetric"], ["beginning", "chart"]])
+    figure, axes = new_figure(TWO_COLUMNS, 6.0, mosaic=[["asymmetric", "symmetric"], ["beginning", "chart"]])
     shown = {"asymmetric": ~dimers.symmetric(table), "symmetric": dimers.symmetric(table)}
     for name, chosen in shown.items():
         for _, row in table[chosen].iterrows():
             _turns(axes[name], sources.trajectory(row["run"]), row["dimers.angle"])
+        _mark_quarters(axes[name])
     axes["asymmetric"].set_title("asymmetric: along the axis, ψ = 0, ±180°, …")
     axes["symmetric"].set_title("symmetric: across the axis, ψ = ±90°")
-    axes["asymmetric"].set_yticks(np.arange(-540, 541, 180))
-    axes["symmetric"].set_yticks(np.arange(-180, 181, 90))
     handles, labels = axes["asymmetric"].get_legend_handles_labels()
-    figure.legend(handles, labels, title="started at", fontsize=7, title_fontsize=7, loc="outside right center")
+    figure.legend(
+        handles, labels, title="(a) to (c): started at an angle of", loc="outside lower center", ncols=len(labels)
+    )
     asymmetric = table[shown["asymmetric"]]
     for _, row in asymmetric[asymmetric["dimers.angle"].isin(_BEGINNINGS)].iterrows():
         _beginning(axes["beginning"], sources.trajectory(row["run"]), row["dimers.angle"])
     axes["beginning"].plot([], [], color="0.2", label="engine")
     axes["beginning"].plot([], [], "--", color="0.2", label="rolling without sliding")
-    axes["beginning"].legend(fontsize=7)
-    axes["beginning"].set_title("the first cycles, one facing each way")
+    legend_below(axes["beginning"], ncols=2)
+    axes["beginning"].set_title("asymmetric: the first cycles, one facing each way")
+    _mark_quarters(axes["beginning"])
     _chart(axes["chart"])
+    letter_panels(axes.values())
     kinds = dict.fromkeys(dimers.described(sources.trajectory(run).case) for run in table["run"])
-    figure.suptitle("; ".join(kinds), fontsize=10)
+    figure.suptitle("; ".join(kinds))
     return figure
 
 
-def _shade(angle: float) -> str:
-    """Darker for a start nearer to the axis."""
-    return f"{0.75 * angle / 90.0:.2f}"
+def _shade(angle: float) -> tuple[float, float, float, float]:
+    """From dark violet for a start on the axis to green for one across it; none is too light for thin lines."""
+    from matplotlib import colormaps
+
+    return colormaps["viridis"](0.8 * angle / 90.0)
+
+
+def _mark_quarters(axes: Axes) -> None:
+    """Ticks at quarters of a turn, or at halves if there are many."""
+    from matplotlib.ticker import MultipleLocator
+
+    axes.yaxis.set_major_locator(MultipleLocator(90.0 if np.ptp(axes.get_ylim()) < 720.0 else 180.0))
 
 
 def _turns(axes: Axes, trajectory: Group, angle: float) -> None:
@@ -118,7 +130,7 @@ def _chart(axes: Axes) -> None:
         axes.plot([one.v for one in points], [one.u for one in points], "osD"[number], color=f"C{number}", label=prefix)
     for below, marker, label in ((True, "v", "climber, large bead below"), (False, "^", "climber, large bead above")):
         one = climber(below)
-        axes.plot(one.v, one.u, marker, color="C4", ms=6, label=f"{label}: U = {one.u:.1g}")
+        axes.plot(one.v, one.u, marker, color="C4", ms=5, label=f"{label}: U = {one.u:.1g}")
     axes.axvline(published.LARGEST_V, color="0.45", ls="-.", lw=0.8, label="paper's bound, 0.4")
     axes.set(xlabel="V", ylabel="U", title="where small angles stay small (grey)", ylim=(-0.4, 1.4))
-    axes.legend(fontsize=7, loc="upper right")
+    legend_below(axes, ncols=2)

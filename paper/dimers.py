@@ -30,11 +30,10 @@ def symmetric(table: pd.DataFrame) -> pd.Series[bool]:
 
 
 def driven(case: Case, frequency: float, accelerations: Iterable[float]) -> list[Case]:
-    """A case at another frequency, Hz, and peak accelerations, m/s²."""
-    return [
-        replace(case, drive=Drive((Harmonic(case.drive.direction, float(frequency), float(peak)),), case.drive.frame))
-        for peak in accelerations
-    ]
+    """A case at another frequency, Hz, and peak accelerations, m/s²; for the theory, without a time step for a deck."""
+    drives = [Harmonic(case.drive.direction, float(frequency), float(peak)) for peak in accelerations]
+    run = replace(case.run, time_step=0.0)
+    return [replace(case, drive=Drive((one,), case.drive.frame), run=run) for one in drives]
 
 
 def of_asymmetry(case: Case, sin_delta: float, gamma0: float) -> Case:

@@ -20,7 +20,7 @@ from walkers.paper.sensitivity import fig_sensitivity
 from walkers.paper.sources import NothingFinishedError, ProgressOf, Sources, make_sources
 from walkers.paper.stroboscopic import fig1b
 from walkers.paper.velocity import fig2, fig3
-from walkers.postprocess.drawing import save_figure
+from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.runner.files import write_text
 from walkers.sweeps.scheduler import Failure, Options
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg")
+"""In which figures are written if nothing else is asked for; of those of `walkers.postprocess.drawing`."""
 
 
 @dataclass(frozen=True)
@@ -81,12 +82,13 @@ class Made:
     compared: int = 0
 
 
-def make_figures(
+def make_figures(  # noqa: PLR0913
     out: Path,
     to: Path,
     options: Options,
     *,
     only: Sequence[str] = (),
+    formats: Sequence[str] = FORMATS,
     engine: str | None = None,
     allow_failed_audit: bool = False,
     progress_of: ProgressOf | None = None,
@@ -103,6 +105,8 @@ def make_figures(
         As for `walkers.sweeps.run.run_sweep`.
     only
         Names of `FIGURES`, or ``comparison``; if empty, all but those that are drawn only if asked for.
+    formats
+        Of the figures, of `walkers.postprocess.drawing.FORMATS`.
     progress_of
         As for `walkers.paper.sources.make_sources`.
 
@@ -113,7 +117,7 @@ def make_figures(
     Raises
     ------
     InputError
-        If there is no such figure, or a file is where a folder is to be.
+        If there is no such figure or format, or a file is where a folder is to be.
     runner.EngineFailure
         If there is no engine, or its audit failed.
     """
@@ -122,6 +126,7 @@ def make_figures(
     for name in chosen:
         if name not in (*FIGURES, COMPARISON):
             raise InputError("--only", [Problem("", name, f"expected one of {', '.join((*FIGURES, COMPARISON))}")])
+    check_formats(formats)
     for option, folder in (("--out", out), ("--to", to)):
         if folder.exists() and not folder.is_dir():
             raise InputError(option, [Problem("", None, f"expected a folder, {folder} is a file")])
@@ -136,7 +141,7 @@ def make_figures(
             )[1]
             for name in [name for name in chosen if name not in drawn and failures.keys() >= set(needed[name])]:
                 if name in FIGURES:
-                    drawn[name] = drawers.submit(draw_figure, name, out, to)
+                    drawn[name] = drawers.submit(draw_figure, name, out, to, formats)
                 elif rows is None:
                     rows = drawers.submit(_compared, out)
         outcomes = {name: drawn[name].result() for name in chosen if name in drawn}
@@ -168,12 +173,12 @@ def _drawers(workers: int) -> Iterator[ProcessPoolExecutor]:
     drawers.shutdown()
 
 
-def draw_figure(name: str, out: Path, to: Path) -> list[Path] | str:
+def draw_figure(name: str, out: Path, to: Path, formats: Sequence[str] = FORMATS) -> list[Path] | str:
     """Draw one of `FIGURES` from finished sweeps; the files, or why nothing could be drawn."""
     drawing, sources = FIGURES[name], Sources(out)
     try:
         runs = sources.runs(*drawing.sweeps)
-        return save_figure(drawing.draw(sources), to / name, runs, FORMATS, drawing.title)
+        return save_figure(drawing.draw(sources), to / name, runs, formats, drawing.title)
     except NothingFinishedError as missing:
         return str(missing)
 

@@ -166,7 +166,7 @@ def _bare(case: Case) -> Case:
     known = library.liquid(case.liquid.name or "")
     liquid = replace(
         case.liquid,
-        dynamic_viscosity=known["kinematic_viscosity"] * known["density"],
+        dynamic_viscosity=known["kinematic_viscosity"].value * known["density"].value,
         film_viscosity=0.0,
         volume_fraction=0.01,
         contact_angle=0.0,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from walkers.inputs.loads import dimer_of
 from walkers.paper import dimers
 from walkers.paper.sources import Sources
-from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, styled
 from walkers.postprocess.gait import gait, settled_samples
 from walkers.theory.prediction import MOVING, motion_of
 from walkers.theory.quasistatic import detachment, translation
@@ -30,7 +30,8 @@ REST = 2e-6
 SLIDES = 0.1
 """The large bead slides if its sliding velocity is more than this share of its rotation velocity, in the rms."""
 MODES = ("at rest", "large bead rolls", "large bead rolls and slides", "leaves the axis", "detached")
-_MARKERS = ("x", "o", "s", "v", "*")
+_LOOKS = (("x", "0.1"), ("o", "#1f4e8c"), ("s", "#5aa9dd"), ("v", "#dd9d1f"), ("*", "#c4473a"))
+"""Markers and colours of the modes."""
 
 
 def sliding_share(trajectory: Group) -> float:
@@ -67,30 +68,39 @@ def classify(table: pd.DataFrame, shares: Sequence[float]) -> npt.NDArray[np.int
 
 @styled
 def fig_modes(sources: Sources) -> Figure:
-    """Γ0 against sin δ: the engine's modes as symbols, velocity as lightness, the models' borders as lines."""
+    """Γ0 against sin δ: the engine's modes with the models' borders, and the engine's velocity."""
     table = sources.finished("modes")
     shares = [sliding_share(sources.trajectory(run)) for run in table["run"]]
-    modes, speed = classify(table, shares), table["velocity"].to_numpy() * 1e3
-    figure, axes = new_figure(7.2, 5.0)
-    shades = {"cmap": "cividis", "vmin": 0.0, "vmax": float(np.nanmax(speed))}
-    scale = None
-    for mode, (name, marker) in enumerate(zip(MODES, _MARKERS, strict=True)):
+    modes = classify(table, shares)
+    figure, (kinds, speeds) = new_figure(TWO_COLUMNS, 4.4, ncols=2, sharey=True)
+    for mode, (name, (marker, colour)) in enumerate(zip(MODES, _LOOKS, strict=True)):
         here = modes == mode
-        count = f"{name} ({here.sum()})"
         place = table["sin_delta"][here], table["gamma0"][here]
-        if marker == "x":
-            axes.scatter(*place, marker=marker, color="0.1", s=30, label=count)
-            continue
-        drawn = axes.scatter(*place, c=speed[here], marker=marker, s=46, ec="0.1", lw=0.5, label=count, **shades)
-        scale = drawn if here.any() else scale
-    if scale is not None:
-        figure.colorbar(scale, ax=axes, label="velocity in the engine (mm/s)")
-    _borders(axes, float(table["gamma0"].max()))
-    axes.set(xlabel=r"asymmetry $\sin\delta$", ylabel=r"dimensionless peak force $\Gamma_0$", ylim=(0.0, None))
+        look = {"color": colour} if marker == "x" else {"fc": colour, "ec": "0.1"}
+        size = 36.0 if marker == "*" else 20.0
+        kinds.scatter(*place, marker=marker, s=size, lw=0.5, label=f"{name} ({here.sum()})", **look)
+    _borders(kinds, float(table["gamma0"].max()))
+    kinds.set(ylabel=r"dimensionless peak force $\Gamma_0$", ylim=(0.0, None), title="modes in the engine")
+    _speeds(speeds, table)
+    for panel in (kinds, speeds):
+        panel.set_xlabel(r"asymmetry $\sin\delta$")
+    letter_panels((kinds, speeds))
     case = dimers.shipped()
-    axes.set_title(f"mean R = {dimer_of(case).mean_radius * 1e3:g} mm, {case.drive.frequency:g} Hz, {case.liquid.name}")
-    figure.legend(loc="outside lower center", ncols=3, fontsize=7)
+    radius, drive = f"mean R = {dimer_of(case).mean_radius * 1e3:g} mm", f"{case.drive.frequency:g} Hz"
+    figure.suptitle(f"{radius}, {drive}, {case.liquid.name}")
+    figure.legend(*kinds.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
+
+
+def _speeds(axes: Axes, table: pd.DataFrame) -> None:
+    """Velocities as colours, the slowest 2 % and the fastest 5 % beyond the scale: few are not to darken the rest."""
+    speed = table["velocity"].to_numpy() * 1e3
+    low, high = (float(np.nanpercentile(speed, share)) for share in (2.0, 95.0))
+    drawn = axes.scatter(
+        table["sin_delta"], table["gamma0"], c=speed, marker="s", s=26, cmap="viridis", vmin=min(low, 0.0), vmax=high
+    )
+    axes.set_title("velocity in the engine")
+    axes.figure.colorbar(drawn, ax=axes, label="velocity (mm/s)", extend="both", location="right")
 
 
 def _borders(axes: Axes, top: float) -> None:

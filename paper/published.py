@@ -46,7 +46,8 @@ class Published:
     bounds
         Between which a value is what the paper says, if it says so: the rounding of its digits is none.
     depends_on
-        A sentence: what a disagreement of the engine depends on, as the sensitivity study and docs/physics.md find.
+        A sentence: what a disagreement of the engine depends on, as the sensitivity study and
+        docs/explanation/physics.md find.
     measured
         Whether it tests the engine: Γ0 and Mathieu's V follow from beads and drive alone.
     """
@@ -115,7 +116,7 @@ NUMBERS = (
         1.0,
         "",
         depends_on="Of all sets that the calibration ran none levels off. In theory friction that is larger at rest "
-        "than in motion gives the plateau (docs/calibration.md); the engine knows one coefficient.",
+        "than in motion gives the plateau (docs/explanation/calibration.md); the engine knows one coefficient.",
     ),
     Published(
         "fig2_threshold",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from walkers.paper import dimers, published
 from walkers.paper.sources import Sources
-from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, styled
 from walkers.postprocess.gait import gait
 from walkers.theory.prediction import motion_of
 from walkers.theory.quasistatic import translation
@@ -18,60 +18,76 @@ from walkers.theory.quasistatic import translation
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
     from walkers.postprocess.motion import Group
 
 _CYCLES = 2
-_SERIES = (("walker", "s", "#c4473a"), ("large bead", "o", "#111111"), ("small bead", "^", "#1f5fa8"))
+_SERIES = (
+    ("walker", "velocity", "s", "#c4473a"),
+    ("large bead", "rotation_1", "o", "#111111"),
+    ("small bead", "rotation_2", "^", "#1f5fa8"),
+)
+"""Name, column of a sweep's table, marker and colour."""
+_PUBLISHED = (0, (6, 2, 1, 2))
+"""Dashes of the published means."""
 
 
 @styled
 def fig4(sources: Sources) -> Figure:
     """Velocity and rotation velocities through two cycles, large beads."""
     table = sources.finished("fig4")
-    figure, axes = new_figure(9.6, 4.4, ncols=2)
+    figure, axes = new_figure(TWO_COLUMNS, 3.6, ncols=2)
+    means: dict[str, list[str]] = {name: [] for name, *_ in _SERIES}
     for panel, letter, peak in zip(axes, "ab", published.FIG4_PEAKS, strict=True):
+        known = _published(letter)
         rows = table[np.isclose(table["peak_acceleration"], peak * published.GRAVITY)]
         for _, row in rows.iterrows():
             trajectory = sources.trajectory(row["run"])
-            _draw(panel, trajectory, [row[name] for name in ("velocity", "rotation_1", "rotation_2")])
-            panel.set_title(
-                f"{letter}   {dimers.described(trajectory.case)}, $\\Gamma_0$ = {row['gamma0']:.3g}", fontsize=9
-            )
-        for name, value, colour in _published(letter):
-            panel.axhline(value * 1e3, color=colour, ls=(0, (6, 2, 1, 2)), lw=1.0)
-            place = (1.01, value * 1e3)
-            told = f"{name} {value * 1e3:g}"
-            panel.annotate(
-                told, place, xycoords=("axes fraction", "data"), fontsize=7, va="center", annotation_clip=False
-            )
-    figure.suptitle("markers: engine, lines: Coulomb friction and drag, at the right: published means", fontsize=10)
+            _draw(panel, trajectory)
+            panel.set_title(f"{dimers.described(trajectory.case)}, $\\Gamma_0$ = {row['gamma0']:.3g}")
+            for name, column, *_ in _SERIES:
+                paper = f", published {known[name] * 1e3:g}" if name in known else ""
+                means[name].append(f"({letter}) {row[column] * 1e3:.2f}{paper}")
+        for name, _, _, colour in _SERIES:
+            if name in known:
+                panel.axhline(known[name] * 1e3, color=colour, ls=_PUBLISHED, lw=1.0)
+    letter_panels(axes)
+    figure.legend(handles=_handles(means), loc="outside lower center", ncols=2, title="means in mm/s")
     return figure
 
 
-def _published(letter: str) -> list[tuple[str, float, str]]:
-    """Published means of a panel: name, m/s, colour."""
-    walker, large, _ = (colour for _, _, colour in _SERIES)
-    means = [("walker", published.FIG4_VELOCITY["ab".index(letter)], walker)]
-    return means if letter == "a" else [*means, ("large bead", published.FIG4B_ROTATION, large)]
+def _handles(means: Mapping[str, Sequence[str]]) -> list[Line2D]:
+    """Of the one legend: the engine's symbols with their means, theory, published means."""
+    from matplotlib.lines import Line2D
+
+    symbols = [
+        Line2D([], [], ls="", marker=marker, ms=4, mfc="none", color=colour, label=f"{name}: {'; '.join(means[name])}")
+        for name, _, marker, colour in _SERIES
+    ]
+    theory = Line2D([], [], color="0.3", lw=0.9, label="lines: Coulomb friction and drag")
+    return [*symbols, theory, Line2D([], [], color="0.3", lw=1.0, ls=_PUBLISHED, label="published means")]
 
 
-def _draw(axes: Axes, trajectory: Group, means: Sequence[float]) -> None:
-    """The last cycles of the first walker, the theory's last cycle beside it; means (m/s) are over all walkers."""
+def _published(letter: str) -> dict[str, float]:
+    """Published means of a panel, m/s."""
+    walker = {"walker": published.FIG4_VELOCITY["ab".index(letter)]}
+    return walker if letter == "a" else {**walker, "large bead": published.FIG4B_ROTATION}
+
+
+def _draw(axes: Axes, trajectory: Group) -> None:
+    """The last cycles of the first walker, the theory's last cycle beside it."""
     case = trajectory.case
     samples = case.run.samples_per_cycle
     last = slice((case.run.cycles - _CYCLES) * samples, case.run.cycles * samples + 1)
     motion = gait(trajectory)
     values = [motion.velocity[last, 0], motion.rotation[last, 0, 0], motion.rotation[last, 0, 1]]
     phase = np.arange(len(values[0])) / samples
-    for (label, marker, colour), series, mean, line in zip(_SERIES, values, means, model(trajectory), strict=True):
-        axes.plot(phase, series * 1e3, marker, color=colour, ms=4, mfc="none", label=f"{label}, mean {mean * 1e3:.2f}")
+    for (_, _, marker, colour), series, line in zip(_SERIES, values, model(trajectory), strict=True):
+        axes.plot(phase, series * 1e3, marker, color=colour, ms=4, mfc="none", mew=0.8)
         axes.plot(np.arange(len(line)) / (len(line) - 1) * _CYCLES, line * 1e3, color=colour, lw=0.9)
     axes.axhline(0.0, color="0.4", lw=0.6)
     axes.set(xlabel="time (cycles of the drive)", ylabel=r"velocity; beads: $-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)")
-    axes.legend(
-        fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, title="engine, mm/s", title_fontsize=7
-    )
 
 
 def model(trajectory: Group) -> list[npt.NDArray[np.float64]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from walkers.paper import published
 from walkers.paper.sources import Sources
-from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, styled
 from walkers.postprocess.steady_state import on_axis, steady_walkers
 from walkers.postprocess.tables import read_table
 
@@ -147,19 +147,20 @@ def _value(observation: Observation, experiments: pd.DataFrame) -> float:
 def fig_sensitivity(sources: Sources) -> Figure:
     """A tornado plot: a panel an observation, a bar a parameter from its lower to its higher value."""
     found = sensitivities(sources)
-    figure, axes = new_figure(13.0, 4.3, ncols=len(OBSERVATIONS), sharey=True)
-    for panel, observation in zip(axes, OBSERVATIONS, strict=True):
+    figure, axes = new_figure(TWO_COLUMNS, 7.4, nrows=2, ncols=len(OBSERVATIONS) // 2, sharey=True)
+    for panel, observation in zip(axes.flat, OBSERVATIONS, strict=True):
         _tornado(panel, found, observation)
     names = [_label(found, name) for name in PARAMETERS]
-    axes[0].set_yticks(range(len(names) + 1), [*names, "friction 0.07,\nliquid as it is"])
-    axes[0].invert_yaxis()
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=7)
+    axes[0, 0].set_yticks(range(len(names) + 1), [*names, "friction 0.07,\nliquid as it is"])
+    axes[0, 0].invert_yaxis()
+    letter_panels(axes.flat)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
 
 
 def _label(found: pd.DataFrame, parameter: str) -> str:
     low, high = sorted(found["value"][found["parameter"] == parameter])
-    return f"{parameter}\n{low:g} … {high:g}"
+    return f"{parameter}\n{low:.3g} … {high:.3g}"
 
 
 def _tornado(axes: Axes, found: pd.DataFrame, observation: Observation) -> None:
@@ -180,7 +181,8 @@ def _tornado(axes: Axes, found: pd.DataFrame, observation: Observation) -> None:
     if known:
         axes.axvline(shipped, color="0.1", lw=1.0, label="shipped")
     else:
-        axes.set_title("shipped: none on the axis", fontsize=7)
+        axes.set_title("shipped: none on the axis")
     axes.axvline(observation.published, color="C1", ls="--", lw=1.4, label="published")
-    axes.set_xlabel(observation.name, fontsize=7.5)
+    axes.margins(x=0.08)
+    axes.set_xlabel(observation.name)
     axes.grid(axis="y", visible=False)

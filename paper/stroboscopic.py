@@ -8,7 +8,7 @@ import numpy as np
 
 from walkers.paper import dimers
 from walkers.paper.sources import Sources
-from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.drawing import ONE_COLUMN, letter_panels, new_figure, styled
 from walkers.postprocess.pictures import top_view
 
 if TYPE_CHECKING:
@@ -33,17 +33,18 @@ def fig1b(sources: Sources) -> Figure:
     reach = 2.4 * float(trajectory.radii.max())
     along = (float(centre[:, 0].min()) - reach, float(centre[:, 0].max()) + reach)
     half = 1.15 * float(trajectory.radii.max())
-    row = 5.4 * 1.12 * 2.0 * half / (along[1] - along[0])
-    figure, axes = new_figure(5.4, len(frames) * row + 0.9, nrows=len(frames), sharex=True)
+    row = 0.97 * ONE_COLUMN * 2.0 * half / (along[1] - along[0]) + 0.22
+    figure, axes = new_figure(ONE_COLUMN, len(frames) * row + 0.75, nrows=len(frames), sharex=True)
     for panel, frame, middle in zip(axes, frames, centre, strict=True):
         across = (float(middle[1]) - half, float(middle[1]) + half)
         picture = top_view(trajectory, 0, frame, along, across)
         origin = float(centre[0, 0])
         edges = [(along[0] - origin) * 1e3, (along[1] - origin) * 1e3, -half * 1e3, half * 1e3]
         panel.imshow(picture, extent=edges, interpolation="bilinear")
-        panel.set(yticks=[], ylabel=f"{trajectory.time[frame]:.1f} s")
+        panel.set(yticks=[], title=f"{trajectory.time[frame]:.1f} s")
         panel.axvline(0.0, color="white", lw=0.6, ls=":")
         panel.grid(visible=False)
-    axes[-1].set_xlabel("along the shaking axis, from the mass centre at the start (mm)")
-    figure.suptitle(f"{dimers.described(case)}; an image every {apart // strobe} cycles", fontsize=9)
+    axes[-1].set_xlabel("along the shaking axis,\nfrom the mass centre at the start (mm)")
+    letter_panels(axes)
+    figure.suptitle(f"{dimers.described(case)}\nan image every {apart // strobe} cycles")
     return figure

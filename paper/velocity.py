@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from walkers.inputs.loads import dimer_of
 from walkers.paper import dimers, published
 from walkers.paper.sources import Sources
-from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.drawing import ONE_COLUMN, TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 from walkers.sweeps.table import thresholds
 from walkers.theory.prediction import motion_of, threshold
 from walkers.theory.quasistatic import detachment, mean_velocity
@@ -24,72 +25,77 @@ MARKERS = {60.0: "D", 70.0: "o", 80.0: "^", 90.0: "s"}
 _DASHES = ("-", (0, (6, 2)), (0, (3, 2)), (0, (1, 1.5)))
 """From the lowest frequency to the highest."""
 _FINE = 61
-_FIG2_TOP = 11.0
-"""Highest speed shown, mm/s: dry friction's at 60 Hz."""
-
-
-_ASIDE = {"D": -0.06, "o": -0.02, "^": 0.02, "s": 0.06}
-"""g by which symbols stand aside, so that their bars do not hide each other."""
 
 
 @styled
 def fig2(sources: Sources) -> Figure:
-    """Velocity against peak acceleration at four frequencies, and the threshold of motion."""
+    """Velocity against peak acceleration at four frequencies, dry friction alone, and the threshold of motion."""
     table, case = sources.finished("fig2"), dimers.shipped()
     dimer = dimer_of(case)
-    figure, axes = new_figure(9.6, 4.6, ncols=2, sharey=True, width_ratios=[1.5, 1.0])
-    engine, dry = axes
+    rows = [["engine", "dry"], ["engine", "threshold"]]
+    figure, axes = new_figure(TWO_COLUMNS, 4.8, mosaic=rows, width_ratios=[1.5, 1.0], height_ratios=[1.4, 1.0])
+    engine, dry = axes["engine"], axes["dry"]
     top = float(table["peak_acceleration"].max()) / published.GRAVITY
     peaks = np.linspace(0.02, top, _FINE) * published.GRAVITY
     gammas = np.array([dimer.gamma0(peak) for peak in peaks])
     paper = mean_velocity(gammas, dimer.sin_delta) * 1e3
     for number, frequency in enumerate(sorted(table["frequency"].unique())):
-        rows = table[table["frequency"] == frequency]
+        rows_there = table[table["frequency"] == frequency]
         colour, dashes = f"C{number}", _DASHES[number % len(_DASHES)]
-        _points(engine, rows["peak_acceleration"] / published.GRAVITY, rows, MARKERS[frequency], colour, frequency)
+        _points(engine, rows_there, MARKERS[frequency], colour, frequency)
         cases = dimers.driven(case, frequency, peaks)
         engine.plot(peaks / published.GRAVITY, motion_of(*cases).velocity * 1e3, ls=dashes, color=colour, lw=0.9)
         slippery = motion_of(*cases, viscous=False).velocity * 1e3
-        dry.plot(peaks / published.GRAVITY, slippery, ls=dashes, lw=1.2, color=colour, label=f"{frequency:g} Hz")
-    for panel in axes:
-        panel.plot(peaks / published.GRAVITY, paper, color="0.45", lw=2.2, zorder=0)
-        panel.plot(list(published.FIT), np.array(list(published.FIT.values())) * 1e3, "*", color="0.45", ms=9, zorder=0)
-        above = panel.secondary_xaxis(
-            "top",
-            functions=(lambda g: g * dimer.gamma0(published.GRAVITY), lambda x: x / dimer.gamma0(published.GRAVITY)),
-        )
-        above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
+        dry.plot(peaks / published.GRAVITY, slippery, ls=dashes, color=colour, label=f"{frequency:g} Hz")
+    for panel in (engine, dry):
+        panel.plot(peaks / published.GRAVITY, paper, color="0.45", lw=2.0, zorder=0)
+        panel.plot(list(published.FIT), np.array(list(published.FIT.values())) * 1e3, "*", color="0.45", ms=8, zorder=0)
         panel.axhline(0.0, color="0.4", lw=0.6)
-        panel.set(xlabel=r"peak acceleration $a_0$ (g, 9.8 m/s²)", xlim=(0.0, top * 1.02), ylim=(-5.0, _FIG2_TOP))
-    engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction, bridges and film")
-    engine.plot([], [], color="0.45", lw=2.2, marker="*", ms=9, label="paper's fit, κ = 0.033 s/mm")
-    engine.set_ylabel("velocity (mm/s)")
-    engine.legend(
-        loc="lower left", title="symbols: engine, mean and range of 6; inset: of 2", fontsize=7, title_fontsize=7
+        panel.set(xlabel=r"peak acceleration $a_0$ (g, 9.8 m/s²)", ylabel="velocity (mm/s)", xlim=(0.0, top * 1.03))
+    # The paper's fit goes on beyond what the paper measured: that is not to flatten the rest.
+    engine.set_ylim(*_limits([*table["smallest"], *table["largest"], *published.FIT.values()]))
+    engine.set_title("engine, and theory with bridges and film")
+    dry.set_title("theory: Coulomb friction, dry")
+    dry.locator_params(nbins=5)
+    above = engine.secondary_xaxis(
+        "top",
+        functions=(lambda g: g * dimer.gamma0(published.GRAVITY), lambda x: x / dimer.gamma0(published.GRAVITY)),
     )
-    dry.legend(loc="lower left", title="Coulomb friction, dry", fontsize=7, title_fontsize=7)
-    _threshold_inset(engine.inset_axes((0.13, 0.67, 0.36, 0.31)), sources)
-    figure.suptitle(f"{_beads(dimer.radii)}, {case.liquid.name}", fontsize=10)
+    above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
+    engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction, bridges and film")
+    engine.plot([], [], color="0.45", lw=2.0, marker="*", ms=8, label="paper's fit, κ = 0.033 s/mm")
+    legend_below(engine, ncols=3, title="symbols: engine, mean and range of 6 walkers; in (c) of 2")
+    legend_below(dry, ncols=4, columnspacing=1.0, handlelength=1.8, handletextpad=0.4)
+    _threshold(axes["threshold"], sources)
+    letter_panels((engine, dry, axes["threshold"]))
+    figure.suptitle(f"{_beads(dimer.radii)}, {case.liquid.name}")
     return figure
 
 
-def _points(axes: Axes, x: pd.Series[float], rows: pd.DataFrame, marker: str, colour: str, frequency: object) -> None:
+def _limits(speeds: Sequence[float]) -> tuple[float, float]:
+    """From below zero and all speeds, m/s, to above them, mm/s."""
+    low, high = min(0.0, np.nanmin(speeds) * 1e3), np.nanmax(speeds) * 1e3
+    return low - 0.04 * (high - low), high + 0.1 * (high - low)
+
+
+def _points(axes: Axes, rows: pd.DataFrame, marker: str, colour: str, frequency: object) -> None:
     """Means with bars from the smallest to the largest of the walkers, as in the paper."""
     mean, low, high = (rows[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
     axes.errorbar(
-        x.to_numpy() + _ASIDE[marker],
+        rows["peak_acceleration"] / published.GRAVITY,
         mean,
         yerr=[mean - low, high - mean],
         fmt=marker,
         color=colour,
         ms=4,
         lw=0.7,
-        mfc="white" if marker in "o^" else colour,
+        mfc="none",
+        mew=0.8,
         label=f"{frequency:g} Hz",
     )
 
 
-def _threshold_inset(inset: Axes, sources: Sources) -> None:
+def _threshold(axes: Axes, sources: Sources) -> None:
     """Γc by the paper's protocol: between the last drive that moved the walkers and the first that did not."""
     sources.finished("fig2-threshold")
     ends = thresholds(sources.out / "fig2-threshold")
@@ -97,27 +103,28 @@ def _threshold_inset(inset: Axes, sources: Sources) -> None:
         frequency = row["drive.frequency"]
         bounds = [row["gamma0_at_rest"], row["gamma0_moving"]]
         middle, half = sum(bounds) / 2.0, (bounds[1] - bounds[0]) / 2.0
-        inset.errorbar(frequency, middle, yerr=half, fmt=MARKERS[float(frequency)], color=f"C{number}", ms=4, lw=1.0)
+        axes.errorbar(
+            frequency, middle, yerr=half, fmt=MARKERS[float(frequency)], color=f"C{number}", ms=4, lw=1.0, mfc="none"
+        )
     case = dimers.shipped()
     predicted = [threshold(one) for f in MARKERS for one in dimers.driven(case, f, [case.drive.peak_acceleration])]
-    inset.plot(list(MARKERS), predicted, "--", color="0.2", lw=0.9)
+    axes.plot(list(MARKERS), predicted, "--", color="0.2", lw=0.9)
     known = np.array([*ends["gamma0_moving"], *ends["gamma0_at_rest"], *predicted], dtype=float)
-    inset.set(ylim=(0.0, 1.3 * float(np.nanmax(known))), xlim=(55.0, 95.0))
-    inset.tick_params(labelsize=6)
-    inset.set_xlabel("f (Hz)", fontsize=7, labelpad=1)
-    inset.set_ylabel(r"$\Gamma_\mathrm{c}$", fontsize=7, labelpad=1)
+    axes.set(ylim=(0.0, 1.3 * float(np.nanmax(known))), xlim=(55.0, 95.0), xticks=list(MARKERS))
+    axes.locator_params(axis="y", nbins=5)
+    axes.set(title="threshold of motion; dashed: theory", xlabel="frequency (Hz)", ylabel=r"$\Gamma_\mathrm{c}$")
 
 
 @styled
 def fig3(sources: Sources) -> Figure:
     """Velocity against asymmetry at Γ0 = 0.5."""
     table, case = sources.finished("fig3"), dimers.shipped()
-    figure, axes = new_figure(5.6, 4.2)
+    figure, axes = new_figure(ONE_COLUMN, 4.1)
     sines = np.linspace(1e-3, 0.4, _FINE)
     gamma0 = float(table["gamma0"].iloc[0])
-    axes.plot(sines, mean_velocity(gamma0, sines) * 1e3, color="0.45", lw=2.2, label="paper's fit, κ = 0.033 s/mm")
+    axes.plot(sines, mean_velocity(gamma0, sines) * 1e3, color="0.45", lw=2.0, label="paper's fit, κ = 0.033 s/mm")
     fitted = [((r1 - r2) / (r1 + r2), v * 1e3) for (r1, r2), v in published.FIG3_FIT.items()]
-    axes.plot(*zip(*fitted, strict=True), "*", color="0.45", ms=9)
+    axes.plot(*zip(*fitted, strict=True), "*", color="0.45", ms=8)
     for viscous, style, label in (
         (True, "--", "Coulomb friction, bridges and film, mean R 0.25 mm"),
         (False, ":", "Coulomb friction, dry, mean R 0.25 mm"),
@@ -134,28 +141,28 @@ def fig3(sources: Sources) -> Figure:
         label="Coulomb friction, bridges and film, these beads",
     )
     mean, low, high = (table[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
-    axes.errorbar(table["sin_delta"], mean, yerr=[mean - low, high - mean], fmt="s", color="C2", ms=5, label="engine")
-    for _, row in table.iterrows():
-        pair = f"{row['radius_1'] * 1e3:g}/{row['radius_2'] * 1e3:g}"
-        axes.annotate(
-            pair,
-            (row["sin_delta"], row["velocity"] * 1e3),
-            (0, -14),
-            textcoords="offset points",
-            fontsize=7,
-            ha="center",
-        )
+    axes.errorbar(
+        table["sin_delta"], mean, yerr=[mean - low, high - mean], fmt="s", color="C2", ms=5, mfc="none", label="engine"
+    )
+    _name_pairs(axes, table)
     _mark_end(axes, gamma0)
     axes.set(
         xlabel=r"asymmetry $\sin\delta = (R_1 - R_2)/(R_1 + R_2)$",
         ylabel="velocity (mm/s)",
-        xlim=(0.0, 0.41),
-        ylim=(0.0, None),
-        title=rf"$\Gamma_0$ = {gamma0:g}, {case.drive.frequency:g} Hz, {case.liquid.name}; R in mm",
+        xlim=(-0.01, 0.41),
+        ylim=(-0.3, None),
     )
-    axes.title.set_fontsize(10)
-    axes.legend(fontsize=7, loc="upper left")
+    figure.suptitle(rf"$\Gamma_0$ = {gamma0:g}, {case.drive.frequency:g} Hz, {case.liquid.name}")
+    legend_below(axes)
     return figure
+
+
+def _name_pairs(axes: Axes, table: pd.DataFrame) -> None:
+    """The beads above the axes, where they meet no symbol; upright, for some asymmetries are nearly the same."""
+    above = axes.secondary_xaxis("top")
+    pairs = [f"{row['radius_1'] * 1e3:g}/{row['radius_2'] * 1e3:g}" for _, row in table.iterrows()]
+    above.set_xticks(table["sin_delta"], pairs, rotation=90)
+    above.set_xlabel("$R_1/R_2$ (mm)")
 
 
 def _mark_end(axes: Axes, gamma0: float) -> None:

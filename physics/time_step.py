@@ -3,10 +3,10 @@
 Three limits hold at once. The first two are those of any granular simulation; the third is met by wet ones only, and
 passing it gives wrong speeds without a word (a glycerol climber: 10.9 mm/s at 1.2 of it, 1.8 converged).
 
-Rayleigh    π R √(ρ/G)/(0.1631 ν + 0.8766) of the smallest bead
-Hertz       2.87 (m*²/(R* E*² v))^(1/5) for an impact at the substrate's peak velocity v
-viscous     2/Σ(c/m) over the bridges of a bead, c = 6πηR*/ε the largest normal drag and m the mass that it slows
-            (the bead's own at a wall, the reduced mass between beads), or of the film's drag, if that is larger
+    Rayleigh    π R √(ρ/G)/(0.1631 ν + 0.8766) of the smallest bead
+    Hertz       2.87 (m*²/(R* E*² v))^(1/5) for an impact at the substrate's peak velocity v
+    viscous     2/Σ(c/m) over the bridges of a bead, c = 6πηR*/ε the largest normal drag and m the mass that it slows
+                (the bead's own at a wall, the reduced mass between beads), or of the film's drag, if that is larger
 
 Speeds of the AK5 walker agree within 0.5 % from 1 to 10 µs, the latter being its Rayleigh time.
 """

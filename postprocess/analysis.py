@@ -6,23 +6,30 @@ tables, results, text and figures, and sweeps of columns, follows.
 
 from __future__ import annotations
 
+import textwrap
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from walkers.inputs.case import Case
+from walkers.inputs.library import unmeasured
+from walkers.inputs.origins import Origin
+from walkers.postprocess.drawing import check_formats
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
+from walkers.runner.manifest import record_tables
 
 if TYPE_CHECKING:  # how far a sweep is can be told without numpy
     import numpy.typing as npt
 
     from walkers.postprocess.motion import Bridges, Motion
+    from walkers.postprocess.quantities import Quantity
 
 RESULT_NAME = "result.json"
+_WIDTH = 110
 Columns: TypeAlias = "dict[str, npt.NDArray[Any]]"
 Described = Mapping[str, tuple[str, str]]
 """From the names of columns to their units and meanings."""
@@ -49,6 +56,8 @@ class Analysis(ABC):
         Names of the tables that it writes.
     derived, columns
         Columns of a sweep's table: what follows from a point's case, and what its run gives.
+    headlines
+        Those of `columns` that count first.
     """
 
     name: ClassVar[str]
@@ -56,6 +65,7 @@ class Analysis(ABC):
     tables: ClassVar[tuple[str, ...]]
     derived: ClassVar[Described] = {}
     columns: ClassVar[Described] = {}
+    headlines: ClassVar[tuple[str, ...]] = ()
 
     def can_show(self, result: Mapping[str, Any]) -> bool:
         """Whether a result has all that it gives."""
@@ -94,6 +104,11 @@ class Analysis(ABC):
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """What it found, as text: mm, mm/s, degrees."""
 
+    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
+        """Its numbers as rows of a table, with errors and units."""
+        del result
+        return ()
+
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What a reader of the result should know."""
         del result
@@ -104,9 +119,9 @@ class Analysis(ABC):
         del motion
         return lambda _: {}
 
-    def plot(self, directory: Path, destination: Path) -> list[Path]:
-        """Draw its figures of a run into a folder."""
-        del directory, destination
+    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
+        """Draw its figures of a run into a folder, in each of some formats."""
+        del directory, destination, formats
         return []
 
 
@@ -163,13 +178,17 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
         "drive": case.drive.described(),
         "goes_uphill": case.goes_uphill,
         "truncated": motion.truncated,
+        "rests_on": rests_on(case.origins),
     }
+    written: list[str] = []
     for one in analyses_of(case):
         measured = one.of(motion)
         for name, columns in measured.tables.items():
             write_table(directory, name, columns)
+            written.append(name)
         result |= measured.summary
     write_json(directory / RESULT_NAME, result)
+    record_tables(directory, [RESULT_NAME, *(f"{name}.parquet" for name in written)])
     return result
 
 
@@ -187,12 +206,57 @@ def current_result(directory: str | Path) -> dict[str, Any]:
         result = read_result(directory)
         wanted = analyses_of(case_of(directory))
         tables = [name for one in wanted for name in one.tables]
+        result.setdefault("rests_on", [])  # of runs that did not say it
         known = result.get("analyses") == {one.name: one.version for one in wanted} and intact(directory, tables)
         if known and all(one.can_show(result) for one in wanted):
             return result
     except (OSError, ValueError):
         pass
     return tabulate(directory)
+
+
+def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
+    """What a result rests on that nobody measured, and what the case calls uncertain.
+
+    Returns
+    -------
+    list of dict
+        ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``calibrated`` or ``default``),
+        ``range`` (both ends, or None) and ``logarithmic``.
+    """
+    return [
+        {
+            "key": one.key,
+            "value": one.text,
+            "origin": one.origin,
+            "range": list(one.range) if one.range else None,  # as it is read from a file
+            "logarithmic": one.logarithmic,
+        }
+        for one in origins
+        if one.key in unmeasured() or one.range is not None
+    ]
+
+
+def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What a result rests on (`rests_on`) as text: guessed, only said by the case, calibrated."""
+    lines = []
+    for head, meaning, chosen in (
+        ("guessed", "", lambda one: one["range"] is not None and one["origin"] != "calibrated"),
+        ("taken", " (as the case says; nobody measured them)", lambda one: one["range"] is None),
+        ("calibrated", "", lambda one: one["origin"] == "calibrated"),
+    ):
+        found = [f"{one['key'].split('.', 1)[1]} {one['value']}" for one in rests if chosen(one)]
+        if found:
+            lines += textwrap.wrap(
+                ", ".join(found) + meaning,
+                _WIDTH,
+                initial_indent=f"  {head:10} ",
+                subsequent_indent=" " * 13,
+                break_on_hyphens=False,
+            )
+    if any(line.startswith("  guessed") for line in lines):
+        lines.append("             this number is worth what they are; a band instead: walkers run CASE --spread")
+    return lines
 
 
 def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool = False) -> str:
@@ -209,15 +273,24 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
     """
     found = analyses_in(result)
     lines = [line for one in found for line in one.lines(result)] or [f"{result['case']}: {result['drive']}"]
-    warnings = [warning for one in found for warning in one.warnings(result)]
-    if result["truncated"]:
-        warnings.append("the dump ends within a frame")
     if cached:
         lines[0] += " (already run)"
-    return "\n".join([*lines, *(f"  warning: {warning}" for warning in warnings), f"  run        {directory}"])
+    warnings = [f"  warning: {warning}" for warning in warnings_of(result)]
+    return "\n".join([*lines, *lines_of_rest(result["rests_on"]), *warnings, f"  run        {directory}"])
 
 
-def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
+def warnings_of(result: Mapping[str, Any]) -> list[str]:
+    """What a reader of a result should know."""
+    warnings = [warning for one in analyses_in(result) for warning in one.warnings(result)]
+    return [*warnings, "the dump ends within a frame"] if result["truncated"] else warnings
+
+
+def quantities_of(result: Mapping[str, Any]) -> list[Quantity]:
+    """The numbers of a result as rows of a table."""
+    return [row for one in analyses_in(result) for row in one.quantities(result)]
+
+
+def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:
     """Draw the figures of a run.
 
     Parameters
@@ -226,14 +299,22 @@ def plot_run(directory: Path, destination: Path | None = None) -> list[Path]:
         A run directory.
     destination
         Folder for the pictures; the run directory itself if None.
+    formats
+        Of `walkers.postprocess.drawing.FORMATS`.
 
     Returns
     -------
     list of Path
-        Of walkers ``walk.png`` and, if the run was sampled at least eight times a cycle, ``gait.png``; of piles
-        ``climb.png``.
+        Of walkers ``walk`` and, if the run was sampled at least eight times a cycle, ``gait``; of piles ``climb``; each
+        in all formats.
+
+    Raises
+    ------
+    InputError
+        If there is no such format.
     """
+    check_formats(formats)
     destination = destination or directory
     destination.mkdir(parents=True, exist_ok=True)
     case = case_of(directory)
-    return [path for one in analyses_of(case) for path in one.plot(directory, destination)]
+    return [path for one in analyses_of(case) for path in one.plot(directory, destination, formats)]

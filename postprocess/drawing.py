@@ -1,19 +1,31 @@
-"""What all figures share: the style file, and how they are written, with what they were made from."""
+"""What all figures share: style, widths, letters, legends; and how they are written, with what they were made from."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
+from itertools import chain, product
 from pathlib import Path
+from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.runner.files import beside
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
 
+ONE_COLUMN = 3.4
+TWO_COLUMNS = 7.0
+"""Widths of figures in one and in two columns of a journal, inches."""
+FORMATS = ("png", "svg", "pdf")
+"""In which figures can be written."""
 _STYLE = Path(__file__).parent / "style.mplstyle"
+_DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)))
+_MARKERS = "os^Dv"
+_MAKER = "granular-walkers"
 _Given = ParamSpec("_Given")
 _Drawn = TypeVar("_Drawn")
 
@@ -58,6 +70,71 @@ def new_figure(width: float, height: float, *, mosaic: Any = None, **options: An
     return figure, figure.subplots(**options) if mosaic is None else figure.subplot_mosaic(mosaic, **options)
 
 
+def letter_panels(panels: Iterable[Axes]) -> None:
+    """Put (a), (b), … before the titles of panels, which move to the left; after z come aa, ab, …."""
+    letters = chain(ascii_lowercase, map("".join, product(ascii_lowercase, repeat=2)))
+    for panel, letter in zip(panels, letters, strict=False):
+        title, size = panel.get_title(), panel.title.get_fontsize()
+        panel.set_title("")
+        panel.set_title(f"({letter}) {title}".rstrip(), loc="left", fontsize=size)
+
+
+def series_look(number: int) -> dict[str, Any]:
+    """Colour, dashes and marker of a series of many.
+
+    The first 120 have other looks; of the first 15 no two have the same dashes and marker, so that they can be told
+    apart without their colours.
+
+    Parameters
+    ----------
+    number
+        Of the series, from 0.
+
+    Returns
+    -------
+    dict
+        Options of `matplotlib.axes.Axes.plot`.
+    """
+    return {
+        "color": f"C{number}",
+        "linestyle": _DASHES[number % len(_DASHES)],
+        "marker": _MARKERS[number % len(_MARKERS)],
+        "markerfacecolor": "none",
+    }
+
+
+def legend_below(axes: Axes, lines: int = 2, **options: Any) -> Legend:
+    """A legend below axes, where it covers nothing.
+
+    Parameters
+    ----------
+    axes
+        Of a figure with constrained layout, which makes room for it.
+    lines
+        Of text between the axes and the legend: tick labels and the label of the abscissa are 2.
+    options
+        Of `matplotlib.axes.Axes.legend`.
+    """
+    from matplotlib.transforms import ScaledTranslation
+
+    down = ScaledTranslation(0.0, -(6.0 + 12.0 * lines) / 72.0, axes.figure.dpi_scale_trans)
+    options |= {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": axes.transAxes + down, "borderaxespad": 0.0}
+    return axes.legend(loc="upper center", **options)
+
+
+def check_formats(formats: Sequence[str]) -> None:
+    """Refuse formats in which no figure can be written.
+
+    Raises
+    ------
+    InputError
+        If one is none of `FORMATS`.
+    """
+    for form in formats:
+        if form not in FORMATS:
+            raise InputError("--format", [Problem("", None, f"{form!r}: expected one of {', '.join(FORMATS)}")])
+
+
 def check_picture(path: Path, suffix: str) -> None:
     """Refuse a place for a picture or a film that would be written as something else.
 
@@ -84,24 +161,35 @@ def save_figure(
     sources
         Names of the run directories that it shows, written into the file: they end in the hash of case and engine.
     formats
-        ``png``, ``svg``.
+        Of `FORMATS`.
     title
         Written into the file.
 
     Returns
     -------
     list of Path
+
+    Raises
+    ------
+    InputError
+        If there is no such format.
     """
+    check_formats(formats)
     path.parent.mkdir(parents=True, exist_ok=True)
-    names = {"Title": title or path.stem, "Source": " ".join(dict.fromkeys(sources))}
-    extra: dict[str, dict[str, str | None]] = {
-        "png": {"Software": "granular-walkers"},
-        "svg": {"Creator": "granular-walkers", "Date": None},
+    name, runs = title or path.stem, " ".join(dict.fromkeys(sources))
+    # Without a date the same figure is the same file. PDF knows no source.
+    metadata: dict[str, dict[str, str | None]] = {
+        "png": {"Title": name, "Source": runs, "Software": _MAKER},
+        "svg": {"Title": name, "Source": runs, "Creator": _MAKER, "Date": None},
+        "pdf": {"Title": name, "Subject": f"Source: {runs}", "Creator": _MAKER, "CreationDate": None},
     }
+    # Laid out once, for all formats: a layout begins where the last one ended, and would be another each time.
+    styled(figure.draw_without_rendering)()
+    figure.set_layout_engine("none")
     written = []
-    for form in formats:
+    for form in dict.fromkeys(formats):
         place = path.with_suffix(f".{form}")
         with beside(place) as new:
-            styled(figure.savefig)(new, format=form, metadata={**names, **extra[form]})
+            styled(figure.savefig)(new, format=form, metadata=metadata[form])
         written.append(place)
     return written

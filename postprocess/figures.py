@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,15 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
-from walkers.postprocess.drawing import new_figure, plain_text, save_figure, styled
+from walkers.postprocess.drawing import (
+    TWO_COLUMNS,
+    letter_panels,
+    new_figure,
+    plain_text,
+    save_figure,
+    series_look,
+    styled,
+)
 from walkers.postprocess.gait import averages, distance_walked, gait, walk
 from walkers.postprocess.motion import Group, read_motion
 from walkers.postprocess.piles import PileAnalysis, analyse
@@ -20,30 +29,38 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WALK_NAME = "walk.png"
-GAIT_NAME = "gait.png"
-CLIMB_NAME = "climb.png"
+_MOST_NAMED = 12
+"""Walkers, or climbs, that a legend names."""
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """How events are marked (`walkers.postprocess.events`)."""
 _FEWEST_SAMPLES = 8
 """Samples a cycle below which a gait shows nothing."""
 
 
-def plot_walkers(directory: Path, destination: Path) -> list[Path]:
+def plot_walkers(directory: Path, destination: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
     """Draw the walkers of a run.
+
+    Parameters
+    ----------
+    directory
+        The run directory.
+    destination
+        Folder for the pictures.
+    formats
+        Of `walkers.postprocess.drawing.FORMATS`.
 
     Returns
     -------
     list of Path
-        ``walk.png`` (strobed positions, distance walked and orientation against time) and, if the run was sampled at
-        least eight times a cycle, ``gait.png`` (velocity and rotation velocities through two cycles, as in Fig. 4 of
-        Khan et al.).
+        ``walk`` (strobed positions, distance walked and orientation against time) and, if the run was sampled at least
+        eight times a cycle, ``gait`` (velocity and rotation velocities through two cycles, as in Fig. 4 of Khan et
+        al., and the substrate's velocity), in each format.
     """
     groups = read_motion(directory).groups
-    written = save_figure(_walk_figure(groups), destination / WALK_NAME, [directory.name])
+    written = save_figure(_walk_figure(groups), destination / "walk", [directory.name], formats)
     samples = groups[0].case.run.samples_per_cycle
     if samples >= _FEWEST_SAMPLES and len(groups[0].time) > 2 * samples:
-        written += save_figure(_gait_figure(groups[0]), destination / GAIT_NAME, [directory.name])
+        written += save_figure(_gait_figure(groups[0]), destination / "gait", [directory.name], formats)
     return written
 
 
@@ -57,24 +74,31 @@ def _title(case: Case) -> str:
 
 @styled
 def _walk_figure(groups: list[Group]) -> Figure:
-    figure, axes = new_figure(7.6, 5.4, mosaic=[["strobe", "walked"], ["strobe", "turned"]], width_ratios=[1, 1.6])
-    top, middle, bottom = axes["strobe"], axes["walked"], axes["turned"]
-    figure.suptitle(_title(groups[0].case), fontsize=10)
-    _draw_strobe(top, groups[0])
+    rows = [["strobe", "walked"], ["strobe", "turned"]]
+    figure, axes = new_figure(TWO_COLUMNS, 5.2, mosaic=rows, width_ratios=[1, 1.6])
+    walked, turned = axes["walked"], axes["turned"]
+    figure.suptitle(_title(groups[0].case))
+    _draw_strobe(axes["strobe"], groups[0])
     run, facing = groups[0].case.run, ways(uphill=groups[0].case.goes_uphill)
     for group in groups:
         time, distance = distance_walked(group)
         slope, _ = fit_slopes(time[run.settled_strobes :], distance[run.settled_strobes :])
         for place, walker in enumerate(group.walkers):
             number = walker.walker
-            label = f"{number}: {facing[int(walker.facing < 0)]}, {slope[place] * 1e3:.3g} mm/s"
-            middle.plot(time, distance[:, place] * 1e3, "o" if number % 2 == 0 else "s", mfc="none", label=label)
-            bottom.plot(time, np.degrees(group.orientation[:: run.samples_per_cycle, place]))
-    middle.axvspan(0.0, time[run.settled_strobes], color="0.93", zorder=0, label="settling")
-    middle.set(ylabel="distance walked (mm)", xlabel="time (s)")
-    if sum(len(group.walkers) for group in groups) <= 12:
-        middle.legend(fontsize=7, ncols=2, title="walker: facing at the start, velocity", title_fontsize=7)
-    bottom.set(ylabel=r"orientation $\psi$ (°)", xlabel="time (s)")
+            # Marks of walkers that do the same stand beside each other.
+            look = series_look(number) | {"markevery": (number % 6, 6), "linewidth": 0.9}
+            told = f"{number}: {facing[int(walker.facing < 0)]}, {slope[place] * 1e3:.3g} mm/s"
+            label = told if number < _MOST_NAMED else None
+            walked.plot(time, distance[:, place] * 1e3, label=label, **look)
+            turned.plot(time, np.degrees(group.orientation[:: run.samples_per_cycle, place]), **look)
+    for panel in (walked, turned):
+        panel.axvspan(0.0, time[run.settled_strobes], color="0.93", zorder=0)
+        panel.set_xlabel("time (s)")
+    walked.set(ylabel="distance walked (mm)", title="grey: settling")
+    turned.set(ylabel=r"orientation $\psi$ (°)")
+    letter_panels(axes.values())
+    more = " (the first 12)" if sum(len(group.walkers) for group in groups) > _MOST_NAMED else ""
+    figure.legend(loc="outside lower center", ncols=4, title=f"walker: facing at the start, velocity{more}")
     return figure
 
 
@@ -117,8 +141,14 @@ def _gait_figure(group: Group) -> Figure:
     cycles = (len(group.time) - 1) // run.samples_per_cycle
     last = slice((cycles - 2) * run.samples_per_cycle, cycles * run.samples_per_cycle + 1)
     phase = group.time[last] * group.case.drive.frequency - (cycles - 2)
-    figure, axes = new_figure(6.4, 3.8)
-    figure.suptitle(_title(group.case), fontsize=10)
+    shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
+    # The substrate is faster than its walkers by far: in their panel it would make them all flat.
+    rows = [["walker"], ["substrate"]] if np.any(shaken) else [["walker"]]
+    figure, panels = new_figure(
+        TWO_COLUMNS, 3.0 + 1.3 * len(rows), mosaic=rows, height_ratios=[2.5, 1.0][: len(rows)], sharex=True
+    )
+    figure.suptitle(_title(group.case))
+    axes = panels["walker"]
     marks = [("o", "0.1"), ("^", "#1f3b73"), ("v", "#3f7f93"), ("D", "0.5")]
     means = averages(group).rotation[0]
     series = [("walker", motion.velocity[last, 0], walk(group).velocity[0], "s", "#c4473a")]
@@ -127,54 +157,60 @@ def _gait_figure(group: Group) -> Figure:
         for bead, mean in enumerate(means)
     ]
     for label, values, mean, marker, colour in series:
-        axes.plot(phase, values * 1e3, marker=marker, color=colour, label=f"{label} (mean {mean * 1e3:.2f} mm/s)")
-    shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
-    if np.any(shaken):
-        facing = group.walkers[0].facing
-        axes.plot(phase, facing * shaken * 1e3, color="0.6", ls=":", label="substrate")
+        look = {"marker": marker, "color": colour, "mfc": "none"}
+        axes.plot(phase, values * 1e3, label=f"{label} (mean {mean * 1e3:.2f} mm/s)", **look)
     axes.axhline(0.0, color="0.4", lw=0.6)
-    axes.set(
-        xlabel="time (cycles of the drive), the last two of walker 0",
-        ylabel=r"walker: velocity; beads: $-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)",
-    )
-    figure.legend(fontsize=7, ncols=4, loc="outside lower center")
+    axes.set(title="walker 0", ylabel="velocity; beads:\n" r"$-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)")
+    if "substrate" in panels:
+        panels["substrate"].plot(phase, group.walkers[0].facing * shaken * 1e3, color="0.4", ls="--")
+        panels["substrate"].axhline(0.0, color="0.4", lw=0.6)
+        panels["substrate"].set(title="substrate, positive as for the walker", ylabel="velocity\n(mm/s)")
+        letter_panels(panels.values())
+    panels[rows[-1][0]].set_xlabel("time (cycles of the drive), the last two")
+    figure.legend(*axes.get_legend_handles_labels(), ncols=4, loc="outside lower center")
     return figure
 
 
-def plot_pile(directory: Path, destination: Path) -> list[Path]:
+def plot_pile(directory: Path, destination: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
     """Draw what a pile did.
+
+    Parameters
+    ----------
+    directory, destination, formats
+        As for `plot_walkers`.
 
     Returns
     -------
     list of Path
-        ``climb.png``: heights of the clusters' leaders over the pile's surface against time with the events in their
+        ``climb``: heights of the clusters' leaders over the pile's surface against time with the events in their
         lives, the Brazil-nut index, contacts and bridges a bead, the mean square velocity.
     """
-    return save_figure(_climb_figure(analyse(directory)), destination / CLIMB_NAME, [directory.name])
+    return save_figure(_climb_figure(analyse(directory)), destination / "climb", [directory.name], formats)
 
 
 @styled
 def _climb_figure(found: PileAnalysis) -> Figure:
     rows = [["height"], ["height"], ["index"], ["bridges"], ["agitation"]]
-    figure, axes = new_figure(7.6, 7.8, mosaic=rows, sharex=True)
+    figure, axes = new_figure(TWO_COLUMNS, 8.0, mosaic=rows, sharex=True)
     time, case = found.motion.time, found.motion.case
+    beside = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "borderaxespad": 0.0}
     _heights(axes["height"], found)
+    axes["height"].legend(**beside)
     axes["index"].plot(time, [bed.brazil_nut for bed in found.beds], color="C0", label="all beads")
     axes["index"].plot(time, [bed.brazil_nut_of_bulk for bed in found.beds], "--", color="C2", label="bulk alone")
     axes["index"].set_ylabel("Brazil-nut\nindex")
-    axes["index"].legend(fontsize=7)
+    axes["index"].legend(**beside)
     axes["bridges"].plot(time, [bed.bridges for bed in found.beds], color="C0", label="bridges")
     axes["bridges"].plot(time, [bed.contacts for bed in found.beds], "--", color="C2", label="contacts")
     axes["bridges"].set(ylabel="how many a bead,\nto other beads", ylim=(0.0, None))
-    axes["bridges"].legend(fontsize=7, loc="lower right", ncols=2)
+    axes["bridges"].legend(**beside)
     axes["agitation"].semilogy(time, [max(bed.mean_square_velocity, 1e-12) for bed in found.beds], color="C0")
     axes["agitation"].set(
         xlabel="time from the begin of the drive (s)", ylabel="mean square\nvelocity, strobed\n(m²/s²)"
     )
-    figure.suptitle(
-        f"{plain_text(case.title or case.name)}\n{case.count} beads, {case.drive.described()}",
-        fontsize=10,
-    )
+    letter_panels(axes.values())
+    figure.align_ylabels()
+    figure.suptitle(f"{plain_text(case.title or case.name)}\n{case.count} beads, {case.drive.described()}")
     return figure
 
 
@@ -184,19 +220,21 @@ def _heights(axes: Axes, found: PileAnalysis) -> None:
         np.array([getattr(bed, name) for bed in found.beds]) * 1e3
         for name in ("surface_low", "surface", "surface_high")
     )
-    axes.fill_between(time, low, high, color="0.85", lw=0, label="surface, 10th to 90th percentile")
+    axes.fill_between(time, low, high, color="0.85", lw=0, label="surface, 10th to\n90th percentile")
     axes.plot(time, middle, color="0.4", lw=1.0, label="surface, median")
+    named = 0
     for track, climb in zip(found.tracks, found.climbs, strict=True):
         places = [frame for frame, members in zip(track.frames, track.members, strict=True) if climb.leader in members]
         leads = "large" if found.motion.large[climb.leader] else "small"
         colour, width = ("C2", 1.6) if climb.climbed else ("C1", 0.6)
         line = axes.plot(time[places], height[places, climb.leader] * 1e3, color=colour, lw=width)[0]
-        if climb.climbed:
-            told = f"climb led by a {leads} bead, {climb.size} beads: {climb.speed * 1e3:.1f} mm/s"
-            line.set_label(told)
+        named += climb.climbed
+        if climb.climbed and named <= _MOST_NAMED:
+            line.set_label(f"{climb.size} beads climb, led by a\n{leads} one: {climb.speed * 1e3:.1f} mm/s")
     _mark_events(axes, found)
+    if named > _MOST_NAMED:
+        axes.plot([], [], color="C2", lw=1.6, label=f"and {named - _MOST_NAMED} more climbs")
     axes.set(ylabel="height (mm)")
-    axes.legend(fontsize=7, loc="upper left", ncols=2)
 
 
 def _mark_events(axes: Axes, found: PileAnalysis) -> None:

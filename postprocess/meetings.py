@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,6 +11,7 @@ from walkers.inputs.case import Case
 from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
 from walkers.postprocess.clusters import connected
 from walkers.postprocess.motion import Motion, read_bridges
+from walkers.postprocess.quantities import Quantity, of_meetings
 
 Pair = tuple[int, int]
 
@@ -68,6 +69,10 @@ class Meetings(Analysis):
             f"  meetings   {result['merged']} merged, {result['parted']} parted, at most {result['largest_group']} "
             f"together; at the end {f'walkers {together}' if together else 'all are alone'}"
         ]
+
+    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
+        """The same as rows of a table."""
+        return of_meetings(result)
 
 
 def groups_of(joined: frozenset[Pair], count: int) -> list[list[int]]:

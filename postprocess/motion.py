@@ -236,23 +236,24 @@ class Group:
         return unwrapped
 
 
-def gathered(motion: Motion) -> Motion:
-    """Independent walkers near each other, to be looked at: on parallel lanes two lengths apart.
+def gathered(motion: Motion, lane: float = 2.0) -> Motion:
+    """Independent walkers near each other, to be looked at: on parallel lanes so many lengths apart.
 
     Between walls there is no room for lanes: then the first walker alone. Everything else is left as it is.
     """
     case = motion.case
     if not case.apart:
         return motion
-    lane = 2.0 * max(make.length for make in case.walkers)
+    lane *= max(make.length for make in case.walkers)
     across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
     shift = np.array([-number * lane * across - [*one.origin, 0.0] for number, one in enumerate(motion.walkers)])
     moved = replace(motion, position=motion.position + shift[motion.walker_of])
     if case.boundary.bare:
         return moved
     count = len(motion.walkers[0].beads)
-    arrays = {name: getattr(moved, name)[:, :count] for name in ("position", "velocity", "spin")}
-    return replace(moved, **arrays, mean_spin=None, radius=motion.radius[:count], walkers=motion.walkers[:1])
+    names = ("position", "velocity", "spin", "mean_spin")
+    arrays: dict[str, Any] = {name: None if (one := getattr(moved, name)) is None else one[:, :count] for name in names}
+    return replace(moved, **arrays, radius=motion.radius[:count], walkers=motion.walkers[:1])
 
 
 def read_motion(directory: str | Path) -> Motion:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
@@ -29,6 +29,7 @@ from walkers.postprocess.clusters import (
 )
 from walkers.postprocess.events import Event, events_of
 from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
+from walkers.postprocess.quantities import Quantity, of_piles
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -152,6 +153,7 @@ class Pile(Analysis):
     name = "pile"
     version = 5
     tables = ("bed", "clusters", "events", "profile")
+    headlines = ("climbs", "highest", "speed")
     derived: ClassVar[Described] = {
         "beads": ("", "number of beads"),
         "large": ("", "number of large beads"),
@@ -212,6 +214,10 @@ class Pile(Analysis):
         """Did it climb, when, how fast, who led."""
         return _lines(result)
 
+    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
+        """The same as rows of a table."""
+        return of_piles(result)
+
     def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
         """Cluster and track of each bead, the liquid in its bridges (m³), and whether it climbs."""
         found = analyse(motion)
@@ -228,11 +234,11 @@ class Pile(Analysis):
 
         return of_frame
 
-    def plot(self, directory: Path, destination: Path) -> list[Path]:
+    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
         """Heights of the clusters, their events, segregation and agitation."""
         from walkers.postprocess.figures import plot_pile
 
-        return plot_pile(directory, destination)
+        return plot_pile(directory, destination, formats)
 
 
 def _bed_columns(found: PileAnalysis) -> Columns:

@@ -6,7 +6,7 @@ smallest, with the walkers that face left and right also apart.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from math import degrees, nan, sqrt
 from pathlib import Path
 from typing import Any, ClassVar
@@ -21,6 +21,7 @@ from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, averages, gait, settled_samples, walk
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
 from walkers.postprocess.posture import describe_posture, posture_summary, postures, turned_over_at, ways
+from walkers.postprocess.quantities import Quantity, of_walkers
 from walkers.postprocess.tables import WALKERS, described
 
 SEPARATED = 0.1
@@ -41,6 +42,7 @@ class Walking(Analysis):
     name = "walking"
     version = 5
     tables = ("trajectory", "walkers", "bridges")
+    headlines = ("velocity",)
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
         "sin_delta": ("", "asymmetry parameter (R1 - R2)/(R1 + R2) of dimers"),
@@ -157,6 +159,10 @@ class Walking(Analysis):
             lines.append(f"  of {radii} mm  {_speed(make['velocity']['mean'])} mm/s; {_steady(make)}")
         return lines
 
+    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
+        """The same as rows of a table."""
+        return of_walkers(result)
+
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What makes the velocity doubtful."""
         warnings = []
@@ -169,11 +175,11 @@ class Walking(Analysis):
             warnings.append("walkers came close to each other and are not independent: give them more spacing")
         return warnings
 
-    def plot(self, directory: Path, destination: Path) -> list[Path]:
+    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
         """Where they went and turned, and their gait."""
         from walkers.postprocess.figures import plot_walkers
 
-        return plot_walkers(directory, destination)
+        return plot_walkers(directory, destination, formats)
 
 
 def _stacked(parts: list[Columns]) -> Columns:

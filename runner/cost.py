@@ -1,4 +1,4 @@
-"""Predicted time of a run, from measurements on one core of a 2020s x86 server (docs/performance.md)."""
+"""Predicted time of a run, from measurements on one core of a 2020s x86 server (docs/explanation/performance.md)."""
 
 from __future__ import annotations
 

@@ -11,27 +11,23 @@ from __future__ import annotations
 
 import hashlib
 import json
-import platform
 import re
 import shutil
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from walkers.inputs.case import Case
-from walkers.runner.audits import read_audit
 from walkers.runner.binary import Engine
 from walkers.runner.failures import DiskFull
 from walkers.runner.files import fsync_path, read_json, settle, write_json
 from walkers.runner.launch import EngineReport
+from walkers.runner.manifest import FORMAT, MANIFEST_NAME
 from walkers.templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck, Segment
 from walkers.templates.layout import Layout
 
-MANIFEST_NAME = "manifest.json"
 CASE_NAME = "case.json"
 FAILURE_NAME = "failure.json"
 SEGMENTS = "segments"
@@ -39,7 +35,6 @@ FIRST_SEGMENT = Path(SEGMENTS) / "0000"
 SEGMENT_NAME = "segment.json"
 UNFINISHED = ".incomplete"
 REPLACED = ".replaced"
-_FORMAT = 2
 _LONGEST_NAME = 80
 
 
@@ -48,7 +43,7 @@ def run_name(case: Case, engine: Engine) -> str:
 
     The wording of a deck is not among it: a comment in a template leaves the runs that are there.
     """
-    determinants = {"case": case.determinants(), "deck": CONTENT_VERSION, "engine": engine.sha256, "format": _FORMAT}
+    determinants = {"case": case.determinants(), "deck": CONTENT_VERSION, "engine": engine.sha256, "format": FORMAT}
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
     return f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
 
@@ -188,48 +183,3 @@ def record_failure(incomplete: Path, failure: Exception) -> None:
     said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
     with suppress(OSError):  # a full disk: the message reaches the user all the same
         write_json(incomplete / FAILURE_NAME, said)
-
-
-def manifest(
-    case: Case, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path
-) -> dict[str, Any]:
-    """What the manifest of a run says."""
-    finished = time.time()
-    try:
-        own_version = version("granular-walkers")
-    except PackageNotFoundError:
-        own_version = "not installed"
-    audit = read_audit(engine.sha256)
-    return {
-        "format": _FORMAT,
-        "status": "finished",
-        "name": case.name,
-        "run": name,
-        "engine": {
-            "path": str(engine.path),
-            "version": report.version,
-            "sha256": engine.sha256,
-            "audit": audit.summary() if audit else None,
-        },
-        "granular_walkers": own_version,
-        "host": platform.node(),
-        "platform": platform.platform(),
-        "started": _iso(started),
-        "finished": _iso(finished),
-        "seconds": {
-            "total": finished - started,
-            "engine": report.wall_seconds,
-            "engine_loop": report.loop_seconds,
-        },
-        "steps": report.steps,
-        "steps_per_second": report.steps / report.loop_seconds if report.loop_seconds else None,
-        "files": {
-            str(path.relative_to(directory)): path.stat().st_size
-            for path in sorted(directory.rglob("*"))
-            if path.is_file()
-        },
-    }
-
-
-def _iso(seconds: float) -> str:
-    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))

@@ -20,11 +20,9 @@ from walkers.runner.binary import Engine
 from walkers.runner.directory import (
     CASE_NAME,
     FIRST_SEGMENT,
-    MANIFEST_NAME,
     REPLACED,
     UNFINISHED,
     FinishedRun,
-    manifest,
     move_into_place,
     recover,
     room_on_disk,
@@ -35,6 +33,8 @@ from walkers.runner.directory import (
 from walkers.runner.files import write_json
 from walkers.runner.launch import EngineReport, check_room
 from walkers.runner.locks import locked
+from walkers.runner.manifest import MANIFEST_NAME, manifest
+from walkers.runner.provenance import look_ahead
 from walkers.templates.deck import Deck, Segment
 
 FOLDER = "ensembles"
@@ -91,7 +91,15 @@ class OpenEnsemble:
             own = {"drive_from": 0, "segments": 1, "shared_deck": shared}
             write_json(made / MANIFEST_NAME, {**said, **own}, at_once=False)
         first = next(iter(self.cases.values()))
-        said = manifest(first, self.place.name, self.engine, report, started=self.started, directory=self.directory)
+        said = manifest(
+            first,
+            self.place.name,
+            self.engine,
+            report,
+            started=self.started,
+            directory=self.directory,
+            described=self.cases.keys(),
+        )
         named = {**said, "shared_deck": {**shared, "names": list(self.cases)}}
         write_json(self.directory / MANIFEST_NAME, named, at_once=False)
         move_into_place(self.directory, self.place)
@@ -123,6 +131,7 @@ def make_ensemble(
             for name, case in cases.items():
                 (ensemble.run_directory(name) / FIRST_SEGMENT).mkdir(parents=True)
                 write_json(ensemble.run_directory(name) / CASE_NAME, case.as_dict(), at_once=False)
+            look_ahead()
             yield ensemble
     finally:
         shutil.rmtree(incomplete, ignore_errors=True)

@@ -21,11 +21,9 @@ from walkers.inputs.errors import Stopped, WalkersError
 from walkers.runner.binary import Engine
 from walkers.runner.directory import (
     CASE_NAME,
-    MANIFEST_NAME,
     SEGMENT_NAME,
     SEGMENTS,
     FinishedRun,
-    manifest,
     move_into_place,
     record_failure,
     recover,
@@ -40,6 +38,8 @@ from walkers.runner.failures import RunBusy
 from walkers.runner.files import fsync_path, read_json, settle, write_json
 from walkers.runner.launch import EngineReport, Progress, launch
 from walkers.runner.locks import locked
+from walkers.runner.manifest import MANIFEST_NAME, manifest
+from walkers.runner.provenance import look_ahead
 from walkers.templates.deck import (
     OUTPUT_NAME,
     PREVIOUS_RESTART_NAME,
@@ -111,6 +111,7 @@ class OpenRun:
             If the engine fails; the segments before stay.
         """
         begun, made = time.perf_counter(), 0
+        look_ahead()
         for cycles in self.case.run.attempts:
             case = self.case.for_cycles(cycles)
             if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:

@@ -103,7 +103,7 @@ def _stiffness_ratio(case: Case) -> float | None:
     """Young's modulus of the simulation over that of the beads' material."""
     if case.material not in library.materials():
         return None
-    return case.contact.youngs_modulus / library.material(case.material)["youngs_modulus"]
+    return case.contact.youngs_modulus / library.material(case.material)["youngs_modulus"].value
 
 
 def describe(summary: dict[str, Any]) -> str:
@@ -118,27 +118,25 @@ def describe(summary: dict[str, Any]) -> str:
 
 
 def _text_of_case(case: dict[str, Any]) -> str:
-    """A resolved case, one line per table."""
+    """A resolved case, one line per value: its key, the value in the units of a case file, where it comes from."""
     lines = [f"{case['name']}: {case['title']}".rstrip(": ")]
-    tables = [(key, values) for key, values in case.items() if key not in ("name", "title", "walkers")]
-    for table, values in [*(("walkers", one) for one in case["walkers"]), *tables]:
-        if isinstance(values, dict):
-            given = {key: value for key, value in values.items() if value not in (None, [])}
-            shown = ", ".join(f"{key} {_short(value)}" for key, value in given.items())
-            lines.append(f"  {table:10} {shown}")
-        elif values is not None:
-            lines.append(f"  {table:10} {_short(values)}")
-    return "\n".join(lines) + "\n  (SI units: m, kg, s, N, Pa, rad)"
+    table = None
+    for one in case["recorded"]:
+        within, _, key = one["key"].rpartition(".")
+        if within != table:
+            table = within
+            lines.append(f"  [{table}]")
+        lines.append(f"    {key:24} {one['text']:24} {_whence(one)}".rstrip())
+    return "\n".join(lines)
 
 
-def _short(value: object) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    if isinstance(value, list):
-        return "[" + ", ".join(_short(entry) for entry in value) + "]"
-    if isinstance(value, dict):
-        return " ".join(f"{key} {_short(entry)}" for key, entry in value.items())
-    return str(value)
+def _whence(one: dict[str, Any]) -> str:
+    """Where a value comes from, in a few words."""
+    origin, source = one["origin"], one["source"]
+    ends = f", may be {one['range'][0]} to {one['range'][1]}" if one["range"] else ""
+    if origin == "default" and ends:
+        return f"guessed (nobody measured it){ends}"
+    return (f"{origin}: {source}" if source else origin) + ends
 
 
 def _text_of_beads(beads: dict[str, Any]) -> str:

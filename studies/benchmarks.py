@@ -16,13 +16,12 @@ from walkers.audit.checks import benchmarks as tests
 from walkers.audit.impacts import Course
 from walkers.audit.oblique import Oblique
 from walkers.inputs.text import rendered
-from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.studies.audited import as_numbers, failures, line_table, lines_of, table, temporary_bench
 from walkers.studies.chapter import Chapter
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _WALL_STYLES: dict[str, dict[str, Any]] = {
@@ -157,15 +156,15 @@ def spin_table(measured: Measured) -> str:
 @styled
 def fig_normal(measured: Measured) -> Figure:
     """Tests 1 to 3."""
-    figure, (one, two, three) = new_figure(10.0, 3.4, ncols=3)
+    figure, (one, two, three) = new_figure(TWO_COLUMNS, 3.2, ncols=3)
     glass = measured.pair["glass"]
     one.plot(*published.SPHERES_FORCE_TIME.T, label="published", **_SIMULATED)
     one.plot(glass.time * 1e6, glass.force / 1e3, color="C1", label="engine")
-    one.set(xlabel="time (µs)", ylabel="force (kN)", title="1: two glass spheres", xlim=(0.0, 45.0))
+    one.set(xlabel="time (µs)", ylabel="force (kN)", title="test 1: glass spheres", xlim=(0.0, 45.0))
     two.plot(*published.PLANE_FORCE_TIME.T, label="published", **_SIMULATED)
     for wall, course in measured.plane.items():
         two.plot(course.time * 1e6, course.force / 1e3, label=wall, **_WALL_STYLES[wall])
-    two.set(xlabel="time (µs)", ylabel="force (kN)", title="2: aluminium alloy on a plane", xlim=(0.0, 800.0))
+    two.set(xlabel="time (µs)", ylabel="force (kN)", title="test 2: alloy on a plane", xlim=(0.0, 800.0))
     given = np.linspace(0.06, 1.0, 60)
     copies = tests.WALLS["doubled wall"]
     closed = [tests.OXIDE.impact_on_plane(float(e), copies=copies).rebound for e in given]
@@ -174,18 +173,19 @@ def fig_normal(measured: Measured) -> Figure:
     for wall, found in measured.damped.items():
         style = {**_WALL_STYLES[wall], "ls": "", "marker": "o" if wall == "single wall" else "s", "ms": 5.0}
         three.plot(tests.RESTITUTIONS, found.restitution, label=wall, **style)
-    three.set(xlabel="restitution given", ylabel="restitution", title="3: aluminium oxide on a plane")
+    three.set(xlabel="restitution given", ylabel="restitution", title="test 3: oxide on a plane")
+    one.set_ylim(0.0, None)
+    two.set_ylim(0.0, None)
     for axes in (one, two, three):
-        axes.legend(loc="upper left" if axes is three else "upper right", fontsize=7)
-    one.set_ylim(0.0, 13.5)
-    two.set_ylim(0.0, 19.0)
+        legend_below(axes)
+    letter_panels((one, two, three))
     return figure
 
 
 @styled
 def fig_angle(by_wall: Mapping[str, Oblique]) -> Figure:
     """Test 4."""
-    figure, panels = new_figure(10.0, 3.8, ncols=3)
+    figure, panels = new_figure(TWO_COLUMNS, 3.1, ncols=3)
     drawn = (
         ("tangential restitution", published.ANGLE_OXIDE_RESTITUTION, published.ANGLE_MEASURED_RESTITUTION),
         ("spin (rad/s)", published.ANGLE_OXIDE_SPIN, published.ANGLE_MEASURED_SPIN),
@@ -198,19 +198,15 @@ def fig_angle(by_wall: Mapping[str, Oblique]) -> Figure:
             values = (found.tangential_restitution, -found.rebound.spin, found.rebound_angle)[number]
             axes.plot(found.angle, values, label=f"engine, {wall}", **_WALL_STYLES[wall])
         axes.set(xlabel="angle of incidence (°)", ylabel=label, xlim=(0.0, 90.0))
-    _legend_below(figure, panels[0])
+    letter_panels(panels)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
-
-
-def _legend_below(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), fontsize=8)
 
 
 @styled
 def fig_spin(measured: Measured) -> Figure:
     """Tests 5, 6 and 8."""
-    figure, ((surface, turn), (six, eight)) = new_figure(9.0, 7.4, nrows=2, ncols=2)
+    figure, ((surface, turn), (six, eight)) = new_figure(TWO_COLUMNS, 7.0, nrows=2, ncols=2)
     surface.plot(*published.TANGENTIAL_STEEL_SURFACE.T, label="simulated, steel", **_SIMULATED)
     surface.plot(*published.TANGENTIAL_POLYETHYLENE_SURFACE.T, label="simulated, polyethylene", **_OTHER_SIMULATED)
     surface.plot(*published.TANGENTIAL_FINITE_ELEMENTS_SURFACE.T, label="finite elements", **_INDEPENDENT)
@@ -220,9 +216,10 @@ def fig_spin(measured: Measured) -> Figure:
         incidence = found.incidence / tests.STEEL_FRICTION
         for axes, values in zip((surface, turn), tests.reduced_rebound(found), strict=True):
             axes.plot(incidence, values, label=f"engine, {wall}", **_WALL_STYLES[wall])
-    surface.set(xlabel="s/(μ vₙ)", ylabel="s′/(μ vₙ′)", title="5: steel, elastic", xlim=(0.0, 13.2))
-    turn.set(xlabel="s/(μ vₙ)", ylabel="-Rω′/(μ vₙ)", title="5: steel, elastic", xlim=(0.0, 13.2))
-    surface.legend(loc="upper left", fontsize=7)
+    surface.set(xlabel="s/(μ vₙ)", ylabel="s′/(μ vₙ′)", title="test 5: steel, elastic", xlim=(0.0, 13.2))
+    surface.set_ylim(top=7.0)  # of what is shown
+    turn.set(xlabel="s/(μ vₙ)", ylabel="-Rω′/(μ vₙ)", title="test 5: steel, elastic", xlim=(0.0, 13.2))
+    legend_below(surface, ncols=2)
     six.plot(*published.SPIN_ALLOY_BETA.T, label="simulated, aluminium alloy", **_SIMULATED)
     six.plot(*published.SPIN_NYLON_BETA.T, label="simulated, nylon", **_OTHER_SIMULATED)
     for wall, found in measured.by_spin.items():
@@ -231,8 +228,9 @@ def fig_spin(measured: Measured) -> Figure:
     eight.plot(*published.UNEQUAL_B_BETA.T, label="simulated, case B", **{**_OTHER_SIMULATED, "marker": "x"})
     eight.plot(measured.unequal.stickiness, measured.unequal.beta, color="C1", label="engine")
     slides = np.geomspace(0.15, 1.0, 40)
-    for axes, title in ((six, "6: on a plane, e = 0.5"), (eight, "8: on a larger sphere, e = 0.5")):
+    for axes, title in ((six, "test 6: on a plane, e = 0.5"), (eight, "test 8: on a larger sphere, e = 0.5")):
         axes.plot(slides, slides - 1.0, label="slides all the way: x - 1", **_CLOSED)
         axes.set(xlabel="7/2 μ(1+e) vₙ/s", ylabel="-s′/s", title=title, xscale="log")
-        axes.legend(loc="lower right", fontsize=7)
+        legend_below(axes, ncols=2)
+    letter_panels((surface, turn, six, eight))
     return figure

@@ -17,7 +17,7 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics import capillary
-from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, styled
 from walkers.studies.bridge_laws import ENGINE, LAWS, Law
 from walkers.studies.chapter import Chapter
 from walkers.studies.crosscheck.laws import ForceTable
@@ -421,7 +421,7 @@ def _coverage(case: Case) -> dict[str, float]:
 
 
 _SHOWN = tuple(law for law in LAWS if "Eq. 12" not in law.name)
-_LOOKS = (("#c4473a", "-"), ("#1f4e8c", "--"), ("#8f8f8f", ":"), ("#58b89a", "-."), ("#e8c060", "-"), ("#7b52a1", "--"))
+_LOOKS = (("#c4473a", "-"), ("#1f4e8c", "--"), ("#8f8f8f", ":"), ("#58b89a", "-."), ("#dd9d1f", "-"), ("#7b52a1", "--"))
 _HIGHEST = 2.0
 
 
@@ -429,18 +429,20 @@ _HIGHEST = 2.0
 def figure() -> Figure:
     """Force against gap by Young–Laplace and by the laws, and their differences, between beads and at a wall."""
     panels = (
-        ("between beads of 0.3 and 0.2 mm", Condition("0.3/0.2 mm", *PAIRS[0], *shipped())),
+        ("beads of 0.3 and 0.2 mm", Condition("0.3/0.2 mm", *PAIRS[0], *shipped())),
         ("bead on wall", Condition(*_flat(WALL), *shipped())),
         ("bead on wall", Condition(*_flat(WALL), *PILES)),
     )
-    drawing, axes = new_figure(10.0, 6.2, nrows=2, ncols=3, sharex="col", sharey="row")
+    drawing, axes = new_figure(TWO_COLUMNS, 4.9, nrows=2, ncols=3, sharex="col", sharey="row")
     for column, (what, condition) in enumerate(panels):
         _draw(axes[:, column], condition)
         angle = degrees(condition.contact_angle)
-        axes[0, column].set_title(f"{what}\nliquid {condition.volume_fraction:g} of a bead, {angle:.3g}°", fontsize=9)
-        axes[1, column].set_xlabel("gap / rupture distance by Young–Laplace")
-    axes[0, 0].set(ylabel="pull / pull at contact by Young–Laplace", ylim=(0.0, _HIGHEST))
+        axes[0, column].set_title(f"{what}\nliquid {condition.volume_fraction:g} of a bead, {angle:.3g}°")
+        axes[1, column].set_xlabel("gap / rupture distance\nby Young–Laplace")
+    axes[0, 0].set(ylabel="pull / pull at contact\nby Young–Laplace", ylim=(0.0, _HIGHEST))
     axes[1, 0].set(ylabel="difference / pull at contact", ylim=(-0.25, 0.5))
+    letter_panels(axes.flat)
+    drawing.align_ylabels()
     drawing.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return drawing
 
@@ -452,7 +454,7 @@ def _draw(axes: Any, condition: Condition) -> None:
     pull = np.zeros(_GAPS)
     pull[inside] = force_curve(*condition.bridge, gaps[inside]).forces
     axes[0].plot(
-        gaps[inside] / exact.rupture, pull[inside] / pull[0], color="black", linewidth=2.2, label="Young–Laplace"
+        gaps[inside] / exact.rupture, pull[inside] / pull[0], color="black", linewidth=2.0, label="Young–Laplace"
     )
     axes[0].plot(1.0, exact.forces[-1] / pull[0], "o", color="black", markersize=5)
     axes[1].axhline(0.0, color="black", linewidth=1.0)

@@ -1,4 +1,4 @@
-"""What a study gives: a chapter of docs/validation.md."""
+"""What a study gives: a chapter of docs/explanation/validation.md."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Chapter:
-    """A chapter of docs/validation.md.
+    """A chapter of docs/explanation/validation.md.
 
     Attributes
     ----------

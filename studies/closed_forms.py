@@ -12,7 +12,7 @@ from walkers.audit.check import Line, Verdict
 from walkers.audit.checks import closed_forms as forms
 from walkers.audit.checks.benchmarks import WALLS
 from walkers.inputs.text import rendered
-from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 from walkers.studies.audited import as_numbers, failures, line_table, lines_of, temporary_bench
 from walkers.studies.chapter import Chapter
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WALL_STYLES: dict[str, dict[str, Any]] = {
-    "single wall": {"ls": "", "marker": "o", "color": "C1", "ms": 4.0},
+    "single wall": {"ls": "", "marker": "o", "color": "C1", "ms": 3.5, "mfc": "none"},
     "doubled wall": {"ls": "", "marker": "x", "color": "C2", "ms": 5.0},
 }
 _EVERY = 8
@@ -77,7 +77,7 @@ def _contents(lines: list[Line]) -> dict[str, str]:
 @styled
 def fig_ways(measured: Measured) -> Figure:
     """Velocities along the four ways and after the spinning impact; lines are the closed forms."""
-    figure, ((slide, roll), (film, throw)) = new_figure(9.0, 6.6, nrows=2, ncols=2)
+    figure, ((slide, roll), (film, throw)) = new_figure(TWO_COLUMNS, 6.2, nrows=2, ncols=2)
     _draw(slide, measured.sliding, spin=True)
     slide.set_title("slides until it rolls")
     _draw(roll, measured.rolling)
@@ -91,7 +91,8 @@ def fig_ways(measured: Measured) -> Figure:
     for wall, one in measured.thrown.items():
         throw.plot(one.spin, one.sideways, label=wall, **_WALL_STYLES[wall])
     throw.set(xlabel="Rω/(μ vₙ)", ylabel="velocity sideways/(μ vₙ)", title="spins as it falls")
-    throw.legend(loc="lower right", fontsize=7)
+    legend_below(throw, ncols=2)
+    letter_panels((slide, roll, film, throw))
     return figure
 
 
@@ -109,4 +110,5 @@ def _draw(
             axes.plot(one.time[::_EVERY] * 1e3, sign * values[::_EVERY] * 1e3, label=label, **_WALL_STYLES[wall])
             label = None
     axes.set(xlabel="time (ms)", ylabel="velocity (mm/s)")
-    axes.legend(fontsize=7)
+    if not dashed:
+        legend_below(axes, ncols=2)

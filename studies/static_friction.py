@@ -22,7 +22,7 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
 from walkers.paper import published
 from walkers.physics.wall import WALL_COPIES
-from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, styled
 from walkers.studies.audited import temporary_bench
 from walkers.studies.chapter import Chapter
 from walkers.studies.crosscheck.engine import Beads
@@ -84,12 +84,12 @@ def shipped() -> dict[str, float]:
     assert prism is not None and slide is not None and beads is not None, "the library has ruby's surface pairs"
     same = ("rolling_friction", "viscosity_ratio", "minimum_separation_ratio", "volume_fraction")
     return {
-        "friction_wall": prism["friction"],
-        "friction_slide": slide["friction"],
-        "friction_bead": beads["friction"],
-        **{name: prism[name] for name in same},
-        "film_drag": prism["film_drag_ratio"],
-        "contact_angle": degrees(prism["contact_angle"]),
+        "friction_wall": prism["friction"].value,
+        "friction_slide": slide["friction"].value,
+        "friction_bead": beads["friction"].value,
+        **{name: prism[name].value for name in same},
+        "film_drag": prism["film_drag_ratio"].value,
+        "contact_angle": degrees(prism["contact_angle"].value),
         "restitution": contact.restitution,
     }
 
@@ -381,7 +381,7 @@ def _given(outcome: Outcome, calibration: Calibration) -> dict[str, Any]:
 @styled
 def draw(outcomes: Sequence[Outcome], plateaus: Mapping[str, Sequence[float]]) -> Figure:
     """Figs. 2 and 3 by each set, and the plateau against the ratio of the frictions."""
-    figure, (fig2, fig3, scan) = new_figure(10.5, 3.6, ncols=3)
+    figure, (fig2, fig3, scan) = new_figure(TWO_COLUMNS, 3.0, ncols=3)
     fit = published.FIT
     fig2.plot(list(fit), [1e3 * speed for speed in fit.values()], "k-", lw=2.0, alpha=0.5, label="published")
     fig2.plot([6.0, 10.0], [1e3 * fit[6.0]] * 2, "k--", lw=2.0, alpha=0.5)
@@ -392,7 +392,8 @@ def draw(outcomes: Sequence[Outcome], plateaus: Mapping[str, Sequence[float]]) -
     scan.axhline(1.0, color="k", ls="--", lw=2.0, alpha=0.5)
     fig2.set(xlabel="peak acceleration (g)", ylabel="velocity (mm/s)", title="Fig. 2, 60 and 90 Hz")
     fig3.set(xlabel="sin δ", ylabel="velocity (mm/s)", title="Fig. 3, Γ0 = 0.5")
-    scan.set(xlabel="friction at rest over that in motion", ylabel="v(10 g)/v(6 g)", title="plateau of Fig. 2")
+    scan.set(xlabel="friction at rest / in motion", ylabel="v(10 g)/v(6 g)", title="plateau of Fig. 2")
+    letter_panels((fig2, fig3, scan))
     handles, labels = fig2.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
     return figure

@@ -1,4 +1,4 @@
-"""All chapters of docs/validation.md, from their studies to the files."""
+"""All chapters of docs/explanation/validation.md, from their studies to the files."""
 
 from __future__ import annotations
 

@@ -20,8 +20,9 @@ import numpy.typing as npt
 from walkers.inputs.errors import InputError, Problem
 from walkers.postprocess.clusters import Climb, ClimbCriteria
 from walkers.postprocess.piles import Pile, analyse, classified
-from walkers.runner.directory import CASE_NAME, MANIFEST_NAME, finished_run
+from walkers.runner.directory import CASE_NAME, finished_run
 from walkers.runner.files import read_json
+from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.record import RECORD_NAME, read_record, result_in, states
 
 FloatArray = npt.NDArray[np.float64]

@@ -34,6 +34,11 @@ def result_columns(names: Sequence[str]) -> Described:
     return {key: told for one in analyses() if one.name in names for key, told in one.columns.items()}
 
 
+def headlines(names: Sequence[str]) -> list[str]:
+    """The columns that count first, of the analyses of these names."""
+    return [key for one in analyses() if one.name in names for key in one.headlines]
+
+
 def derived_of(case: Case, names: Sequence[str]) -> list[float]:
     """The columns `derived_columns` of a case; NaN where it has none."""
     drive = case.drive

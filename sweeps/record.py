@@ -6,7 +6,7 @@ being made is read from them and from nowhere else.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
@@ -51,6 +51,8 @@ class SweepRecord:
         How the points depend on each other, if they do.
     analyses
         Names of the analyses that mean something for its cases.
+    file
+        Tables of the sweep file; empty for one that was recorded before they were.
     """
 
     directory: Path
@@ -62,6 +64,7 @@ class SweepRecord:
     runs: Sequence[str]
     descent: Descent | None
     analyses: Sequence[str]
+    file: Mapping[str, Any]
 
     @property
     def out(self) -> Path:
@@ -92,6 +95,7 @@ def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Pat
         runs=[run_place(case, engine, out).name for case in cases],
         descent=sweep.descent,
         analyses=names,
+        file=sweep.file,
     )
 
 
@@ -109,6 +113,7 @@ def write_record(record: SweepRecord) -> None:
             "format": _FORMAT,
             "name": record.name,
             "title": record.title,
+            "file": dict(record.file),
             "units": dict(record.units),
             "descent": vars(descent) if descent else None,
             "analyses": list(record.analyses),
@@ -143,6 +148,7 @@ def read_record(directory: str | Path) -> SweepRecord:
             runs=[point["run"] for point in points],
             descent=_descent(contents["descent"]),
             analyses=contents["analyses"],
+            file=contents.get("file", {}),
         )
     except FileNotFoundError as error:
         told = f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"
@@ -180,9 +186,23 @@ class PointState:
     lost: int = 0
 
 
-def states(record: SweepRecord) -> list[PointState]:
-    """What has become of each point, as the run directories say."""
-    finished = finished_places(record.out)
+def states(
+    record: SweepRecord,
+    finished: Mapping[str, Path] | None = None,
+    velocity: Callable[[Path], float] | None = None,
+) -> list[PointState]:
+    """What has become of each point, as the run directories say.
+
+    Parameters
+    ----------
+    record
+        The sweep.
+    finished
+        From the names of the finished runs of its folder to their directories, for who knows them already.
+    velocity
+        What gives the mean velocity (m/s) of a finished run, by which descents end; `velocity_of` if left out.
+    """
+    finished = finished_places(record.out) if finished is None else finished
     found = [_state(record.out / run, finished.get(run)) for run in record.runs]
     if record.descent is None:
         return found
@@ -193,7 +213,7 @@ def states(record: SweepRecord) -> list[PointState]:
                 found[number] = PointState("not needed")
             directory = found[number].directory
             if found[number].status == "finished" and directory is not None:
-                stopped = record.descent.at_rest(velocity_of(directory))
+                stopped = record.descent.at_rest((velocity or velocity_of)(directory))
     return found
 
 

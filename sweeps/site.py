@@ -78,6 +78,7 @@ class SiteFile(BaseModel):
     modules: list[str] = []
     shell: list[str] = []
     launcher: str | None = None
+    container: str | None = None
     provider: dict[str, Any] = {}
     executor: dict[str, Any] = {}
 
@@ -222,6 +223,7 @@ def pilots(site: Site, run_dir: Path) -> Config:
     import parsl.providers
     from parsl.config import Config
     from parsl.executors import HighThroughputExecutor
+    from parsl.executors.high_throughput.executor import DEFAULT_LAUNCH_CMD
     from parsl.jobs.error_handlers import windowed_error_handler
 
     file = site.file
@@ -240,6 +242,7 @@ def pilots(site: Site, run_dir: Path) -> Config:
         settings["launcher"] = getattr(parsl.launchers, _launchers()[launcher])()
     provider = getattr(parsl.providers, name)(**(settings | _as_tuples(file.provider)))
     options: dict[str, Any] = {
+        **({"launch_cmd": f"{file.container} {DEFAULT_LAUNCH_CMD}"} if file.container else {}),
         "max_workers_per_node": site.workers_per_node,
         "heartbeat_period": 10,
         "heartbeat_threshold": 60,

@@ -151,7 +151,7 @@ class Plan:
         suits few beads far apart.
     static_ratio
         Friction at rest over that in motion, by another of the engine's models, on linear springs; None for the one
-        that cases have. docs/validation.md tells what it does.
+        that cases have. docs/explanation/validation.md tells what it does.
     """
 
     case: Case

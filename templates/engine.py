@@ -1,7 +1,7 @@
 """What LIGGGHTS-PUBLIC 3.8.0 (as Debian packages it) does wrong or unlike its manual, and what the decks do about it.
 
-This is the only place that knows; docs/engine.md is generated from `DEFECTS` and from an audit. The functions below are
-the workarounds that need arithmetic, the rest stands in the deck's blocks (``templates/blocks``).
+This is the only place that knows; docs/explanation/engine.md is made from `DEFECTS` and an audit. The functions
+below are the workarounds that need arithmetic, the rest stands in the deck's blocks (``templates/blocks``).
 """
 
 from __future__ import annotations

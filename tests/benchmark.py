@@ -1,4 +1,4 @@
-"""Measure what docs/performance.md states: ``make bench`` prints its tables.
+"""Measure what docs/explanation/performance.md states: ``make bench`` prints its tables.
 
 Seconds depend on the machine; the shares and ratios of one run are what counts.
 """

@@ -1,4 +1,4 @@
-"""Start many engines, several at a time, and count those that never started: what docs/runs.md states of starts."""
+"""Start many engines, several at a time, and count those that never started (docs/reference/runs.md)."""
 
 from __future__ import annotations
 

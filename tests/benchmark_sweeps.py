@@ -1,6 +1,6 @@
-"""Measure what docs/performance.md states of sweeps: ``make bench-sweeps`` prints its tables (a quarter of an hour).
+"""Measure what docs/explanation/performance.md states of sweeps: ``make bench-sweeps`` prints its tables.
 
-Seconds depend on the machine; the shares and ratios of one run are what counts.
+It takes a quarter of an hour. Seconds depend on the machine; the shares and ratios of one run are what counts.
 """
 
 from __future__ import annotations

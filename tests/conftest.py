@@ -175,6 +175,58 @@ def walked(trajectory: Callable[..., Group]) -> Callable[..., Walk]:
     return run
 
 
+LOOKED_THROUGH = {
+    "grid": {
+        "axes": {"drive.frequency": ["60 Hz", "80 Hz"], "drive.peak_acceleration": ["2 g", "4 g", "6 g"]},
+    },
+    "rough": {
+        "set": {"contact.friction.bead_wall": 0.2},
+        "axes": {"drive.frequency": ["60 Hz", "80 Hz"], "drive.peak_acceleration": ["4 g", "2 g"]},
+    },
+    "three": {
+        "axes": {
+            "contact.friction.bead_wall": [0.1, 0.2],
+            "drive.frequency": ["60 Hz", "80 Hz"],
+            "drive.peak_acceleration": ["2 g", "4 g", "6 g"],
+        },
+    },
+    "beads": {
+        "axes": {
+            "liquid.name": ["Si AK5", "Si AK10"],
+            "dimers.radii": [["0.3 mm", "0.2 mm"], ["0.25 mm", "0.2 mm"], ["0.35 mm", "0.2 mm"]],
+        },
+    },
+    "sampled": {
+        "sample": [
+            {
+                "points": 4,
+                "ranges": {
+                    "contact.friction.bead_wall": {"uniform": [0.05, 0.3]},
+                    "contact.friction.bead_bead": {"uniform": [0.05, 0.3]},
+                },
+            }
+        ]
+    },
+}
+"""Sweeps that are plotted, listed and compared, of two walkers each for four cycles."""
+
+
+@pytest.fixture(scope="session")
+def looked_through(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+    """A folder with the runs of `LOOKED_THROUGH`; who changes it takes a copy."""
+    run = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
+    changes = {"run": run, "dimers": {"replicates": 2, "angle_spread": "1 deg"}}
+
+    def fill(folder: Path) -> None:
+        (folder / "base.toml").write_text(to_toml(document(**changes)))
+        for name, axes in LOOKED_THROUGH.items():
+            sweep = expand({"case": "base.toml", **axes}, source=name, name=name, folder=folder)
+            _, failures = run_sweep(sweep, folder / "runs", Options(2))
+            assert not failures
+
+    return once("looked-through", fill) / "runs"
+
+
 @pytest.fixture
 def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty working directory."""

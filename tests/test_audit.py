@@ -184,8 +184,8 @@ def test_tables(report: AuditReport) -> None:
 
 
 def test_docs_engine_is_what_the_audit_writes(report: AuditReport) -> None:
-    """docs/engine.md is generated: all defects and all lines of the quick audit are in it, by their names."""
-    written = (Path(__file__).parent.parent / "docs" / "engine.md").read_text("utf-8")
+    """The page is generated: all defects and all lines of the quick audit are in it, by their names."""
+    written = (Path(__file__).parent.parent / "docs" / "explanation" / "engine.md").read_text("utf-8")
     for defect in DEFECTS:
         assert f"### {defect.name}\n\n{defect.shows}\n\n*Workaround.* {defect.workaround}\n" in written
     for checked in report.checked:

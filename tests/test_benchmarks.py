@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.printed import spoilt
 from walkers.audit import AuditReport, Verdict, chung_ooi, run_audit
 from walkers.audit.bench import FIRST_BEAD, bench_recording, scene_on_floor
 from walkers.audit.checks import benchmarks, closed_forms
@@ -177,4 +178,4 @@ def test_chapters(chapter: Callable[[Path], Chapter], tmp_path: Path) -> None:
     assert "doi.org/10." in found.text
     for name, figure in found.figures.items():
         assert f"figures/validation-{name}.png" in found.text
-        figure.savefig(tmp_path / f"{name}.png")
+        assert spoilt(figure) == []

@@ -488,7 +488,7 @@ def test_bodies_that_cannot_be_are_refused(tmp_path: Path, changes: dict[str, An
 
 def test_every_arrangement_is_told_of(tmp_path: Path) -> None:
     """The documents have all of them, with the meaning that the program knows."""
-    told = (Path(__file__).parents[1] / "docs" / "cases.md").read_text()
+    told = (Path(__file__).parents[1] / "docs" / "reference" / "cases.md").read_text()
     for name, arrangement in ARRANGEMENTS.items():
         assert f"`{name}`" in told
         assert arrangement.meaning in told

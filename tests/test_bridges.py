@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import run_case
+from tests.printed import spoilt
 from walkers.inputs import resolve_case
 from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import load_case, read_toml, shipped_cases
@@ -138,6 +139,7 @@ def test_chapter(tmp_path: Path) -> None:
     assert not found.failed
     assert set(found.figures) == {"bridges"}
     assert "figures/validation-bridges.png" in found.text
+    assert spoilt(found.figures["bridges"]) == []
     assert "nan" not in json.dumps(found.numbers, allow_nan=False)
     assert {row["name"] for row in found.numbers["laws"]} == {law.name for law in LAWS}
     assert len(found.numbers["engine"]) == 8

@@ -14,10 +14,12 @@ import pytest
 from scipy.stats import multivariate_normal, norm
 
 from tests.conftest import call, to_toml
+from tests.printed import spoilt
 from walkers.calibration.calibrate import FINAL, calibrate, first_wave, next_wave, ranking
 from walkers.calibration.convergence import effective_samples, rhat
 from walkers.calibration.emulator import fit_emulators
 from walkers.calibration.feasibility import fit_feasibility
+from walkers.calibration.figures import figures_of
 from walkers.calibration.likelihood import log_likelihood, observation_covariance
 from walkers.calibration.posterior import Density, sample_posterior
 from walkers.calibration.report import emulator_checks, intervals, rows_of, words_of
@@ -495,6 +497,8 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     assert again.best == pytest.approx(said["best"])
     assert {name: list(one) for name, one in intervals(again).items()} == said["intervals"]
     assert emulator_checks(again).shape == (2, 4)
+    for figure in figures_of(again, rows_of(again)).values():
+        assert spoilt(figure) == []
     for row in rows_of(again):
         assert row.engine is not None
         assert row.half_step == pytest.approx(row.engine, rel=0.02)
@@ -581,7 +585,7 @@ def test_a_set_that_loses_its_beads_is_told_and_not_run_again(tmp_path: Path) ->
 
 
 def test_the_example_of_the_docs_can_be_read(tmp_path: Path) -> None:
-    page = (Path(__file__).parents[1] / "docs" / "calibration.md").read_text()
+    page = (Path(__file__).parents[1] / "docs" / "explanation" / "calibration.md").read_text()
     document = tomllib.loads(page.split("```toml\n")[1].split("```")[0])
     found = read_calibration(document, source="docs", name="docs", folder=tmp_path)
     assert [one.group for one in found.observations] == ["fig2", "fig4a"]

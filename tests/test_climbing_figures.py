@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from tests.conftest import run_shipped, shipped_sweep
+from tests.printed import letters, spoilt
 from walkers.paper.climbing import KINDS, kinds
 from walkers.paper.make import FIGURES
 from walkers.paper.sources import Sources
@@ -46,6 +47,8 @@ def test_they_are_drawn_only_if_asked_for_and_say_what_they_were_made_from(
     figure = drawing.draw(sources)
     paths = save_figure(figure, tmp_path / name, sources.runs(*drawing.sweeps), ("png",), drawing.title)
     assert paths[0].stat().st_size > 1e4
+    assert spoilt(figure) == []
+    assert len(letters(figure)) == {"climbing": 6, "zoo": 15}[name]
     drawn = [axes for axes in figure.axes if axes.collections or axes.patches]
     assert len(drawn) >= {"climbing": 6, "zoo": 15}[name]
 

@@ -254,12 +254,12 @@ def test_command(in_folder: Path) -> None:
     ("arguments", "told"),
     [
         (["fig1b", "--without", "magic"], "--without magic: expected one of"),
-        (["fig1b", "--set", "wall-lubrication=sphere"], "expected one of halves, plane-normal, plane"),
-        (["fig1b", "--set", "static-ratio=half"], "expected a number"),
-        (["fig1b", "--set", "static-ratio=1.5"], "expected static-friction=velocity or stick-slip"),
+        (["fig1b", "--law", "wall-lubrication=sphere"], "expected one of halves, plane-normal, plane"),
+        (["fig1b", "--law", "static-ratio=half"], "expected a number"),
+        (["fig1b", "--law", "static-ratio=1.5"], "expected static-friction=velocity or stick-slip"),
         (
-            ["fig1b", "--set", "static-ratio=0.5", "--set", "static-friction=velocity"],
-            "--set static-ratio: expected at least 1",
+            ["fig1b", "--law", "static-ratio=0.5", "--law", "static-friction=velocity"],
+            "--law static-ratio: expected at least 1",
         ),
         (["fig1b", "--cycles", "1"], "expected at least 3"),
         (["fig1b", "--seeds", "2"], "--seeds: is for piles"),

@@ -181,7 +181,7 @@ def test_without_yade_it_says_how_to_get_it(in_folder: Path, monkeypatch: pytest
     ("arguments", "told"),
     [
         (["fig1b", "--without", "film"], "has the decks' laws alone"),
-        (["fig1b", "--set", "wall-lubrication=plane"], "has the decks' laws alone"),
+        (["fig1b", "--law", "wall-lubrication=plane"], "has the decks' laws alone"),
         (["pile-ci"], "expected walkers that do not meet"),
         (["groove.toml"], "expected flat walls that are normal to x, y or z"),
     ],

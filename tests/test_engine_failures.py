@@ -194,7 +194,7 @@ def test_children_that_do_not_care_for_sigterm_are_ended_too(tmp_path: Path) -> 
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front), on_progress=interrupt)
+        run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front), progress=interrupt)
     wait_for(lambda: not processes_in(tmp_path, b"sleep"))
 
 

@@ -421,7 +421,7 @@ def test_piles_are_run_from_python_as_walkers_are(tmp_path: Path) -> None:
     tables["run"] = {"duration": "0.015 s", "time_step": "3 us", "longest_settling": "0.02 s"}
     brief = resolve_case(tables, name="brief")
     seen: list[object] = []
-    outcome = run_case(brief, tmp_path, on_progress=seen.append)
+    outcome = run_case(brief, tmp_path, progress=seen.append)
     assert (outcome.cached, outcome.result["beads"]) == (False, brief.count)
     assert seen
     assert run_case(brief, tmp_path).cached

@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 from tests.conftest import call, run_shipped, shipped_sweep
+from tests.printed import letters, spoilt
 from walkers.inputs import load_case
 from walkers.inputs.errors import InputError
 from walkers.inputs.loads import dimer_of
@@ -148,18 +149,33 @@ def test_figures_say_what_they_were_made_from(sources: Sources, tmp_path: Path, 
     drawing = FIGURES[name]
     runs = sources.runs(*drawing.sweeps)
     figure = drawing.draw(sources)
-    paths = save_figure(figure, tmp_path / name, runs, ("png", "svg"), drawing.title)
-    assert [path.name for path in paths] == [f"{name}.png", f"{name}.svg"]
+    paths = save_figure(figure, tmp_path / name, runs, ("png", "svg", "pdf"), drawing.title)
+    assert [path.name for path in paths] == [f"{name}.png", f"{name}.svg", f"{name}.pdf"]
     picture = Image.open(paths[0])
     assert picture.info["Source"].split() == list(dict.fromkeys(runs))
     text = "".join(ElementTree.parse(paths[1]).getroot().itertext())
     assert all(run in text for run in runs)
+    contents = paths[2].read_bytes()
+    assert all(run.encode() in contents for run in runs)
+    assert b"/FontFile2" in contents  # TrueType, embedded
+    assert b"/Type3" not in contents
+    assert b"Date" not in contents
+    save_figure(figure, tmp_path / "again", runs, ("pdf",), drawing.title)
+    assert (tmp_path / "again.pdf").read_bytes() == contents
     for axes in figure.axes:
         labels = {axes.get_xlabel(), axes.get_ylabel()} - {"", "V", "U"}
         for label in labels:
             known = ("(mm/s)", "(mm)", "(s)", "(ms)", "(°)", "(Hz)", "9.8 m/s²)", "cycles", "Gamma", "delta")
             assert any(unit in label for unit in known) or label.endswith(" s"), label
     assert not list(tmp_path.glob("*.new"))
+
+
+@pytest.mark.parametrize("name", sorted(set(FIGURES) - {"sensitivity", "climbing", "zoo"}))
+def test_figures_can_be_printed(sources: Sources, name: str) -> None:
+    figure = FIGURES[name].draw(sources)
+    assert spoilt(figure) == []
+    panels = {"fig1b": 3, "fig2": 3, "fig3": 0, "fig4": 2, "alignment": 4, "modes": 2}[name]
+    assert letters(figure) == list("abcd")[:panels]
 
 
 @pytest.mark.slow
@@ -172,7 +188,8 @@ def test_the_sensitivity_study_covers_each_parameter_both_ways(sensitivity: Sour
     # Two cycles are too few for a walker to be steady.
     assert found[[one.name for one in OBSERVATIONS if "(%)" in one.name or "(°)" in one.name]].notna().all().all()
     figure = FIGURES["sensitivity"].draw(sensitivity)
-    assert len(figure.axes) == len(OBSERVATIONS)
+    assert len(figure.axes) == len(letters(figure)) == len(OBSERVATIONS)
+    assert spoilt(figure) == []
 
 
 def test_the_style_is_readable_in_grey() -> None:
@@ -270,6 +287,11 @@ def test_the_program_draws_what_is_asked_for(in_folder: Path, monkeypatch: pytes
     monkeypatch.setattr("walkers.inputs.run_tables._MOST_CYCLES", 12)  # of 60: Fig. 4b would take them all
     done = call("figures", "--only", "fig4", "-j", "1", check=True)
     assert done.stdout.splitlines() == ["figures/fig4.png", "figures/fig4.svg"]
+    done = call("figures", "--only", "fig4", "--format", "pdf", "-j", "1", check=True)
+    assert done.stdout.splitlines() == ["figures/fig4.pdf"]
+    done = call("figures", "--only", "fig4", "--format", "jpeg")
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert "jpeg" in done.stderr
     done = call("figures", "--only", "fig9")
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
     assert "fig9" in done.stderr
@@ -299,3 +321,6 @@ def test_the_comparison_is_written_for_programs_too(sources: Sources, tmp_path: 
 def test_unknown_figures_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="fig7"):
         make_figures(tmp_path / "runs", tmp_path / "to", Options(1), only=["fig7"])
+    with pytest.raises(InputError, match="jpeg"):
+        make_figures(tmp_path / "runs", tmp_path / "to", Options(1), formats=["jpeg"])
+    assert not (tmp_path / "runs").exists()

@@ -8,12 +8,16 @@ import meshio
 import numpy as np
 import pytest
 import pyvista as pv
+from matplotlib import rcParams
+from matplotlib.colors import to_rgb
 from PIL import Image
 
+from tests.printed import letters, spoilt
 from walkers.inputs import InputError
 from walkers.postprocess import Group, read_motion, read_table
 from walkers.postprocess.analysis import plot_run
-from walkers.postprocess.drawing import styled
+from walkers.postprocess.drawing import legend_below, new_figure, series_look, styled
+from walkers.postprocess.figures import _gait_figure, _walk_figure
 from walkers.postprocess.paraview import write_vtk
 from walkers.postprocess.pictures import render_run
 from walkers.postprocess.series import _panels
@@ -143,6 +147,58 @@ def test_figures_are_pictures(directory: Path, tmp_path: Path) -> None:
     assert [path.name for path in paths] == ["walk.png", "gait.png"]
     for path in paths:
         assert len(Image.open(path).convert("RGB").getcolors(maxcolors=1 << 24)) > 20
+
+
+def test_figures_of_runs_come_in_other_formats_and_in_no_unknown_one(directory: Path, tmp_path: Path) -> None:
+    paths = plot_run(directory, tmp_path, ["pdf", "svg"])
+    assert [path.name for path in paths] == ["walk.pdf", "walk.svg", "gait.pdf", "gait.svg"]
+    assert all(directory.name.encode() in path.read_bytes() for path in paths)
+    with pytest.raises(InputError, match="jpeg"):
+        plot_run(directory, tmp_path / "none", ["jpeg"])
+    assert not (tmp_path / "none").exists()
+
+
+def test_figures_of_runs_can_be_printed(directory: Path) -> None:
+    groups = read_motion(directory).groups
+    for figure, panels in ((_walk_figure(groups), "abc"), (_gait_figure(groups[0]), "ab")):
+        assert spoilt(figure) == []
+        assert letters(figure) == list(panels)
+
+
+def test_what_spoils_a_figure_is_found() -> None:
+    figure, axes = new_figure(3.4, 3.0)
+    axes.plot([0.0, 1.0], [0.0, 1.0], label="a line")
+    axes.set_title("a title\nof two lines")
+    legend_below(axes)
+    assert spoilt(figure) == []
+    figure.set_size_inches(5.0, 3.0)
+    axes.legend(loc="upper right")
+    axes.text(0.5, 0.5, "over the line", ha="center")
+    axes.text(0.4, 0.9, "of texts", rotation=20)
+    axes.text(0.4, 0.9, "two texts", fontsize=6)
+    figure.text(1.01, 0.5, "beyond").set_in_layout(False)
+    found = spoilt(figure)
+    for told in ("'legend a line' over data", "'over the line' over data", "'of texts' over 'two texts'",
+                 "'beyond' is cut off", "'two texts' has 6 pt", "5 inches wide"):  # fmt: skip
+        assert told in found
+    assert not any("title" in told for told in found)
+
+
+def test_a_dozen_walkers_are_told_apart() -> None:
+    """By dashes or marker; and neighbours by colour too, also by those who see no red or no green.
+
+    Simulation of colour vision deficiency: Machado, Oliveira and Fernandes, doi.org/10.1109/TVCG.2009.113, severity 1.
+    """
+    looks = styled(lambda: [series_look(number) for number in range(12)])()
+    assert len({(look["linestyle"], look["marker"]) for look in looks}) == 12
+    colours = np.array([to_rgb(colour) for colour in styled(lambda: rcParams["axes.prop_cycle"].by_key()["color"])()])
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    protanopia = [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    deuteranopia = [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+    for seen in (np.eye(3), np.array(protanopia), np.array(deuteranopia)):
+        shown = np.clip(linear @ seen.T, 0.0, 1.0) ** (1.0 / 2.4)
+        apart = np.linalg.norm(shown[:, None] - shown, axis=-1)
+        assert apart[np.triu_indices(len(shown), 1)].min() > 0.1
 
 
 def test_a_strobed_run_has_no_gait(run_directory: Callable[..., Path], tmp_path: Path) -> None:

@@ -21,11 +21,13 @@ import pytest
 
 import walkers
 from tests.conftest import PROGRAM, call, engines_in, to_toml, wait_for
+from tests.printed import spoilt
 from walkers.inputs import Case, InputError, load_case, resolve_case, shipped_cases
 from walkers.inputs.sweep import expand
 from walkers.postprocess import current_result, read_motion, read_table, tabulate
+from walkers.postprocess.figures import _climb_figure
 from walkers.postprocess.motion import FLOOR, read_bridges
-from walkers.postprocess.piles import Pile
+from walkers.postprocess.piles import Pile, analyse
 from walkers.postprocess.tables import TABLES
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
@@ -401,6 +403,8 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
 
     assert "climbs  " in told("result", str(run))
     assert told("plot", str(run), "--to", "here").strip() == "here/climb.png"
+    assert told("plot", str(run), "--to", "here", "--format", "pdf").strip() == "here/climb.pdf"
+    assert spoilt(_climb_figure(analyse(run))) == []
     assert told("render", str(run), "--to", "here/box.png", "--images", "2").strip() == "here/box.png"
     assert told("render", str(run), "--to", "here/row.png", "--interval", "0.1 s").strip() == "here/row.png"
     film = in_folder / told("film", str(run), "--to", "here/box.mp4", "--fps", "10", "--slowdown", "5").strip()

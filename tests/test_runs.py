@@ -63,7 +63,7 @@ def test_a_forced_run_that_fails_leaves_the_old_one(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
     old = run_case(case, tmp_path)
     with pytest.raises(KeyboardInterrupt):
-        run_case(case, tmp_path, force=True, on_progress=_interrupt)
+        run_case(case, tmp_path, force=True, progress=_interrupt)
     assert finished_run(old.directory) is not None
     assert run_case(case, tmp_path).cached
 
@@ -75,7 +75,7 @@ def _interrupt(_: object) -> None:
 def test_an_unfinished_run_is_redone(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
     with pytest.raises(KeyboardInterrupt):
-        run_case(case, tmp_path, on_progress=_interrupt)
+        run_case(case, tmp_path, progress=_interrupt)
     (part,) = tmp_path.glob("*.incomplete")
     (segment,) = part.glob("segments/*")
     assert segment.name == "0000.new"
@@ -98,7 +98,7 @@ def test_an_interrupted_run_goes_on_after_its_last_whole_segment(tmp_path: Path)
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_case(case, tmp_path, on_progress=interrupt)
+        run_case(case, tmp_path, progress=interrupt)
     (part,) = tmp_path.glob("*.incomplete")
     *whole, begun = sorted(path.name for path in part.glob("segments/*"))
     assert whole

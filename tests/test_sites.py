@@ -98,6 +98,22 @@ def test_workers_of_another_process_give_the_same(in_folder: Path) -> None:
     assert set(load(in_folder / "there" / "test")["status"]) == {"finished"}
 
 
+def test_workers_in_a_container(in_folder: Path) -> None:
+    """A script in place of ``apptainer exec IMAGE`` starts what starts the engines."""
+    (in_folder / "base.toml").write_text(to_toml(document(run=TINY)))
+    (in_folder / "test.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+    (in_folder / "apptainer").write_text(f'#!/bin/sh\necho "$@" >> {in_folder}/called\nshift 2\nexec "$@"\n')
+    (in_folder / "apptainer").chmod(0o755)
+    site = f'scheduler = "local"\ncores = 2\ncontainer = "{in_folder}/apptainer exec walkers.sif"\n'
+    (in_folder / "site.toml").write_text(site + '[executor]\naddress = "127.0.0.1"\n')
+    program = subprocess.run(
+        [PROGRAM, "sweep", "test.toml", "--site", "site.toml"], capture_output=True, text=True, check=False
+    )
+    assert program.returncode == 0, program.stderr
+    assert set(load(in_folder / "runs" / "test")["status"]) == {"finished"}
+    assert (in_folder / "called").read_text().startswith("exec walkers.sif process_worker_pool.py ")
+
+
 SLOW_SWEEP = """
 case = "base.toml"
 [axes]

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.printed import spoilt
 from walkers.inputs.calibration import load_calibration
 from walkers.studies.audited import temporary_bench
 from walkers.studies.static_friction import (
@@ -51,4 +52,5 @@ def test_chapter(tmp_path: Path) -> None:
     made = chapter(tmp_path)
     assert "figures/validation-static-friction.png" in made.text
     assert set(made.figures) == {"static-friction"}
+    assert spoilt(made.figures["static-friction"]) == []
     assert chapter(tmp_path, quick=True).numbers["plateau"]["ratios"] == [1.0, 1.6]

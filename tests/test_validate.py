@@ -33,7 +33,7 @@ def test_a_chapter_that_cannot_be_made_leaves_the_others(tmp_path: Path, monkeyp
 
 
 def test_docs_have_all_chapters() -> None:
-    page = (Path(__file__).parent.parent / "docs" / PAGE).read_text()
+    page = (Path(__file__).parent.parent / "docs" / "explanation" / PAGE).read_text()
     assert page.count("\n## ") == len(CHAPTERS)
     assert "Not as expected" not in page
 

@@ -57,7 +57,7 @@ def motion_of(*cases: Case, viscous: bool = True) -> Motion:
     ValueError
         If a drive is not along the substrate.
     """
-    _check(*cases)
+    check_applies(*cases)
     return walk(
         Walker.joined([_walker_of(case, viscous=viscous) for case in cases]),
         friction_of(*cases, viscous=viscous),
@@ -72,7 +72,14 @@ def _walker_of(case: Case, *, viscous: bool) -> Walker:
     return walker if viscous else replace(walker, film=np.zeros_like(walker.film))
 
 
-def _check(*cases: Case) -> None:
+def check_applies(*cases: Case) -> None:
+    """Refuse cases that the theory is not one of.
+
+    Raises
+    ------
+    ValueError
+        With the key that is at fault and what the theory is one of.
+    """
     for case in cases:
         if len(case.walkers) != 1 or len(case.walkers[0].radii) != 2 or case.loose:
             raise ValueError("bodies: the theory is one of dimers")
@@ -98,7 +105,7 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
         To a part in ten thousand of the range in which contacts stay closed; NaN if it does not move there, and for a
         symmetric dimer.
     """
-    _check(case)
+    check_applies(case)
     if dimer_of(case).sin_delta == 0.0:
         return float("nan")
     dimer, walker, friction = dimer_of(case), _walker_of(case, viscous=viscous), friction_of(case, viscous=viscous)

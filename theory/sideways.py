@@ -4,7 +4,7 @@ The Mathieu equation (`walkers.theory.mathieu`) takes the beads for one rigid co
 normal to the substrate, against which nothing holds it, and a contact that slides along the axis resists sideways
 sliding as a drag does only. `turning_rate` leaves all that to the beads: it is the Floquet exponent of ψ, both beads'
 sideways velocities and their spins about the drive and about the normal, linearised about the axial motion of
-`walkers.theory.motion`. The engine's dimers turn over at these rates within a per cent (docs/climbing.md).
+`walkers.theory.motion`. The engine's dimers turn over at these rates within a per cent (docs/explanation/climbing.md).
 """
 
 from __future__ import annotations

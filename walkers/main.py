@@ -10,18 +10,21 @@ from contextlib import suppress
 from importlib import import_module
 from io import TextIOBase, TextIOWrapper
 from types import FrameType
-from typing import Any, NoReturn, TextIO
+from typing import Annotated, Any, NoReturn, TextIO
 
 import typer
 
 COMMANDS = (
     *("show", "deck", "run", "result", "plot", "render", "film", "vtk", "paraview", "export", "theory"),
-    *("sweep", "status", "table", "climb", "figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"),
+    *("sweep", "status", "table", "climb", "compare", "list", "clean", "report", "verify", "archive"),
+    *("figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"),
 )
 """Each the function ``command`` of a module of `walkers.commands`, in the order of ``walkers --help``."""
 
 
 INTERRUPTED = 130
+_COMPLETION = "_WALKERS_COMPLETE"
+"""Variable in which a shell's completion script says what it wants."""
 
 
 class Forgiving(TextIOBase):
@@ -110,7 +113,9 @@ def _show_warning(
 def _status(arguments: list[str] | None) -> int:
     """Run the program: its exit status. What is not known to happen is raised."""
     try:
-        outcome: Any = _program(sys.argv[1:] if arguments is None else arguments)(arguments, standalone_mode=False)
+        outcome: Any = _program(_words() if arguments is None else arguments)(
+            arguments, standalone_mode=False, prog_name="walkers"
+        )
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
         return _told(stop)
@@ -125,15 +130,38 @@ def _program(arguments: list[str]) -> typer.Typer:
         name="walkers",
         help="Wet granular walkers, simulated with LIGGGHTS.",
         no_args_is_help=True,
-        add_completion=False,
+        add_completion=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # rich takes longer to load than all that most commands need
+        context_settings={"help_option_names": ["-h", "--help"]},
     )
-    program.callback()(lambda: None)  # else a single command would have no name
+    program.callback()(_options)
     for name in set(arguments[:1]).intersection(COMMANDS) or COMMANDS:
         command = import_module(f"walkers.commands.{name.replace('-', '_')}").command
         program.command(name=name, short_help=command.__doc__)(command)
     return program
+
+
+def _words() -> list[str]:
+    """What was typed after the program's name, also where a shell asks how it may go on."""
+    typed = os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS")
+    return typed.split()[1:] if typed and _COMPLETION in os.environ else sys.argv[1:]
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from walkers.version import describe_version
+
+        print(describe_version())
+        raise typer.Exit
+
+
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show what is installed and exit.")
+    ] = False,
+) -> None:
+    """Take what is no command's."""
 
 
 def _told(stop: BaseException) -> int:

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import threading
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.notebook import Pictures
 
 if TYPE_CHECKING:
+    import k3d
     import pandas as pd
 
     from walkers.inputs.case import Case
+    from walkers.inputs.origins import Origin
     from walkers.postprocess.films import FilmOptions
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
+    from walkers.sweeps.comparison import Side
 
 DEFAULT_OUT = Path("runs")
 
@@ -32,10 +37,14 @@ class Run:
         The run directory.
     cached
         Whether it was there before.
+    origins
+        Where the values of the case come from by which it was asked for; None: of that by which it was made. The same
+        numbers may once have been given and once be the library's.
     """
 
     directory: Path
     cached: bool = True
+    origins: tuple[Origin, ...] | None = field(default=None, repr=False)
 
     @property
     def case(self) -> Case:
@@ -47,9 +56,10 @@ class Run:
     @property
     def result(self) -> dict[str, Any]:
         """The result, SI units."""
-        from walkers.postprocess.analysis import current_result
+        from walkers.postprocess.analysis import current_result, rests_on
 
-        return current_result(self.directory)
+        result = current_result(self.directory)
+        return result if self.origins is None else {**result, "rests_on": rests_on(self.origins)}
 
     @property
     def motion(self) -> Motion:
@@ -80,17 +90,52 @@ class Run:
 
         return describe_result(self.directory, self.result, cached=self.cached)
 
-    def plot(self, to: Path | None = None) -> list[Path]:
-        """Draw its figures, see `walkers.postprocess.analysis.plot_run`."""
+    def _repr_html_(self) -> str:
+        """The result in a notebook: a table with errors and units, warnings, the parameters folded in."""
+        from walkers.postprocess.report.run import result_html
+
+        return result_html(self.directory, self.result, self.origins)
+
+    def plot(self, to: Path | None = None, formats: Sequence[str] = ("png",)) -> Pictures:
+        """Draw its figures, see `walkers.postprocess.analysis.plot_run`: a list of paths, which a notebook shows."""
         from walkers.postprocess.analysis import plot_run
 
-        return plot_run(self.directory, to)
+        return Pictures(plot_run(self.directory, to, formats))
+
+    def view(self, *, height: int = 480) -> k3d.Plot:
+        """Its beads in three dimensions, for a notebook; see `walkers.postprocess.report.scene.scene_of`.
+
+        Parameters
+        ----------
+        height
+            Pixels.
+
+        Examples
+        --------
+        >>> len(walkers.run("fig1b", tmp).view().objects)  # twelve beads, the floor, the lines on it
+        14
+        """
+        from walkers.postprocess.report.scene import scene_of
+
+        return scene_of(self.directory, height=height).plot
+
+    def report(self, to: Path | None = None) -> Path:
+        """Write one HTML file to mail, see `walkers.postprocess.report.run.report_run`."""
+        from walkers.postprocess.report.run import report_run
+
+        return report_run(self.directory, to, self.origins)
 
     def vtk(self, to: Path | None = None, **options: Any) -> Path:
         """Write it for ParaView, see `walkers.postprocess.paraview.write_vtk`."""
         from walkers.postprocess.paraview import write_vtk
 
         return write_vtk(self.directory, destination=to, **options)
+
+    def archive(self, to: Path | None = None, **options: Any) -> Path:
+        """Pack it into an RO-Crate, see `walkers.archive.writing.write_archive` and its `ArchiveOptions`."""
+        from walkers.archive.writing import ArchiveOptions, write_archive
+
+        return write_archive(self.directory, to, ArchiveOptions(**options))
 
     def paraview(self, to: Path | None = None, **options: Any) -> Path:
         """Write it with a script for ParaView, see `walkers.postprocess.paraview_script.write_paraview`."""
@@ -116,11 +161,11 @@ class Run:
 
         return render_film(self.directory, to, options, on_progress=on_progress)
 
-    def render(self, to: Path | None = None, *, images: int = 6) -> list[Path]:
-        """Render pictures of it, see `walkers.postprocess.pictures.render_run`."""
+    def render(self, to: Path | None = None, *, images: int = 6) -> Pictures:
+        """Render pictures of it, see `walkers.postprocess.pictures.render_run`: paths, which a notebook shows."""
         from walkers.postprocess.pictures import render_run
 
-        return render_run(self.directory, to, images=images)
+        return Pictures(render_run(self.directory, to, images=images))
 
 
 def run(
@@ -129,7 +174,7 @@ def run(
     *,
     engine: str | None = None,
     force: bool = False,
-    on_progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[Progress], None] | bool | None = None,
     time_limit: float | None = None,
     allow_failed_audit: bool = False,
 ) -> Run:
@@ -145,8 +190,8 @@ def run(
         Name or path of the binary; see `walkers.runner.find_engine`.
     force
         Run again; the old run is replaced only by a finished one.
-    on_progress
-        Called a few times a second while the engine runs.
+    progress
+        Whether to show how far the run is; if None, in notebooks. Or what is called a few times a second meanwhile.
     time_limit
         Wall time in s that the engine may take, for each segment of the run.
     allow_failed_audit
@@ -170,6 +215,7 @@ def run(
     """
     from walkers.inputs.reading import load_case
     from walkers.postprocess.analysis import current_result
+    from walkers.progress import progress_of, shown_if
     from walkers.runner.binary import find_engine
     from walkers.runner.directory import run_place, unfinished
     from walkers.runner.ensemble import finished_place
@@ -182,14 +228,16 @@ def run(
     there = finished_place(out, place.name)
     if there is not None and not force:
         current_result(there)
-        return Run(there)
+        return Run(there, origins=case.origins)
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
     threading.Thread(target=_load_postprocess, daemon=True).start()
-    made = make_runs([case], out, binary, force=force, on_progress=on_progress, time_limit=time_limit)
+    watch = nullcontext(progress) if callable(progress) else shown_if(progress, progress_of(case.name))
+    with watch as advance:
+        made = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
     if made.busy:
         raise RunBusy(unfinished(place))
-    return Run(made.runs[place.name].directory, cached=place.name in made.found)
+    return Run(made.runs[place.name].directory, cached=place.name in made.found, origins=case.origins)
 
 
 def _load_postprocess() -> None:
@@ -198,13 +246,14 @@ def _load_postprocess() -> None:
     import walkers.postprocess.walking  # noqa: F401
 
 
-def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
+def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     """Find a finished run.
 
     Parameters
     ----------
     run
-        A run directory; or a case (file or shipped name), whose run with the installed engine is looked up in ``out``.
+        A run directory, or its name in ``out``, alone or in an ensemble; or a case (resolved, file or shipped name),
+        whose run with the installed engine is looked up there.
     out
         Folder of the run directories.
 
@@ -215,27 +264,111 @@ def find_run(run: str | Path, out: Path = DEFAULT_OUT) -> Run:
     runner.EngineFailure
         If a case is given and there is no engine to look it up for.
     """
+    from walkers.inputs.reading import load_case
     from walkers.runner.directory import finished_run
 
-    path = Path(run)
-    if path.is_dir():
-        if finished_run(path) is None:
-            told = "not a finished run: expected a folder with a manifest.json"
-            raise InputError(str(run), [Problem("", None, told)])
-        return _readable(path)
-    there = _place_of(path, out)
-    if there is None or finished_run(there) is None:
-        raise InputError(str(run), [Problem("", None, f"no finished run in {out}; first do: walkers run {run}")])
-    return _readable(there)
+    place = place_of(run, out)
+    if finished_run(place) is None:
+        told = "not a finished run: expected a folder with a manifest.json"
+        if find_sweep(place) is not None:
+            told = "a sweep's directory: walkers plot, table and status take it, this takes one of its runs"
+        raise InputError(str(run), [Problem("", None, told)])
+    if not isinstance(run, (str, Path)):
+        return replace(_readable(place), origins=run.origins)
+    by_place = Path(run).is_dir() or _named(run, out) is not None
+    return replace(_readable(place), origins=None if by_place else load_case(run).origins)
 
 
-def _place_of(case: Path, out: Path) -> Path | None:
+def place_of(run: Case | str | Path, out: Path = DEFAULT_OUT, *, archives: bool = False) -> Path:
+    """Where something is: a directory as it is, for a case that of its finished run with the installed engine.
+
+    Nothing in it is read or made anew.
+
+    Parameters
+    ----------
+    run, out
+        As for `find_run`; a sweep's name too.
+    archives
+        Take a zip file for what it is, not for a case.
+
+    Raises
+    ------
+    InputError
+        If a case is given and has no finished run.
+    """
     from walkers.inputs.reading import load_case
+
+    name = str(run) if isinstance(run, (str, Path)) else run.name
+    if isinstance(run, (str, Path)):
+        path = Path(run)
+        if path.is_dir() or (archives and path.suffix == ".zip" and path.is_file()):
+            return path
+        there = _named(run, out) or (find_sweep(run, out) if not path.is_file() else None)
+        if there is not None:
+            return there
+        run = load_case(run)
+    there = _run_of(run, out)
+    if there is None:
+        raise InputError(name, [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
+    return there
+
+
+def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:
+    """A run, or a case with its run if it has one, for `walkers.sweeps.comparison.compare_runs`.
+
+    Parameters
+    ----------
+    run
+        A run directory, also of a run that is not finished; its name in ``out``; or a case (file or shipped name).
+    out
+        Folder of the run directories.
+
+    Raises
+    ------
+    InputError
+        If it is none of them.
+    """
+    from walkers.inputs.reading import load_case
+    from walkers.runner.directory import CASE_NAME, case_of, finished_run
+    from walkers.runner.failures import EngineMissing
+    from walkers.sweeps.comparison import Side
+
+    directory = Path(run) if (Path(run) / CASE_NAME).is_file() else _named(run, out)
+    if directory is not None:
+        try:
+            return Side(directory.name, case_of(directory), directory if finished_run(directory) else None)
+        except (OSError, ValueError) as error:
+            raise InputError(str(run), [Problem("", None, f"its case cannot be read ({error})")]) from error
+    case, there = load_case(run), None
+    with suppress(EngineMissing):
+        there = _run_of(case, out)
+    return Side(str(run), case, there)
+
+
+def find_sweep(sweep: str | Path, out: Path = DEFAULT_OUT) -> Path | None:
+    """The directory of a sweep, given itself or its name in the folder ``out``; None if there is none."""
+    from walkers.sweeps.record import RECORD_NAME
+
+    for path in (Path(sweep), out / sweep):
+        if (path / RECORD_NAME).is_file():
+            return path
+    return None
+
+
+def _named(run: str | Path, out: Path) -> Path | None:
+    """The directory of the finished run of this name in a folder, alone or in an ensemble."""
+    from walkers.runner.ensemble import finished_place
+
+    return finished_place(out, str(run)) if Path(run).name == str(run) else None
+
+
+def _run_of(case: Case, out: Path) -> Path | None:
+    """The directory of a case's finished run with the installed engine."""
     from walkers.runner.binary import find_engine
     from walkers.runner.directory import run_place
     from walkers.runner.ensemble import finished_place
 
-    return finished_place(out, run_place(load_case(case), find_engine(), out).name)
+    return finished_place(out, run_place(case, find_engine(), out).name)
 
 
 def _readable(directory: Path) -> Run:
@@ -250,9 +383,12 @@ def _readable(directory: Path) -> Run:
         except (OSError, ValueError, KeyError, TypeError) as error:
             problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
             raise InputError(str(directory), [problem]) from error
+    left_out = run.manifest.get("left_out", ())  # of an archive
     for segment in run.segments:
         layout = layout_of(segment)
         dump = segment / layout.bead_dump
+        if dump.relative_to(directory).as_posix() in left_out:
+            continue
         if not dump.is_file():
             raise InputError(str(directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
         if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:

@@ -1,17 +1,20 @@
-"""Progress on the terminal: a bar where there is one, plain lines where there is not; both on standard error."""
+"""Progress: a bar on a terminal or in a notebook, plain lines elsewhere, on standard error."""
 
 from __future__ import annotations
 
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from typing import TYPE_CHECKING, TypeVar
+
+from walkers.notebook import in_notebook, progress_bar
 
 if TYPE_CHECKING:
     from walkers.runner.launch import Progress
     from walkers.sweeps.scheduler import SweepProgress
 
+T = TypeVar("T")
 _FIRST_LINE_SECONDS = 1.0
 _LONGEST_SILENCE_SECONDS = 60.0
 
@@ -32,6 +35,11 @@ def progress_of_sweep(name: str) -> Iterator[Callable[[SweepProgress], None]]:
         )
 
 
+def shown_if(wanted: bool | None, progress: AbstractContextManager[T]) -> AbstractContextManager[T | None]:
+    """A progress if it is wanted, or if nobody says and this is a notebook; else what gives None."""
+    return progress if (in_notebook() if wanted is None else wanted) else nullcontext()
+
+
 @contextmanager
 def progress_of_film(name: str) -> Iterator[Callable[[int, int], None]]:
     """Yield a function that shows how many pictures of a film are made, of how many."""
@@ -43,6 +51,10 @@ def progress_of_film(name: str) -> Iterator[Callable[[int, int], None]]:
 @contextmanager
 def _shown(name: str) -> Iterator[Callable[[float, float, str, float], None]]:
     """Yield a function that shows the whole, how much of it is done, words, given the seconds that have passed."""
+    if in_notebook():
+        with progress_bar(name) as show:
+            yield show
+        return
     if not sys.stderr.isatty():
         is_due = _rarely()
 

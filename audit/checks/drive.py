@@ -21,7 +21,7 @@ _SINE = "A sin ωt, A = a0/ω²"
 
 
 def reference_walker(**changes: dict[str, Any]) -> Case:
-    """The walker of Fig. 2 at 4 g, friction 0.1, alone and on the axis (docs/validation.md: in a second engine)."""
+    """The walker of Fig. 2 at 4 g, friction 0.1, alone, on the axis (docs/explanation/validation.md)."""
     tables: dict[str, dict[str, Any]] = {
         "beads": {"material": "ruby"},
         "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},

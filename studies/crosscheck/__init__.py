@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def chapter(out: Path, *, quick: bool = False) -> Chapter:
-    """The chapter of docs/validation.md; see `walkers.studies.crosscheck.report.chapter`."""
+    """The chapter of docs/explanation/validation.md; see `walkers.studies.crosscheck.report.chapter`."""
     from walkers.studies.crosscheck import report
 
     return report.chapter(out, quick=quick)

@@ -110,11 +110,11 @@ class Laws:
 
     def __post_init__(self) -> None:
         if self.static_ratio < 1.0 or not isfinite(self.static_ratio):
-            raise ValueError("set static-ratio: expected at least 1, static friction over kinetic friction")
+            raise ValueError("law static-ratio: expected at least 1, static friction over kinetic friction")
         if not 0.0 < self.static_velocity < float("inf"):
-            raise ValueError("set static-velocity: expected more than 0 m/s")
+            raise ValueError("law static-velocity: expected more than 0 m/s")
         if self.wall_copies < 1:
-            raise ValueError("set wall-copies: expected at least 1")
+            raise ValueError("law wall-copies: expected at least 1")
 
     def differences(self) -> list[str]:
         """What is unlike the decks, each as ``name=value``."""
@@ -130,7 +130,7 @@ SETTINGS = tuple(
     for _name, _type in get_type_hints(Laws).items()
     if _type is not bool and _name != "capillary_tables"
 )
-"""What ``--set`` takes."""
+"""What ``--law`` takes."""
 
 
 def laws_from(without: Sequence[str] = (), settings: Sequence[str] = ()) -> Laws:
@@ -162,11 +162,11 @@ def laws_from(without: Sequence[str] = (), settings: Sequence[str] = ()) -> Laws
     for setting in settings:
         name, _, value = setting.partition("=")
         if name not in SETTINGS:
-            raise ValueError(f"set {setting}: expected NAME=VALUE, the name one of {', '.join(SETTINGS)}")
+            raise ValueError(f"law {setting}: expected NAME=VALUE, the name one of {', '.join(SETTINGS)}")
         key = name.replace("-", "_")
         changes[key] = _read(name, value, types[key])
     if {"static_ratio", "static_velocity"} & set(changes) and changes.get("static_friction", "none") == "none":
-        raise ValueError("set static-ratio, static-velocity: expected static-friction=velocity or stick-slip with them")
+        raise ValueError("law static-ratio, static-velocity: expected static-friction=velocity or stick-slip with them")
     return replace(Laws(), **changes)
 
 
@@ -182,11 +182,11 @@ def _read(name: str, value: str, kind: type) -> str | float | int:
         try:
             number = int(value) if kind is int else float(value)
         except ValueError:
-            raise ValueError(f"set {name}={value}: expected a {'whole ' if kind is int else ''}number") from None
+            raise ValueError(f"law {name}={value}: expected a {'whole ' if kind is int else ''}number") from None
         return number
     known = get_args(kind)
     if value not in known:
-        raise ValueError(f"set {name}={value}: expected one of {', '.join(known)}")
+        raise ValueError(f"law {name}={value}: expected one of {', '.join(known)}")
     return value
 
 

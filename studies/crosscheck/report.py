@@ -1,4 +1,4 @@
-"""The second engine's chapter of docs/validation.md: cases of all kinds in both engines, and other laws."""
+"""The second engine's chapter of docs/explanation/validation.md: cases of all kinds in both engines, and other laws."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case, read_toml, shipped_cases
 from walkers.inputs.text import rendered
 from walkers.pipeline import run
-from walkers.postprocess.drawing import new_figure, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, series_look, styled
 from walkers.postprocess.gait import gait, walk
 from walkers.postprocess.motion import Motion
 from walkers.studies.bridges import force_tables
@@ -168,20 +168,18 @@ def _jitter(found: Comparison) -> float:
 @styled
 def draw(single: Mapping[str, Comparison], piles: Mapping[str, PileComparison]) -> Figure:
     """Gait of a walker in both engines, and how far apart beads are through the runs."""
-    from matplotlib import colormaps
-
-    figure, (left, right) = new_figure(7.2, 3.0, ncols=2)
+    figure, (left, right) = new_figure(TWO_COLUMNS, 4.0, ncols=2)
     name = "fig4b" if "fig4b" in single else next(iter(single))
     shown = single[name]
     _draw_gait(left, shown, name)
-    colours = colormaps["tab20"].colors  # type: ignore[attr-defined]
-    for (label, one), colour in zip(single.items(), colours, strict=False):
-        right.semilogy(*_apart(one), label=label, lw=0.8, color=colour)
+    for number, (label, one) in enumerate(single.items()):
+        right.semilogy(*_apart(one), label=label, lw=0.8, markevery=0.2, **series_look(number))
     for label, pile in piles.items():
         for number, one in enumerate(pile.starts):
             right.semilogy(*_apart(one), color="0.6", lw=0.6, label=None if number else label)
-    right.set(xlabel="cycles", ylabel="largest distance of a bead / radius")
-    right.legend(fontsize=5, ncols=2, loc="lower right")
+    right.set(xlabel="cycles", ylabel="distance / radius", title="largest distance of a bead from itself")
+    legend_below(right, ncols=2)
+    letter_panels((left, right))
     return figure
 
 
@@ -194,7 +192,7 @@ def _draw_gait(axes: Any, shown: Comparison, name: str) -> None:
         line = axes.plot(cycles, 1e3 * one.sliding[last, 0, contact], label=f"contact {contact + 1}")[0]
         axes.plot(cycles, 1e3 * other.sliding[last, 0, contact], "x", color=line.get_color(), ms=3)
     axes.set(xlabel="cycles", ylabel="sliding velocity / mm s$^{-1}$", title=f"{name}: LIGGGHTS, second engine (x)")
-    axes.legend(fontsize=6)
+    legend_below(axes, ncols=2)
 
 
 def _apart(one: Comparison) -> tuple[Any, Any]:

@@ -39,8 +39,8 @@ from walkers.studies.crosscheck.setup import matter_of, surroundings_of
 PROGRAMS = ("yade", "yadedaily")
 INSTALL_COMMAND = "sudo apt-get install yade"
 TOLERANCES = Tolerances(speed=0.01, gait=0.01, orientation=0.5)
-"""Of YADE, whose contacts differ from LIGGGHTS's in three ways (docs/crosscheck.md): more than twice what the cases
-there then differ by at most, 0.31 % and 0.40 % (climber)."""
+"""Of YADE, whose contacts differ from LIGGGHTS's in three ways (docs/explanation/crosscheck.md): more than twice what
+the cases there then differ by at most, 0.31 % and 0.40 % (climber)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,7 @@ from walkers.commands.arguments import EngineName, Json
 
 Only = Annotated[list[str] | None, typer.Option("--only", help="Name of a check; may be repeated.")]
 Quick = Annotated[bool, typer.Option("--quick", help="Leave out the checks that take longest.")]
-Markdown = Annotated[Path | None, typer.Option("--markdown", help="Write docs/engine.md: the defects and the table.")]
+Markdown = Annotated[Path | None, typer.Option("--markdown", help="Write a page of the defects and the table.")]
 
 
 def command(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from walkers.commands.arguments import AllowFailedAudit, Case, EngineName, Json, Out, check_out, refuse
+from walkers.commands.arguments import AllowFailedAudit, Case, EngineName, Json, Out, Set, check_out, load, refuse
 from walkers.pipeline import DEFAULT_OUT, Run, run
 
 if TYPE_CHECKING:
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 Cycles = Annotated[int | None, typer.Option("--cycles", help="Of the drive, in place of the case's own.")]
 Without = Annotated[list[str] | None, typer.Option("--without", metavar="TERM", help="Leave a term out, such as film.")]
-Settings = Annotated[
+Laws = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Replace a law, such as wall-lubrication=plane."),
+    typer.Option("--law", metavar="NAME=VALUE", help="Replace a law, such as wall-lubrication=plane."),
 ]
 With = Annotated[
     Literal["second-engine", "yade"],
@@ -37,7 +37,8 @@ def command(
     out: Out = DEFAULT_OUT,
     cycles: Cycles = None,
     without: Without = None,
-    settings: Settings = None,
+    laws: Laws = None,
+    settings: Set = None,
     seeds: Seeds = 1,
     other: With = "second-engine",
     as_json: Json = False,
@@ -46,7 +47,6 @@ def command(
 ) -> int:
     """Compare a case's run with an engine of our own, written from the published formulas; exit 1 if they differ."""
     from walkers.inputs.errors import InputError, Problem
-    from walkers.inputs.reading import load_case
     from walkers.progress import progress_of
     from walkers.studies.crosscheck.checking import crosscheck
     from walkers.studies.crosscheck.comparison import shortened
@@ -54,11 +54,11 @@ def command(
     from walkers.studies.crosscheck.setup import surroundings_of
     from walkers.studies.crosscheck.yade import compare_with_yade
 
-    loaded = load_case(case)
+    loaded = load(case, settings)
     check_out(out)
     refuse("--seeds", seeds > 1 and loaded.mixture is None, "is for piles: walkers and placed beads start but one way")
     try:
-        laws = laws_from(without or (), settings or ())
+        supposed = laws_from(without or (), laws or ())
     except ValueError as error:
         option, _, told = str(error).partition(": ")
         raise InputError(f"--{option}", [Problem("", None, told)]) from error
@@ -71,17 +71,17 @@ def command(
     except ValueError as error:
         raise InputError("--cycles", [Problem("", None, str(error))]) from error
 
-    program = "" if other == "second-engine" else _yade(loaded, bool(without or settings))
+    program = "" if other == "second-engine" else _yade(loaded, bool(without or laws))
 
     def make(one: Resolved, folder: Path) -> Run:
         with progress_of(one.name) as advance:
-            return run(one, folder, engine=engine, on_progress=advance, allow_failed_audit=allow_failed_audit)
+            return run(one, folder, engine=engine, progress=advance, allow_failed_audit=allow_failed_audit)
 
     found: Comparison | PileComparison | YadeComparison
     if program:
         found = compare_with_yade(make(loaded, out).motion, program)
     else:
-        found = crosscheck(loaded, out, laws, seeds=seeds, make=make)
+        found = crosscheck(loaded, out, supposed, seeds=seeds, make=make)
     if as_json:
         print(json.dumps(found.as_dict(), ensure_ascii=False))
     else:
@@ -101,7 +101,7 @@ def _yade(case: Resolved, other_laws: bool) -> str:
     """
     from walkers.studies.crosscheck.yade import INSTALL_COMMAND, check_case, find_program
 
-    refuse("--with yade", other_laws, "it has the decks' laws alone: leave --without and --set away")
+    refuse("--with yade", other_laws, "it has the decks' laws alone: leave --without and --law away")
     try:
         check_case(case)
     except ValueError as error:

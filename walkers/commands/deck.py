@@ -7,20 +7,19 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import Case
+from walkers.commands.arguments import Case, Set, load
 
 Folder = Annotated[
     Path | None, typer.Option("--to", help="Write the deck and its files into this new folder, to run by hand.")
 ]
 
 
-def command(case: Case, to: Folder = None) -> None:
+def command(case: Case, settings: Set = None, to: Folder = None) -> None:
     """Print the LIGGGHTS deck of a case (of a run in segments, the first), or write it with its files."""
     from walkers.inputs.errors import InputError, Problem
-    from walkers.inputs.reading import load_case
     from walkers.templates.deck import DECK_NAME, render_deck
 
-    deck = render_deck(load_case(case))
+    deck = render_deck(load(case, settings))
     if to is None:
         print(deck.text, end="")
         return

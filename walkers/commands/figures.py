@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import AllowFailedAudit, EngineName, Out
+from walkers.commands.arguments import AllowFailedAudit, EngineName, Formats, Out
 from walkers.pipeline import DEFAULT_OUT
 
 To = Annotated[Path, typer.Option("--to", help="Folder of the figures.")]
@@ -20,12 +20,13 @@ def command(
     out: Out = DEFAULT_OUT,
     to: To = Path("figures"),
     only: Only = None,
+    formats: Formats = None,
     jobs: Jobs = None,
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Draw the paper's figures with engine, theory and published values; runs that are missing are made first."""
-    from walkers.paper.make import make_figures
+    from walkers.paper.make import FORMATS, make_figures
     from walkers.progress import progress_of_sweep
     from walkers.sweeps.scheduler import Options
     from walkers.sweeps.site import cores_here
@@ -35,6 +36,7 @@ def command(
         to,
         Options(jobs or cores_here()),
         only=only or (),
+        formats=formats or FORMATS,
         engine=engine,
         allow_failed_audit=allow_failed_audit,
         progress_of=progress_of_sweep,

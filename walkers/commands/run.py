@@ -4,36 +4,48 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from walkers.commands.arguments import AllowFailedAudit, EngineName, Json, Out, check_out
+from walkers.commands.arguments import AllowFailedAudit, Cases, EngineName, Json, Out, Set, check_out, load, refuse
 from walkers.pipeline import DEFAULT_OUT
 
-Cases = Annotated[list[str], typer.Argument(metavar="CASE...", help="Case files, or names of shipped cases.")]
+if TYPE_CHECKING:
+    from walkers.inputs.case import Case
+    from walkers.sweeps.spread import Spread
+
 Force = Annotated[bool, typer.Option("--force", help="Run again even if the run is there.")]
 Limit = Annotated[
     float | None, typer.Option("--limit", min=0.0, help="Stop a run (of a pile: a segment) after this many seconds.")
 ]
 
+SpreadFlag = Annotated[
+    bool, typer.Option("--spread", help="Run it too with all that nobody measured drawn from its range: a band.")
+]
+Points = Annotated[int | None, typer.Option("--points", min=2, max=4096, help="Of the spread; 32 if left out.")]
+
 
 def command(
     cases: Cases,
+    settings: Set = None,
     out: Out = DEFAULT_OUT,
     force: Force = False,
     as_json: Json = False,
     limit: Limit = None,
+    spread: SpreadFlag = False,
+    points: Points = None,
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Run cases, unless they have been run, and print their results (with --json an object a line)."""
-    from walkers.inputs.reading import load_case
     from walkers.pipeline import run
     from walkers.progress import progress_of
     from walkers.runner.failures import EngineFailure
 
-    loaded = [load_case(case) for case in cases]  # a mistake in the last file shows before the first run starts
+    refuse("--points", points is not None and not spread, "is for --spread")
+    loaded = [load(case, settings) for case in cases]  # a mistake in the last file shows before the first run starts
     check_out(out)
     failed = 0
     for case in loaded:
@@ -44,7 +56,7 @@ def command(
                     out,
                     engine=engine,
                     force=force,
-                    on_progress=advance,
+                    progress=advance,
                     time_limit=limit,
                     allow_failed_audit=allow_failed_audit,
                 )
@@ -52,8 +64,36 @@ def command(
             print(f"walkers: {case.name}: {failure}", file=sys.stderr)
             failed += 1
             continue
+        band = _spread(case, out, points, engine, allow_failed_audit) if spread else None
         if as_json:
-            print(json.dumps({**done.result, "run": str(done.directory), "cached": done.cached}))
+            found = {"spread": band.as_dict()} if band else {}
+            print(json.dumps({**done.result, **found, "run": str(done.directory), "cached": done.cached}))
         else:
             print(done.describe())
+        if band and not as_json:
+            print(_described(band))
     return 1 if failed else 0
+
+
+def _spread(case: Case, out: Path, points: int | None, engine: str | None, allow_failed_audit: bool) -> Spread:
+    from walkers.progress import progress_of_sweep
+    from walkers.sweeps.scheduler import Options
+    from walkers.sweeps.site import cores_here
+    from walkers.sweeps.spread import POINTS, run_spread
+
+    with progress_of_sweep(f"{case.name}, spread") as advance:
+        return run_spread(
+            case,
+            out,
+            Options(cores_here()),
+            points=points or POINTS,
+            engine=engine,
+            allow_failed_audit=allow_failed_audit,
+            on_progress=advance,
+        )
+
+
+def _described(band: Spread) -> str:
+    from walkers.sweeps.spread import describe
+
+    return describe(band)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 
-from walkers.commands.arguments import Case, Json
+from walkers.commands.arguments import Case, Json, Set, load
 
 
-def command(case: Case, as_json: Json = False) -> None:
-    """Show a case in SI units with its forces, its time step and its cost."""
-    from walkers.inputs.reading import load_case
-
-    loaded = load_case(case)
+def command(case: Case, settings: Set = None, as_json: Json = False) -> None:
+    """Show each value of a case and where it comes from, its forces, its time step and its cost."""
+    loaded = load(case, settings)
     from walkers.runner.summary import describe, summarise
 
     summary = summarise(loaded)

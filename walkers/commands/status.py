@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-Directory = Annotated[Path, typer.Argument(metavar="DIR", help="A sweep's directory, or the folder of several.")]
+from walkers import completion
+
+Directory = Annotated[
+    Path,
+    typer.Argument(
+        metavar="DIR", help="A sweep's directory, or the folder of several.", autocompletion=completion.sweeps
+    ),
+]
 
 
 def command(directory: Directory) -> None:

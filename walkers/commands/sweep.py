@@ -8,10 +8,9 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import AllowFailedAudit, EngineName, Out, check_out, refuse
+from walkers.commands.arguments import AllowFailedAudit, EngineName, Out, Set, SweepFile, check_out, refuse
 from walkers.pipeline import DEFAULT_OUT
 
-SweepFile = Annotated[str, typer.Argument(metavar="SWEEP", help="A sweep file, or a shipped sweep such as fig2.")]
 Jobs = Annotated[int | None, typer.Option("-j", "--jobs", min=1, help="Decks at once; all cores if left out.")]
 SitePath = Annotated[Path | None, typer.Option("--site", help="A site file: run on that cluster instead.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be done, and its cost; write nothing.")]
@@ -22,6 +21,7 @@ Limit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Stop an e
 
 def command(
     sweep: SweepFile,
+    settings: Set = None,
     out: Out = DEFAULT_OUT,
     jobs: Jobs = None,
     site: SitePath = None,
@@ -32,14 +32,16 @@ def command(
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Run the points of a sweep that are missing, on all cores or on a cluster; exit status 1 if any failed."""
+    from walkers.inputs.changes import settings_of
     from walkers.inputs.sweep import load_sweep
+    from walkers.postprocess.analysis import lines_of_rest, rests_on
     from walkers.progress import progress_of_sweep
     from walkers.sweeps.run import plan_sweep, run_sweep
     from walkers.sweeps.scheduler import Options
     from walkers.sweeps.site import cores_here, load_site
     from walkers.sweeps.summary import describe_status
 
-    loaded = load_sweep(sweep)
+    loaded = load_sweep(sweep, settings_of(settings or ()))
     check_out(out)
     refuse("--jobs", jobs is not None and site is not None, "a site says by itself how many decks run at once")
     if len(loaded.rows) > _MANY:
@@ -60,4 +62,6 @@ def command(
     for failure in failures:
         print(f"walkers: point {failure.point}, {failure.run}: {failure.message}", file=sys.stderr)
     print(describe_status(record.directory))
+    for line in lines_of_rest(rests_on(next(loaded.cases()).origins)):
+        print(line)
     return 1 if failures else 0

@@ -8,9 +8,13 @@ from typing import Annotated
 
 import typer
 
+from walkers import completion
 from walkers.commands.arguments import refuse
 
-Directory = Annotated[Path, typer.Argument(metavar="DIR", help="A sweep's directory, such as runs/fig2.")]
+Directory = Annotated[
+    Path,
+    typer.Argument(metavar="DIR", help="A sweep's directory, such as runs/fig2.", autocompletion=completion.sweeps),
+]
 Csv = Annotated[bool, typer.Option("--csv", help="Comma-separated, units in the head.")]
 Parquet = Annotated[bool, typer.Option("--parquet", help="Parquet, units in the field metadata.")]
 Json = Annotated[bool, typer.Option("--json", help="JSON with units and meanings.")]

@@ -1,0 +1,267 @@
+"""What goes into an archive: which files of a run or a sweep, where they are in it, and what they are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from walkers.inputs.errors import InputError, Problem
+from walkers.runner.directory import CASE_NAME, FinishedRun
+from walkers.runner.ensemble import FOLDER
+from walkers.runner.manifest import MANIFEST_NAME
+from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_record, states
+
+RUNS = "runs"
+"""Folder of the run directories in an archive: there, the program finds them as it does elsewhere."""
+_MEANINGS = {
+    CASE_NAME: ("case", "the resolved case: every number that determines the run, SI units"),
+    MANIFEST_NAME: ("record", "what made the run, what that took, and what its files were when it was finished"),
+    RECORD_NAME: ("record", "the points of the sweep: what varied, what follows from it, the names of the runs"),
+    "result.json": ("result", "what the run gave, SI units"),
+    "walker.lig": ("deck", "the deck: what the engine was told"),
+    "walls.stl": ("deck", "mesh of the walls"),
+    "layout.json": ("deck", "columns of the dumps; which bead belongs to which walker"),
+    "engine.log": ("output", "what the engine said"),
+    "segment.json": ("output", "from which step to which the segment went, and what it took"),
+    "beads.bin": (
+        "dump",
+        "places, velocities and spins of the beads, in LIGGGHTS's binary format; columns in layout.json",
+    ),
+    "bridges.pairs.txt": ("dump", "bridges between beads, frame by frame, text"),
+    "bridges.walls.txt": ("dump", "bridges between beads and walls, frame by frame, text"),
+    "state.restart": ("dump", "where the next segment goes on, the engine's own format"),
+    "table.csv": ("table", "the table of the sweep, one row per point, units in the head"),
+    "table.parquet": ("table", "the table of the sweep, one row per point, units and meanings in the field metadata"),
+}
+_GIVEN = ("case", "the case as it was given, with the values that were put beside it")
+_SWEEP = ("record", "the sweep as it was given")
+_NUMBERS = ("deck", "numbers of each bead, from which the deck adds forces of the walls")
+_MEDIA = {
+    ".json": "application/json",
+    ".toml": "application/toml",
+    ".parquet": "application/vnd.apache.parquet",
+    ".csv": "text/csv",
+    ".stl": "model/stl",
+    ".html": "text/html",
+}
+_TEXT = (".lig", ".txt", ".log")
+
+
+@dataclass(frozen=True)
+class Item:
+    """A file of an archive.
+
+    Attributes
+    ----------
+    place
+        Its path in the archive.
+    source
+        Where it is, or what is to be in it.
+    sha256
+        Of its contents, if that is known already.
+    told
+        Its role and meaning, where its name does not say them.
+    """
+
+    place: str
+    source: Path | bytes
+    sha256: str | None = None
+    told: tuple[str, str] | None = None
+
+    @property
+    def name(self) -> str:
+        """Its name without folders."""
+        return self.place.rpartition("/")[2]
+
+    @property
+    def role(self) -> str:
+        """``case``, ``deck``, ``dump``, ``output``, ``table``, ``result`` or ``record``."""
+        return (self.told or _told(self.name))[0]
+
+    @property
+    def meaning(self) -> str:
+        """What it is."""
+        return (self.told or _told(self.name))[1]
+
+    @property
+    def media_type(self) -> str:
+        """By its suffix."""
+        suffix = Path(self.name).suffix
+        return _MEDIA.get(suffix, "text/plain" if suffix in _TEXT else "application/octet-stream")
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return len(self.source) if isinstance(self.source, bytes) else self.source.stat().st_size
+
+
+def _told(name: str) -> tuple[str, str]:
+    stem, _, suffix = name.rpartition(".")
+    if name in _MEANINGS:
+        return _MEANINGS[name]
+    if suffix == "parquet":
+        return "table", f"table {stem}; units and meanings of its columns are in the field metadata"
+    return _NUMBERS
+
+
+@dataclass(frozen=True)
+class PackedFolder:
+    """A run, or an ensemble without its runs, as it goes into an archive.
+
+    Attributes
+    ----------
+    directory
+        Where it is.
+    place
+        Where it goes, a folder of the archive.
+    manifest
+        As in the archive: it names what was left out.
+    items
+        Its files.
+    shares
+        Place of the ensemble whose deck made the run; None where it has its own.
+    """
+
+    directory: Path
+    place: str
+    manifest: dict[str, Any]
+    items: Sequence[Item]
+    shares: str | None = None
+
+    @property
+    def name(self) -> str:
+        """Of the run."""
+        return self.directory.name
+
+    def with_role(self, *roles: str) -> list[Item]:
+        """Its files that are any of these."""
+        return [item for item in self.items if item.role in roles]
+
+
+@dataclass(frozen=True)
+class Contents:
+    """All that goes into an archive.
+
+    Attributes
+    ----------
+    name
+        Of the run or sweep.
+    title
+        For people.
+    runs, ensembles
+        Its run directories, and those of the decks that some of them shared.
+    sweep
+        Files of the sweep itself.
+    record
+        The sweep, None of a single run.
+    """
+
+    name: str
+    title: str
+    runs: Sequence[PackedFolder]
+    ensembles: Sequence[PackedFolder] = ()
+    sweep: Sequence[Item] = field(default=())
+    record: SweepRecord | None = None
+
+    @property
+    def folders(self) -> list[PackedFolder]:
+        """Ensembles and runs."""
+        return [*self.ensembles, *self.runs]
+
+    @property
+    def items(self) -> list[Item]:
+        """All files."""
+        return [*self.sweep, *(item for folder in self.folders for item in folder.items)]
+
+    @property
+    def finished(self) -> str:
+        """When the last of the runs was finished, ISO 8601."""
+        return max(str(run.manifest["finished"]) for run in self.runs)
+
+
+def contents_of_run(directory: Path, *, dumps: bool = True) -> Contents:
+    """What the archive of a finished run holds; with ``dumps`` false not what its tables were made from."""
+    run = _run(directory, dumps)
+    title = FinishedRun(directory).case.title
+    return Contents(run.name, title, [run], _ensembles([directory], dumps))
+
+
+def contents_of_sweep(directory: Path, *, dumps: bool = True) -> Contents:
+    """What the archive of a sweep holds.
+
+    Raises
+    ------
+    InputError
+        If it is no sweep, or points of it are not finished.
+    """
+    record = read_record(directory)
+    found = states(record)
+    open_points = [state for state in found if state.status not in ("finished", "not needed")]
+    if open_points:
+        told = f"{len(open_points)} of {len(found)} points are not finished; see: walkers status {directory}"
+        raise InputError(str(directory), [Problem("", None, told)])
+    places = list(dict.fromkeys(state.directory for state in found if state.directory is not None))
+    return Contents(
+        record.name,
+        record.title,
+        [_run(place, dumps) for place in places],
+        _ensembles(places, dumps),
+        _sweep_items(record),
+        record,
+    )
+
+
+def _sweep_items(record: SweepRecord) -> list[Item]:
+    from walkers.sweeps.table import encoded, load
+
+    place = f"{RUNS}/{record.name}"
+    table = load(record.directory)
+    table["run"] = [f"{RUNS}/{Path(one).name}" if one else "" for one in table["run"]]  # not where this machine has it
+    items = [Item(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)]
+    items += [Item(f"{place}/table.{form}", encoded(table, form)) for form in ("csv", "parquet")]
+    if record.file:
+        items.append(Item(f"{place}/{record.name}.toml", _toml(record.file), told=_SWEEP))
+    return items
+
+
+def _in_ensemble(directory: Path) -> bool:
+    return directory.resolve().parent.parent.name == FOLDER
+
+
+def _run(directory: Path, dumps: bool) -> PackedFolder:
+    """A run with its case file, if it is known as it was given."""
+    shares = f"{RUNS}/{FOLDER}/{directory.resolve().parent.name}" if _in_ensemble(directory) else None
+    folder = _folder(directory, f"{shares or RUNS}/{directory.resolve().name}", dumps, shares=shares)
+    case = FinishedRun(directory).case
+    given = [Item(f"{folder.place}/{case.name}.toml", _toml(case.document), told=_GIVEN)] if case.document else []
+    return PackedFolder(folder.directory, folder.place, folder.manifest, [*given, *folder.items], shares)
+
+
+def _ensembles(runs: Iterable[Path], dumps: bool) -> list[PackedFolder]:
+    """The ensembles of runs, without their runs: the decks and what the engine said."""
+    places = dict.fromkeys(run.resolve().parent for run in runs if _in_ensemble(run))
+    return [_folder(place, f"{RUNS}/{FOLDER}/{place.name}", dumps, own=True) for place in places]
+
+
+def _folder(directory: Path, place: str, dumps: bool, *, own: bool = False, shares: str | None = None) -> PackedFolder:
+    """The files that a manifest names, and the manifest."""
+    manifest = FinishedRun(directory).manifest
+    before, sums = set(manifest.get("left_out", ())), manifest.get("sha256", {})
+    names = [name for name in manifest["files"] if name not in before and not (own and "/" in name)]
+    items = [Item(f"{place}/{name}", directory / name, sums.get(name)) for name in names]
+    left_out = [name for name, item in zip(names, items, strict=True) if item.role == "dump" and not dumps]
+    said: Path | bytes = directory / MANIFEST_NAME
+    if left_out:
+        manifest["left_out"] = sorted(before.union(left_out))
+        said = (json.dumps(manifest, indent=2, ensure_ascii=False) + "\n").encode("utf-8")
+        items = [item for item in items if item.role != "dump"]
+    return PackedFolder(directory.resolve(), place, manifest, [Item(f"{place}/{MANIFEST_NAME}", said), *items], shares)
+
+
+def _toml(tables: Any) -> bytes:
+    import tomli_w
+
+    return tomli_w.dumps(tables).encode("utf-8")

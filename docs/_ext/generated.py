@@ -1,0 +1,189 @@
+"""Pages of the reference that the program writes, in reference/generated/: keys, tables, the library, shipped files."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+import types
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from pydantic import BaseModel, BeforeValidator
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError, PydanticUndefined
+from sphinx.application import Sphinx
+from sphinx.config import Config
+
+import walkers.inputs
+from walkers.inputs.reading import read_toml
+from walkers.inputs.schema import AUTO, CaseFile
+from walkers.main import _program
+from walkers.postprocess.analysis import analyses
+from walkers.postprocess.tables import FAMILIES, TABLES
+from walkers.sweeps.columns import derived_columns, result_columns
+from walkers.sweeps.table import STATE
+
+INPUTS = Path(walkers.inputs.__file__).parent
+program = _program([])
+"""The program with all of its commands, for the directive ``typer`` of reference/commands.rst."""
+
+_BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+_KINDS = {"materials": "Materials", "liquids": "Liquids"}
+_PAGE = re.compile(r"docs/(\S+?\.md)")
+
+
+def _table(heads: Sequence[str], rows: Iterator[Sequence[str]]) -> str:
+    """A table of Markdown."""
+    cells = ([cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in rows)
+    lines = [heads, ["---"] * len(heads), *cells]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def _described(columns: Mapping[str, tuple[str, str]]) -> str:
+    return _table(["column", "unit", "meaning"], ((f"`{key}`", unit, told) for key, (unit, told) in columns.items()))
+
+
+# --- keys of a case file ----------------------------------------------------------------------------------------------
+
+
+def _parts(hint: Any) -> Iterator[Any]:
+    """A type hint and all that is in it, what annotates it included."""
+    yield hint
+    for part in get_args(hint):
+        yield from _parts(part)
+
+
+def _tables_in(hint: Any) -> list[type[BaseModel]]:
+    return [part for part in _parts(hint) if inspect.isclass(part) and issubclass(part, BaseModel)]
+
+
+def _expected(hint: Any) -> str:
+    """What a key expects, in the words of the message that a wrong value gets."""
+    if get_origin(hint) is Annotated:
+        inner, *notes = get_args(hint)
+        bounds = " and ".join(
+            f"{sign} {getattr(one, name):g}"
+            for note in notes
+            for one in (note.metadata if isinstance(note, FieldInfo) else [note])
+            for name, sign in _BOUNDS.items()
+            if isinstance(getattr(one, name, None), (int, float))
+        )
+        told = next((_refusal(note) for note in notes if isinstance(note, BeforeValidator) and note != AUTO), None)
+        told = told or _expected(inner)
+        told += ', or `"auto"`' if AUTO in notes else ""
+        return f"{told}; {bounds}" if bounds else told
+    if get_origin(hint) is Literal:
+        return "one of " + ", ".join(f'`"{one}"`' for one in get_args(hint))
+    if get_origin(hint) in (Union, types.UnionType):
+        return " or ".join(_expected(one) for one in get_args(hint) if one is not types.NoneType)
+    if get_origin(hint) in (list, tuple):
+        parts = list(dict.fromkeys(_expected(one) for one in get_args(hint)))
+        return f"a list, each {' or '.join(parts)}"
+    return {str: "text", bool: "true or false"}.get(hint, getattr(hint, "__name__", str(hint)))
+
+
+def _refusal(validator: BeforeValidator) -> str | None:
+    try:
+        validator.func(object())  # type: ignore[call-arg]
+    except PydanticCustomError as error:
+        return error.message().removeprefix("expected ")
+    return None
+
+
+def _default(field: FieldInfo) -> str:
+    if field.default is PydanticUndefined:
+        return "required" if field.is_required() else ""
+    if field.default is None or isinstance(field.default, BaseModel) or field.default in ([], ""):
+        return ""
+    return f"`{json.dumps(field.default)}`"
+
+
+def _keys() -> str:
+    """Every key of a case file with what it expects, read off the models that check it."""
+    text = ["# Keys, as the program checks them\n\nWhat each means is in [](../cases.md). Defaults are in SI units.\n"]
+
+    def add(model: type[BaseModel], name: str) -> None:
+        hints = get_type_hints(model, include_extras=True)
+        own = {key: field for key, field in model.model_fields.items() if not _tables_in(hints[key])}
+        if own:
+            text.append(f"\n## {name or 'at the top'}\n\n{inspect.getdoc(model)}\n".replace("``", "`"))
+            rows = ((f"`{key}`", _expected(hints[key]), _default(field)) for key, field in own.items())
+            text.append(_table(["key", "expects", "default"], rows))
+        for key in model.model_fields:
+            for inner in _tables_in(hints[key])[:1]:
+                path = f"{name.strip('[]')}.{key}".strip(".")
+                add(inner, f"[[{path}]]" if list in map(get_origin, _parts(hints[key])) else f"[{path}]")
+
+    add(CaseFile, "")
+    return "\n".join(text)
+
+
+# --- tables, library, what is shipped ---------------------------------------------------------------------------------
+
+
+def _tables() -> str:
+    """Columns of the tables of a run and of a sweep, from where they are declared."""
+    text = "# Tables and their columns\n\nUnits and meanings are in the parquet files, too.\n\n"
+    text += "".join(f"## {name}.parquet\n\n{_described(columns)}\n" for name, columns in TABLES.items())
+    numbered = {f"{name}_1, {name}_2, …": told for name, told in FAMILIES.items()}
+    text += f"## One for each bead or contact\n\nIn `trajectory` and `walkers`.\n\n{_described(numbered)}\n"
+    text += "## The table of a sweep\n\nAfter the keys that vary.\n\n"
+    for one in analyses():
+        columns = {**one.derived, **one.columns}
+        text += f"### Of {one.name}\n\n{_described(columns)}\n" if columns else ""
+    names = [one.name for one in analyses()]
+    known = {key for one in analyses() for key in one.derived} | set(result_columns(names))
+    common = {key: told for key, told in derived_columns(names).items() if key not in known}
+    return text + f"### Of all\n\n{_described({**common, **STATE})}"
+
+
+def _library() -> str:
+    """The library of materials and liquids with its sources."""
+    contents = read_toml(INPUTS / "library.toml")
+    text = "# Materials and liquids\n\nWhat `inputs/library.toml` holds. A case may override each number.\n"
+    for kind, title in _KINDS.items():
+        text += f"\n## {title}\n"
+        for name, entries in contents[kind].items():
+            text += f"\n### {name}\n\n{_sourced(entries)}"
+    text += "\n## Surfaces that touch\n"
+    for entry in contents["surface_pairs"]:
+        numbers = {key: one for key, one in entry.items() if key != "materials"}
+        text += f"\n### {' on '.join(entry['materials'])}\n\n{_sourced(numbers)}"
+    return text
+
+
+def _sourced(entries: Mapping[str, Any]) -> str:
+    linked = {key: _PAGE.sub(r"[docs/\1](../../\1)", one["source"]) for key, one in entries.items()}
+    return _table(
+        ["", "value", "source"], ((f"`{key}`", str(one["value"]), linked[key]) for key, one in entries.items())
+    )
+
+
+def _shipped() -> str:
+    """Shipped cases and sweeps with their titles."""
+    text = "# Shipped cases, sweeps and calibrations\n\nEach may be named instead of a file.\n"
+    for folder, command in (("cases", "run"), ("sweeps", "sweep"), ("calibrations", "calibrate")):
+        files = sorted((INPUTS / folder).glob("*.toml"))
+        rows = ((f"`walkers {command} {file.stem}`", str(read_toml(file).get("title", ""))) for file in files)
+        text += f"\n## {folder.capitalize()}\n\n{_table(['', 'title'], rows)}"
+    return text
+
+
+PAGES = {"keys": _keys, "tables": _tables, "library": _library, "shipped": _shipped}
+
+
+def _write(app: Sphinx, _config: Config) -> None:
+    folder = Path(app.srcdir) / "reference" / "generated"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, page in PAGES.items():
+        path, text = folder / f"{name}.md", page()
+        if not path.exists() or path.read_text("utf-8") != text:  # else Sphinx would read it again
+            path.write_text(text, "utf-8")
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Write the pages before Sphinx looks for files."""
+    app.connect("config-inited", _write)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,90 @@
+"""How Sphinx builds the site (``make docs``): from docs/, the docstrings and what the program says of itself."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from importlib import metadata
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent), str(HERE / "_ext")]
+
+from walkers.runner.failures import UnauditedEngineWarning  # noqa: E402
+
+warnings.simplefilter("ignore", UnauditedEngineWarning)  # an example's engine may never have been audited
+
+project = "granular-walkers"
+author = "the authors of granular-walkers"
+project_copyright = author
+version = release = metadata.version("granular-walkers")
+
+extensions = [
+    *("numpydoc", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode", "sphinxcontrib.typer"),
+    *("myst_nb", "sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex"),
+    *("docstrings", "generated", "mathml"),  # docs/_ext
+]
+exclude_patterns = ["_ext", "_templates", "examples", "**/.ipynb_checkpoints", "gallery/**.ipynb"]
+templates_path = ["_templates"]
+default_role = "py:obj"
+nitpicky = False
+
+# Pages are Markdown that GitHub shows as well: links between them by their files, formulas in dollars.
+myst_enable_extensions = ["dollarmath", "colon_fence", "attrs_block", "deflist"]
+myst_heading_anchors = 4
+myst_links_external_new_tab = False
+# Notebooks are shown as they were executed when they were committed.
+nb_execution_mode = "off"
+nb_merge_streams = True
+nb_ipywidgets_js = {}  # would come from the network: what a widget shows, a picture shows here
+nb_mime_priority_overrides = [("html", "application/vnd.jupyter.widget-view+json", None)]
+
+# Nothing comes from the network: formulas become MathML, which browsers draw by themselves.
+html_math_renderer = "mathml"
+html_theme = "pydata_sphinx_theme"
+html_title = "granular-walkers"
+html_context = {"default_mode": "auto"}
+html_static_path = ["_static"]
+html_css_files = ["walkers.css"]
+html_show_sourcelink = False
+html_copy_source = False
+html_theme_options = {
+    "navbar_align": "left",
+    "navbar_end": ["theme-switcher"],
+    "header_links_before_dropdown": 6,
+    "show_nav_level": 1,
+    "show_toc_level": 2,
+    "navigation_depth": 3,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "secondary_sidebar_items": ["page-toc"],
+}
+html_sidebars = {"index": []}
+
+autosummary_generate = True
+autosummary_ignore_module_all = False
+autodoc_typehints_format = "short"
+autodoc_member_order = "bysource"
+autodoc_default_options = {"exclude-members": "model_config"}
+numpydoc_show_class_members = False
+copybutton_exclude = ".linenos, .gp, .go"
+
+bibtex_bibfiles = ["references.bib"]
+bibtex_default_style = "unsrt"
+
+sphinx_gallery_conf = {
+    "examples_dirs": "examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",
+    "within_subsection_order": "FileNameSortKey",
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "show_signature": False,
+    "show_memory": False,
+    "min_reported_time": 1000,
+    "write_computation_times": False,  # its table of times would load scripts from the network
+    "plot_gallery": True,
+    "image_srcset": ["2x"],
+}
+# Two classes of different packages may have one name: an annotation that says it is left without a link.
+suppress_warnings = ["ref.python"]

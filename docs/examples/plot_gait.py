@@ -1,0 +1,37 @@
+"""
+The gait of a walker
+====================
+
+What the beads of Fig. 4b's walker do in two cycles of the drive: how fast the walker goes, how fast each bead rotates,
+and which contacts are open. Driven so hard, its beads part in every cycle, and come together again.
+"""
+
+import matplotlib.pyplot as plt
+
+import walkers
+
+run = walkers.run("fig4b")
+print(run.describe())
+
+# %%
+# The trajectory has a row for each sample and walker. Two cycles of one walker, when it is steady:
+
+walker = run.trajectory.query("walker == 0")
+last = walker["cycle"].max()
+cycles = walker[walker["cycle"] >= last - 2.0]
+
+figure, (speeds, gaps) = plt.subplots(2, sharex=True, figsize=(7, 6))
+speeds.plot(cycles["cycle"], 1e3 * cycles["velocity"], "k", label="mass centre, relative to the substrate")
+speeds.plot(cycles["cycle"], 1e3 * cycles["rotation_1"], "C0", label="rotation of the large bead")
+speeds.plot(cycles["cycle"], 1e3 * cycles["rotation_2"], "C1", label="rotation of the small bead")
+speeds.set(ylabel="velocity (mm/s)")
+speeds.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize="small", frameon=False)
+for number, name in ((1, "large bead on the substrate"), (2, "small bead on the substrate"), (3, "bead on bead")):
+    gaps.plot(cycles["cycle"], 1e6 * cycles[f"gap_{number}"], label=name)
+gaps.axhline(0.0, color="0.5", lw=0.8)
+gaps.set(xlabel="cycle", ylabel="gap (µm)")
+gaps.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize="small", frameon=False)
+plt.show()
+
+# %%
+# ``run.plot()`` draws this with the means of all walkers, at every step of the engine.

@@ -1,0 +1,201 @@
+"""A resolved case as people read it: its values by dotted key, as near a case file's as may be, in the usual units."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from contextlib import suppress
+from math import isclose, pi
+from typing import Any
+
+from walkers.inputs import units
+from walkers.inputs.units import Kind
+
+READABLE_UNITS: Mapping[str, tuple[str, float]] = {
+    "m": ("mm", 1e-3),
+    "m/s": ("mm/s", 1e-3),
+    "m/s^2": ("g", units.ACCELERATION_OF_ONE_G),
+    "rad": ("deg", pi / 180.0),
+    "N/m": ("mN/m", 1e-3),
+    "Pa*s": ("mPa*s", 1e-3),
+    "Pa": ("MPa", 1e6),
+    "kg/m^3": ("g/cm^3", 1e3),
+}
+"""For SI units the unit in which the field states such quantities, and what it is in the SI unit."""
+_TIME_STEP = ("us", 1e-6)
+_KINDS: Mapping[str, Kind] = {
+    **dict.fromkeys(("radii", "small", "large", "gap", "spacing", "width", "height", "places", "beads"), units.LENGTH),
+    **dict.fromkeys(("angle", "angle_spread", "tilt", "uphill", "opening", "phase", "contact_angle"), units.ANGLE),
+    **dict.fromkeys(("peak_acceleration", "gravity"), units.ACCELERATION),
+    **dict.fromkeys(("dynamic_viscosity", "film_viscosity"), units.DYNAMIC_VISCOSITY),
+    "frequency": units.FREQUENCY,
+    "density": units.DENSITY,
+    "surface_tension": units.SURFACE_TENSION,
+    "youngs_modulus": units.MODULUS,
+    "settled_below": units.SPEED,
+    "longest_settling": units.DURATION,
+    "time_step": units.TIME,
+}
+"""What the numbers of a resolved case are, by the last part of their keys; the others are pure numbers."""
+_RENAMED = {
+    "material": "beads.material",
+    "density": "beads.density",
+    "gravity": "environment.gravity",
+    "seed": "run.seed",
+    "contact.friction_bead_bead": "contact.friction.bead_bead",
+    "contact.friction_bead_wall": "contact.friction.bead_wall",
+}
+"""Values that a case file has under another key."""
+_SOLE = {"walkers[0].": "walkers.", "drive.harmonics[0].": "drive."}
+"""Entries of lists that are told by the list's name where they are the only one."""
+_FOLLOWS: Mapping[str, tuple[str, ...] | None] = {
+    **dict.fromkeys(("run.time_step", "run.steps_per_cycle", "run.until_steady", "boundary.uphill"), None),
+    **dict.fromkeys(("liquid.surface_tension", "liquid.dynamic_viscosity", "liquid.film_viscosity"), ("liquid.name",)),
+    "liquid.density": ("liquid.name",),
+    "beads.density": ("beads.material",),
+}
+"""Values that may follow from others: from those of these keys, or (None) from any."""
+_NOT_COMPARED = ("name", "title", "document", "recorded")
+"""What does not determine a run."""
+
+
+def flattened(case: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a resolved case by dotted key, SI units.
+
+    Parameters
+    ----------
+    case
+        As `walkers.inputs.case.Case.as_dict` gives it, or a run directory's ``case.json`` has it.
+
+    Returns
+    -------
+    dict
+        Keys are a case file's where it has the value, such as ``drive.frequency`` and ``contact.friction.bead_wall``;
+        ``walkers.radii`` are those of ``[dimers]`` or ``[[clusters]]``, ``walkers[1].radii`` where there are several.
+    """
+    flat: dict[str, Any] = {}
+    for key, value in case.items():
+        if key not in _NOT_COMPARED:
+            _flatten(key, value, flat)
+    for listed, alone in _SOLE.items():
+        if not any(key.startswith(listed.replace("0", "1")) for key in flat):
+            flat = {alone + key.removeprefix(listed) if key.startswith(listed) else key: flat[key] for key in flat}
+    return {_RENAMED.get(key, key): value for key, value in flat.items()}
+
+
+def _flatten(key: str, value: Any, flat: dict[str, Any]) -> None:
+    if isinstance(value, Mapping):
+        for name, one in value.items():
+            _flatten(f"{key}.{name}", one, flat)
+    elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+        for number, one in enumerate(value):
+            _flatten(f"{key}[{number}]", one, flat)
+    else:
+        flat[key] = value
+
+
+def readable(key: str, value: Any) -> str:
+    """A value of `flattened` in the usual unit, such as ``4 g`` or ``0.3/0.2 mm``; a dash for none."""
+    if value is None:
+        return "-"
+    kind = _kind_of(key)
+    if kind is None or isinstance(value, str):
+        return _number(value, 1.0)
+    unit, size = readable_unit(kind.unit) if kind is not units.TIME else _TIME_STEP
+    if key == "environment.gravity":  # the paper's g, 9.8 m/s², is not the case's gravity
+        unit, size = kind.unit, 1.0
+    return f"{_number(value, size)} {unit}"
+
+
+def readable_unit(unit: str) -> tuple[str, float]:
+    """The unit in which the field states what has such an SI unit, and what it is in the SI unit."""
+    return READABLE_UNITS.get(unit, (unit, 1.0))
+
+
+def _kind_of(key: str) -> Kind | None:
+    return _KINDS.get(key.rpartition(".")[2])
+
+
+def _number(value: Any, size: float) -> str:
+    if isinstance(value, list):
+        return "/".join(_number(one, size) for one in value) or "-"
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return str(value)
+    return f"{value / size:.6g}"
+
+
+def differing(cases: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The keys whose values differ among flattened cases, without those that merely follow from others.
+
+    Parameters
+    ----------
+    cases
+        From `flattened`.
+
+    Returns
+    -------
+    list of str
+        In the order of the cases. A time step that ``"auto"`` chose, and the numbers of a liquid that the library
+        knows by name, are left out where they are the same in all cases that agree in what they follow from.
+    """
+    keys = dict.fromkeys(key for case in cases for key in case)
+    values = {key: [_comparable(case.get(key)) for case in cases] for key in keys}
+    varied = [key for key, column in values.items() if len(set(column)) > 1]
+    found = [key for key in varied if key not in _FOLLOWS and not key.endswith(".spacing")]
+
+    def follows(key: str, parents: Sequence[str]) -> bool:
+        of_parents: dict[tuple[Hashable, ...], Hashable] = {}
+        for number, value in enumerate(values[key]):
+            if of_parents.setdefault(tuple(values[one][number] for one in parents if one in values), value) != value:
+                return False
+        return True
+
+    # Those of known parents first: one that does not follow from them may be what others follow from.
+    for key in sorted((key for key in varied if key not in found), key=lambda key: _FOLLOWS.get(key) is None):
+        named = _FOLLOWS.get(key)
+        if not follows(key, found if named is None else named):
+            found.append(key)
+    return sorted(found, key=varied.index)
+
+
+def _comparable(value: Any) -> Hashable:
+    if isinstance(value, list):
+        return tuple(_comparable(one) for one in value)
+    return float(f"{value:.12g}") if isinstance(value, float) else value
+
+
+def agrees(case: Mapping[str, Any], key: str, wanted: str) -> bool:
+    """Whether a flattened case has a value, as a user writes both.
+
+    Parameters
+    ----------
+    case
+        From `flattened`.
+    key
+        A key, or its end, such as ``frequency``; ``dimers`` and ``clusters[0]`` are ``walkers``.
+    wanted
+        A number with its unit, a number, a text, or a list as `readable` writes it.
+    """
+    return any(_is(one, value, wanted.strip().strip('"')) for one, value in case.items() if _names(key, one))
+
+
+def has_key(case: Mapping[str, Any], key: str) -> bool:
+    """Whether a flattened case has a key, or one that ends so."""
+    return any(_names(key, one) for one in case)
+
+
+def _names(given: str, key: str) -> bool:
+    for table in ("dimers.", "clusters[0]."):
+        if given.startswith(table):
+            given = "walkers." + given.removeprefix(table)
+    return key == given or key.endswith(f".{given}")
+
+
+def _is(key: str, value: Any, wanted: str) -> bool:
+    if readable(key, value) == wanted or str(value) == wanted:
+        return True
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return str(value).lower() == wanted.lower()
+    kind = _kind_of(key)
+    with suppress(ValueError):
+        return isclose(units.parse_quantity(wanted, kind) if kind else float(wanted), value, rel_tol=1e-6)
+    return False

@@ -1,0 +1,151 @@
+"""One HTML file that carries all that it shows: libraries, plots and scenes, packed; no network, no other file.
+
+A page is a list of sections, one of which is shown at a time where there is JavaScript; without it all of their tables
+can be read.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import zlib
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from walkers.inputs.errors import InputError, Problem
+from walkers.runner.files import write_text
+
+if TYPE_CHECKING:
+    from bokeh.models import Model
+    from jinja2 import Environment
+
+    from walkers.postprocess.report.scene import Scene
+
+LARGEST = 5_000_000
+"""Bytes that a report may have: what any mail takes along."""
+NAME = "report.html"
+
+
+def check_report(path: Path) -> None:
+    """Refuse a place for a report that is none.
+
+    Raises
+    ------
+    InputError
+        If its name does not end in .html, it is a folder, or there is no folder for it.
+    """
+    if path.suffix.lower() not in {".html", ".htm"} or path.is_dir():
+        raise InputError("--to", [Problem("", None, f"{path}: expected the name of a .html file")])
+    if not path.absolute().parent.is_dir():
+        raise InputError("--to", [Problem("", None, f"{path.absolute().parent}: there is no such folder")])
+
+
+def write_page(path: Path, title: str, body: str, carried: Mapping[str, str]) -> Path:
+    """Write a page beside its place and rename it.
+
+    Parameters
+    ----------
+    path
+        The file.
+    title
+        As plain text.
+    body
+        As HTML, of a template.
+    carried
+        What scripts unpack, by id: from `packed_plots` and `packed_scene`.
+    """
+    libraries = {name: _library(name) for name in ("bokeh", "k3d")} if carried else {}
+    page = fill(
+        "page.html.j2",
+        title=title,
+        body=markup(body),
+        style=markup(_read("report.css")),
+        carried=carried,
+        libraries=libraries,
+        unpacker=markup(_unpacker()) if carried else "",
+        player=markup(_read("player.js")) if carried else "",
+        written_by=f"granular-walkers {version('granular-walkers')}",
+    )
+    write_text(path, page)
+    return path
+
+
+def overhead() -> int:
+    """Bytes of a page's libraries and scripts."""
+    return (
+        sum(map(len, (_library("bokeh"), _library("k3d"), _unpacker(), _read("player.js"), _read("report.css")))) + 2000
+    )
+
+
+def fill(template: str, package: str = "walkers.postprocess.report", **values: Any) -> str:
+    """The HTML of a template; what is put in is escaped."""
+    return _environment(package).get_template(template).render(**values)
+
+
+def markup(text: str) -> Any:
+    """A text that is HTML already."""
+    from markupsafe import Markup
+
+    return Markup(text)
+
+
+def packed_plots(plots: Model) -> str:
+    """Bokeh plots as the page carries them."""
+    from bokeh.embed import json_item
+
+    return _packed(json.dumps(json_item(plots)).encode())
+
+
+def packed_scene(scene: Scene) -> str:
+    """A scene as the page carries it."""
+    return base64.b64encode(scene.plot.get_binary_snapshot(9)).decode()
+
+
+def picture_uri(path: Path) -> str:
+    """A PNG as the source of an image."""
+    return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"
+
+
+def _packed(contents: bytes) -> str:
+    return base64.b64encode(zlib.compress(contents, 9)).decode()
+
+
+@cache
+def _library(name: str) -> str:
+    if name == "k3d":
+        source = files("k3d").joinpath("static", "standalone.js").read_text("utf-8")
+        # Its letters are in it as woff2; the same in other formats would be looked for beside the page.
+        return _packed(re.sub(r',url\(fonts/[^)]*\) format\("(?:woff|truetype)"\)', "", source).encode())
+    from bokeh.resources import Resources
+
+    return _packed("\n".join(Resources(mode="inline", components=["bokeh"], log_level="error").js_raw).encode())
+
+
+@cache
+def _unpacker() -> str:
+    return files("k3d").joinpath("static", "fflate.js").read_text("utf-8")
+
+
+@cache
+def _read(name: str) -> str:
+    return files("walkers.postprocess.report").joinpath(name).read_text("utf-8")
+
+
+@cache
+def _environment(package: str) -> Environment:
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+
+    own = PackageLoader("walkers.postprocess.report", ".")
+    return Environment(
+        loader=ChoiceLoader([PackageLoader(package, "."), own]),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        auto_reload=False,
+    )

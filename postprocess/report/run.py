@@ -1,0 +1,235 @@
+"""The report of a run: its parameters and where they come from, its numbers, its plots, and the beads to be played."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from walkers.inputs.case import Case
+from walkers.inputs.origins import Origin, text_of
+from walkers.postprocess.analysis import analyses_in, current_result, quantities_of, warnings_of
+from walkers.postprocess.motion import read_motion
+from walkers.postprocess.quantities import Quantity
+from walkers.postprocess.report.page import NAME, check_report, fill, packed_plots, packed_scene, write_page
+from walkers.postprocess.report.plots import plots_of
+from walkers.postprocess.report.scene import MOST_PLACES, Scene, scene_of
+from walkers.runner.directory import case_of
+from walkers.runner.files import read_json
+from walkers.runner.manifest import MANIFEST_NAME
+
+_ORIGINS = {"given": "given by the case", "default": "default"}
+"""What is said of origins that do not say it themselves."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A row of the table of parameters, as text."""
+
+    key: str
+    text: str
+    origin: str
+    source: str
+    range: str
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """What the report of a run shows, for its template.
+
+    Attributes
+    ----------
+    directory
+        The run directory.
+    id
+        Of its section in the page.
+    places
+        Beads times instants of its scene at most.
+    origins
+        Where the values of the case come from; None: as the run recorded it.
+    """
+
+    directory: Path
+    id: str = "run"
+    places: int = MOST_PLACES
+    origins: tuple[Origin, ...] | None = None
+    result: dict[str, Any] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "result", current_result(self.directory))
+
+    @cached_property
+    def case(self) -> Case:
+        """The resolved case."""
+        return case_of(self.directory)
+
+    @property
+    def name(self) -> str:
+        """Of the run directory."""
+        return self.directory.resolve().name
+
+    @property
+    def title(self) -> str:
+        """What the case calls itself."""
+        return self.case.title or self.case.name
+
+    @property
+    def summary(self) -> str:
+        """What was run, in a sentence."""
+        return summary_of(self.case)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader should know."""
+        return warnings_of(self.result)
+
+    @property
+    def quantities(self) -> list[Quantity]:
+        """The numbers of the result."""
+        return quantities_of(self.result)
+
+    @property
+    def parameters(self) -> list[Parameter]:
+        """The values of the case and where they come from."""
+        return parameters_of(self.case, self.origins)
+
+    @property
+    def guessed(self) -> list[Parameter]:
+        """What of them is neither measured nor calibrated."""
+        return guessed_of(self.case, self.origins)
+
+    @cached_property
+    def _manifest(self) -> dict[str, Any]:
+        return read_json(self.directory / MANIFEST_NAME)
+
+    @property
+    def engine(self) -> str:
+        """The engine that made it."""
+        return str(self._manifest.get("engine", {}).get("version", ""))
+
+    @property
+    def finished(self) -> str:
+        """When."""
+        return str(self._manifest.get("finished", ""))
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The beads in three dimensions."""
+        return scene_of(read_motion(self.directory), places=self.places)
+
+    @property
+    def begin(self) -> float:
+        """Of the scene, s."""
+        return self.scene.begin
+
+    @property
+    def end(self) -> float:
+        """Of the scene, s."""
+        return self.scene.end
+
+    @property
+    def captions(self) -> tuple[str, ...]:
+        """What the scene shows and what not."""
+        return self.scene.captions
+
+    @property
+    def cameras(self) -> dict[str, str]:
+        """Buttons that put the camera somewhere: its places as JSON."""
+        return {name: json.dumps(camera) for name, camera in self.scene.cameras.items()}
+
+    @cached_property
+    def carried(self) -> dict[str, str]:
+        """What the page's scripts unpack."""
+        plots = plots_of(self.directory)
+        packed = {f"scene-{self.id}": packed_scene(self.scene)}
+        return packed if plots is None else {**packed, f"plots-{self.id}": packed_plots(plots)}
+
+
+def report_run(directory: Path, to: Path | None = None, origins: tuple[Origin, ...] | None = None) -> Path:
+    """Write the report of a run: one HTML file to mail, which needs no network.
+
+    Parameters
+    ----------
+    directory
+        A run directory.
+    to
+        The file; ``report.html`` in the run directory if None.
+    origins
+        Where the values of the case come from; None: as the run recorded it.
+
+    Returns
+    -------
+    Path
+        The file, less than 5 MB.
+
+    Raises
+    ------
+    InputError
+        If the name is none of an HTML file, or there is no folder for it.
+    postprocess.dump.DumpError
+        If the dumps cannot be read.
+    """
+    path = to or directory / NAME
+    check_report(path)
+    run = RunReport(directory, origins=origins)
+    return write_page(path, run.title, fill("run.html.j2", run=run), run.carried)
+
+
+def summary_of(case: Case) -> str:
+    """What is run, in a sentence."""
+    bodies = []
+    for make in case.walkers:
+        radii = " / ".join(f"{radius * 1e3:g}" for radius in make.radii)
+        bodies.append(f"{make.replicates} walkers of R = {radii} mm")
+    if case.loose:
+        bodies.append(f"{case.count - sum(make.count for make in case.walkers)} loose beads")
+    boundary = f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"
+    return f"{', '.join(bodies)} {boundary} of {case.boundary.material}, {case.liquid.name}; {case.drive.described()}."
+
+
+def parameters_of(case: Case, origins: tuple[Origin, ...] | None = None) -> list[Parameter]:
+    """The values of a case, each with where it comes from; of runs that did not keep this, the values in SI units."""
+    known = case.origins if origins is None else origins
+    if known:
+        return [_parameter(one) for one in known]
+    return [Parameter(key, text_of(value), "", "", "") for key, value in flat(case.as_dict())]
+
+
+def guessed_of(case: Case, origins: tuple[Origin, ...] | None = None) -> list[Parameter]:
+    """The values of a case that are neither measured nor calibrated."""
+    return [_parameter(one) for one in (case.origins if origins is None else origins) if one.guessed]
+
+
+def _parameter(one: Origin) -> Parameter:
+    ends = " … ".join(text_of(end) for end in one.range) if one.range else ""
+    return Parameter(one.key, one.text, _ORIGINS.get(one.origin, one.origin), one.source, ends)
+
+
+def flat(values: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """Values of nested tables by dotted keys."""
+    if isinstance(values, dict):
+        for name, value in values.items():
+            yield from flat(value, f"{key}.{name}" if key else name)
+    elif isinstance(values, list) and values and isinstance(values[0], dict):
+        for number, value in enumerate(values):
+            yield from flat(value, f"{key}[{number}]")
+    elif values not in (None, "", [], ()):
+        yield key, values
+
+
+def result_html(directory: Path, result: dict[str, Any], origins: tuple[Origin, ...] | None = None) -> str:
+    """A result as a piece of HTML: a table with errors and units, warnings, and the parameters folded in."""
+    case = case_of(directory)
+    headline = [line for one in analyses_in(result) for line in one.lines(result)][:1]
+    return fill(
+        "result.html.j2",
+        headline=headline[0] if headline else case.name,
+        warnings=warnings_of(result),
+        quantities=quantities_of(result),
+        guessed=guessed_of(case, origins),
+        parameters=parameters_of(case, origins),
+        run=directory.name,
+    )

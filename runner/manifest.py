@@ -1,0 +1,140 @@
+"""Manifests: what made a finished run, and what its files were when it was finished."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import time
+from collections.abc import Collection, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from walkers.inputs.case import Case
+from walkers.runner.audits import read_audit
+from walkers.runner.binary import Engine
+from walkers.runner.files import read_json, write_json
+from walkers.runner.launch import EngineReport
+from walkers.runner.provenance import software
+
+MANIFEST_NAME = "manifest.json"
+FORMAT = 2
+_SMALL_BYTES = 8 << 20
+"""Less than this is hashed before threads have begun."""
+_MOST_THREADS = 4
+
+
+def manifest(
+    case: Case,
+    name: str,
+    engine: Engine,
+    report: EngineReport,
+    *,
+    started: float,
+    directory: Path,
+    described: Collection[str] = (),
+) -> dict[str, Any]:
+    """What the manifest of a run, or of an ensemble, says.
+
+    Parameters
+    ----------
+    case, name, engine, report
+        What was run, what the run is called, by what it was made and what that took.
+    started
+        Seconds since the epoch.
+    directory
+        The run directory, all of its files written but this one.
+    described
+        Names of folders in it that have manifests of their own: checksums of their files are there.
+    """
+    finished = time.time()
+    audit, made_by = read_audit(engine.sha256), software()
+    files = {
+        path.relative_to(directory).as_posix(): path.stat().st_size
+        for path in sorted(directory.rglob("*"))
+        if path.is_file()
+    }
+    return {
+        "format": FORMAT,
+        "status": "finished",
+        "name": case.name,
+        "run": name,
+        "engine": {
+            "path": str(engine.path),
+            "version": report.version,
+            "sha256": engine.sha256,
+            "audit": audit.summary() if audit else None,
+        },
+        "granular_walkers": made_by.version,
+        "commit": made_by.commit,
+        "python": made_by.python,
+        "packages": made_by.packages,
+        "host": platform.node(),
+        "platform": platform.platform(),
+        "started": _iso(started),
+        "finished": _iso(finished),
+        "seconds": {
+            "total": finished - started,
+            "engine": report.wall_seconds,
+            "engine_loop": report.loop_seconds,
+        },
+        "steps": report.steps,
+        "steps_per_second": report.steps / report.loop_seconds if report.loop_seconds else None,
+        "files": files,
+        "sha256": checksums(directory, [file for file in files if file.partition("/")[0] not in described]),
+    }
+
+
+def checksums(directory: Path, names: Iterable[str]) -> dict[str, str]:
+    """SHA-256 of files of a directory, in threads where there is much to read.
+
+    Raises
+    ------
+    OSError
+        If one cannot be read.
+    """
+    paths = {name: directory / name for name in names}
+    if sum(path.stat().st_size for path in paths.values()) < _SMALL_BYTES:
+        return {name: checksum(path) for name, path in paths.items()}
+    with ThreadPoolExecutor(min(_MOST_THREADS, len(os.sched_getaffinity(0)))) as pool:
+        return dict(zip(paths, pool.map(checksum, paths.values()), strict=True))
+
+
+def checksum(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def record_tables(directory: Path, names: Iterable[str]) -> None:
+    """Say in the manifest of a finished run that files were made anew from its dumps: by what, when, what they are now.
+
+    Parameters
+    ----------
+    directory
+        A run directory; nothing is done if its run is not finished.
+    names
+        Of the files.
+    """
+    path = directory / MANIFEST_NAME
+    if not path.is_file():
+        return
+    contents, made_by = read_json(path), software()
+    sums = checksums(directory, names)
+    contents.setdefault("files", {}).update({name: (directory / name).stat().st_size for name in sums})
+    if "sha256" in contents:  # else one of a time when there were none: of these files alone they would mislead
+        contents["sha256"].update(sums)
+    contents["tabulated"] = {
+        "granular_walkers": made_by.version,
+        "commit": made_by.commit,
+        "python": made_by.python,
+        "packages": made_by.packages,
+        "date": _iso(time.time()),
+        "files": list(sums),
+    }
+    write_json(path, contents)
+
+
+def _iso(seconds: float) -> str:
+    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))

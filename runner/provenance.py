@@ -1,0 +1,105 @@
+"""Which program makes a run: its version and commit, Python's version and those of the packages that it needs.
+
+Stands on Python alone: the build of a wheel (``setup.py``) runs this file to learn the commit.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import subprocess
+import threading
+from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+PROJECT = "granular-walkers"
+COMMIT_NAME = "commit.txt"
+"""In a wheel that was built in a checkout: its commit."""
+CHANGED = "+changes"
+_PATIENCE_SECONDS = 20.0
+
+
+@dataclass(frozen=True)
+class Software:
+    """What makes runs.
+
+    Attributes
+    ----------
+    version
+        Of this project; ``not installed`` where it runs without having been installed.
+    commit
+        Of the checkout that it runs from or was built in, with ``+changes`` if files that git knows had been changed;
+        None if that is not known.
+    python
+        Version of the interpreter.
+    packages
+        From the names of the packages that the project requires to their versions.
+    """
+
+    version: str
+    commit: str | None
+    python: str
+    packages: dict[str, str]
+
+
+@cache
+def software() -> Software:
+    """What makes the runs of this process; looked up once, which takes some 30 ms."""
+    try:
+        version, required = metadata.version(PROJECT), metadata.requires(PROJECT) or []
+    except metadata.PackageNotFoundError:
+        version, required = "not installed", []
+    needed = [match[0] for one in required if "extra ==" not in one and (match := re.match(r"[\w.-]+", one))]
+    return Software(version, _commit(), platform.python_version(), _versions(needed))
+
+
+def look_ahead() -> None:
+    """Begin to look up `software` in a thread, as long as there is nothing to do but to wait for an engine."""
+    threading.Thread(target=software, daemon=True).start()
+
+
+def commit_of(checkout: Path) -> str | None:
+    """The commit of a checkout, with ``+changes`` if files that git knows differ from it; None if it is no checkout.
+
+    Files that git does not know do not count: runs are made in the folder.
+    """
+    if not (checkout / ".git").exists():
+        return None
+    # Not of another repository that a hook of git speaks for; and nothing is written, for many may ask at once.
+    ours = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", f"--dirty={CHANGED}"]
+    try:
+        done = subprocess.run(
+            command,
+            cwd=checkout,
+            env={**ours, "GIT_OPTIONAL_LOCKS": "0"},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=_PATIENCE_SECONDS,
+        )
+    except (OSError, subprocess.SubprocessError):  # no git here, or a file system that does not answer
+        return None
+    return done.stdout.strip() or None if done.returncode == 0 else None
+
+
+def _commit() -> str | None:
+    package = Path(__file__).resolve().parents[1]  # the checkout, or `walkers` in site-packages
+    try:
+        return commit_of(package) or (package / COMMIT_NAME).read_text("utf-8").strip() or None
+    except OSError:
+        return None
+
+
+def _versions(names: list[str]) -> dict[str, str]:
+    found = {}
+    for name in names:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found

@@ -1,0 +1,241 @@
+"""What may go from a folder of runs, and removing it: never what a process is making.
+
+Who removes a run holds its lock meanwhile, as who makes it does. A finished run loses its manifest first: should the
+removal be interrupted, what is left is no run, and goes the next time.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from walkers.inputs.errors import InputError, Problem
+from walkers.runner.directory import REPLACED, UNFINISHED, recover
+from walkers.runner.ensemble import FOLDER
+from walkers.runner.locks import is_locked, locked
+from walkers.runner.manifest import MANIFEST_NAME
+from walkers.sweeps.inventory import Entry, inventory, select
+from walkers.sweeps.listing import age_text, aligned, bytes_text
+from walkers.sweeps.record import RECORD_NAME, read_record
+
+_LOCK = re.compile(r".+-[0-9a-f]{12}\.lock")
+LEFTOVERS = ("interrupted", "failed")
+_MOST_LINES = 40
+
+
+@dataclass(frozen=True)
+class Cleaning:
+    """What is to be removed from a folder.
+
+    Attributes
+    ----------
+    out
+        The folder.
+    remove
+        Runs and sweeps.
+    locks
+        Lock files that lock nothing.
+    sweeps_of
+        From the name of a run to those of the sweeps that have it.
+    kept
+        Why something that was asked for stays, and how much of it.
+    """
+
+    out: Path
+    remove: Sequence[Entry]
+    locks: Sequence[Path]
+    sweeps_of: Mapping[str, Sequence[str]]
+    kept: Mapping[str, int]
+
+    @property
+    def size(self) -> int:
+        """Bytes that it frees."""
+        return sum(entry.size for entry in self.remove if not entry.is_sweep)
+
+    def as_text(self) -> str:
+        """What goes, what of sweeps, what stays, and how much it is."""
+        rows = [
+            [
+                entry.name,
+                entry.status if not entry.is_sweep else "sweep",
+                age_text(entry.age),
+                _size(entry),
+                _why(entry),
+            ]
+            for entry in self.remove[:_MOST_LINES]
+        ]
+        lines = [aligned(rows)] if rows else []
+        if len(self.remove) > _MOST_LINES:
+            lines.append(f"and {len(self.remove) - _MOST_LINES} more")
+        lines += [
+            f"needed by the sweep {sweep}, which would make them again: {n}" for sweep, n in self._needed().items()
+        ]
+        lines += [f"stays: {number} {reason}" for reason, number in self.kept.items()]
+        lines.append(f"{self._counted() or 'nothing'} to remove, {bytes_text(self.size)}")
+        return "\n".join(lines)
+
+    def _needed(self) -> dict[str, int]:
+        """Runs that go, by the sweeps that have them and stay."""
+        going = {entry.name for entry in self.remove if entry.is_sweep}
+        runs = [entry for entry in self.remove if not entry.is_sweep]
+        names = [name for entry in runs for name in self.sweeps_of.get(entry.name, ()) if name not in going]
+        return {name: names.count(name) for name in dict.fromkeys(names)}
+
+    def _counted(self) -> str:
+        kinds = ["sweep" if entry.is_sweep else f"{entry.status} run" for entry in self.remove]
+        kinds += ["stale lock"] * len(self.locks)
+        count = {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
+        return ", ".join(f"{number} {kind}{'s' if number > 1 else ''}" for kind, number in count.items())
+
+
+def _size(entry: Entry) -> str:
+    return "" if entry.is_sweep else bytes_text(entry.size)
+
+
+def _why(entry: Entry) -> str:
+    if entry.status == "interrupted" and not entry.is_sweep:
+        return "would go on where it was"
+    return entry.reason or ""
+
+
+def plan_cleaning(
+    out: Path,
+    given: Sequence[str] = (),
+    *,
+    finished: bool = False,
+    case: str | None = None,
+    older_than: str | None = None,
+) -> Cleaning:
+    """See what may go; nothing is removed.
+
+    Parameters
+    ----------
+    out
+        Folder of the run directories.
+    given
+        Runs (names or directories), and sweeps: these go with those of their runs that no other sweep has. If left out
+        what is interrupted or failed.
+    finished
+        Without ``given``: finished runs too, but those that a sweep has.
+    case, older_than
+        Of all that only what is of a case, or older than an age such as ``7 d``.
+
+    Raises
+    ------
+    InputError
+        If there is no such run or sweep, or no such age; or if finished runs are to go and a sweep cannot be read.
+    """
+    entries = inventory(out)
+    if finished or given:
+        for sweep_file in out.glob(f"*/{RECORD_NAME}"):
+            read_record(sweep_file.parent)  # of one that cannot be read nobody knows which runs it has
+    sweeps_of: dict[str, list[str]] = {}
+    for sweep in entries:
+        for run in sweep.runs if sweep.is_sweep else ():
+            sweeps_of.setdefault(run, []).append(sweep.name)
+    statuses = (*LEFTOVERS, "finished") if finished else LEFTOVERS
+    wanted = _given(given, entries, sweeps_of) if given else [one for one in entries if not one.is_sweep]
+    wanted = select(
+        [one for one in wanted if given or one.status in (*statuses, "running")], case=case, older_than=older_than
+    )
+    kept: dict[str, int] = {}
+
+    def stays(entry: Entry) -> bool:
+        reason = None
+        if entry.status == "running":
+            reason = "running"
+        elif not given and entry.status == "finished" and entry.name in sweeps_of:
+            reason = f"finished, of the sweep {sweeps_of[entry.name][0]} (give its name to remove it)"
+        elif entry.directory.name.endswith(REPLACED) and not entry.place.exists():
+            reason = "about to be put back in its place"
+        if reason is not None:
+            kept[reason] = kept.get(reason, 0) + 1
+        return reason is not None
+
+    remove = [entry for entry in wanted if not stays(entry)]
+    locks = [] if given or case or older_than else [path for path in _locks(out) if not is_locked(_place(path))]
+    return Cleaning(out, remove, locks, sweeps_of, kept)
+
+
+def _given(given: Sequence[str], entries: Sequence[Entry], sweeps_of: Mapping[str, Sequence[str]]) -> list[Entry]:
+    """The entries of these names or directories, and the runs that go with sweeps."""
+    found: dict[Path, Entry] = {}
+    sweeps = []
+    for name in given:
+        path = Path(name).resolve()
+        matches = [one for one in entries if name == one.directory.name or path == one.directory.resolve()]
+        matches = matches or [one for one in entries if name == one.name]
+        if not matches:
+            told = "no run or sweep in the folder of runs (see walkers list; another folder is given by --out)"
+            raise InputError(name, [Problem("", None, told)])
+        found |= {one.directory: one for one in matches}
+        sweeps += [one for one in matches if one.is_sweep]
+    going = {sweep.name for sweep in sweeps}
+    for one in entries:
+        if not one.is_sweep and one.name in sweeps_of and going.issuperset(sweeps_of[one.name]):
+            found[one.directory] = one
+    return list(found.values())
+
+
+def _locks(out: Path) -> list[Path]:
+    return [path for path in sorted(out.glob("*.lock")) if _LOCK.fullmatch(path.name)]
+
+
+def _place(lock: Path) -> Path:
+    return lock.with_name(lock.name.removesuffix(".lock"))
+
+
+def clean(cleaning: Cleaning) -> list[Path]:
+    """Remove what was planned.
+
+    Parameters
+    ----------
+    cleaning
+        From `plan_cleaning`.
+
+    Returns
+    -------
+    list of Path
+        What is still there, for a process has begun to make it meanwhile.
+    """
+    left = []
+    for directory, places in _units(cleaning.remove).items():
+        with locked(places) as ours:
+            if len(ours) < len(places):
+                left.append(directory)
+                continue
+            for place in places:
+                recover(place)
+            _remove(directory)
+    for sweep in cleaning.remove:
+        if sweep.is_sweep:
+            (sweep.directory / RECORD_NAME).unlink(missing_ok=True)
+            shutil.rmtree(sweep.directory, ignore_errors=True)
+    with locked(_place(lock) for lock in cleaning.locks if lock.exists()):
+        pass  # a lock file goes with its lock
+    return left
+
+
+def _units(remove: Iterable[Entry]) -> dict[Path, list[Path]]:
+    """What is removed at once, and the places that are locked for it: an unfinished ensemble with all of its runs."""
+    units: dict[Path, list[Path]] = {}
+    for entry in remove:
+        if entry.is_sweep:
+            continue
+        ensemble = entry.directory.parent
+        if ensemble.parent.name == FOLDER and ensemble.name.endswith((UNFINISHED, REPLACED)):
+            units[ensemble] = [entry.place.with_name(run.name) for run in ensemble.iterdir() if run.is_dir()]
+        else:
+            units[entry.directory] = [entry.place]
+    return units
+
+
+def _remove(directory: Path) -> None:
+    (directory / MANIFEST_NAME).unlink(missing_ok=True)
+    shutil.rmtree(directory, ignore_errors=True)
+    ensemble = directory.parent
+    if ensemble.parent.name == FOLDER and not any(path.is_dir() for path in ensemble.iterdir()):
+        shutil.rmtree(ensemble, ignore_errors=True)  # nothing but the deck and the log of runs that are gone

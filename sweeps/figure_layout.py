@@ -1,0 +1,208 @@
+"""What of a sweep's table is drawn where: one column against what was varied, in colours and panels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.readable import readable_unit
+from walkers.sweeps.factors import SEEDS, Factor, by_asymmetry, factors_of, find_name, readable_key, with_unit
+from walkers.sweeps.record import SweepRecord
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = npt.NDArray[np.float64]
+NONE = "none"
+"""Instead of a column: do not tell points apart so."""
+DEFAULTS = ("velocity", "climbs")
+"""What is drawn if nothing else is asked for, the first that the table has."""
+_ERRORS = {"velocity": "standard_error"}
+_MOST_PANELS = 12
+"""More combinations of what is left are not told apart by panels."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What is drawn where.
+
+    Attributes
+    ----------
+    x
+        One for each panel if points were sampled, else one.
+    hue, panels
+        What colours and panels tell apart, if anything.
+    untold
+        Names of what varies and is not told apart.
+    """
+
+    x: Sequence[Factor]
+    hue: Factor | None
+    panels: Factor | None
+    untold: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What of a table is drawn: a column in readable units, its errors, and the theory's values of it.
+
+    Attributes
+    ----------
+    label
+        Of the axis.
+    values, errors : ndarray, shape (N,)
+        Of each row.
+    theory
+        From what a model is called to its values.
+    """
+
+    label: str
+    values: FloatArray
+    errors: FloatArray
+    theory: Mapping[str, FloatArray] = field(default_factory=dict)
+
+
+def default_column(table: pd.DataFrame) -> str:
+    """The column of a table that is drawn if nothing else is asked for."""
+    return next((name for name in DEFAULTS if name in table), "frequency")
+
+
+def drawn_column(table: pd.DataFrame, name: str, theory: Mapping[str, FloatArray] | None = None) -> Drawn:
+    """A column of a sweep's table, in readable units.
+
+    Raises
+    ------
+    InputError
+        If it has no numbers.
+    """
+    unit, size = readable_unit(table.attrs["units"].get(name, ""))
+    values = _numbers(table, name, "--y") / size
+    errors = np.full(len(table), np.nan)
+    if name in _ERRORS:
+        errors = table[_ERRORS[name]].to_numpy(dtype=float, na_value=np.nan) / size
+    predicted = {model: numbers / size for model, numbers in (theory or {}).items()}
+    return Drawn(with_unit(readable_key(name), unit), values, errors, predicted)
+
+
+def _numbers(table: pd.DataFrame, name: str, option: str) -> FloatArray:
+    import pandas as pd
+
+    values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float, na_value=np.nan)
+    if len(table) and np.isnan(values).all():
+        raise InputError(option, [Problem("", None, f'"{name}" has no number that could be drawn')])
+    return values
+
+
+def layout_of(
+    record: SweepRecord,
+    table: pd.DataFrame,
+    *,
+    x: str | None = None,
+    hue: str | None = None,
+    panels: str | None = None,
+) -> Layout:
+    """What of a sweep goes where, as asked for or guessed.
+
+    Guessed is: along x the numbers with the most values, in colours what has the most values of the rest, in panels
+    all else. Samples have a panel for each key.
+
+    Parameters
+    ----------
+    record
+        The sweep.
+    table
+        Rows of its table (`walkers.sweeps.table.load`).
+    x, hue, panels
+        Keys that vary or columns of the table; ``none`` for neither colours nor panels.
+
+    Raises
+    ------
+    InputError
+        If there is no such key or column.
+    """
+    points = table["point"].to_numpy()
+    factors = [_at(factor, points) for factor in factors_of(record)]
+
+    def named(option: str, name: str) -> Factor:
+        found = find_name(option, name, [*(key for factor in factors for key in factor.keys), *table.columns])
+        return next((one for one in factors if found in one.keys), None) or _of_column(table, found, option)
+
+    asked = {
+        option: named(f"--{option}", name)
+        for option, name in (("x", x), ("hue", hue), ("panels", panels))
+        if name is not None and not (name == NONE and option != "x")
+    }
+    taken = {key for factor in asked.values() for key in factor.keys}
+    left = [factor for factor in factors if not taken.intersection(factor.keys)]
+    left = [factor for factor in left if not any(_same(factor, other) for other in asked.values())]
+    samples = [factor for factor in left if factor.is_sample]
+    left = [factor for factor in left if not factor.is_sample]
+    if "x" in asked:
+        along = [asked["x"]]
+    elif samples:
+        along = samples
+    else:
+        along = [_along(left, record, points) or _of_column(table, "point", "--x")]
+        left = [factor for factor in left if factor.keys != along[0].keys]
+    untold = [one.name for one in samples] if "x" in asked else []
+    left = sorted((one for one in left if one.keys[0] not in SEEDS), key=lambda one: -len(one.levels))
+    colours = asked.get("hue") or (left.pop(0) if left and hue is None else None)
+    many = len(along) > 1
+    apart = asked.get("panels")
+    if apart is None and panels is None and left and not many:
+        while prod(len(one.levels) for one in left) > _MOST_PANELS:
+            untold.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
+        apart, left = _joined(left) if left else None, []
+    if many and apart is not None:
+        raise InputError("--panels", [Problem("", None, "expected --x too: the samples have a panel for each key")])
+    return Layout(along, colours, apart, [*untold, *(one.name for one in left)])
+
+
+def _at(factor: Factor, points: npt.NDArray[Any]) -> Factor:
+    """A factor of all points, of some of them."""
+    return replace(factor, values=[factor.values[point] for point in points])
+
+
+def _same(one: Factor, other: Factor) -> bool:
+    """Whether two factors tell the same points apart, such as Γ0 and the acceleration that it follows from."""
+    pairs = len(set(zip(one.values, other.values, strict=True)))
+    return pairs == len(one.levels) == len(other.levels)
+
+
+def _along(factors: Sequence[Factor], record: SweepRecord, points: npt.NDArray[Any]) -> Factor | None:
+    """What is best along x: most values, of equally many the last; categories and seeds if there is nothing else."""
+    order: list[tuple[bool, bool, int, int, Factor]] = []
+    for number, factor in enumerate(factors):
+        shown = by_asymmetry(factor, record, points.tolist()) or factor
+        order.append((shown.keys[0] not in SEEDS, shown.is_number, len(shown.levels), number, shown))
+    return max(order, key=lambda entry: entry[:4])[4] if order else None
+
+
+def _of_column(table: pd.DataFrame, name: str, option: str) -> Factor:
+    unit, size = readable_unit(table.attrs["units"].get(name, ""))
+    label = with_unit(readable_key(name), unit)
+    if table[name].map(lambda value: isinstance(value, str)).all() and len(table):
+        return Factor((name,), label, list(table[name]), False)
+    values = [float(value) for value in _numbers(table, name, option) / size]
+    return Factor((name,), label, values, True, unit=unit)
+
+
+def _joined(factors: Sequence[Factor]) -> Factor:
+    """Several factors as one."""
+    if len(factors) == 1:
+        return factors[0]
+
+    def told(factor: Factor, level: Any) -> str:
+        bare = factor.is_number and not factor.unit
+        return f"{factor.name} = {factor.told(level)}" if bare else factor.told(level)
+
+    rows = zip(*(factor.values for factor in factors), strict=True)
+    texts = [", ".join(told(factor, level) for factor, level in zip(factors, row, strict=True)) for row in rows]
+    keys = tuple(key for factor in factors for key in factor.keys)
+    return Factor(keys, ", ".join(factor.name for factor in factors), texts, False)

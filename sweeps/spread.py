@@ -1,0 +1,242 @@
+"""What a result is worth: the case run again with all that nobody measured drawn from its ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from math import sqrt
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from walkers.inputs.axes import sampled, unit_of
+from walkers.inputs.case import Case
+from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.origins import Origin
+from walkers.inputs.sweep import Sweep
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import run_name
+from walkers.sweeps.columns import analyses_of_all, headlines, result_columns
+from walkers.sweeps.run import run_sweep
+from walkers.sweeps.scheduler import Failure, Options, SweepProgress
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+POINTS = 32
+"""Enough for 5 and 95 %, and for ranks that tell what matters most; a power of two, as Sobol's sequence likes it."""
+_SEED = 1
+_AT_REST = 2e-5
+"""m/s: below, walkers are at rest, as in the sweeps that look for the threshold of motion."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Of a result over the points, SI units: 5, 50 and 95 %, the ends, and how many points gave it."""
+
+    low: float
+    median: float
+    high: float
+    smallest: float
+    largest: float
+    points: int
+
+
+@dataclass(frozen=True)
+class Spread:
+    """What came out over the ranges.
+
+    Attributes
+    ----------
+    directory
+        The sweep's, with a table of all points.
+    varied
+        What was drawn, each from its range.
+    bands
+        Of the results that count, by the columns of the sweep's table.
+    depends
+        For each of these columns, rank correlations (Spearman) with what was drawn, the strongest first; only those
+        beyond two standard errors of none.
+    counts
+        Of points: ``forward`` (toward the large bead), ``backward``, ``at_rest``, ``separated``; of piles none.
+    failures
+        Points that failed; they are in no band.
+    """
+
+    directory: Path
+    varied: tuple[Origin, ...]
+    bands: Mapping[str, Band]
+    depends: Mapping[str, Mapping[str, float]]
+    counts: Mapping[str, int]
+    failures: tuple[Failure, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types, SI units."""
+        return {
+            "directory": str(self.directory),
+            "varied": [asdict(one) for one in self.varied],
+            "bands": {key: asdict(band) for key, band in self.bands.items()},
+            "depends": {key: dict(ranks) for key, ranks in self.depends.items()},
+            "counts": dict(self.counts),
+            "failed": len(self.failures),
+        }
+
+
+def uncertain(case: Case) -> tuple[Origin, ...]:
+    """The values of a case that may lie elsewhere: guessed, calibrated, or called uncertain."""
+    return tuple(one for one in case.origins if one.range is not None)
+
+
+def spread_sweep(case: Case, points: int = POINTS) -> Sweep:
+    """A sweep over all that is uncertain in a case, by Sobol's sequence: more points go on where fewer ended.
+
+    Raises
+    ------
+    InputError
+        If nothing in it is.
+    """
+    varied = uncertain(case)
+    if not varied:
+        told = "nothing here is uncertain: say ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
+        raise InputError(case.name, [Problem("", None, told)])
+    ranges = {one.key: {"loguniform" if one.logarithmic else "uniform": list(one.range or ())} for one in varied}
+    axis = sampled("sobol", points, _SEED, ranges)
+    units = tuple(unit_of(key, [row[number] for row in axis.rows]) for number, key in enumerate(axis.keys))
+    return Sweep(
+        name=f"{run_name(case, find_engine())}-spread",
+        title=f"{case.title or case.name}: what nobody measured, over its ranges",
+        source=case.name,
+        case_name=case.name,
+        document=case.document,
+        keys=axis.keys,
+        units=units,
+        rows=axis.rows,
+        descent=None,
+        file={
+            "case": case.name,
+            "sample": [{"method": "sobol", "points": points, "seed": _SEED, "ranges": ranges}],
+        },
+    )
+
+
+def run_spread(
+    case: Case,
+    out: Path,
+    options: Options,
+    *,
+    points: int = POINTS,
+    engine: str | None = None,
+    allow_failed_audit: bool = False,
+    on_progress: Callable[[SweepProgress], None] | None = None,
+) -> Spread:
+    """Run a case with all that nobody measured drawn from its ranges.
+
+    Parameters
+    ----------
+    case
+        Read from a file: its own values say what is uncertain (`uncertain`).
+    out, options, engine, allow_failed_audit, on_progress
+        As for `walkers.sweeps.run.run_sweep`.
+    points
+        How many.
+
+    Raises
+    ------
+    InputError
+        If nothing in the case is uncertain, or a point cannot be used.
+    runner.EngineFailure
+        If there is no engine, or its audit failed.
+
+    Notes
+    -----
+    Each value is drawn by itself. Those of a calibration hang together (docs/calibration.md), so that the band of a
+    calibrated case is wider than that of its posterior.
+    """
+    from walkers.sweeps.table import load
+
+    sweep = spread_sweep(case, points)
+    record, failures = run_sweep(
+        sweep, out, options, engine=engine, allow_failed_audit=allow_failed_audit, on_progress=on_progress
+    )
+    table = load(record.directory)
+    table = table[table["status"] == "finished"]
+    names = analyses_of_all([case])
+    shown = [name for name in headlines(names) if name in result_columns(names)]
+    return Spread(
+        directory=record.directory,
+        varied=uncertain(case),
+        bands={name: _band(table[name]) for name in shown if table[name].notna().any()},
+        depends={name: _ranks(table, name, sweep.keys) for name in shown},
+        counts=_counts(table) if "velocity" in table else {},
+        failures=tuple(failures),
+    )
+
+
+def _band(values: pd.Series[float]) -> Band:
+    given = values.dropna().astype(float)
+    low, median, high = (float(given.quantile(share)) for share in (0.05, 0.5, 0.95))
+    return Band(low, median, high, float(given.min()), float(given.max()), len(given))
+
+
+def _ranks(table: pd.DataFrame, name: str, keys: tuple[str, ...]) -> dict[str, float]:
+    """Rank correlations of a column with each key, the strongest first, if they are more than chance."""
+    given = table[table[name].notna()]
+    if len(given) < 4 or given[name].nunique() < 2:
+        return {}
+    ranks = {key: float(given[key].rank().corr(given[name].rank())) for key in keys}
+    certain = {key: rank for key, rank in ranks.items() if abs(rank) > 2.0 / sqrt(len(given) - 1)}
+    return dict(sorted(certain.items(), key=lambda one: -abs(one[1])))
+
+
+def _counts(table: pd.DataFrame) -> dict[str, int]:
+    from walkers.postprocess.walking import SEPARATED
+
+    together = table[table["separated_fraction"] <= SEPARATED]
+    return {
+        "forward": int((together["velocity"] > _AT_REST).sum()),
+        "backward": int((together["velocity"] < -_AT_REST).sum()),
+        "at_rest": int((together["velocity"].abs() <= _AT_REST).sum()),
+        "separated": len(table) - len(together),
+    }
+
+
+_WORDS = {
+    "forward": "walk toward the large bead",
+    "backward": "walk toward the small one",
+    "at_rest": "rest",
+    "separated": "come apart",
+}
+_DIGITS = 5
+"""After the point, of what is shown: less than 1e-5 mm/s is 0."""
+_SHOWN = {"m/s": ("mm/s", 1e3), "m": ("mm", 1e3)}
+
+
+def describe(spread: Spread) -> str:
+    """A spread in a few lines: mm, mm/s."""
+    units = {key: unit for key, (unit, _) in _all_columns().items()}
+    points = max((band.points for band in spread.bands.values()), default=0)
+    lines = [f"  spread     over {points} points, each of these drawn from its range by itself:"]
+    lines += [f"             {one.key} {one.range[0]} to {one.range[1]}" for one in spread.varied if one.range]
+    for name, band in spread.bands.items():
+        unit, factor = _SHOWN.get(units[name], (units[name], 1.0))
+        low, median, high, smallest, largest = (
+            f"{round(value * factor, _DIGITS):.3g}"
+            for value in (band.low, band.median, band.high, band.smallest, band.largest)
+        )
+        shown = f"{low} to {high} {unit}".rstrip()
+        lines.append(f"    {name:9}{shown} (5 to 95 %), median {median}; smallest {smallest}, largest {largest}")
+        ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
+        lines.append(
+            f"             depends most on {ranks} (rank correlation)"
+            if ranks
+            else "             on none of them clearly"
+        )
+    found = [f"{count} {_WORDS[name]}" for name, count in spread.counts.items() if count]
+    found += [f"{len(spread.failures)} failed"] if spread.failures else []
+    lines += [f"    of these {', '.join(found)}"] if found else []
+    return "\n".join([*lines, f"    table    {spread.directory}"])
+
+
+def _all_columns() -> Mapping[str, tuple[str, str]]:
+    from walkers.postprocess.analysis import analyses
+
+    return result_columns([one.name for one in analyses()])

@@ -1,0 +1,305 @@
+"""What a run is worth later: its manifest, its checksums, and archives that others can read, check and use again."""
+
+import hashlib
+import importlib.resources
+import io
+import json
+import shutil
+import subprocess
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import requests
+from requests_cache import CachedSession
+from rocrate.rocrate import ROCrate
+from rocrate_validator.models import Severity
+from rocrate_validator.services import ValidationSettings, validate
+from urllib3 import HTTPResponse
+
+from tests.conftest import SHORT, call, document, make_case, to_toml
+from walkers import Run, load_case
+from walkers.archive.citation import PAPER
+from walkers.archive.writing import ArchiveOptions, ArchiveRefused, write_archive
+from walkers.inputs.reading import resolve_case
+from walkers.runner.directory import FinishedRun
+from walkers.runner.manifest import record_tables
+from walkers.runner.provenance import commit_of, software
+from walkers.sweeps.table import load
+
+AUTHOR = ("--author", "Josiah Carberry", "--orcid", "0000-0002-1825-0097")
+CONTEXT = "https://w3id.org/ro/crate/1.1/context"
+NOT_SAID = {
+    "Application url",  # of this project, which has no home on the web yet
+    "SoftwareApplication id",
+    "Root Data Entity: `publisher` property",
+    "CreativeWork Author: RECOMMENDED affiliation property",
+    "CreativeWork Author: RECOMMENDED Contextual Entity linked for the organizational `affiliation` property",
+}
+"""What the profiles recommend and archives leave open, for nobody has been asked."""
+
+
+@pytest.fixture
+def run(run_directory: Callable[..., Path], tmp_path: Path) -> Path:
+    """A copy of a finished run, to be changed."""
+    there = run_directory(run=SHORT)
+    return Path(shutil.copytree(there, tmp_path / "runs" / there.name))
+
+
+@pytest.fixture(scope="session")
+def shared(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+    """The runs of a sweep whose points share a deck."""
+
+    def fill(folder: Path) -> None:
+        (folder / "base.toml").write_text(to_toml(document(run=SHORT)))
+        (folder / "angles.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+        call("sweep", "angles.toml", "-j", "1", check=True, folder=folder)
+
+    return once("archived-sweep", fill) / "runs"
+
+
+def _issues(archive: Path, folder: Path, severity: Severity) -> list[str]:
+    """What the validator of RO-Crates finds, without a network: its cache is given the context that rocrate ships."""
+    cache = folder / "http"
+    if not cache.with_suffix(".sqlite").exists():
+        session = CachedSession(cache_name=str(cache), backend="sqlite", expire_after=-1)
+        text = (importlib.resources.files("rocrate") / "data" / "ro-crate.jsonld").read_bytes()
+        asked = requests.Request("GET", CONTEXT).prepare()
+        head = {"Content-Type": "application/ld+json"}
+        raw = HTTPResponse(io.BytesIO(text), head, 200, preload_content=False, request_url=CONTEXT)
+        session.cache.save_response(requests.adapters.HTTPAdapter().build_response(asked, raw))
+        session.close()
+    settings = ValidationSettings(
+        rocrate_uri=str(archive),
+        profile_identifier="process-run-crate",
+        requirement_severity=severity,
+        offline=True,
+        cache_path=cache,
+    )
+    return [str(issue.check.name) for issue in validate(settings).get_issues()]
+
+
+def test_manifests_say_what_made_the_run(run: Path) -> None:
+    manifest = FinishedRun(run).manifest
+    files = {path.relative_to(run).as_posix(): path for path in run.rglob("*") if path.is_file()}
+    del files["manifest.json"]
+    assert manifest["sha256"] == {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
+    assert manifest["files"] == {name: path.stat().st_size for name, path in files.items()}
+    assert manifest["packages"]["numpy"] == np.__version__
+    assert manifest["commit"] == software().commit
+
+
+def test_the_commit_of_a_checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def git(*arguments: str) -> str:
+        who = ("-c", "user.name=nobody", "-c", "user.email=nobody@example.org")
+        done = subprocess.run(["git", *who, *arguments], cwd=tmp_path, check=True, capture_output=True, text=True)
+        return done.stdout.strip()
+
+    assert commit_of(tmp_path) is None
+    git("init", "-q")
+    (tmp_path / "code.py").write_text("a = 1\n")
+    git("add", "code.py")
+    git("commit", "-q", "-m", "begin")
+    commit = git("rev-parse", "HEAD")
+    (tmp_path / "runs").write_text("what git does not know\n")
+    assert commit_of(tmp_path) == commit
+    (tmp_path / "code.py").write_text("a = 2\n")
+    assert commit_of(tmp_path) == f"{commit}+changes"
+    monkeypatch.setenv("GIT_DIR", str(tmp_path / "another"))  # as a hook of another repository has it
+    assert commit_of(tmp_path) == f"{commit}+changes"
+
+
+def test_what_changed_is_named(run: Path) -> None:
+    files = len(FinishedRun(run).manifest["files"])
+    assert call("verify", str(run)).stdout == f"{run.name}: {files} files are what they were\n"
+    dump = run / "segments" / "0000" / "beads.bin"
+    contents = bytearray(dump.read_bytes())
+    contents[1000] ^= 1
+    dump.write_bytes(contents)
+    (run / "walkers.parquet").unlink()
+    (run / "walk.png").write_bytes(b"drawn since")
+    told = call("verify", str(run))
+    assert told.returncode == 1
+    assert told.stdout.splitlines() == [
+        f"{run.name}: {files - 2} files are what they were",
+        "  changed    segments/0000/beads.bin",
+        "  missing    walkers.parquet",
+    ]
+    refused = call("archive", str(run), "--to", str(run.parent / "run.zip"))
+    assert (refused.returncode, "walkers.parquet" in refused.stderr) == (1, True)
+    assert [path.name for path in run.parent.iterdir()] == [run.name]
+
+
+def test_tables_made_anew_are_what_the_manifest_says(run: Path) -> None:
+    (run / "walkers.parquet").write_bytes(b"damaged")
+    assert call("verify", str(run)).returncode == 1
+    call("result", str(run), check=True)
+    assert call("verify", str(run)).returncode == 0
+    again = FinishedRun(run).manifest["tabulated"]
+    assert again["commit"] == software().commit
+    assert set(again["files"]) == {"result.json", "walkers.parquet", "trajectory.parquet", "bridges.parquet"}
+
+
+def test_manifests_of_older_runs(run: Path, tmp_path: Path) -> None:
+    """Those without checksums and versions are read, verified by sizes and archived all the same."""
+    path = run / "manifest.json"
+    older = {key: one for key, one in json.loads(path.read_text()).items() if key not in _YOUNGER}
+    path.write_text(json.dumps(older))
+    call("result", str(run), check=True)
+    assert "by their sizes" in call("verify", str(run)).stdout
+    record_tables(run, ["result.json"])
+    assert "sha256" not in FinishedRun(run).manifest
+    assert call("verify", str(Run(run).archive(tmp_path / "older.zip"))).returncode == 0
+    (run / "result.json").write_text("{}")
+    assert "  changed    result.json" in call("verify", str(run)).stdout
+
+
+_YOUNGER = ("sha256", "commit", "python", "packages")
+
+
+def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
+    archive, again = tmp_path / "run.zip", tmp_path / "again.zip"
+    assert call("archive", str(run), "--to", str(archive), *AUTHOR, check=True).stdout == f"{archive}\n"
+    call("archive", str(run), "--to", str(again), *AUTHOR, check=True)
+    assert archive.read_bytes() == again.read_bytes()
+    assert set(_issues(archive, tmp_path, Severity.RECOMMENDED)) == NOT_SAID
+
+    unpacked = tmp_path / "unpacked"
+    shutil.unpack_archive(archive, unpacked)
+    subprocess.run(["sha256sum", "--check", "--quiet", "sha256sums.txt"], cwd=unpacked, check=True)
+    there = unpacked / "runs" / run.name
+    assert call("verify", str(unpacked)).returncode == call("verify", str(there)).returncode == 0
+    assert Run(there).result == Run(run).result
+    drawn = call("plot", str(there), check=True).stdout.splitlines()
+    assert [Path(path).name for path in drawn] == ["walk.png", "gait.png"]
+    assert load_case(there / "test.toml") == make_case(run=SHORT)
+
+
+def test_what_an_archive_says_of_its_run(run: Path, tmp_path: Path) -> None:
+    unpacked = tmp_path / "unpacked"
+    shutil.unpack_archive(Run(run).archive(tmp_path / "run.zip", licence="CC0-1.0"), unpacked)
+    crate, manifest, place = ROCrate(unpacked), FinishedRun(run).manifest, f"runs/{run.name}"
+    root = crate.root_dataset
+    assert root["citation"].id == PAPER
+    assert "zero" in root["license"].id
+    assert root["datePublished"] == manifest["finished"].replace("Z", "+00:00")
+    for name, one in manifest["sha256"].items():
+        assert crate.get(f"{place}/{name}")["sha256"] == one
+
+    engine = crate.get(f"#{run.name}-engine")
+    assert engine["instrument"]["sha256"] == manifest["engine"]["sha256"]
+    names = {what: {Path(item.id).name for item in engine[what]} for what in ("object", "result")}
+    assert names["object"] >= {"walker.lig", "walls.stl", "reach.txt"}
+    assert names["result"] == {"beads.bin", "bridges.pairs.txt", "bridges.walls.txt", "engine.log", "segment.json"}
+    needed = crate.get(f"#{run.name}-tables")["instrument"]["softwareRequirements"]
+    versions = {one["name"]: one["softwareVersion"] for one in needed}
+    assert versions == {**manifest["packages"], "Python": manifest["python"]}
+
+    columns = crate.get(f"{place}/trajectory.parquet")["variableMeasured"]
+    told = {one["name"]: (one.get("unitText", ""), one["description"]) for one in columns}
+    schema = pq.read_schema(run / "trajectory.parquet")
+    assert told == {
+        field.name: (field.metadata[b"unit"].decode(), field.metadata[b"meaning"].decode()) for field in schema
+    }
+    assert manifest["engine"]["sha256"] in (unpacked / "ro-crate-preview.html").read_text()
+
+
+def test_an_archive_without_dumps(run: Path, tmp_path: Path) -> None:
+    archive, again = tmp_path / "run.zip", tmp_path / "again.zip"
+    call("archive", str(run), "--to", str(archive), "--without-dumps", check=True)
+    shutil.unpack_archive(archive, tmp_path / "unpacked")
+    there = tmp_path / "unpacked" / "runs" / run.name
+    files = len(FinishedRun(run).manifest["files"])
+    assert f"{files - 3} files are what they were, 3 left out" in call("verify", str(there), check=True).stdout
+    assert (
+        call("result", str(there), check=True).stdout.splitlines()[:-1]
+        == Run(run).describe().replace(" (already run)", "").splitlines()[:-1]
+    )
+    call("archive", str(there), "--to", str(again), "--without-dumps", check=True)
+    assert archive.read_bytes() == again.read_bytes()
+    assert _issues(archive, tmp_path, Severity.REQUIRED) == []
+    told = call("plot", str(there))
+    assert (told.returncode, "beads.bin" in told.stderr) == (1, True)
+
+
+def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
+    """Runs that shared a deck come with it, and the table is what it was."""
+    archive, unpacked = tmp_path / "sweep.zip", tmp_path / "unpacked"
+    call("archive", str(shared / "angles"), "--to", str(archive), *AUTHOR, check=True)
+    assert _issues(archive, tmp_path, Severity.REQUIRED) == []
+    shutil.unpack_archive(archive, unpacked)
+    before, after = (load(folder / "angles").drop(columns="run") for folder in (shared, unpacked / "runs"))
+    assert list(after["status"]) == ["finished"] * 2
+    assert before.equals(after)
+    assert len(list(unpacked.glob("runs/ensembles/*/walker.lig"))) == 1
+    for number, angle in enumerate(("0 deg", "10 deg")):
+        name = Path(load(shared / "angles")["run"][number]).name
+        (given,) = unpacked.glob(f"runs/ensembles/*/{name}/base.toml")
+        assert load_case(given) == resolve_case(document(run=SHORT, dimers={"angle": angle}), name="base")
+    assert (unpacked / "runs" / "angles" / "angles.toml").read_text().startswith('case = "base.toml"\n')
+    crate = ROCrate(unpacked)
+    assert [action["name"].split()[0] for action in crate.root_dataset["mentions"]] == [
+        *("Deck", "Engine's", "Tables", "Tables", "Table")
+    ]
+
+    (deck,) = unpacked.glob("runs/ensembles/*/walker.lig")
+    deck.write_text(deck.read_text().replace("gravity", "levity"))
+    told = call("verify", str(unpacked / "runs" / "angles"))
+    assert (told.returncode, "  changed    walker.lig" in told.stdout) == (1, True)
+    shutil.rmtree(deck.parent)
+    refused = call("archive", str(unpacked / "runs" / "angles"), "--to", str(tmp_path / "two.zip"))
+    assert (refused.returncode, "2 of 2 points are not finished" in refused.stderr) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--to", "run.tar"), "--to: expected the name of a .zip file"),
+        (("--to", "nowhere/run.zip"), "No such file"),
+        (("--licence", "MINE"), "--licence: expected one of CC-BY-4.0"),
+        (("--author", " "), "--author: expected a name"),
+        (("--orcid", "0000-0002-1825-0097"), "--orcid: expected an --author for each"),
+        (("--author", "N", "--orcid", "0000-0002-1825-0098"), "--orcid: expected an ORCID"),
+    ],
+)
+def test_options_that_make_no_sense(run: Path, tmp_path: Path, options: tuple[str, ...], message: str) -> None:
+    refused = call("archive", str(run), *options, folder=tmp_path)
+    assert (refused.returncode, message in refused.stderr) == (2, True), refused.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["runs"]
+
+
+def test_what_is_no_run(run: Path, tmp_path: Path) -> None:
+    unfinished = run.rename(run.with_name(f"{run.name}.incomplete"))
+    (unfinished / "manifest.json").unlink()
+    for command in ("archive", "verify"):
+        refused = call(command, str(unfinished), folder=tmp_path)
+        assert (refused.returncode, "expected a run directory" in refused.stderr) == (2, True)
+    with zipfile.ZipFile(tmp_path / "other.zip", "w") as other:
+        other.writestr("readme", "no run")
+    assert "it has no sha256sums.txt" in call("verify", str(tmp_path / "other.zip")).stderr
+
+
+def test_an_archive_that_was_damaged(run: Path, tmp_path: Path) -> None:
+    archive = write_archive(run, tmp_path / "run.zip")
+    contents = bytearray(archive.read_bytes())
+    with zipfile.ZipFile(archive) as opened:
+        place = opened.getinfo(f"runs/{run.name}/trajectory.parquet").header_offset
+    contents[place + 5000] ^= 1
+    archive.write_bytes(contents)
+    told = call("verify", str(archive))
+    assert (told.returncode, f"  changed    runs/{run.name}/trajectory.parquet" in told.stdout) == (1, True)
+    archive.write_bytes(contents[: len(contents) // 2])
+    assert call("verify", str(archive)).returncode == 2
+
+
+def test_what_fails_leaves_the_older_archive(run: Path, tmp_path: Path) -> None:
+    archive = write_archive(run, tmp_path / "run.zip")
+    before = archive.read_bytes()
+    (run / "result.json").write_text("{}")
+    with pytest.raises(ArchiveRefused, match=r"changed +result\.json"):
+        write_archive(run, archive, ArchiveOptions(dumps=False))
+    assert archive.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.zip", "runs"]

@@ -1,0 +1,149 @@
+"""Reports in a browser, without a network: they play, pause and turn, and say nothing to the console.
+
+Debian's Chromium, driven by Playwright; where there is none these tests are left out (``make test-browser`` installs it).
+WebGL is computed by the processor (SwiftShader), which is slow: windows are small and patience is long.
+"""
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from tests.conftest import PATIENCE, wait_for
+from tests.test_report import HOSTILE, pile_report, pile_run, swept, swept_report, walked_report, walked_run
+
+__all__ = ["pile_report", "pile_run", "swept", "swept_report", "walked_report", "walked_run"]  # fixtures
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: make test-browser installs it")
+MILLISECONDS = 1e3 * PATIENCE
+_FLAGS = (
+    *("--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking"),
+    *("--disable-component-update", "--disable-sync"),
+    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),
+)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(
+            executable_path=CHROMIUM, headless=True, args=list(_FLAGS), timeout=MILLISECONDS
+        )
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
+    """Open a file; what it asked a network for, and what it complained of, is looked at in the end."""
+    context = browser.new_context(offline=True, viewport={"width": 480, "height": 420})
+    context.set_default_timeout(MILLISECONDS)
+    asked: list[str] = []
+    complaints: list[str] = []
+
+    def opened(path: Path, address: str = "") -> Page:
+        page = context.new_page()
+        page.on("request", lambda request: asked.append(request.url))
+        page.on("console", lambda said: complaints.append(said.text) if said.type in {"error", "warning"} else None)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(f"{path.as_uri()}{address}")
+        page.wait_for_selector("body[data-ready]")
+        return page
+
+    yield opened
+    context.close()
+    files = {url.partition("#")[0] for url in asked if not url.startswith(("blob:", "data:"))}
+    assert len(files) == 1, asked
+    assert next(iter(files)).startswith("file:///")
+    # What the software renderer says of itself is not the page's.
+    assert not [one for one in complaints if "GPU stall" not in one and "swiftshader" not in one.lower()], complaints
+
+
+def picture(page: Page) -> bytes:
+    return page.locator(".scene:visible canvas").first.screenshot()
+
+
+def rested(page: Page) -> bytes:
+    """The picture as soon as it changes no more."""
+
+    def same() -> bytes | None:
+        before = picture(page)
+        page.wait_for_timeout(300)
+        return before if picture(page) == before else None
+
+    return wait_for(same)
+
+
+def changed(page: Page, before: bytes) -> bytes:
+    def other() -> bytes | None:
+        now = picture(page)
+        return now if now != before else None
+
+    return wait_for(other)
+
+
+@pytest.mark.parametrize("name", ["walked_report", "pile_report"])
+def test_beads_play_pause_and_turn(name: str, visit: Callable[..., Page], request: pytest.FixtureRequest) -> None:
+    page = visit(request.getfixturevalue(name))
+    page.wait_for_selector(".scene[data-ready]")
+    play, time = page.locator(".play"), page.locator(".time")
+    begin = rested(page)
+    assert play.text_content() == "Play"
+    assert time.text_content() == "0.0000 s"
+    play.click()
+    changed(page, begin)
+    play.click()
+    paused = rested(page)
+    assert paused != begin
+    stopped = time.text_content()
+    assert float((stopped or "").removesuffix(" s")) > 0.0
+    page.wait_for_timeout(500)
+    assert (picture(page), time.text_content()) == (paused, stopped)
+    box = page.locator(".scene").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 2 + 90, box["y"] + box["height"] / 2 + 30, steps=4)
+    page.mouse.up()
+    turned = changed(page, paused)
+    assert turned != begin
+    assert time.text_content() == stopped  # turned, not played
+    page.get_by_role("button", name="from above").click()
+    assert rested(page) not in {begin, paused, turned}
+    # As often slower as is chosen: what passes while it plays is so much less than on the clock.
+    assert page.locator(".slower option:checked").count() == 1
+    # Plots are there, drawn by Bokeh from what the page carries.
+    assert page.locator("[data-plots] > *").count() > 0
+    assert page.evaluate("Bokeh.documents.length") == 1
+
+
+def test_tables_need_no_script(walked_report: Path, browser: Browser) -> None:
+    context = browser.new_context(offline=True, java_script_enabled=False)
+    context.set_default_timeout(MILLISECONDS)
+    page = context.new_page()
+    page.goto(walked_report.as_uri())
+    assert page.locator("table.result tr:visible").count() > 10
+    assert page.locator("table.parameters tr:visible").count() > 20
+    assert page.title() == HOSTILE
+    context.close()
+
+
+def test_a_sweep_opens_its_runs(swept_report: Path, visit: Callable[..., Page]) -> None:
+    page = visit(swept_report)
+    assert page.evaluate("window.hostile") is None
+    assert page.locator("h1").text_content() == HOSTILE
+    assert page.locator("section:visible").count() == 1
+    assert page.locator(".multiples svg").count() == 3
+    page.locator("table.sweep a").nth(2).click()
+    page.wait_for_selector("#point-2 .scene[data-ready]")
+    assert page.locator("section:visible").get_attribute("id") == "point-2"
+    first = rested(page)
+    page.go_back()
+    page.wait_for_selector("#sweep:visible")
+    page.locator("nav a", has_text="point 0").click()
+    page.wait_for_selector("#point-0 .scene[data-ready]")
+    assert rested(page) != first
+    assert page.locator("canvas:visible").count() > 0

@@ -1,0 +1,229 @@
+"""Where the values of a case come from, values put beside a file, and what a result is worth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import walkers
+from tests.conftest import REFERENCE, call, make_case, to_toml
+from walkers.inputs import InputError, library, load_case, shipped_cases
+from walkers.inputs.case import Case
+from walkers.inputs.changes import settings_of
+from walkers.inputs.origins import Origin
+from walkers.inputs.reading import read_toml, resolve_case
+from walkers.inputs.sweep import load_sweep
+from walkers.sweeps.scheduler import Options
+from walkers.sweeps.spread import run_spread
+
+# Glass beads on polystyrene in glycol, materials that the paper names: nobody has measured how they touch.
+GLASS = {
+    "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2},
+    "beads": {"material": "glass"},
+    "liquid": {"name": "ethylene glycol"},
+    "boundary": {"material": "polystyrene"},
+    "drive": {"frequency": "80 Hz", "peak_acceleration": "10 g"},
+    "contact": {"friction": {"bead_bead": 0.3, "bead_wall": 0.3}, "rolling_friction": 0.0, "youngs_modulus": "10 MPa"},
+    "run": {"cycles": 6},
+    "uncertain": {"contact": {"friction": {"bead_wall": {"loguniform": [0.1, 0.6]}}}},
+}
+
+
+def origins(case: Case) -> dict[str, Origin]:
+    return {one.key: one for one in case.origins}
+
+
+def test_values_know_where_they_come_from() -> None:
+    found = origins(load_case("fig1b"))
+    assert (found["drive.frequency"].origin, found["drive.frequency"].text) == ("given", "80 Hz")
+    assert found["beads.density"] == Origin(
+        "beads.density", "4.0 g/cm^3", "library", library.material("ruby")["density"].source
+    )
+    friction = found["contact.friction.bead_wall"]
+    assert friction.origin == "calibrated"
+    assert friction.range is not None
+    assert friction.range[0] < float(friction.text) < friction.range[1]
+    assert found["dimers.replicates"] == Origin("dimers.replicates", "6", "default")
+    assert found["liquid.dynamic_viscosity"].text == "4.6 mPa*s"  # 5 mm²/s times 0.92 g/cm³, not that of the bridges
+    assert found["run.time_step"].origin == "derived"
+    assert not any(one.guessed for one in found.values())
+
+
+@pytest.mark.parametrize("name", sorted(shipped_cases()))
+def test_the_origins_tell_the_numbers_of_the_case(name: str) -> None:
+    """Each text, read as a file's, gives the same case: nothing is told that is not so."""
+    case = load_case(name)
+    told = {
+        one.key: _as_given(one.text)
+        for one in case.origins
+        if one.origin in ("library", "calibrated", "default")
+        and one.key.split(".")[0] in ("beads", "liquid", "contact")
+    }
+    assert len(told) >= 10
+    again = load_case(name, told)
+    assert (again.liquid, again.contact, again.density) == (case.liquid, case.contact, case.density)
+    assert {one.origin for one in again.origins if one.key in told} == {"given"}
+
+
+def _as_given(text: str) -> object:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def test_another_material_loses_what_was_calibrated_and_says_so() -> None:
+    found = origins(resolve_case(GLASS))
+    guessed = {key: one.text for key, one in found.items() if one.guessed}
+    assert guessed == {
+        "liquid.volume_fraction": "0.01",
+        "liquid.viscosity_ratio": "1",
+        "liquid.film_drag_ratio": "0",
+        "liquid.contact_angle": "0 deg",
+        "contact.restitution": "0.3",
+        "contact.minimum_separation_ratio": "0.01",
+        "contact.friction.bead_wall": "0.3",  # given, and called uncertain
+    }
+    assert found["contact.friction.bead_wall"].range == (0.1, 0.6)
+    assert not found["contact.friction.bead_bead"].guessed  # given, and not called uncertain
+
+
+@pytest.mark.parametrize(
+    ("ranges", "told"),
+    [
+        ({"contact.frictio": [0.1, 0.2]}, "uncertain.contact.frictio: unknown key"),
+        ({"contact.restitution": [0.6, 0.2]}, "contact.restitution: expected the smaller value first"),
+        ({"contact.restitution": 0.2}, "contact.restitution: expected [low, high]"),
+        ({"drive.frequency": ["1 Hz", "2 kHz"]}, "drive.frequency: expected one unit"),
+        ({"drive.axis": ["x", "y"]}, "drive.axis: expected a number"),
+    ],
+)
+def test_ranges_that_are_none_are_refused(ranges: dict[str, object], told: str) -> None:
+    with pytest.raises(InputError) as caught:
+        resolve_case({**GLASS, "uncertain": ranges})
+    assert told in str(caught.value)
+
+
+def test_a_changed_value_is_validated_like_a_file() -> None:
+    case = load_case("fig1b", {"drive.frequency": "70 Hz"})
+    assert case == resolve_case({**case.document}, name="fig1b")
+    assert case.run.period == pytest.approx(1.0 / 70.0, rel=1e-12)
+    for changes, told in (
+        ({"drive.frequency": "70 mm"}, 'drive.frequency = "70 mm": expected a frequency'),
+        ({"drive.frequenzy": "70 Hz"}, 'did you mean "frequency"?'),
+        ({"dimers.radii[2]": "1 mm"}, "the base case has no dimers.radii of that length"),
+        ({"drive": "70 Hz"}, "is a table of a case"),
+    ):
+        with pytest.raises(InputError) as caught:
+            load_case("fig1b", changes)
+        assert told in str(caught.value)
+    # What says the same in other words goes.
+    assert load_case("fig1b", {"drive.gamma0": 0.5}).drive.peak_acceleration > 50.0
+
+
+def test_a_drive_changed_alone_is_refused() -> None:
+    """Its time step, sampling and segments would be those of the old one."""
+    case = load_case("fig1b")
+    faster = replace(case.drive, harmonics=(replace(case.drive.largest, frequency=120.0),))
+    with pytest.raises(ValueError, match=r'120 Hz, but time step and sampling of one of 80 Hz: use load_case\("fig1b"'):
+        replace(case, drive=faster)
+
+
+def test_settings_are_read_as_a_file_would() -> None:
+    words = [
+        "drive.frequency=70Hz",
+        "liquid.name = Si AK10",
+        "run.cycles=8",
+        "dimers.meet=false",
+        "drive.axis=[1, 0, 0]",
+    ]
+    assert settings_of(words) == {
+        "drive.frequency": "70Hz",
+        "liquid.name": "Si AK10",
+        "run.cycles": 8,
+        "dimers.meet": False,
+        "drive.axis": [1, 0, 0],
+    }
+    for words, told in ((["drive.frequency"], "key=value"), (["a=1", "a=2"], "given twice")):
+        with pytest.raises(InputError) as caught:
+            settings_of(words)
+        assert told in str(caught.value)
+
+
+def test_set_on_the_command_line(in_folder: Path) -> None:
+    shown = json.loads(call("show", "fig1b", "--set", "drive.frequency=70Hz", "--json", check=True).stdout)
+    assert shown["case"]["drive"]["harmonics"][0]["frequency"] == 70.0
+    assert {"key": "drive.frequency", "text": "70Hz", "origin": "given"}.items() <= next(
+        one for one in shown["case"]["recorded"] if one["key"] == "drive.frequency"
+    ).items()
+    predicted = json.loads(call("theory", "fig1b", "--set", "dimers.radii[1]=0.25mm", "--json", check=True).stdout)
+    assert predicted["sin_delta"] == pytest.approx(0.05 / 0.55)
+    deck = call("deck", "fig1b", "--set", "dimers.replicates=1", check=True).stdout
+    assert deck != call("deck", "fig1b", check=True).stdout
+    for command in ("show", "run", "deck", "theory"):
+        told = call(command, "fig1b", "--set", "drive.frequency=70 mm")
+        assert told.returncode == 2
+        assert told.stderr.startswith('walkers: fig1b: drive.frequency = "70 mm": expected a frequency')
+    assert list(in_folder.iterdir()) == []
+
+
+def test_a_sweep_with_a_setting_has_a_directory_of_its_own(in_folder: Path) -> None:
+    assert load_sweep("fig4", {"run.cycles": 8}).name == "fig4,run.cycles=8"
+    planned = call("sweep", "fig4", "--set", "run.cycles=8", "--dry-run", check=True).stdout
+    assert "runs/fig4,run.cycles=8" in planned
+    told = call("sweep", "fig4", "--set", "liquid.name=Si AK5")
+    assert told.returncode == 2
+    assert 'liquid.name = "Si AK5": varies: it cannot be set as well' in told.stderr
+
+
+def test_show_says_where_values_come_from() -> None:
+    lines = call("show", "fig1b", check=True).stdout.splitlines()
+    assert any(line.split() == ["frequency", "80", "Hz", "given"] for line in lines)
+    assert any(line.startswith("    contact_angle") and "calibrated, may be" in line for line in lines)
+    assert not any("None" in line for line in lines)
+
+
+def test_a_result_says_what_it_rests_on(run_directory: Callable[..., Path], tmp_path: Path) -> None:
+    """The reference's case gives all of it: nobody measured them, so they are told all the same."""
+    case = make_case(run={"cycles": 2, "settling_cycles": 0})
+    done = walkers.find_run(run_directory(case))
+    told = {one["key"]: one for one in done.result["rests_on"]}
+    assert told["contact.friction.bead_wall"]["origin"] == "given"
+    assert told.keys() == library.unmeasured().keys()
+    assert "  taken      " in done.describe()
+    # The same numbers from the library are the same run, and told otherwise.
+    stored = done.case
+    assert stored == case
+    assert {one.key: one.origin for one in stored.origins} == {one.key: one.origin for one in case.origins}
+    assert stored.document == case.document
+
+
+def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
+    """Glass on polystyrene at 10 g walks or not as one guesses; the single number, exact to 1e-5, does not say so."""
+    case = resolve_case(GLASS, name="guessed")
+    spread = run_spread(case, runs_folder, Options(2), points=8)
+    assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed}
+    table = walkers.load(spread.directory)
+    assert table["contact.friction.bead_wall"].between(0.1, 0.6).all()
+    assert (table["liquid.viscosity_ratio"] > 1.0).all()
+    band, speeds = spread.bands["velocity"], table["velocity"]
+    assert (band.smallest, band.median, band.largest) == (speeds.min(), speeds.median(), speeds.max())
+    assert band.high - band.low > 1e-4  # m/s
+    assert sum(spread.counts.values()) == band.points == 8
+    assert (speeds > 2e-5).sum() - spread.counts["forward"] in range(spread.counts["separated"] + 1)
+    # A case of which all is given has none.
+    with pytest.raises(InputError, match="nothing here is uncertain"):
+        run_spread(resolve_case(REFERENCE), runs_folder, Options(2))
+
+
+def test_spread_on_the_command_line(in_folder: Path) -> None:
+    (in_folder / "glass.toml").write_text(to_toml(GLASS))
+    told = call("run", "glass.toml", "--spread", "--points", "2", check=True).stdout
+    assert "  guessed    " in told
+    assert "(5 to 95 %)" in told
+    assert read_toml(in_folder / "glass.toml") == GLASS
+    assert call("run", "fig1b", "--points", "2").returncode == 2

@@ -1,0 +1,50 @@
+"""Reports to mail, of whatever a directory holds: a run, a sweep or a calibration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from walkers.pipeline import DEFAULT_OUT, find_run
+
+
+def report(what: str | Path, to: Path | None = None, out: Path = DEFAULT_OUT) -> Path:
+    """Write the report of a run, a sweep or a calibration: one HTML file that needs no network.
+
+    Parameters
+    ----------
+    what
+        The directory of one of them; or the name of one in ``out``, or a case, whose run is looked up there.
+    to
+        The file; ``report.html`` in that directory if None.
+    out
+        Folder of the run directories.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If there is no such thing, or the name is none of an HTML file.
+
+    Examples
+    --------
+    >>> walkers.report(walkers.run("fig1b", tmp).directory, tmp / "fig1b.html").name
+    'fig1b.html'
+    """
+    from walkers.calibration.page import report_calibration
+    from walkers.calibration.report import RECORD_NAME as CALIBRATION
+    from walkers.postprocess.report.page import check_report
+    from walkers.sweeps.record import RECORD_NAME as SWEEP
+    from walkers.sweeps.report import report_sweep
+
+    if to is not None:
+        check_report(to)
+    for place in (Path(what), out / what):
+        if (place / CALIBRATION).is_file():
+            return report_calibration(place, to)
+        if (place / SWEEP).is_file():
+            return report_sweep(place, to)
+    return find_run(what, out).report(to)
