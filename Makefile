@@ -55,6 +55,10 @@ test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test fir
 	@$(WALKERS) theory fig1b > /dev/null # compiles the integrator once; each worker would by itself
 	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"
 
+.PHONY: test-browser
+test-browser: setup chromium ## Test reports in Debian's Chromium, without a network (`make test` does so where it is installed)
+	.venv/bin/pytest -q tests/test_browser.py
+
 .PHONY: test-slow
 test-slow: setup ## Run what `make test` leaves out: what only a release needs
 	.venv/bin/pytest -q -n 2 -m slow
@@ -74,6 +78,10 @@ validate: setup ## Check it against published benchmarks, exact solutions and a 
 .PHONY: docs-pictures
 docs-pictures: setup ## Make what docs/ shows and is not of today's parameters: pictures, tables, outputs, numbers (ONLY=fig2: that)
 	@.venv/bin/python -m walkers.studies.illustrations $(OUT) docs $(ONLY)
+
+.PHONY: docs-notebooks
+docs-notebooks: setup ## Execute the tutorial's notebooks and store what they show
+	@.venv/bin/python -m tests.notebooks
 
 .PHONY: docs
 docs: engine .venv/ready-docs ## Build the documentation into build/site, to be opened from disk; runs its examples
@@ -133,6 +141,15 @@ cluster:
 	  slurm-wlm munge >/dev/null || echo "that failed: tests on SLURM will be skipped" >&2; fi
 else
 cluster:
+endif
+
+.PHONY: chromium
+ifeq ($(shell command -v chromium),)
+chromium:
+	@echo "installing chromium, for the tests"
+	$(call debian,--no-install-recommends chromium,chromium)
+else
+chromium:
 endif
 
 .venv/ready: requirements.txt pyproject.toml
