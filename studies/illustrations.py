@@ -47,7 +47,8 @@ from walkers.templates.deck import CONTENT_VERSION
 
 RECORD = Path("figures") / "made-from.json"
 _BLOCK = re.compile(
-    r"(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)", re.MULTILINE | re.DOTALL
+    r"(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)",
+    re.MULTILINE | re.DOTALL,
 )
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
