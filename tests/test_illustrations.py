@@ -1,4 +1,4 @@
-"""What the documentation shows follows today's parameters: pictures, tables, outputs of commands, numbers in sentences."""
+"""What the documentation shows follows today's parameters: pictures, tables, outputs, numbers in sentences."""
 
 from __future__ import annotations
 
