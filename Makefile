@@ -55,6 +55,10 @@ test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test fir
 	@$(WALKERS) theory fig1b > /dev/null # compiles the integrator once; each worker would by itself
 	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"
 
+.PHONY: test-browser
+test-browser: setup chromium ## Test reports in Debian's Chromium, without a network (`make test` does so where it is installed)
+	.venv/bin/pytest -q tests/test_browser.py
+
 .PHONY: test-slow
 test-slow: setup ## Run what `make test` leaves out: what only a release needs
 	.venv/bin/pytest -q -n 2 -m slow
@@ -71,13 +75,13 @@ docs-audit: setup ## Write docs/explanation/engine.md from an audit of the insta
 validate: setup ## Check it against published benchmarks, exact solutions and a second engine (under ten minutes)
 	@$(WALKERS) validate --out $(OUT)
 
-.PHONY: docs-validation
-docs-validation: setup ## Write docs/explanation/validation.md and its pictures
-	@$(WALKERS) validate --out $(OUT) --to docs/explanation
+.PHONY: docs-pictures
+docs-pictures: setup ## Make what docs/ shows and is not of today's parameters: pictures, tables, outputs, numbers (ONLY=fig2: that)
+	@.venv/bin/python -m walkers.studies.illustrations $(OUT) docs $(ONLY)
 
-.PHONY: docs-figures
-docs-figures: setup ## Write the figures and the comparison that docs/ shows
-	@$(WALKERS) figures --out $(OUT) --to docs/figures
+.PHONY: docs-notebooks
+docs-notebooks: setup ## Execute the tutorial's notebooks and store what they show
+	@.venv/bin/python -m tests.notebooks
 
 .PHONY: docs
 docs: engine .venv/ready-docs ## Build the documentation into build/site, to be opened from disk; runs its examples
@@ -137,6 +141,15 @@ cluster:
 	  slurm-wlm munge >/dev/null || echo "that failed: tests on SLURM will be skipped" >&2; fi
 else
 cluster:
+endif
+
+.PHONY: chromium
+ifeq ($(shell command -v chromium),)
+chromium:
+	@echo "installing chromium, for the tests"
+	$(call debian,--no-install-recommends chromium,chromium)
+else
+chromium:
 endif
 
 .venv/ready: requirements.txt pyproject.toml

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from walkers.inputs import resolve_case
 from walkers.inputs.boundary import Face
-from walkers.inputs.case import Case
+from walkers.inputs.case import Case, Run
 from walkers.inputs.drive import Vector
 from walkers.inputs.errors import Stopped
 from walkers.postprocess.dump import BinaryDump, FloatArray
@@ -33,6 +33,11 @@ FIRST_BEAD = 2
 _BEAD_COLUMNS = (*BEAD_COLUMNS, *FORCE_COLUMNS)
 _WALL_BRIDGE_COLUMNS = tuple(" ".join(WALL_BRIDGES).split())
 FLOOR = Face("z", 1, (0.0, 0.0, 0.0))
+
+
+def free_run(run: Run, time_step: float) -> Run:
+    """The same with a time step (s) of which a cycle need not be a multiple: a bench counts steps by itself."""
+    return replace(run, time_step=time_step, steps_per_cycle=0)
 
 
 def bench_case(**changes: dict[str, Any]) -> Case:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from walkers.audit.bench import FIRST_BEAD, FLOOR, Bench, Measured, bench_case, bench_recording
+from walkers.audit.bench import FIRST_BEAD, FLOOR, Bench, Measured, bench_case, bench_recording, free_run
 from walkers.inputs.case import Case
 from walkers.physics.contact import reduced_modulus, reduced_shear_modulus
 from walkers.physics.impact import Impact
@@ -106,7 +106,7 @@ def stiff_case(youngs_modulus: float, poissons_ratio: float, density: float, tim
     """A dry case with real moduli, which no case file may have."""
     case = bench_case(liquid={"volume_fraction": 1e-9, "surface_tension": "1e-9 N/m"})
     contact = replace(case.contact, youngs_modulus=youngs_modulus, poissons_ratio=poissons_ratio)
-    return replace(case, density=density, contact=contact, run=replace(case.run, time_step=time_step))
+    return replace(case, density=density, contact=contact, run=free_run(case.run, time_step))
 
 
 def _roomy_scene(beads: Sequence[Bead], radius: float) -> Scene:

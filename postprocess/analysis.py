@@ -286,8 +286,8 @@ def warnings_of(result: Mapping[str, Any]) -> list[str]:
 
 
 def quantities_of(result: Mapping[str, Any]) -> list[Quantity]:
-    """The numbers of a result as rows of a table."""
-    return [row for one in analyses_in(result) for row in one.quantities(result)]
+    """The numbers that a result has, as rows of a table."""
+    return [row for one in analyses_in(result) for row in one.quantities(result) if row.value is not None]
 
 
 def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:

@@ -1,6 +1,6 @@
 """Reports in a browser, without a network: they play, pause and turn, and say nothing to the console.
 
-Debian's Chromium, driven by Playwright; where there is none these tests are left out (``make test-browser`` installs it).
+Debian's Chromium, driven by Playwright; without it these tests are left out: ``make test-browser`` installs it.
 WebGL is computed by the processor (SwiftShader), which is slow: windows are small and patience is long.
 """
 
@@ -111,7 +111,7 @@ def test_beads_play_pause_and_turn(name: str, visit: Callable[..., Page], reques
     turned = changed(page, paused)
     assert turned != begin
     assert time.text_content() == stopped  # turned, not played
-    page.get_by_role("button", name="from above").click()
+    page.get_by_role("button", name="onto the floor").click()
     assert rested(page) not in {begin, paused, turned}
     # As often slower as is chosen: what passes while it plays is so much less than on the clock.
     assert page.locator(".slower option:checked").count() == 1

@@ -24,6 +24,6 @@ def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch
 
 
 def test_the_public_names_are_few_and_documented() -> None:
-    names = ["Run", "find_run", "load", "load_case", "plot_sweep", "run", "sweep", "sweep_figure"]
+    names = ["Run", "find_run", "load", "load_case", "plot_sweep", "report", "run", "sweep", "sweep_figure"]
     assert dir(walkers) == walkers.__all__ == names
     assert all(getattr(walkers, name).__doc__ for name in walkers.__all__)

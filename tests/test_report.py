@@ -167,7 +167,7 @@ def test_parameters_say_where_they_come_from(walked_report: Path, walked_run: Pa
     for one in origins:
         assert one.key in words
         assert one.text in words
-    for said in ("given by the case", "library", "default"):
+    for said in ("given", "library", "default"):
         assert said in words
 
 
@@ -287,7 +287,8 @@ def test_a_calibration_and_its_report(tmp_path: Path) -> None:
         "design": {"waves": [4], "predictive": 2, "steps": 100},
     }
     lines = "".join(
-        f'[[observations]]\nname = "{name}"\ngroup = "v"\nof = ["{name}"]\nvalue = "{speed} mm/s"\ndeviation = "0.3 mm/s"\n'
+        f'[[observations]]\nname = "{name}"\ngroup = "v"\nof = ["{name}"]\n'
+        f'value = "{speed} mm/s"\ndeviation = "0.3 mm/s"\n'
         for name, speed in (("slow", 1), ("fast", 3))
     )
     file.write_text(to_toml(given) + lines)

@@ -2,8 +2,9 @@
 
 `load_case` reads a case, `run` takes it to its result as ``walkers run`` does, `find_run` finds a finished run, `sweep`
 makes all points of a sweep, `load` gives its table, `plot_sweep` and `sweep_figure` its figure, `report` writes a file
-to mail. The folders of the project are packages below: `physics` (laws), `inputs` (cases), `templates` (decks), `runner`
-(run directories), `postprocess` (what runs mean), and on them `sweeps`, `audit`, `theory`, `paper` and `calibration`.
+to mail. The folders of the project are packages below: `physics` (laws), `inputs` (cases), `templates` (decks),
+`runner` (run directories), `postprocess` (what runs mean), and on them `sweeps`, `audit`, `theory`, `paper` and
+`calibration`.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from walkers.audit.bench import Bench, bench_case, bench_recording
+from walkers.audit.bench import Bench, bench_case, bench_recording, free_run
 from walkers.audit.check import Check, Line
 from walkers.audit.checks.drive import reference_walker, walking_speed
 from walkers.inputs.boundary import Face
@@ -40,7 +40,7 @@ def pile_case(time_step: float | None = None) -> Case:
         run={"time_step": "auto", "samples_per_cycle": 1},
         environment={"gravity": "9.81 m/s^2"},
     )
-    return case if time_step is None else replace(case, run=replace(case.run, time_step=time_step))
+    return case if time_step is None else replace(case, run=free_run(case.run, time_step))
 
 
 def pile_scene() -> Scene:

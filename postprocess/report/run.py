@@ -21,9 +21,6 @@ from walkers.runner.directory import case_of
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 
-_ORIGINS = {"given": "given by the case", "default": "default"}
-"""What is said of origins that do not say it themselves."""
-
 
 @dataclass(frozen=True)
 class Parameter:
@@ -205,7 +202,7 @@ def guessed_of(case: Case, origins: tuple[Origin, ...] | None = None) -> list[Pa
 
 def _parameter(one: Origin) -> Parameter:
     ends = " … ".join(text_of(end) for end in one.range) if one.range else ""
-    return Parameter(one.key, one.text, _ORIGINS.get(one.origin, one.origin), one.source, ends)
+    return Parameter(one.key, one.text, one.origin, one.source, ends)
 
 
 def flat(values: Any, key: str = "") -> Iterator[tuple[str, Any]]:

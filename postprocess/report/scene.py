@@ -37,7 +37,7 @@ _LANE = 1.25
 """Lengths of a walker between the lanes of independent ones."""
 _VIEW = 30.0
 """Degrees, of the camera's view."""
-_ASPECT = 1.8
+_ASPECT = 1.5
 """Width of a picture over its height, at least."""
 _RULES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Millimetres between the lines on a floor."""
@@ -80,8 +80,11 @@ def scene_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int
     """
     import k3d
 
-    whole = gathered(run if isinstance(run, Motion) else read_motion(run), lane=_LANE).driven
+    read = run if isinstance(run, Motion) else read_motion(run)
+    whole = gathered(read, lane=_LANE).driven
     motion, frames, beads, captions = _thinned(whole, places)
+    if len(whole.walkers) < len(read.walkers):
+        captions.append(f"The first of {len(read.walkers)} walkers is shown.")
     plot = k3d.plot(
         height=height,
         name=whole.case.name,
@@ -258,17 +261,18 @@ def _rules(low: FloatArray, high: FloatArray) -> Any:
 
 
 def cameras_of(motion: Motion) -> dict[str, list[float]]:
-    """Where to look from so that everything is in view: `Scene.cameras`."""
+    """Where to look from so that everything is in view, gravity downward: `Scene.cameras`."""
     reached = motion.position * 1e3
     margin = 1.5 * float(motion.radius.max()) * 1e3
     low, high = reached.min(axis=(0, 1)) - margin, reached.max(axis=(0, 1)) + margin
     corners = np.array([[(low, high)[bit][axis] for axis, bit in enumerate(bits)] for bits in np.ndindex(2, 2, 2)])
-    closed = motion.case.boundary.closed
-    upward = np.array([0.0, 0.0, 1.0])
+    closed, upward = motion.case.boundary.closed, -np.array(motion.case.gravity_vector) / motion.case.gravity
+    steep = upward[2] < 0.5
+    first = np.array([-0.25, -1.0, 0.2] if closed else [-0.1, -0.7, 0.9] if steep else [-0.55, -0.8, 0.6])
     ways = {
-        "as at first": (np.array([-0.25, -1.0, 0.2]) if closed else np.array([-0.55, -0.8, 0.6]), upward),
+        "as at first": (first, upward),
         "from the side": (np.array([0.0, -1.0, 0.0]), upward),
-        "from above": (upward, np.array([0.0, 1.0, 0.0])),
+        "onto the floor": (np.array([0.0, 0.0, 1.0]), upward if steep else np.array([0.0, 1.0, 0.0])),
     }
     return {name: _camera(corners, way / np.linalg.norm(way), up) for name, (way, up) in ways.items()}
 
