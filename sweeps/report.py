@@ -91,10 +91,11 @@ def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARG
     record, frame = read_record(directory), load(directory)
     path = to or directory / NAME
     check_report(path)
+    whole = set(frame["point"][frame["status"] == "finished"])  # what was damaged since is not
     finished = {
         number: state.directory
         for number, state in enumerate(states(record))
-        if state.status == "finished" and state.directory is not None
+        if number in whole and state.directory is not None
     }
     plot = _overview(frame, record)
     carried = {} if plot is None else {"plots-sweep": packed_plots(plot)}
@@ -176,8 +177,8 @@ def _table(frame: pd.DataFrame, record: SweepRecord) -> tuple[list[str], list[li
 
 
 def _cell(value: Any, factor: float, error: Any) -> Cell:
-    if isinstance(value, (bool, np.bool_, str)):
-        return Cell(str(value))
+    if value is None or isinstance(value, (bool, np.bool_, str)):
+        return Cell("–" if value is None else str(value))
     number = float(value)
     if not isfinite(number):
         return Cell("–")
