@@ -75,13 +75,9 @@ docs-audit: setup ## Write docs/explanation/engine.md from an audit of the insta
 validate: setup ## Check it against published benchmarks, exact solutions and a second engine (under ten minutes)
 	@$(WALKERS) validate --out $(OUT)
 
-.PHONY: docs-validation
-docs-validation: setup ## Write docs/explanation/validation.md and its pictures
-	@$(WALKERS) validate --out $(OUT) --to docs/explanation
-
-.PHONY: docs-figures
-docs-figures: setup ## Write the figures and the comparison that docs/ shows
-	@$(WALKERS) figures --out $(OUT) --to docs/figures
+.PHONY: docs-pictures
+docs-pictures: setup ## Make what docs/ shows and is not of today's parameters: pictures, tables, outputs, numbers (ONLY=fig2: that)
+	@.venv/bin/python -m walkers.studies.illustrations $(OUT) docs $(ONLY)
 
 .PHONY: docs-notebooks
 docs-notebooks: setup ## Execute the tutorial's notebooks and store what they show

@@ -48,6 +48,7 @@ html_static_path = ["_static"]
 html_css_files = ["walkers.css"]
 html_show_sourcelink = False
 html_copy_source = False
+html_show_search_summary = False  # a browser may not read other pages from disk
 html_theme_options = {
     "navbar_align": "left",
     "navbar_end": ["theme-switcher"],
@@ -62,7 +63,7 @@ html_theme_options = {
 html_sidebars = {"index": []}
 
 autosummary_generate = True
-autosummary_ignore_module_all = False
+autosummary_ignore_module_all = True  # all modules of a package, not those alone that it names
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"exclude-members": "model_config"}

@@ -67,7 +67,9 @@ class Stage:
         camera.parallel_projection, camera.parallel_scale = True, tall / 2.0
         wide = tall * size[0] / size[1]
         self._around: list[pv.Actor] = (
-            self._add_floor(seen.mean(axis=(0, 1)), wide) if self._bare else self._add_walls(motion)
+            self._add_floor(seen.mean(axis=(0, 1)), wide)
+            if self._bare
+            else self._add_walls(motion, 1e-2 * tall * toward)
         )
         camera.clipping_range = (0.1 * tall, 40.0 * max(tall, wide))
         axis = (0.0, 1.0, 0.0) if motion.case.boundary.closed else np.cross([0.0, 0.0, 1.0], motion.case.drive_axis)
@@ -107,12 +109,13 @@ class Stage:
             self._plotter.add_mesh(lines, color=_LINES, line_width=2, lighting=False),
         ]
 
-    def _add_walls(self, motion: Motion) -> list[pv.Actor]:
-        """Walls, of which those that would hide the beads are left out."""
-        walls = boundary_of(motion).scale(1e3, inplace=False)
+    def _add_walls(self, motion: Motion, nearer: FloatArray) -> list[pv.Actor]:
+        """Walls, of which those that would hide the beads are left out; their edges nearer, lest walls hide them."""
+        walls = boundary_of(motion).scale(1e3, inplace=False).clean(tolerance=1e-6, absolute=True)
         drawn = self._plotter.add_mesh(walls, color=_WALL, lighting=False)
         drawn.prop.culling = "back"
-        edges = walls.extract_feature_edges(feature_angle=30.0)
+        edges = walls.extract_feature_edges(feature_angle=30.0, manifold_edges=False, non_manifold_edges=False)
+        edges.translate(nearer, inplace=True)
         return [drawn, self._plotter.add_mesh(edges, color=_EDGE, line_width=2, lighting=False)]
 
 

@@ -209,7 +209,8 @@ def boundary_of(motion: Motion) -> pv.PolyData:
     low, high = motion.position.min(axis=(0, 1)) - margin, motion.position.max(axis=(0, 1)) + margin
     half, top = boundary.inner_width / 2.0, boundary.top
     if boundary.closed:
-        low, high = np.array([-half, -half, min(low[2], 0.0)]), np.array([half, half, top])
+        wide = 1.01 * half  # the edges of a cylinder's prism lie beyond its faces
+        low, high = np.array([-wide, -wide, min(low[2], 0.0)]), np.array([wide, wide, top])
     faces = boundary.faces()
     planes = [(np.array(face.centroid), np.array(face.normal)) for face in faces]
     edges = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]
@@ -217,7 +218,9 @@ def boundary_of(motion: Motion) -> pv.PolyData:
     cells: list[int] = []
     for number, (centroid, normal) in enumerate(planes):
         others = planes[:number] + planes[number + 1 :]
-        corners = _clipped(_square(centroid, normal, 2.0 * float(np.linalg.norm(high - low))), [*others, *edges])
+        middle = (low + high) / 2.0
+        nearest = middle - (middle - centroid) @ normal * normal
+        corners = _clipped(_square(nearest, normal, 2.0 * float(np.linalg.norm(high - low))), [*others, *edges])
         if len(corners) > 2:
             cells += [len(corners), *range(len(points), len(points) + len(corners))]
             points += list(corners)

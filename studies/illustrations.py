@@ -3,10 +3,9 @@
 All of it follows from the shipped parameters. `make_illustrations` makes it anew and records, for each picture and
 table, a digest of the cases that it shows; `stale` tells which are of other cases than today's.
 
-Pages have two kinds of marks, which readers do not see:
-
-    <!-- $ walkers theory fig1b -->                      the block below it is what this command prints
-    <!--fact fig4b_velocity-->8.15<!--/fact-->          this number is the comparison's
+Pages have two kinds of marks, which readers do not see. A block of code that begins with a command and stands below
+``<!--output-->`` is what that command prints; ``<!--fact fig4b_velocity-->8.15<!--/fact-->`` is a number of the
+comparison.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import hashlib
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -22,6 +22,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from walkers.calibration.calibrate import calibrate
+from walkers.calibration.figures import draw
+from walkers.calibration.report import rows_of, write_tables
+from walkers.inputs.axes import flatten
+from walkers.inputs.calibration import load_calibration
 from walkers.inputs.case import Case
 from walkers.inputs.changes import settings_of
 from walkers.inputs.errors import InputError, Problem
@@ -31,22 +36,27 @@ from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.model_terms import try_model_terms, write_model_terms
 from walkers.pipeline import run
 from walkers.postprocess.analysis import analyses
+from walkers.postprocess.films import FilmOptions
 from walkers.postprocess.pictures import render_run
 from walkers.postprocess.series import render_series
 from walkers.runner.files import read_json, write_json, write_text
+from walkers.studies.validate import validate
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import cores_here
 from walkers.templates.deck import CONTENT_VERSION
 
 RECORD = Path("figures") / "made-from.json"
-_BLOCK = re.compile(r"(?P<mark><!-- \$ (?P<command>walkers [^>]+) -->\n\n)(?P<block>(?:    [^\n]*\n|\n(?=    ))+)")
+_BLOCK = re.compile(
+    r"(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)",
+    re.MULTILINE | re.DOTALL,
+)
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
 
 
 @dataclass(frozen=True)
 class Illustration:
-    """Files of the documentation, the cases that they show, how they are made, and whether that takes long.
+    """Files of the documentation, the cases that they show, and how they are made.
 
     Attributes
     ----------
@@ -56,14 +66,11 @@ class Illustration:
         All whose runs they show.
     make
         Makes the files: folder of the runs, folder of the documentation.
-    long
-        Whether only if it is asked for by name: a quarter of an hour and more.
     """
 
     files: tuple[str, ...]
     cases: Callable[[], Iterable[Case]]
     make: Callable[[Path, Path], None]
-    long: bool = False
 
 
 def _of_figure(name: str) -> Illustration:
@@ -71,7 +78,6 @@ def _of_figure(name: str) -> Illustration:
         (f"figures/{name}.png",),
         lambda: _points(FIGURES[name].sweeps),
         lambda out, docs: _figures(name, out, docs),
-        long=FIGURES[name].only_asked,
     )
 
 
@@ -84,7 +90,7 @@ def _points(sweeps: Iterable[str]) -> Iterator[Case]:
         yield from load_sweep(sweep).cases()
 
 
-def _rendered(name: str, case: str, *settings: str, apart: float | None = None, long: bool = False) -> Illustration:
+def _rendered(name: str, case: str, *settings: str, apart: float | None = None) -> Illustration:
     """A picture of one run: as `walkers render` has it, or views so many s apart."""
 
     def make(out: Path, docs: Path) -> None:
@@ -97,7 +103,7 @@ def _rendered(name: str, case: str, *settings: str, apart: float | None = None, 
     def loaded() -> Case:
         return load_case(case, settings_of(settings))
 
-    return Illustration((f"pictures/{name}.png",), lambda: [loaded()], make, long)
+    return Illustration((f"pictures/{name}.png",), lambda: [loaded()], make)
 
 
 def _model_terms(out: Path, docs: Path) -> None:
@@ -105,11 +111,40 @@ def _model_terms(out: Path, docs: Path) -> None:
     write_model_terms(try_model_terms(), docs / "figures")
 
 
+def _film(out: Path, docs: Path) -> None:
+    options = FilmOptions(size=(512, 216), fps=20, slowdown=20.0, walker=0, end=0.4)
+    run(load_case("fig1b", {"run.cycles": 60}), out).film(docs / "pictures" / "walker.gif", options)
+
+
+def _validation(out: Path, docs: Path) -> None:
+    made = validate(out, docs / "explanation", jobs=cores_here())
+    for statement in made.failed:
+        print(f"walkers: not as expected: {statement}", file=sys.stderr)
+
+
+def _calibration(out: Path, docs: Path) -> None:
+    found = calibrate(load_calibration("ruby"), out, Options(cores_here()))
+    rows = rows_of(found)
+    write_tables(found, rows, out / "ruby")
+    draw(found, rows, out / "ruby")
+    for name in ("bands", "corner", "predictions", "sobol"):
+        shutil.copy(out / "ruby" / f"{name}.png", docs / "figures" / f"calibration-{name}.png")
+    shutil.copy(out / "ruby" / "calibration.md", docs / "figures" / "calibration.md")
+
+
+def _calibrated() -> list[Case]:
+    """The experiments of the calibration with the shipped values of what it varies."""
+    read = load_calibration("ruby")
+    base = flatten(read.file.set, lambda _: False)
+    return [load_case(read.file.case, {**base, **values}) for values in read.experiments.values()]
+
+
 ILLUSTRATIONS: Mapping[str, Illustration] = {
     "walker": _rendered("walker", "fig1b", "run.cycles=60"),
+    "film": Illustration(("pictures/walker.gif",), lambda: [load_case("fig1b", {"run.cycles": 60})], _film),
     "tray": _rendered("tray", "tray"),
     "climber": _rendered("climber", "climber"),
-    "pile": _rendered("pile", "pile-small", "run.duration=10 s", apart=2.0, long=True),
+    "pile": _rendered("pile", "pile-small", "run.duration=10 s", apart=2.0),
     **{name: _of_figure(name) for name in FIGURES},
     "comparison": Illustration(
         ("figures/comparison.md", "figures/comparison.json"),
@@ -120,7 +155,16 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
         ("figures/model_terms.md", "figures/model_terms.json"),
         lambda: [load_case("fig1b"), load_case("fig4a")],
         _model_terms,
-        long=True,
+    ),
+    "validation": Illustration(
+        ("explanation/validation.md",),
+        lambda: [load_case(name) for name in ("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci")],
+        _validation,
+    ),
+    "calibration": Illustration(
+        tuple(f"figures/calibration-{name}.png" for name in ("bands", "corner", "predictions", "sobol")),
+        _calibrated,
+        _calibration,
     ),
 }
 
@@ -137,7 +181,7 @@ def digest(cases: Iterable[Case]) -> str:
 
 def stale(docs: Path) -> list[str]:
     """Files of the documentation that are missing, or show other cases than today's."""
-    record = read_json(docs / RECORD)
+    record = recorded(docs)
     return [
         file
         for one in ILLUSTRATIONS.values()
@@ -145,6 +189,11 @@ def stale(docs: Path) -> list[str]:
         for file in one.files
         if record.get(file) != today or not (docs / file).is_file()
     ]
+
+
+def recorded(docs: Path) -> dict[str, str]:
+    """The digest of the cases that each file was made from."""
+    return read_json(docs / RECORD) if (docs / RECORD).is_file() else {}
 
 
 def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[Path]:
@@ -157,7 +206,7 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
     docs
         Folder of the documentation.
     only
-        Names of `ILLUSTRATIONS`; if empty, all but those that take long and are of today's cases.
+        Names of `ILLUSTRATIONS`; if empty, all of which a file is missing or of other cases than today's.
 
     Returns
     -------
@@ -175,10 +224,10 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
     old = set(stale(docs))
     written = []
     for name, one in ILLUSTRATIONS.items():
-        if name in only or (not only and not (one.long and old.isdisjoint(one.files))):
+        if name in only or (not only and not old.isdisjoint(one.files)):
             print(f"walkers: {name}", file=sys.stderr)
             one.make(out, docs)
-            record = {**read_json(docs / RECORD), **dict.fromkeys(one.files, digest(one.cases()))}
+            record = {**recorded(docs), **dict.fromkeys(one.files, digest(one.cases()))}
             write_json(docs / RECORD, dict(sorted(record.items())))
             written += [docs / file for file in one.files]
     return written + refresh_pages(pages_of(docs), facts(docs), out)
@@ -208,8 +257,8 @@ def refresh_pages(pages: Iterable[Path], known: Mapping[str, str], out: Path) ->
     for page in pages:
         old = page.read_text("utf-8")
         new = _FACT.sub(lambda found: f"<!--fact {found['name']}-->{known[found['name']]}<!--/fact-->", old)
-        new = _BLOCK.sub(lambda found: found["mark"] + _indented(output_of(found["command"], out)), new)
-        if _RUN_HASH.sub("", new) != _RUN_HASH.sub("", old):
+        new = _BLOCK.sub(lambda found: found["head"] + output_of(found["command"], out), new)
+        if without_hashes(new) != without_hashes(old):
             write_text(page, new)
             changed.append(page)
     return changed
@@ -218,7 +267,12 @@ def refresh_pages(pages: Iterable[Path], known: Mapping[str, str], out: Path) ->
 def outputs_in(page: Path) -> dict[str, str]:
     """The commands of a page whose output is below them, and that output; names of runs without their hash."""
     found = _BLOCK.finditer(page.read_text("utf-8"))
-    return {one["command"]: _RUN_HASH.sub("", one["block"]) for one in found}
+    return {one["command"]: without_hashes(one["text"]) for one in found}
+
+
+def without_hashes(text: str) -> str:
+    """A text with the names of runs without what depends on the engine's binary."""
+    return _RUN_HASH.sub("", text)
 
 
 def facts_in(page: Path) -> list[tuple[str, str]]:
@@ -241,10 +295,6 @@ def output_of(command: str, out: Path) -> str:
         words.append("--force")  # else it says that it was run already
     printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     return printed.replace(str(out), "runs")
-
-
-def _indented(text: str) -> str:
-    return "".join(f"    {line}\n" if line else "\n" for line in text.rstrip("\n").split("\n"))
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.errors import InputError, Problem
-from walkers.postprocess.drawing import new_figure, plain_text, styled
+from walkers.postprocess.drawing import letter_panels, new_figure, plain_text, styled
 from walkers.sweeps.factors import SEEDS, Factor
 from walkers.sweeps.figure_layout import Drawn, FloatArray, Layout
 
@@ -76,6 +76,8 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
         if number % columns == 0:
             axes.set_ylabel(plain_text(drawn.label))
         _scale(axes, x, log)
+    if len(parts) > 1:
+        letter_panels(grid.flat[: len(parts)])
     _limits(grid[0, 0], drawn, log)
     for axes in grid.flat[len(parts) :]:
         axes.set_axis_off()

@@ -148,8 +148,8 @@ def run_spread(
 
     Notes
     -----
-    Each value is drawn by itself. Those of a calibration hang together (docs/calibration.md), so that the band of a
-    calibrated case is wider than that of its posterior.
+    Each value is drawn by itself. Those of a calibration hang together (docs/explanation/calibration.md), so that the
+    band of a calibrated case is wider than that of its posterior.
     """
     from walkers.sweeps.table import load
 

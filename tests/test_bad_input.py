@@ -298,7 +298,7 @@ def test_a_mistake_in_the_last_file_stops_before_the_first_run(in_folder: Path) 
     assert not (in_folder / "runs").exists()
 
 
-@pytest.mark.parametrize("command", ["result", "plot", "vtk", "render"])
+@pytest.mark.parametrize("command", ["result", "plot", "vtk", "render", "film", "paraview"])
 def test_runs_that_are_not_there(command: str, in_folder: Path) -> None:
     assert "no finished run in runs; first do: walkers run fig1b" in _message(command, "fig1b")
     (in_folder / "empty").mkdir()

@@ -12,12 +12,14 @@ from scipy.spatial.transform import Rotation
 
 from tests.conftest import call
 from walkers.inputs import InputError
+from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Plane
 from walkers.postprocess import read_motion
 from walkers.postprocess.analysis import current_result
 from walkers.postprocess.film_stage import Stage
 from walkers.postprocess.film_times import film_times, positions_at, round_below
 from walkers.postprocess.films import parse_size, told_speed
 from walkers.postprocess.motion import Motion
+from walkers.postprocess.paraview import boundary_of
 from walkers.postprocess.rolling import turns_of
 from walkers.postprocess.scene import camera_axes
 
@@ -169,3 +171,28 @@ def test_words_and_numbers() -> None:
     assert [told_speed(slowdown) for slowdown in (20.0, 1.0, 0.5)] == ["20 × slower", "real time", "2 × faster"]
     assert [round_below(value) for value in (33.3, 20.0, 0.99, 7.0)] == [20.0, 20.0, 0.5, 5.0]
     assert (parse_size("720p"), parse_size("640x360")) == ((1280, 720), (640, 360))
+
+
+@pytest.mark.parametrize(
+    ("boundary", "faces"),
+    [
+        (Plane(material="glass"), 1),
+        (Channel(material="glass", width=2e-3), 3),
+        (Box(material="glass", width=2e-3, height=4e-3), 5),
+        (Cylinder(material="glass", width=2e-3, height=4e-3), 65),
+    ],
+)
+def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Boundary, faces: int) -> None:
+    """Beads high above the floor of a container, or far from the middle of what has no end."""
+    away = [0.0, 0.0, 2e-3] if boundary.closed else [5e-2, 0.0, 0.0]
+    beads = motion.position - motion.position.mean(axis=(0, 1)) + away
+    moved = replace(motion, position=0.1 * (beads - away) + away, case=replace(motion.case, boundary=boundary))
+    walls = boundary_of(moved).clean(tolerance=1e-9, absolute=True)
+    assert walls.n_cells == faces
+    assert walls.bounds[4] == pytest.approx(0.0, abs=1e-12)
+    assert (
+        walls.extract_feature_edges(
+            boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
+        ).n_cells
+        == {1: 4, 3: 8, 5: 4, 65: 64}[faces]
+    )  # no seams but the rim, or the ends

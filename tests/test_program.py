@@ -24,7 +24,7 @@ def _walkers(*arguments: str) -> str:
 
 def test_help_names_every_command() -> None:
     shown = _walkers("--help")
-    for command in ("show", "deck", "run", "result", "plot", "vtk", "render", "audit"):
+    for command in ("show", "deck", "run", "result", "plot", "vtk", "render", "film", "paraview", "export", "audit"):
         assert command in shown
         assert call(command, "--help", check=True).stdout.strip()
     assert not set(shown) & set("╭│╰─"), "boxes are for terminals"

@@ -56,7 +56,8 @@ def test_the_axis_with_most_values_is_x_and_the_other_has_colours(looked_through
 
 def test_a_third_axis_has_panels_with_the_same_scales(looked_through: Path) -> None:
     first, second = _panels(walkers.sweep_figure(looked_through / "three"))
-    assert [axes.get_title() for axes in (first, second)] == ["frequency = 60 Hz", "frequency = 80 Hz"]
+    titles = [axes.get_title(loc="left") for axes in (first, second)]
+    assert titles == ["(a) frequency = 60 Hz", "(b) frequency = 80 Hz"]
     assert first.get_ylim() == second.get_ylim()
     assert [len(_drawn(axes)) for axes in (first, second)] == [2, 2]
     table = walkers.load(looked_through / "three")
@@ -112,7 +113,7 @@ def test_keys_that_go_together_are_one_factor() -> None:
     """A zip of equal numbers, one of texts, and one that only together tell its points apart."""
 
     def factors(units: dict[str, str | None], values: list[list[Any]]) -> list[tuple[tuple[str, ...], list[Any], bool]]:
-        record = SweepRecord(Path("x"), "x", "", units, values, [[]] * len(values), [""] * len(values), None, [])
+        record = SweepRecord(Path("x"), "x", "", units, values, [[]] * len(values), [""] * len(values), None, [], {})
         return [(one.keys, one.levels, one.is_sample) for one in factors_of(record)]
 
     both = {"contact.friction.bead_wall": None, "contact.friction.bead_bead": None}
@@ -198,7 +199,7 @@ def test_what_would_take_too_many_panels_is_not_told_apart() -> None:
     """Of five keys of three values one is along x, one has colours, and two have nine panels: the last is named."""
     keys = ["drive.frequency", *(f"contact.friction.{name}" for name in ("a", "b", "c", "d"))]
     rows = [list(row) for row in product((1.0, 2.0, 3.0), repeat=5)]
-    record = SweepRecord(Path("x"), "x", "", dict.fromkeys(keys), rows, [[]] * 243, [""] * 243, None, [])
+    record = SweepRecord(Path("x"), "x", "", dict.fromkeys(keys), rows, [[]] * 243, [""] * 243, None, [], {})
     table = pd.DataFrame(rows, columns=pd.Index(keys)).assign(point=range(243))
     table.attrs["units"] = {}
     layout = layout_of(record, table)

@@ -151,14 +151,18 @@ def _library() -> str:
     for entry in contents["surface_pairs"]:
         numbers = {key: one for key, one in entry.items() if key != "materials"}
         text += f"\n### {' on '.join(entry['materials'])}\n\n{_sourced(numbers)}"
-    return text
+    rows = ((f"`{key}`", str(one.get("usual", "")), _range(one)) for key, one in contents["unmeasured"].items())
+    return f"{text}\n## What nobody has measured\n\n{_table(['', 'usual', 'range'], rows)}"
 
 
 def _sourced(entries: Mapping[str, Any]) -> str:
     linked = {key: _PAGE.sub(r"[docs/\1](../../\1)", one["source"]) for key, one in entries.items()}
-    return _table(
-        ["", "value", "source"], ((f"`{key}`", str(one["value"]), linked[key]) for key, one in entries.items())
-    )
+    rows = ((f"`{key}`", str(one["value"]), _range(one), linked[key]) for key, one in entries.items())
+    return _table(["", "value", "range", "source"], rows)
+
+
+def _range(entry: Mapping[str, Any]) -> str:
+    return f"{entry['range'][0]} to {entry['range'][1]}" if "range" in entry else ""
 
 
 def _shipped() -> str:
