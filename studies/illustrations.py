@@ -281,18 +281,18 @@ def facts_in(page: Path) -> list[tuple[str, str]]:
 
 
 def output_of(command: str, out: Path) -> str:
-    """What a command of this program prints; runs are in ``runs``, wherever that is.
+    """What a command on a case prints; runs are in ``runs``, wherever that is.
 
     Raises
     ------
     subprocess.CalledProcessError
         If it fails.
     """
-    words = [sys.executable, "-m", "walkers.main", *shlex.split(command)[1:]]
-    if words[3] in ("run", "theory", "sweep", "crosscheck", "result"):
-        words += ["--out", str(out)]
-    if words[3] == "run":
-        words.append("--force")  # else it says that it was run already
+    _, name, *arguments = shlex.split(command)
+    if name == "theory":
+        run(load_case(arguments[0]), out)  # which it prints beside the models
+    words = [sys.executable, "-m", "walkers.main", name, *arguments, "--out", str(out)]
+    words += ["--force"] if name == "run" else []  # else it says that it was run already
     printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     return printed.replace(str(out), "runs")
 

@@ -53,9 +53,9 @@ def test_every_picture_of_the_pages_is_made_by_the_command() -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_outputs_on_pages_are_todays(page: Path, runs_folder: Path) -> None:
+def test_outputs_on_pages_are_todays(page: Path, tmp_path: Path) -> None:
     for command, text in outputs_in(page).items():
-        assert text == without_hashes(output_of(command, runs_folder)), command
+        assert text == without_hashes(output_of(command, tmp_path)), command
 
 
 def test_numbers_in_sentences_are_the_comparisons() -> None:
@@ -65,14 +65,14 @@ def test_numbers_in_sentences_are_the_comparisons() -> None:
     assert [(page, name, known[name]) for page, name, _ in quoted] == quoted
 
 
-def test_pages_are_written_anew(tmp_path: Path, runs_folder: Path) -> None:
+def test_pages_are_written_anew(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(
         "Walks at <!--fact fig4b_velocity-->9.99<!--/fact--> mm/s.\n\n<!--output-->\n```console\n"
         "$ walkers theory fig1b\nsomething old\n```\n\n```console\n$ walkers show fig1b\n...\n```\n"
     )
     other = shutil.copy(DOCS / "index.md", tmp_path)
-    assert refresh_pages([page, Path(other)], facts(DOCS), runs_folder) == [page]
+    assert refresh_pages([page, Path(other)], facts(DOCS), tmp_path) == [page]
     text = page.read_text()
     assert f"<!--fact fig4b_velocity-->{facts(DOCS)['fig4b_velocity']}<!--/fact--> mm/s" in text
     assert "something old" not in text
