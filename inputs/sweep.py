@@ -185,7 +185,11 @@ def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) ->
         except (AttributeError, UnusableAxisError) as error:
             raise InputError(str(sweep), [Problem("set", None, f"expected a table of keys ({error})")]) from error
         name = _name_with(name, changes)
-    return expand(document, source=str(sweep), name=name, folder=path.parent)
+    made = expand(document, source=str(sweep), name=name, folder=path.parent)
+    told = "varies in this sweep: it cannot be set as well"
+    if problems := [Problem(key, f'"{value}"', told) for key, value in (changes or {}).items() if key in made.keys]:
+        raise InputError(str(sweep), problems)
+    return made
 
 
 def _name_with(name: str, changes: Mapping[str, Value]) -> str:
@@ -220,8 +224,6 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         settings = flatten(file.set, lambda _: False)
         given = read_toml(base)
         for key in (*settings, *keys):
-            if key in settings and key in keys:
-                raise UnusableAxisError(key, settings[key], "varies: it cannot be set as well")
             if key == "title" and key in keys:
                 raise UnusableAxisError(key, None, "does not vary: points with other titles alone are the same run")
             check_key(key)

@@ -143,6 +143,9 @@ def _value(observation: Observation, experiments: pd.DataFrame) -> float:
         return np.nan
 
 
+_NO_RANGE = 1e-6
+
+
 @styled
 def fig_sensitivity(sources: Sources) -> Figure:
     """A tornado plot: a panel an observation, a bar a parameter from its lower to its higher value."""
@@ -184,5 +187,8 @@ def _tornado(axes: Axes, found: pd.DataFrame, observation: Observation) -> None:
         axes.set_title("shipped: none on the axis")
     axes.axvline(observation.published, color="C1", ls="--", lw=1.4, label="published")
     axes.margins(x=0.08)
+    low, high = axes.get_xlim()
+    if high - low < _NO_RANGE:  # nothing changes it: a scale of its rounding would say nothing
+        axes.set_xlim(low - 1.0, high + 1.0)
     axes.set_xlabel(observation.name)
     axes.grid(axis="y", visible=False)

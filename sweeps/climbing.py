@@ -21,7 +21,6 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.postprocess.clusters import Climb, ClimbCriteria
 from walkers.postprocess.piles import Pile, analyse, classified
 from walkers.runner.directory import CASE_NAME, finished_run
-from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.record import RECORD_NAME, read_record, result_in, states
 
@@ -57,7 +56,7 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
     runs = [run for path in found if (run := finished_run(path)) is not None]
     try:
         piles = {run.directory.name.rpartition("-")[2]: run for run in runs if Pile().applies(run.case)}
-        cases = {run.directory: _conditions(read_json(run.directory / CASE_NAME)) for run in piles.values()}
+        cases = {run.directory: _conditions(run.case.determinants()) for run in piles.values()}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(str(directory), [Problem("", None, f"a case cannot be read ({error})")]) from error
     if not cases:

@@ -12,6 +12,7 @@ from walkers.inputs.axes import sampled, unit_of
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.origins import Origin
+from walkers.inputs.readable import readable_unit
 from walkers.inputs.sweep import Sweep
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_name
@@ -207,7 +208,6 @@ _WORDS = {
 }
 _DIGITS = 5
 """After the point, of what is shown: less than 1e-5 mm/s is 0."""
-_SHOWN = {"m/s": ("mm/s", 1e3), "m": ("mm", 1e3)}
 
 
 def describe(spread: Spread) -> str:
@@ -217,13 +217,12 @@ def describe(spread: Spread) -> str:
     lines = [f"  spread     over {points} points, each of these drawn from its range by itself:"]
     lines += [f"             {one.key} {one.range[0]} to {one.range[1]}" for one in spread.varied if one.range]
     for name, band in spread.bands.items():
-        unit, factor = _SHOWN.get(units[name], (units[name], 1.0))
-        low, median, high, smallest, largest = (
-            f"{round(value * factor, _DIGITS):.3g}"
-            for value in (band.low, band.median, band.high, band.smallest, band.largest)
+        unit, size = readable_unit(units[name])
+        shown = {key: f"{round(value / size, _DIGITS):.3g}" for key, value in asdict(band).items()}
+        lines.append(
+            f"    {name:9}{shown['low']} to {shown['high']} {unit} (5 to 95 %), median {shown['median']}; "
+            f"smallest {shown['smallest']}, largest {shown['largest']}"
         )
-        shown = f"{low} to {high} {unit}".rstrip()
-        lines.append(f"    {name:9}{shown} (5 to 95 %), median {median}; smallest {smallest}, largest {largest}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
         lines.append(
             f"             depends most on {ranks} (rank correlation)"

@@ -177,7 +177,7 @@ def test_a_sweep_with_a_setting_has_a_directory_of_its_own(in_folder: Path) -> N
     assert "runs/fig4,run.cycles=8" in planned
     told = call("sweep", "fig4", "--set", "liquid.name=Si AK5")
     assert told.returncode == 2
-    assert 'liquid.name = "Si AK5": varies: it cannot be set as well' in told.stderr
+    assert 'liquid.name = "Si AK5": varies in this sweep: it cannot be set as well' in told.stderr
 
 
 def test_show_says_where_values_come_from() -> None:
