@@ -597,10 +597,10 @@ def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch
     cases = {}
     for name, seed, cycles in (("a-1", 1, 40), ("b-2", 1, 80), ("c-3", 2, 40), ("d-4", 2, 20)):
         (tmp_path / name).mkdir()
-        text = json.dumps({"seed": seed, "run": {"cycles": cycles, "cycles_per_segment": 20}, "gravity": 9.81})
-        for file in ("case.json", "manifest.json"):
-            (tmp_path / name / file).write_text(text)
-        cases[tmp_path / name] = SimpleNamespace(directory=tmp_path / name, case=None)
+        told = {"seed": seed, "run": {"cycles": cycles, "cycles_per_segment": 20}, "gravity": 9.81}
+        (tmp_path / name / "manifest.json").write_text("{}")
+        case = SimpleNamespace(determinants=lambda told=told: told)
+        cases[tmp_path / name] = SimpleNamespace(directory=tmp_path / name, case=case)
     monkeypatch.setattr("walkers.sweeps.climbing.finished_run", cases.get)
     monkeypatch.setattr(Pile, "applies", lambda self, case: True)
     assert piles_in(tmp_path) == {"": [tmp_path / "b-2", tmp_path / "c-3"]}
