@@ -5,11 +5,12 @@ This is what the deck is rendered from, what a run directory stores as ``case.js
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from math import cos, hypot, inf, isclose, sin
 from typing import Annotated, Any
+from zlib import crc32
 
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -119,9 +120,9 @@ class Case:
     """Bodies on a boundary under a drive, resolved.
 
     Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²). ``seed`` is that of all that is drawn at
-    the start. ``name``, ``title``, ``document`` (the tables that it was read from) and ``recorded`` (the `origins` that
-    were written down with a run) do not determine the run: they stay out of `determinants`, the latter two out of
-    comparisons too.
+    the start. ``name``, ``title``, ``document`` (the tables that it was read from), ``recorded`` (the `origins` that
+    were written down with a run) and ``fingerprint`` (of what these two tell of) do not determine the run: they stay
+    out of `determinants`, the last three out of comparisons too.
 
     Raises
     ------
@@ -145,6 +146,7 @@ class Case:
     run: Run
     document: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
     recorded: tuple[Origin, ...] = field(default=(), compare=False, repr=False)
+    fingerprint: int = field(default=0, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse a drive that was changed alone: its step and sampling would be another's."""
@@ -157,12 +159,26 @@ class Case:
 
     @property
     def origins(self) -> tuple[Origin, ...]:
-        """Where each of its values comes from; empty for one that was neither read from tables nor from a run."""
-        return self.recorded or origins_of(self)
+        """Where each of its values comes from; empty for one that was not read, or was changed since."""
+        return (self.recorded or origins_of(self)) if self.as_read else ()
+
+    @property
+    def as_read(self) -> bool:
+        """Whether it is what its document says: it was read, and not changed since."""
+        return bool(self.document) and self.fingerprint == self._fingerprint()
+
+    def _fingerprint(self) -> int:
+        told = (self.walkers, self.mixture, self.placed, self.boundary, self.drive, self.gravity, self.material)
+        return crc32(repr((*told, self.density, self.liquid, self.contact, self.seed, self.run)).encode())
+
+    def read_from(self, document: Mapping[str, Any], recorded: tuple[Origin, ...] = ()) -> Case:
+        """The same with the tables that it was read from, and the origins that were written down with a run."""
+        return replace(self, document=dict(document), recorded=recorded, fingerprint=self._fingerprint())
 
     def for_cycles(self, cycles: int) -> Case:
         """The same for so many cycles at a stretch, of a case whose run ends when its walkers are steady."""
-        return replace(self, run=self.run.for_cycles(cycles))
+        shorter = replace(self, run=self.run.for_cycles(cycles))
+        return shorter.read_from(self.document, self.recorded) if self.as_read else shorter
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -265,13 +281,14 @@ class Case:
 
     def determinants(self) -> dict[str, Any]:
         """Everything that the run's outcome depends on, as plain JSON types."""
-        left_out = {"name", "title", "document", "recorded"}
+        left_out = {"name", "title", "document", "recorded", "fingerprint"}
         values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=left_out)
         return values
 
     def as_dict(self) -> dict[str, Any]:
         """The whole case as plain JSON types, SI units, with the origins of its values."""
-        values: dict[str, Any] = _adapter().dump_python(replace(self, recorded=self.origins), mode="json")
+        told = replace(self, recorded=self.origins, document=self.document if self.as_read else {})
+        values: dict[str, Any] = _adapter().dump_python(told, mode="json", exclude={"fingerprint"})
         return values
 
     @classmethod
@@ -284,7 +301,8 @@ class Case:
             If it is none.
         """
         try:
-            return _adapter().validate_python(values)
+            case = _adapter().validate_python(values)
+            return case.read_from(case.document, case.recorded)
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error

@@ -47,15 +47,18 @@ class Known:
     text
         As the library has it, with its unit.
     source
-        Where it is from; ``calibrated`` if nobody measured it.
+        Where it is from.
     range
         Ends between which a calibrated number may lie as well (5 to 95 % of the posterior), as a case would write them.
+    calibrated_with
+        Names of the liquids of the experiments that it was calibrated to; empty if it was not.
     """
 
     value: float
     text: str
     source: str
     range: tuple[Any, Any] | None = None
+    calibrated_with: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -116,7 +119,13 @@ def surface_pair(first: str | None, second: str | None) -> Mapping[str, Known] |
     """
     for entry in _contents()["surface_pairs"]:
         if sorted(entry["materials"]) == sorted([first or "", second or ""]):
-            return {key: _known(key, known) for key, known in entry.items() if key != "materials"}
+            liquids = tuple(entry["calibrated_with"])
+            source = f"calibrated with {' and '.join(liquids)}"
+            return {
+                key: Known(_number(key, one["value"]), str(one["value"]), source, _range(one), liquids)
+                for key, one in entry.items()
+                if isinstance(one, dict)
+            }
     return None
 
 

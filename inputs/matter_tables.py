@@ -37,7 +37,7 @@ def resolve_matter(file: CaseFile) -> tuple[float, Liquid, Contact, Choices]:
     UnusableKeyError
         If something is missing that the library does not know, or is said twice.
     """
-    choices, bead, wall = Choices(), file.beads.material, file.boundary.material
+    choices, bead, wall = Choices(file.liquid.name), file.beads.material, file.boundary.material
     pair = library.surface_pair(bead, wall) or {}
     density = _density(file, choices)
     return density, _liquid(file.liquid, pair, choices), _contact(file.contact, bead, wall, choices), choices

@@ -6,8 +6,9 @@ with the range in which it may lie: a speed that rests on such values is worth n
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from walkers.inputs.library import Known, unmeasured
@@ -41,6 +42,8 @@ class Origin:
         case gives it, and of what the case calls ``uncertain``.
     logarithmic
         Whether the range is one of magnitudes.
+    uncertain
+        Whether the case calls it so.
     """
 
     key: str
@@ -49,15 +52,23 @@ class Origin:
     source: str = ""
     range: tuple[Any, Any] | None = None
     logarithmic: bool = False
+    uncertain: bool = False
 
     @property
     def guessed(self) -> bool:
-        """Whether it is neither measured nor calibrated: a default of what nobody measures, or called uncertain."""
-        return self.range is not None and self.origin != "calibrated"
+        """Whether it is a default of what nobody measures, or the case calls it uncertain."""
+        return self.uncertain or (self.range is not None and self.origin == "default")
 
 
 class Choices:
     """Chooses, of what may say a value, who says it first; and keeps from where it came.
+
+    What was calibrated with other liquids is a guess for this one.
+
+    Parameters
+    ----------
+    liquid
+        Name of the case's.
 
     Attributes
     ----------
@@ -65,16 +76,16 @@ class Choices:
         Of all that the case does not say itself, by its key.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, liquid: str | None) -> None:
         self.origins: dict[str, Origin] = {}
+        self._liquid = liquid
 
     def choose(self, key: str, given: float | None, known: Known | None) -> float | None:
         """The value of a key as given, else as the library knows it, else as is usual; None if nobody says it."""
         if given is not None:
             return given
         if known is not None:
-            # The range of one that is derived from, such as a viscosity, is the library's affair.
-            self.note(key, known.text, "calibrated" if known.source == "calibrated" else "library", known)
+            self.origins[key] = self._known(key, known)
             return known.value
         loose = unmeasured().get(key)
         if loose is None or loose.usual is None:
@@ -82,11 +93,13 @@ class Choices:
         self.origins[key] = Origin(key, loose.usual.text, "default", "", loose.range, loose.logarithmic)
         return loose.usual.value
 
-    def note(self, key: str, text: str, origin: Whence, known: Known) -> None:
-        """Keep from where a value of the library came."""
+    def _known(self, key: str, known: Known) -> Origin:
         loose = unmeasured().get(key)
-        source = "" if origin == "calibrated" else known.source
-        self.origins[key] = Origin(key, text, origin, source, known.range, loose.logarithmic if loose else False)
+        if loose is None or not known.calibrated_with:
+            return Origin(key, known.text, "library", known.source)
+        if self._liquid in known.calibrated_with:
+            return Origin(key, known.text, "calibrated", known.source, known.range, loose.logarithmic)
+        return Origin(key, known.text, "default", known.source, loose.range, loose.logarithmic)
 
     def derive(self, key: str, text: str, source: str) -> None:
         """Keep from what a value follows."""
@@ -113,7 +126,21 @@ def origins_of(case: Case) -> tuple[Origin, ...]:
         for key, raw, default in _leaves(file, case.document)
         if case.run.rests or key != "run.settled_below"
     ]
-    return tuple(_uncertain(one, file.uncertain) for one in found if one is not None)
+    listed = {one.key: one for one in found if one is not None}
+    # What has no line of its own, such as one of two radii, has one if the case calls it uncertain.
+    alone = {key: Origin(key, _text_at(case.document, key), "given") for key in file.uncertain if key not in listed}
+    return tuple(_uncertain(one, file.uncertain) for one in (listed | alone).values())
+
+
+def _text_at(document: Mapping[str, Any], key: str) -> str:
+    """What a document says at a dotted key, such as ``dimers.radii[1]``; a dash where it says nothing."""
+    value: Any = document
+    for part in re.findall(r"[^.\[\]]+", key):
+        try:
+            value = value[int(part)] if isinstance(value, list) else value[part]
+        except (KeyError, IndexError, TypeError, ValueError):
+            return "-"
+    return text_of(value)
 
 
 def _origin(key: str, raw: Any, default: str | None, known: Mapping[str, Origin]) -> Origin | None:
@@ -131,8 +158,7 @@ def _uncertain(one: Origin, ranges: Mapping[str, Any]) -> Origin:
     if one.key not in ranges:
         return one
     ((distribution, (low, high)),) = ranges[one.key].items()
-    origin: Whence = one.origin if one.origin == "given" else "default"
-    return Origin(one.key, one.text, origin, one.source, (low, high), distribution == "loguniform")
+    return replace(one, range=(low, high), logarithmic=distribution == "loguniform", uncertain=True)
 
 
 def text_of(value: Any) -> str:

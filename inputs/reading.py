@@ -9,7 +9,6 @@ import re
 import stat
 import tomllib
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -149,7 +148,7 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     _refuse_old_words(document, source)
     file = validated(CaseFile, document, source)
     try:
-        return replace(resolve(file, name), document=dict(document))
+        return resolve(file, name).read_from(document)
     except ArithmeticError as error:
         raise InputError(source, [Problem("", None, f"inconsistent values: {error}")]) from error
     except UnusableKeyError as unusable:

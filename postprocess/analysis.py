@@ -221,8 +221,8 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``calibrated`` or ``default``),
-        ``range`` (both ends, or None) and ``logarithmic``.
+        ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``library``, ``calibrated`` or
+        ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.
     """
     return [
         {
@@ -231,6 +231,7 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
             "origin": one.origin,
             "range": list(one.range) if one.range else None,  # as it is read from a file
             "logarithmic": one.logarithmic,
+            "guessed": one.guessed,
         }
         for one in origins
         if one.key in unmeasured() or one.range is not None
@@ -239,24 +240,19 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
 
 def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     """What a result rests on (`rests_on`) as text: guessed, only said by the case, calibrated."""
-    lines = []
-    for head, meaning, chosen in (
-        ("guessed", "", lambda one: one["range"] is not None and one["origin"] != "calibrated"),
-        ("taken", " (as the case says; nobody measured them)", lambda one: one["range"] is None),
-        ("calibrated", "", lambda one: one["origin"] == "calibrated"),
-    ):
-        found = [f"{one['key'].split('.', 1)[1]} {one['value']}" for one in rests if chosen(one)]
-        if found:
-            lines += textwrap.wrap(
-                ", ".join(found) + meaning,
-                _WIDTH,
-                initial_indent=f"  {head:10} ",
-                subsequent_indent=" " * 13,
-                break_on_hyphens=False,
-            )
-    if any(line.startswith("  guessed") for line in lines):
-        lines.append("             this number is worth what they are; a band instead: walkers run CASE --spread")
-    return lines
+    guessed = [one for one in rests if one["guessed"]]
+    known = [one for one in rests if not one["guessed"]]
+    lines = _listed("guessed", guessed)
+    if guessed:
+        lines.append("             the result is worth what these are; a band instead: walkers run CASE --spread")
+    lines += _listed("as given", [one for one in known if one["origin"] == "given"])
+    return lines + _listed("calibrated", [one for one in known if one["origin"] == "calibrated"])
+
+
+def _listed(head: str, chosen: Sequence[Mapping[str, Any]]) -> list[str]:
+    told = ", ".join(f"{one['key'].split('.', 1)[1]} {one['value']}" for one in chosen)
+    indent = {"initial_indent": f"  {head:10} ", "subsequent_indent": " " * 13}
+    return textwrap.wrap(told, _WIDTH, **indent, break_on_hyphens=False) if told else []  # type: ignore[arg-type]
 
 
 def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool = False) -> str:

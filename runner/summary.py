@@ -132,10 +132,14 @@ def _text_of_case(case: dict[str, Any]) -> str:
 
 def _whence(one: dict[str, Any]) -> str:
     """Where a value comes from, in a few words."""
-    origin, source = one["origin"], one["source"]
+    origin, source = str(one["origin"]), str(one["source"])
     ends = f", may be {one['range'][0]} to {one['range'][1]}" if one["range"] else ""
-    if origin == "default" and ends:
-        return f"guessed (nobody measured it){ends}"
+    if one["uncertain"]:
+        ends = f", called uncertain{ends}"
+    elif origin == "default" and ends:
+        return f"guessed ({source or 'nobody measured it'}){ends}"
+    elif origin == "calibrated":
+        return source + ends
     return (f"{origin}: {source}" if source else origin) + ends
 
 

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.axes import sampled, unit_of
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin
 from walkers.inputs.readable import readable_unit
 from walkers.inputs.sweep import Sweep
+from walkers.postprocess.walking import SEPARATED
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_name
 from walkers.sweeps.columns import analyses_of_all, headlines, result_columns
@@ -52,8 +54,10 @@ class Spread:
         The sweep's, with a table of all points.
     varied
         What was drawn, each from its range.
+    held
+        What nobody measured but the case gives: it stayed as it is.
     bands
-        Of the results that count, by the columns of the sweep's table.
+        Of the results that count, by the columns of the sweep's table; without walkers that came apart.
     depends
         For each of these columns, rank correlations (Spearman) with what was drawn, the strongest first; only those
         beyond two standard errors of none.
@@ -65,6 +69,7 @@ class Spread:
 
     directory: Path
     varied: tuple[Origin, ...]
+    held: tuple[Origin, ...]
     bands: Mapping[str, Band]
     depends: Mapping[str, Mapping[str, float]]
     counts: Mapping[str, int]
@@ -75,6 +80,7 @@ class Spread:
         return {
             "directory": str(self.directory),
             "varied": [asdict(one) for one in self.varied],
+            "held": [asdict(one) for one in self.held],
             "bands": {key: asdict(band) for key, band in self.bands.items()},
             "depends": {key: dict(ranks) for key, ranks in self.depends.items()},
             "counts": dict(self.counts),
@@ -87,14 +93,17 @@ def uncertain(case: Case) -> tuple[Origin, ...]:
     return tuple(one for one in case.origins if one.range is not None)
 
 
-def spread_sweep(case: Case, points: int = POINTS) -> Sweep:
+def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
     """A sweep over all that is uncertain in a case, by Sobol's sequence: more points go on where fewer ended.
 
     Raises
     ------
     InputError
-        If nothing in it is.
+        If nothing in it is, or the case was changed after it was read.
     """
+    if not case.as_read:
+        told = "was changed after it was read; expected a case as load_case(name, changes) gives it"
+        raise InputError(case.name, [Problem("", None, told)])
     varied = uncertain(case)
     if not varied:
         told = "nothing here is uncertain: say ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
@@ -103,7 +112,7 @@ def spread_sweep(case: Case, points: int = POINTS) -> Sweep:
     axis = sampled("sobol", points, _SEED, ranges)
     units = tuple(unit_of(key, [row[number] for row in axis.rows]) for number, key in enumerate(axis.keys))
     return Sweep(
-        name=f"{run_name(case, find_engine())}-spread",
+        name=f"{run_name(case, find_engine(engine))}-spread",
         title=f"{case.title or case.name}: what nobody measured, over its ranges",
         source=case.name,
         case_name=case.name,
@@ -154,19 +163,21 @@ def run_spread(
     """
     from walkers.sweeps.table import load
 
-    sweep = spread_sweep(case, points)
+    sweep = spread_sweep(case, points, engine)
     record, failures = run_sweep(
         sweep, out, options, engine=engine, allow_failed_audit=allow_failed_audit, on_progress=on_progress
     )
     table = load(record.directory)
     table = table[table["status"] == "finished"]
+    together = table[~(table["separated_fraction"] > SEPARATED)] if "velocity" in table else table
     names = analyses_of_all([case])
     shown = [name for name in headlines(names) if name in result_columns(names)]
     return Spread(
         directory=record.directory,
         varied=uncertain(case),
-        bands={name: _band(table[name]) for name in shown if table[name].notna().any()},
-        depends={name: _ranks(table, name, sweep.keys) for name in shown},
+        held=tuple(one for one in case.origins if one.key in unmeasured() and one.range is None),
+        bands={name: _band(together[name]) for name in shown if together[name].notna().any()},
+        depends={name: _ranks(together, name, sweep.keys) for name in shown},
         counts=_counts(table) if "velocity" in table else {},
         failures=tuple(failures),
     )
@@ -189,8 +200,6 @@ def _ranks(table: pd.DataFrame, name: str, keys: tuple[str, ...]) -> dict[str, f
 
 
 def _counts(table: pd.DataFrame) -> dict[str, int]:
-    from walkers.postprocess.walking import SEPARATED
-
     together = table[table["separated_fraction"] <= SEPARATED]
     return {
         "forward": int((together["velocity"] > _AT_REST).sum()),
@@ -203,7 +212,7 @@ def _counts(table: pd.DataFrame) -> dict[str, int]:
 _WORDS = {
     "forward": "walk toward the large bead",
     "backward": "walk toward the small one",
-    "at_rest": "rest",
+    "at_rest": "rest (below 0.02 mm/s)",
     "separated": "come apart",
 }
 _DIGITS = 5
@@ -216,6 +225,9 @@ def describe(spread: Spread) -> str:
     points = max((band.points for band in spread.bands.values()), default=0)
     lines = [f"  spread     over {points} points, each of these drawn from its range by itself:"]
     lines += [f"             {one.key} {one.range[0]} to {one.range[1]}" for one in spread.varied if one.range]
+    if spread.held:
+        told = ", ".join(f"{one.key} {one.text}" for one in spread.held)
+        lines.append(f"    as given {told}: to be drawn too, they need ranges in [uncertain]")
     for name, band in spread.bands.items():
         unit, size = readable_unit(units[name])
         shown = {key: f"{round(value / size, _DIGITS):.3g}" for key, value in asdict(band).items()}

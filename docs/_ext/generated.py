@@ -149,7 +149,11 @@ def _library() -> str:
             text += f"\n### {name}\n\n{_sourced(entries)}"
     text += "\n## Surfaces that touch\n"
     for entry in contents["surface_pairs"]:
-        numbers = {key: one for key, one in entry.items() if key != "materials"}
+        numbers = {
+            key: {"source": f"calibrated with {' and '.join(entry['calibrated_with'])}", **one}
+            for key, one in entry.items()
+            if isinstance(one, dict)
+        }
         text += f"\n### {' on '.join(entry['materials'])}\n\n{_sourced(numbers)}"
     rows = ((f"`{key}`", str(one.get("usual", "")), _range(one)) for key, one in contents["unmeasured"].items())
     return f"{text}\n## What nobody has measured\n\n{_table(['', 'usual', 'range'], rows)}"

@@ -22,7 +22,11 @@ Limit = Annotated[
 ]
 
 SpreadFlag = Annotated[
-    bool, typer.Option("--spread", help="Run it too with all that nobody measured drawn from its range: a band.")
+    bool,
+    typer.Option(
+        "--spread",
+        help="Also with what is guessed, calibrated or uncertain drawn from its range: a band.",
+    ),
 ]
 Points = Annotated[int | None, typer.Option("--points", min=2, max=4096, help="Of the spread; 32 if left out.")]
 
@@ -72,6 +76,7 @@ def command(
             print(done.describe())
         if band and not as_json:
             print(_described(band))
+        failed += bool(band and band.failures)
     return 1 if failed else 0
 
 
