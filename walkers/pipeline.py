@@ -223,6 +223,7 @@ def run(
     from walkers.sweeps.shared_deck import check_audit, make_runs
 
     case = load_case(case) if isinstance(case, (str, Path)) else case
+    _check_changed(case)
     binary = find_engine(engine)
     place = run_place(case, binary, out)
     there = finished_place(out, place.name)
@@ -238,6 +239,18 @@ def run(
     if made.busy:
         raise RunBusy(unfinished(place))
     return Run(made.runs[place.name].directory, cached=place.name in made.found, origins=case.origins)
+
+
+def _check_changed(case: Case) -> None:
+    """Refuse a case that was changed after it was read and whose time step no longer suits it."""
+    from walkers.inputs.run_tables import limits_of
+
+    exceeded = [] if case.as_read else limits_of(case).exceeded_by(case.run.time_step)
+    if exceeded:
+        told = (
+            f"beyond the {' and the '.join(exceeded)} limit of the case as it was changed: use load_case(name, changes)"
+        )
+        raise InputError(case.name, [Problem("run.time_step", f"{case.run.time_step:.3g} s", told)])
 
 
 def _load_postprocess() -> None:
