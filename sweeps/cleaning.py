@@ -53,7 +53,7 @@ class Cleaning:
     @property
     def size(self) -> int:
         """Bytes that it frees."""
-        return sum(entry.size for entry in self.remove if not entry.is_sweep)
+        return sum(_bytes(entry) for entry in self.remove)
 
     def as_text(self) -> str:
         """What goes, what of sweeps, what stays, and how much it is."""
@@ -92,10 +92,17 @@ class Cleaning:
 
 
 def _size(entry: Entry) -> str:
-    return "" if entry.is_sweep else bytes_text(entry.size)
+    return "" if entry.is_sweep else bytes_text(_bytes(entry))
+
+
+def _bytes(entry: Entry) -> int:
+    """What its removal frees: nothing behind a symbolic link, and of a sweep none of its runs."""
+    return 0 if entry.is_sweep or entry.directory.is_symlink() else entry.size
 
 
 def _why(entry: Entry) -> str:
+    if entry.directory.is_symlink():
+        return "a symbolic link: what it leads to stays"
     if entry.status == "interrupted" and not entry.is_sweep:
         return "would go on where it was"
     return entry.reason or ""
@@ -151,6 +158,8 @@ def plan_cleaning(
             reason = f"finished, of the sweep {sweeps_of[entry.name][0]} (give its name to remove it)"
         elif entry.directory.name.endswith(REPLACED) and not entry.place.exists():
             reason = "about to be put back in its place"
+        elif entry.directory.parent.parent.name == FOLDER and entry.directory.parent.is_symlink():
+            reason = "in an ensemble behind a symbolic link"
         if reason is not None:
             kept[reason] = kept.get(reason, 0) + 1
         return reason is not None
@@ -188,7 +197,7 @@ def _place(lock: Path) -> Path:
     return lock.with_name(lock.name.removesuffix(".lock"))
 
 
-def clean(cleaning: Cleaning) -> list[Path]:
+def clean(cleaning: Cleaning) -> dict[Path, str]:
     """Remove what was planned.
 
     Parameters
@@ -198,22 +207,27 @@ def clean(cleaning: Cleaning) -> list[Path]:
 
     Returns
     -------
-    list of Path
-        What is still there, for a process has begun to make it meanwhile.
+    dict
+        What is still there, and why: a process has begun to make it meanwhile, or the system refused.
     """
-    left = []
+    left = {}
     for directory, places in _units(cleaning.remove).items():
         with locked(places) as ours:
             if len(ours) < len(places):
-                left.append(directory)
+                left[directory] = "a process has begun to make it, it stays"
                 continue
-            for place in places:
-                recover(place)
-            _remove(directory)
+            try:
+                for place in places:
+                    recover(place)
+                _remove(directory)
+            except OSError as error:
+                left[directory] = _refused(error)
     for sweep in cleaning.remove:
         if sweep.is_sweep:
-            (sweep.directory / RECORD_NAME).unlink(missing_ok=True)
-            shutil.rmtree(sweep.directory, ignore_errors=True)
+            try:
+                _remove(sweep.directory, RECORD_NAME)
+            except OSError as error:
+                left[sweep.directory] = _refused(error)
     with locked(_place(lock) for lock in cleaning.locks if lock.exists()):
         pass  # a lock file goes with its lock
     return left
@@ -233,9 +247,17 @@ def _units(remove: Iterable[Entry]) -> dict[Path, list[Path]]:
     return units
 
 
-def _remove(directory: Path) -> None:
-    (directory / MANIFEST_NAME).unlink(missing_ok=True)
-    shutil.rmtree(directory, ignore_errors=True)
+def _refused(error: OSError) -> str:
+    return f"cannot be removed whole: {error.strerror or error} ({error.filename})"
+
+
+def _remove(directory: Path, first: str = MANIFEST_NAME) -> None:
+    """Remove a directory, the file that makes it what it is before all else; of a symbolic link the link alone."""
+    if directory.is_symlink():
+        directory.unlink()
+    elif directory.exists():
+        (directory / first).unlink(missing_ok=True)
+        shutil.rmtree(directory)
     ensemble = directory.parent
     if ensemble.parent.name == FOLDER and not any(path.is_dir() for path in ensemble.iterdir()):
-        shutil.rmtree(ensemble, ignore_errors=True)  # nothing but the deck and the log of runs that are gone
+        shutil.rmtree(ensemble)  # nothing but the deck and the log of runs that are gone

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import walkers
-from tests.conftest import call, document, to_toml
+from tests.conftest import call, document, mounted, to_toml
 from walkers.inputs.readable import differing, flattened
 from walkers.runner.directory import MANIFEST_NAME
 from walkers.runner.ensemble import finished_places
@@ -259,3 +259,28 @@ def test_an_unfinished_ensemble_goes_as_a_whole(out: Path) -> None:
     call("clean", "--yes", check=True)
     assert not unfinished.exists()
     assert before.keys() - finished_places(out).keys() == set(names)
+
+
+def test_clean_removes_nothing_behind_a_symbolic_link(out: Path, tmp_path: Path) -> None:
+    alone = Path("alone.toml")
+    alone.write_text(to_toml(document(run=SHORTEST, drive={"peak_acceleration": "3 g"})))
+    call("run", "alone.toml", check=True)
+    (link,) = out.glob("alone-*")
+    kept = link.rename(tmp_path / "elsewhere")
+    link.symlink_to(kept)
+    before = {path: path.read_bytes() for path in kept.rglob("*") if path.is_file()}
+    told = call("clean", link.name, "--yes", check=True).stdout
+    assert "a symbolic link: what it leads to stays" in told
+    assert "1 finished run to remove, 0 B" in told
+    assert not link.is_symlink()
+    assert {path: path.read_bytes() for path in kept.rglob("*") if path.is_file()} == before
+
+
+def test_clean_reports_what_the_system_does_not_let_it_remove(out: Path) -> None:
+    places = finished_places(out)
+    name, directory = next((name, path) for name, path in places.items() if path.parent.parent.name == "ensembles")
+    with mounted(directory / "busy", "64k"):
+        done = call("clean", name, "--yes")
+        assert (done.returncode, directory.exists()) == (1, True)
+        assert f"{directory}: cannot be removed whole" in done.stderr
+    assert name not in finished_places(out)
