@@ -6,14 +6,13 @@ removal be interrupted, what is left is no run, and goes the next time.
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from walkers.inputs.errors import InputError, Problem
-from walkers.runner.directory import REPLACED, UNFINISHED, recover
+from walkers.runner.directory import REPLACED, UNFINISHED, is_run_name, recover
 from walkers.runner.ensemble import FOLDER
 from walkers.runner.locks import is_locked, locked
 from walkers.runner.manifest import MANIFEST_NAME
@@ -21,7 +20,6 @@ from walkers.sweeps.inventory import Entry, inventory, select
 from walkers.sweeps.listing import age_text, aligned, bytes_text
 from walkers.sweeps.record import RECORD_NAME, read_record
 
-_LOCK = re.compile(r".+-[0-9a-f]{12}\.lock")
 LEFTOVERS = ("interrupted", "failed")
 _MOST_LINES = 40
 
@@ -190,7 +188,7 @@ def _given(given: Sequence[str], entries: Sequence[Entry], sweeps_of: Mapping[st
 
 
 def _locks(out: Path) -> list[Path]:
-    return [path for path in sorted(out.glob("*.lock")) if _LOCK.fullmatch(path.name)]
+    return [path for path in sorted(out.glob("*.lock")) if is_run_name(path.stem)]
 
 
 def _place(lock: Path) -> Path:

@@ -18,7 +18,14 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.readable import agrees, flattened, has_key
 from walkers.inputs.units import Kind, parse_quantity
 from walkers.postprocess.analysis import RESULT_NAME
-from walkers.runner.directory import CASE_NAME, FAILURE_NAME, REPLACED, UNFINISHED
+from walkers.runner.directory import (
+    CASE_NAME,
+    FAILURE_NAME,
+    REPLACED,
+    UNFINISHED,
+    holds_unfinished,
+    is_run_name,
+)
 from walkers.runner.ensemble import FOLDER
 from walkers.runner.files import read_json
 from walkers.runner.locks import is_locked
@@ -128,8 +135,9 @@ def _runs(out: Path) -> Iterator[Entry]:
             seen.add(run.place)
             yield run
     for ensemble in _folders(out / FOLDER):
-        for path in _folders(ensemble):
-            if (run := _run(path, out, whole=not ensemble.name.endswith((UNFINISHED, REPLACED)))) is not None:
+        name = _place_name(ensemble)
+        for path in _folders(ensemble) if name == ensemble.name or is_run_name(name) else ():
+            if (run := _run(path, out, whole=name == ensemble.name)) is not None:
                 seen.add(run.place)
                 yield run
     for lock in out.glob(f"*{_LOCK}"):  # a run whose directory is about to be made
@@ -138,15 +146,21 @@ def _runs(out: Path) -> Iterator[Entry]:
             yield Entry(place.name, place.name.rpartition("-")[0], "running", place, place, time.time(), 0)
 
 
+def _place_name(path: Path) -> str:
+    return path.name.removesuffix(UNFINISHED).removesuffix(REPLACED)
+
+
 def _run(path: Path, out: Path, *, whole: bool = True) -> Entry | None:
     """The run in a directory; None if there is none."""
-    name = path.name.removesuffix(UNFINISHED).removesuffix(REPLACED)
+    name = _place_name(path)
     finished = whole and name == path.name and (path / MANIFEST_NAME).is_file()
+    if not (finished or is_run_name(name)):  # a folder of somebody's, whatever is in it
+        return None
     try:
         case = read_json(path / CASE_NAME)
         parameters, case_name = flattened(case), str(case["name"])
     except (OSError, ValueError, KeyError, TypeError):
-        if not finished and name == path.name:  # some other folder
+        if not is_run_name(name) or not (finished or (name != path.name and holds_unfinished(path))):
             return None
         parameters, case_name = {}, name.rpartition("-")[0]
     size, newest = weigh(path)

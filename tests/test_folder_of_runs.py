@@ -284,3 +284,23 @@ def test_clean_reports_what_the_system_does_not_let_it_remove(out: Path) -> None
         assert (done.returncode, directory.exists()) == (1, True)
         assert f"{directory}: cannot be removed whole" in done.stderr
     assert name not in finished_places(out)
+
+
+def test_clean_takes_no_folder_of_somebody_elses(out: Path) -> None:
+    """Unless it has a run's name and nothing in it but what an unfinished run has."""
+    shipped = next(iter(finished_places(out).values()))
+    theirs = ["thesis.incomplete", "data.replaced", "notes-0123456789ab.incomplete", "mine", "ensembles/old.incomplete"]
+    for name in theirs:
+        (out / name).mkdir()
+        (out / name / "chapter.txt").write_text("mine")
+    shutil.copy(shipped / "case.json", out / "mine")
+    shutil.copy(shipped / "case.json", out / "thesis.incomplete")
+    shutil.copytree(shipped, out / "ensembles" / "old.incomplete" / shipped.name)
+    begun = out / "killed-0123456789ab.incomplete"
+    (begun / "segments").mkdir(parents=True)
+    told = call("clean", "--yes", check=True).stdout
+    assert "1 interrupted run to remove" in told
+    assert not begun.exists()
+    assert all((out / name / "chapter.txt").exists() for name in theirs)
+    done = call("clean", "thesis.incomplete", "--yes")
+    assert (done.returncode, "no run or sweep" in done.stderr) == (2, True)
