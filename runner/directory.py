@@ -165,7 +165,10 @@ def recover(place: Path) -> None:
 
 def holds_unfinished(directory: Path) -> bool:
     """Whether a directory has what that of an unfinished run has: its case, or nothing but what is there before it."""
-    names = {path.name for path in directory.iterdir()}
+    try:
+        names = {path.name for path in directory.iterdir()}
+    except OSError:  # not ours to read
+        return False
     begun = {SEGMENTS, FAILURE_NAME}
     return CASE_NAME in names or all(name in begun or name.startswith(".case.") for name in names)
 

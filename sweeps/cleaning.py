@@ -16,6 +16,7 @@ from walkers.runner.directory import REPLACED, UNFINISHED, is_run_name, recover
 from walkers.runner.ensemble import FOLDER
 from walkers.runner.locks import is_locked, locked
 from walkers.runner.manifest import MANIFEST_NAME
+from walkers.sweeps.belongings import bytes_of, others, own_files
 from walkers.sweeps.inventory import Entry, inventory, select
 from walkers.sweeps.listing import age_text, aligned, bytes_text
 from walkers.sweeps.record import RECORD_NAME, read_record
@@ -72,6 +73,10 @@ class Cleaning:
             f"needed by the sweep {sweep}, which would make them again: {n}" for sweep, n in self._needed().items()
         ]
         lines += [f"stays: {number} {reason}" for reason, number in self.kept.items()]
+        for sweep in self.remove:
+            if sweep.is_sweep and not sweep.directory.is_symlink() and (theirs := others(sweep.directory)):
+                names = ", ".join(path.name for path in theirs)
+                lines.append(f"stays, for walkers did not write it: {names} (in {sweep.directory})")
         lines.append(f"{self._counted() or 'nothing'} to remove, {bytes_text(self.size)}")
         return "\n".join(lines)
 
@@ -90,12 +95,14 @@ class Cleaning:
 
 
 def _size(entry: Entry) -> str:
-    return "" if entry.is_sweep else bytes_text(_bytes(entry))
+    return bytes_text(_bytes(entry))
 
 
 def _bytes(entry: Entry) -> int:
     """What its removal frees: nothing behind a symbolic link, and of a sweep none of its runs."""
-    return 0 if entry.is_sweep or entry.directory.is_symlink() else entry.size
+    if entry.directory.is_symlink():
+        return 0
+    return sum(map(bytes_of, own_files(entry.directory))) if entry.is_sweep else entry.size
 
 
 def _why(entry: Entry) -> str:
@@ -223,7 +230,7 @@ def clean(cleaning: Cleaning) -> dict[Path, str]:
     for sweep in cleaning.remove:
         if sweep.is_sweep:
             try:
-                _remove(sweep.directory, RECORD_NAME)
+                _remove_sweep(sweep.directory)
             except OSError as error:
                 left[sweep.directory] = _refused(error)
     with locked(_place(lock) for lock in cleaning.locks if lock.exists()):
@@ -249,12 +256,26 @@ def _refused(error: OSError) -> str:
     return f"cannot be removed whole: {error.strerror or error} ({error.filename})"
 
 
-def _remove(directory: Path, first: str = MANIFEST_NAME) -> None:
-    """Remove a directory, the file that makes it what it is before all else; of a symbolic link the link alone."""
+def _remove_sweep(directory: Path) -> None:
+    """Remove what the project wrote into a sweep's directory, the record last, and the directory if that is all."""
+    if directory.is_symlink():
+        directory.unlink()
+        return
+    for path in reversed(own_files(directory)):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+    if not any(directory.iterdir()):
+        directory.rmdir()
+
+
+def _remove(directory: Path) -> None:
+    """Remove a run's directory, its manifest before all else; of a symbolic link the link alone."""
     if directory.is_symlink():
         directory.unlink()
     elif directory.exists():
-        (directory / first).unlink(missing_ok=True)
+        (directory / MANIFEST_NAME).unlink(missing_ok=True)
         shutil.rmtree(directory)
     ensemble = directory.parent
     if ensemble.parent.name == FOLDER and not any(path.is_dir() for path in ensemble.iterdir()):

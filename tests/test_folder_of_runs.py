@@ -19,6 +19,7 @@ from walkers.runner.directory import MANIFEST_NAME
 from walkers.runner.ensemble import finished_places
 from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import locked
+from walkers.sweeps.listing import bytes_text
 
 SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
 
@@ -304,3 +305,23 @@ def test_clean_takes_no_folder_of_somebody_elses(out: Path) -> None:
     assert all((out / name / "chapter.txt").exists() for name in theirs)
     done = call("clean", "thesis.incomplete", "--yes")
     assert (done.returncode, "no run or sweep" in done.stderr) == (2, True)
+
+
+def test_clean_leaves_what_somebody_put_into_a_sweeps_directory(out: Path) -> None:
+    sweep = out / "grid"
+    call("plot", "grid", check=True)
+    assert (sweep / "velocity.png").exists()
+    (sweep / "parsl").mkdir(exist_ok=True)
+    (sweep / "parsl" / "log.txt").write_bytes(b"x" * 3000)
+    written = sum(path.stat().st_size for path in sweep.rglob("*") if path.is_file())
+    theirs = {"notes/idea.txt": "mine", "measured.csv": "1,2", "sliding_1.png": "no figure of walkers"}
+    for name, text in theirs.items():
+        (sweep / name).parent.mkdir(exist_ok=True)
+        (sweep / name).write_text(text)
+    told = call("clean", "grid", "--dry-run", check=True).stdout
+    assert f"1 sweep to remove, {bytes_text(written)}" in told
+    assert "stays, for walkers did not write it: measured.csv, notes, sliding_1.png" in told
+    call("clean", "grid", "--yes", check=True)
+    assert {str(path.relative_to(sweep)): path.read_text() for path in sweep.rglob("*.*")} == theirs
+    call("clean", "rough", "--yes", check=True)
+    assert not (out / "rough").exists()
