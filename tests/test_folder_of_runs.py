@@ -21,6 +21,7 @@ from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import locked
 from walkers.sweeps.listing import bytes_text
 
+STEP = ["run.time_step", "run.steps_per_cycle"]
 SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
 
 
@@ -137,9 +138,34 @@ def test_what_follows_from_another_value_is_no_difference() -> None:
     assert differing(cases[:2]) == ["liquid.name"]
     assert differing([cases[0], cases[2]]) == ["drive.frequency"]
     ratio = flattened(walkers.load_case("fig1b", {"liquid.viscosity_ratio": 2.0}).as_dict())
-    assert differing([cases[0], ratio]) == ["liquid.dynamic_viscosity"]
+    assert differing([cases[0], ratio]) == ["liquid.viscosity_ratio"]
+    assert cases[0]["liquid.dynamic_viscosity"] == ratio["liquid.dynamic_viscosity"] == pytest.approx(4.6e-3)
+    assert (ratio["liquid.viscosity_ratio"], ratio["liquid.film_drag_ratio"]) == (2.0, 0.48)
     step = flattened(walkers.load_case("fig1b", {"run.time_step": "1 us"}).as_dict())
     assert "run.time_step" in differing([cases[0], step])
+
+
+def test_what_a_case_gives_is_a_difference_whatever_else_differs() -> None:
+    def between(*changes: dict[str, Any]) -> list[str]:
+        return differing([flattened(walkers.load_case("fig1b", one).as_dict()) for one in changes])
+
+    other, faster = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}
+    assert between({}, {**faster, "run.time_step": "2 us"}) == ["drive.frequency", *STEP]
+    same = {"run.time_step": "2 us"}
+    assert between(same, {**faster, **same}) == ["drive.frequency"], "fitted into another cycle"
+    assert "run.until_steady" in between({}, {**faster, "run.cycles": 60})
+    assert set(between({}, {**other, "liquid.viscosity_ratio": 1.0})) == {"liquid.name", "liquid.viscosity_ratio"}
+    given = {**other, "liquid.kinematic_viscosity": "20 mm^2/s"}
+    assert set(between({}, given)) == {"liquid.name", "liquid.dynamic_viscosity"}
+    assert set(between({}, {**other, "liquid.surface_tension": "30 mN/m"})) == {"liquid.name", "liquid.surface_tension"}
+
+
+def test_products_of_viscosity_are_called_so_where_nothing_was_recorded() -> None:
+    case = {**walkers.load_case("fig1b").as_dict(), "recorded": []}
+    flat = flattened(case)
+    assert flat["liquid.bridge_viscosity"] == pytest.approx(4.6e-3 * 8.69)
+    assert flat["liquid.film_viscosity"] == pytest.approx(4.6e-3 * 0.48)
+    assert "liquid.dynamic_viscosity" not in flat
 
 
 def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
