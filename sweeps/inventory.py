@@ -9,7 +9,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,8 @@ class Entry:
         Of a run: beside it is the lock, whether the run is alone or in an ensemble.
     modified
         When it was finished, or something was last written to it; seconds since the epoch.
+    seen
+        When the folder was looked through, the same for all that is in it; seconds since the epoch.
     size
         Of its files, of a sweep those of its runs, bytes.
     parameters
@@ -88,6 +90,7 @@ class Entry:
     climbs: int | None = None
     points: Mapping[str, int] | None = None
     runs: Sequence[str] = ()
+    seen: float = field(default_factory=time.time)
 
     @property
     def is_sweep(self) -> bool:
@@ -97,7 +100,7 @@ class Entry:
     @property
     def age(self) -> float:
         """Since it was modified, s."""
-        return max(time.time() - self.modified, 0.0)
+        return max(self.seen - self.modified, 0.0)
 
 
 def inventory(out: Path) -> list[Entry]:
@@ -117,7 +120,9 @@ def inventory(out: Path) -> list[Entry]:
         raise InputError(str(out), [Problem("", None, "expected a folder of runs, this is a file")])
     runs = list(_runs(out))
     sweeps = [sweep for path in _folders(out) if (sweep := _sweep(path, runs)) is not None]
-    return [*sweeps, *sorted(runs, key=lambda run: (run.name, run.status != "finished"))]
+    found = [*sweeps, *sorted(runs, key=lambda run: (run.name, run.status != "finished"))]
+    now = time.time()
+    return [replace(entry, seen=now) for entry in found]
 
 
 def _folders(out: Path) -> list[Path]:
@@ -156,6 +161,7 @@ def _run(path: Path, out: Path, *, whole: bool = True) -> Entry | None:
     finished = whole and name == path.name and (path / MANIFEST_NAME).is_file()
     if not (finished or is_run_name(name)):  # a folder of somebody's, whatever is in it
         return None
+    parameters: Mapping[str, Any]
     try:
         case = read_json(path / CASE_NAME)
         parameters, case_name = flattened(case), str(case["name"])

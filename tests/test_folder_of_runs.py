@@ -99,6 +99,9 @@ def test_list_filters_and_sorts(out: Path) -> None:
     runs = sorted(finished_places(out).values())
     for days, run in ((30, runs[0]), (2, runs[1])):
         os.utime(run / MANIFEST_NAME, (time.time() - days * 86400.0,) * 2)
+    then = time.time() - 3600.0
+    for number, run in enumerate(runs[2:]):  # of an ensemble the manifests are microseconds apart
+        os.utime(run / MANIFEST_NAME, (then + 1e-6 * number,) * 2)
     assert {entry["name"] for entry in _listed("--older-than", "7d")} == {runs[0].name}
     assert {entry["name"] for entry in _listed("--older-than", "24 h")} == {run.name for run in runs[:2]}
     assert _listed("--case", "other") == []
