@@ -30,7 +30,8 @@ def verify(path: Path) -> list[Verification]:
     Returns
     -------
     list of Verification
-        One a run or archive; of a sweep those of its finished runs and of the decks that they shared.
+        One a run or archive; of a sweep that of its points, those of its finished runs and of the decks that they
+        shared.
 
     Raises
     ------
@@ -51,12 +52,18 @@ def verify(path: Path) -> list[Verification]:
 
 
 def _verify_sweep(directory: Path) -> list[Verification]:
-    runs = [
-        state.directory for state in states(read_record(directory)) if state.directory and state.status == "finished"
+    record = read_record(directory)
+    found = states(record)
+    lacking = [
+        f"{run} ({state.status}: point {number})"
+        for number, (run, state) in enumerate(zip(record.runs, found, strict=True))
+        if state.status not in ("finished", "not needed")
     ]
-    runs = list(dict.fromkeys(runs))
+    finished = sum(state.status == "finished" for state in found)
+    points = Verification(record.name, finished, missing=tuple(lacking), of_points=True)
+    runs = list(dict.fromkeys(state.directory for state in found if state.directory and state.status == "finished"))
     decks = dict.fromkeys(run.parent for run in runs if run.parent.parent.name == FOLDER)
-    return [*(verify_run(deck, own=True) for deck in decks), *(verify_run(run) for run in runs)]
+    return [points, *(verify_run(deck, own=True) for deck in decks), *(verify_run(run) for run in runs)]
 
 
 def _verify_unpacked(folder: Path) -> Verification:

@@ -26,7 +26,7 @@ _KINDS: Mapping[str, Kind] = {
     **dict.fromkeys(("radii", "small", "large", "gap", "spacing", "width", "height", "places", "beads"), units.LENGTH),
     **dict.fromkeys(("angle", "angle_spread", "tilt", "uphill", "opening", "phase", "contact_angle"), units.ANGLE),
     **dict.fromkeys(("peak_acceleration", "gravity"), units.ACCELERATION),
-    **dict.fromkeys(("dynamic_viscosity", "film_viscosity"), units.DYNAMIC_VISCOSITY),
+    **dict.fromkeys(("dynamic_viscosity", "bridge_viscosity", "film_viscosity"), units.DYNAMIC_VISCOSITY),
     "frequency": units.FREQUENCY,
     "density": units.DENSITY,
     "surface_tension": units.SURFACE_TENSION,
@@ -41,6 +41,7 @@ _RENAMED = {
     "density": "beads.density",
     "gravity": "environment.gravity",
     "seed": "run.seed",
+    "liquid.dynamic_viscosity": "liquid.bridge_viscosity",
     "contact.friction_bead_bead": "contact.friction.bead_bead",
     "contact.friction_bead_wall": "contact.friction.bead_wall",
 }
@@ -49,16 +50,35 @@ _SOLE = {"walkers[0].": "walkers.", "drive.harmonics[0].": "drive."}
 """Entries of lists that are told by the list's name where they are the only one."""
 _FOLLOWS: Mapping[str, tuple[str, ...] | None] = {
     **dict.fromkeys(("run.time_step", "run.steps_per_cycle", "run.until_steady", "boundary.uphill"), None),
-    **dict.fromkeys(("liquid.surface_tension", "liquid.dynamic_viscosity", "liquid.film_viscosity"), ("liquid.name",)),
-    "liquid.density": ("liquid.name",),
+    **dict.fromkeys(("liquid.surface_tension", "liquid.dynamic_viscosity", "liquid.density"), ("liquid.name",)),
     "beads.density": ("beads.material",),
 }
 """Values that may follow from others: from those of these keys, or (None) from any."""
+_GIVEN_BY: Mapping[str, tuple[str, ...]] = {
+    "run.steps_per_cycle": ("run.time_step",),
+    "run.until_steady": ("run.cycles", "run.duration"),
+    "liquid.dynamic_viscosity": ("liquid.dynamic_viscosity", "liquid.kinematic_viscosity", "liquid.density"),
+}
+"""The keys by which a case file gives such a value, where they are others than its own."""
+_RATIOS = {"liquid.bridge_viscosity": "liquid.viscosity_ratio", "liquid.film_viscosity": "liquid.film_drag_ratio"}
+"""What the laws take is the liquid's viscosity times these."""
 _NOT_COMPARED = ("name", "title", "document", "recorded")
 """What does not determine a run."""
 
 
-def flattened(case: Mapping[str, Any]) -> dict[str, Any]:
+class FlatCase(dict[str, Any]):
+    """The values of a resolved case by dotted key, SI units.
+
+    Attributes
+    ----------
+    given
+        What the case itself says, by a case file's keys, as text; None where that was not recorded with the run.
+    """
+
+    given: Mapping[str, str] | None = None
+
+
+def flattened(case: Mapping[str, Any]) -> FlatCase:
     """The values of a resolved case by dotted key, SI units.
 
     Parameters
@@ -68,9 +88,11 @@ def flattened(case: Mapping[str, Any]) -> dict[str, Any]:
 
     Returns
     -------
-    dict
+    FlatCase
         Keys are a case file's where it has the value, such as ``drive.frequency`` and ``contact.friction.bead_wall``;
         ``walkers.radii`` are those of ``[dimers]`` or ``[[clusters]]``, ``walkers[1].radii`` where there are several.
+        ``liquid.bridge_viscosity`` and ``liquid.film_viscosity`` stand for the liquid's viscosity and its ratios where
+        these were not recorded.
     """
     flat: dict[str, Any] = {}
     for key, value in case.items():
@@ -79,7 +101,39 @@ def flattened(case: Mapping[str, Any]) -> dict[str, Any]:
     for listed, alone in _SOLE.items():
         if not any(key.startswith(listed.replace("0", "1")) for key in flat):
             flat = {alone + key.removeprefix(listed) if key.startswith(listed) else key: flat[key] for key in flat}
-    return {_RENAMED.get(key, key): value for key, value in flat.items()}
+    recorded = {one["key"]: one for one in case.get("recorded") or ()}
+    told = FlatCase(_with_ratios({_RENAMED.get(key, key): value for key, value in flat.items()}, recorded))
+    if recorded:
+        told.given = {key: one["text"] for key, one in recorded.items() if one["origin"] == "given"}
+    return told
+
+
+def _with_ratios(flat: dict[str, Any], recorded: Mapping[str, Any]) -> dict[str, Any]:
+    """A resolved case has the products of viscosity and ratios; the factors are among what was recorded, as texts."""
+    viscosity, ratios = _own_viscosity(flat, recorded)
+    if viscosity is None:
+        return flat
+    told: dict[str, Any] = {}
+    for key, value in flat.items():
+        if key == "liquid.bridge_viscosity":
+            told["liquid.dynamic_viscosity"] = viscosity
+        told |= {_RATIOS[key]: ratios[key]} if key in ratios else {key: value}
+    return told
+
+
+def _own_viscosity(flat: Mapping[str, Any], recorded: Mapping[str, Any]) -> tuple[float | None, dict[str, float]]:
+    """Viscosity of the liquid, Pa s, and the ratios to it by the products' keys; None if they are not recorded."""
+    ratios = {}
+    try:
+        viscosity = units.parse_quantity(recorded["liquid.dynamic_viscosity"]["text"], units.DYNAMIC_VISCOSITY)
+        for product, ratio in _RATIOS.items():
+            ratios[product] = float(recorded[ratio]["text"])
+            # Of a case that was changed since it was read, what is recorded is not what the laws take.
+            if not isclose(viscosity * ratios[product], flat[product], rel_tol=1e-4, abs_tol=1e-12):
+                return None, {}
+    except (KeyError, ValueError):
+        return None, {}
+    return viscosity, ratios
 
 
 def _flatten(key: str, value: Any, flat: dict[str, Any]) -> None:
@@ -135,12 +189,13 @@ def differing(cases: Sequence[Mapping[str, Any]]) -> list[str]:
     -------
     list of str
         In the order of the cases. A time step that ``"auto"`` chose, and the numbers of a liquid that the library
-        knows by name, are left out where they are the same in all cases that agree in what they follow from.
+        knows by name, are left out where they are the same in all cases that agree in what they follow from; what one
+        of the cases gives itself, and another does not or otherwise, never is.
     """
     keys = dict.fromkeys(key for case in cases for key in case)
     values = {key: [_comparable(case.get(key)) for case in cases] for key in keys}
     varied = [key for key, column in values.items() if len(set(column)) > 1]
-    found = [key for key in varied if key not in _FOLLOWS and not key.endswith(".spacing")]
+    found = [key for key in varied if not _may_follow(key, cases)]
 
     def follows(key: str, parents: Sequence[str]) -> bool:
         of_parents: dict[tuple[Hashable, ...], Hashable] = {}
@@ -155,6 +210,20 @@ def differing(cases: Sequence[Mapping[str, Any]]) -> list[str]:
         if not follows(key, found if named is None else named):
             found.append(key)
     return sorted(found, key=varied.index)
+
+
+def _may_follow(key: str, cases: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether a value may follow from others: none of the cases gives it, or all give it in the same words."""
+    if key not in _FOLLOWS and not key.endswith(".spacing"):
+        return False
+    told = set()
+    for case in cases:
+        given = case.given if isinstance(case, FlatCase) else None
+        if given is None:
+            return False
+        keys = [one for one in given if one.endswith(".spacing")] if key not in _FOLLOWS else _GIVEN_BY.get(key, (key,))
+        told.add(tuple(given.get(one) for one in keys))
+    return len(told) == 1
 
 
 def _comparable(value: Any) -> Hashable:

@@ -11,6 +11,7 @@ drive.peak_acceleration = { linspace = ["0.5 g", "10 g", 20] }
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -195,7 +196,12 @@ def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) ->
 def _name_with(name: str, changes: Mapping[str, Value]) -> str:
     """Name of a sweep with changes: another one, so that its table stands beside that of the sweep without."""
     told = ",".join(f"{key}={value}" for key, value in changes.items())
-    return re.sub(r"[^\w.+=,-]+", "_", f"{name},{told}")[:_LONGEST_NAME]
+    full = re.sub(r"[^\w.+=,-]+", "_", f"{name},{told}")
+    if len(full.encode("utf-8", "surrogateescape")) <= _LONGEST_NAME:
+        return full
+    digest = hashlib.sha256(f"{name},{told}".encode("utf-8", "surrogateescape")).hexdigest()[:12]
+    begin = full.encode("utf-8", "surrogateescape")[: _LONGEST_NAME - 13].decode("utf-8", "ignore")
+    return f"{begin}~{digest}"  # with a hyphen it might be a run's name
 
 
 def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Sweep:

@@ -53,6 +53,11 @@ def name_of(case_name: str) -> str:
     return re.sub(r"[^\w.+-]+", "_", case_name)[:_LONGEST_NAME]
 
 
+def is_run_name(name: str) -> bool:
+    """Whether a directory may be a run's, or an ensemble's, by its name: twelve hex digits at the end."""
+    return re.fullmatch(r".+-[0-9a-f]{12}", name) is not None
+
+
 def run_place(case: Case, engine: Engine, out: Path) -> Path:
     """Where the run of a case belongs; one that shared a deck is within an ensemble."""
     return out / run_name(case, engine)
@@ -156,6 +161,16 @@ def recover(place: Path) -> None:
         shutil.rmtree(replaced)
     else:
         replaced.rename(place)
+
+
+def holds_unfinished(directory: Path) -> bool:
+    """Whether a directory has what that of an unfinished run has: its case, or nothing but what is there before it."""
+    try:
+        names = {path.name for path in directory.iterdir()}
+    except OSError:  # not ours to read
+        return False
+    begun = {SEGMENTS, FAILURE_NAME}
+    return CASE_NAME in names or all(name in begun or name.startswith(".case.") for name in names)
 
 
 @contextmanager

@@ -28,6 +28,8 @@ class Verification:
         How many were left out of an archive on purpose.
     by_size
         Whether only sizes could be compared, the run being older than checksums are.
+    of_points
+        Whether it is a sweep's: of its points rather than of files.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Verification:
     missing: tuple[str, ...] = ()
     left_out: int = 0
     by_size: bool = False
+    of_points: bool = False
 
     @property
     def passed(self) -> bool:
@@ -44,7 +47,7 @@ class Verification:
 
     def describe(self) -> str:
         """The outcome, and a line for each file that is not what it was."""
-        told = f"{self.name}: {self.intact} files are what they were"
+        told = f"{self.name}: {self.intact} {'points have their run' if self.of_points else 'files are what they were'}"
         if self.by_size:
             told += " by their sizes (the run is older than checksums)"
         if self.left_out:

@@ -6,22 +6,21 @@ removal be interrupted, what is left is no run, and goes the next time.
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from walkers.inputs.errors import InputError, Problem
-from walkers.runner.directory import REPLACED, UNFINISHED, recover
+from walkers.runner.directory import REPLACED, UNFINISHED, is_run_name, recover
 from walkers.runner.ensemble import FOLDER
 from walkers.runner.locks import is_locked, locked
 from walkers.runner.manifest import MANIFEST_NAME
+from walkers.sweeps.belongings import bytes_of, others, own_files
 from walkers.sweeps.inventory import Entry, inventory, select
 from walkers.sweeps.listing import age_text, aligned, bytes_text
 from walkers.sweeps.record import RECORD_NAME, read_record
 
-_LOCK = re.compile(r".+-[0-9a-f]{12}\.lock")
 LEFTOVERS = ("interrupted", "failed")
 _MOST_LINES = 40
 
@@ -53,7 +52,7 @@ class Cleaning:
     @property
     def size(self) -> int:
         """Bytes that it frees."""
-        return sum(entry.size for entry in self.remove if not entry.is_sweep)
+        return sum(_bytes(entry) for entry in self.remove)
 
     def as_text(self) -> str:
         """What goes, what of sweeps, what stays, and how much it is."""
@@ -74,6 +73,10 @@ class Cleaning:
             f"needed by the sweep {sweep}, which would make them again: {n}" for sweep, n in self._needed().items()
         ]
         lines += [f"stays: {number} {reason}" for reason, number in self.kept.items()]
+        for sweep in self.remove:
+            if sweep.is_sweep and not sweep.directory.is_symlink() and (theirs := others(sweep.directory)):
+                names = ", ".join(path.name for path in theirs)
+                lines.append(f"stays, for walkers did not write it: {names} (in {sweep.directory})")
         lines.append(f"{self._counted() or 'nothing'} to remove, {bytes_text(self.size)}")
         return "\n".join(lines)
 
@@ -92,10 +95,19 @@ class Cleaning:
 
 
 def _size(entry: Entry) -> str:
-    return "" if entry.is_sweep else bytes_text(entry.size)
+    return bytes_text(_bytes(entry))
+
+
+def _bytes(entry: Entry) -> int:
+    """What its removal frees: nothing behind a symbolic link, and of a sweep none of its runs."""
+    if entry.directory.is_symlink():
+        return 0
+    return sum(map(bytes_of, own_files(entry.directory))) if entry.is_sweep else entry.size
 
 
 def _why(entry: Entry) -> str:
+    if entry.directory.is_symlink():
+        return "a symbolic link: what it leads to stays"
     if entry.status == "interrupted" and not entry.is_sweep:
         return "would go on where it was"
     return entry.reason or ""
@@ -151,6 +163,8 @@ def plan_cleaning(
             reason = f"finished, of the sweep {sweeps_of[entry.name][0]} (give its name to remove it)"
         elif entry.directory.name.endswith(REPLACED) and not entry.place.exists():
             reason = "about to be put back in its place"
+        elif entry.directory.parent.parent.name == FOLDER and entry.directory.parent.is_symlink():
+            reason = "in an ensemble behind a symbolic link"
         if reason is not None:
             kept[reason] = kept.get(reason, 0) + 1
         return reason is not None
@@ -181,14 +195,14 @@ def _given(given: Sequence[str], entries: Sequence[Entry], sweeps_of: Mapping[st
 
 
 def _locks(out: Path) -> list[Path]:
-    return [path for path in sorted(out.glob("*.lock")) if _LOCK.fullmatch(path.name)]
+    return [path for path in sorted(out.glob("*.lock")) if is_run_name(path.stem)]
 
 
 def _place(lock: Path) -> Path:
     return lock.with_name(lock.name.removesuffix(".lock"))
 
 
-def clean(cleaning: Cleaning) -> list[Path]:
+def clean(cleaning: Cleaning) -> dict[Path, str]:
     """Remove what was planned.
 
     Parameters
@@ -198,22 +212,27 @@ def clean(cleaning: Cleaning) -> list[Path]:
 
     Returns
     -------
-    list of Path
-        What is still there, for a process has begun to make it meanwhile.
+    dict
+        What is still there, and why: a process has begun to make it meanwhile, or the system refused.
     """
-    left = []
+    left = {}
     for directory, places in _units(cleaning.remove).items():
         with locked(places) as ours:
             if len(ours) < len(places):
-                left.append(directory)
+                left[directory] = "a process has begun to make it, it stays"
                 continue
-            for place in places:
-                recover(place)
-            _remove(directory)
+            try:
+                for place in places:
+                    recover(place)
+                _remove(directory)
+            except OSError as error:
+                left[directory] = _refused(error)
     for sweep in cleaning.remove:
         if sweep.is_sweep:
-            (sweep.directory / RECORD_NAME).unlink(missing_ok=True)
-            shutil.rmtree(sweep.directory, ignore_errors=True)
+            try:
+                _remove_sweep(sweep.directory)
+            except OSError as error:
+                left[sweep.directory] = _refused(error)
     with locked(_place(lock) for lock in cleaning.locks if lock.exists()):
         pass  # a lock file goes with its lock
     return left
@@ -233,9 +252,31 @@ def _units(remove: Iterable[Entry]) -> dict[Path, list[Path]]:
     return units
 
 
+def _refused(error: OSError) -> str:
+    return f"cannot be removed whole: {error.strerror or error} ({error.filename})"
+
+
+def _remove_sweep(directory: Path) -> None:
+    """Remove what the project wrote into a sweep's directory, the record last, and the directory if that is all."""
+    if directory.is_symlink():
+        directory.unlink()
+        return
+    for path in reversed(own_files(directory)):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+    if not any(directory.iterdir()):
+        directory.rmdir()
+
+
 def _remove(directory: Path) -> None:
-    (directory / MANIFEST_NAME).unlink(missing_ok=True)
-    shutil.rmtree(directory, ignore_errors=True)
+    """Remove a run's directory, its manifest before all else; of a symbolic link the link alone."""
+    if directory.is_symlink():
+        directory.unlink()
+    elif directory.exists():
+        (directory / MANIFEST_NAME).unlink(missing_ok=True)
+        shutil.rmtree(directory)
     ensemble = directory.parent
     if ensemble.parent.name == FOLDER and not any(path.is_dir() for path in ensemble.iterdir()):
-        shutil.rmtree(ensemble, ignore_errors=True)  # nothing but the deck and the log of runs that are gone
+        shutil.rmtree(ensemble)  # nothing but the deck and the log of runs that are gone

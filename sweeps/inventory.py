@@ -9,7 +9,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,14 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.readable import agrees, flattened, has_key
 from walkers.inputs.units import Kind, parse_quantity
 from walkers.postprocess.analysis import RESULT_NAME
-from walkers.runner.directory import CASE_NAME, FAILURE_NAME, REPLACED, UNFINISHED
+from walkers.runner.directory import (
+    CASE_NAME,
+    FAILURE_NAME,
+    REPLACED,
+    UNFINISHED,
+    holds_unfinished,
+    is_run_name,
+)
 from walkers.runner.ensemble import FOLDER
 from walkers.runner.files import read_json
 from walkers.runner.locks import is_locked
@@ -50,6 +57,8 @@ class Entry:
         Of a run: beside it is the lock, whether the run is alone or in an ensemble.
     modified
         When it was finished, or something was last written to it; seconds since the epoch.
+    seen
+        When the folder was looked through, the same for all that is in it; seconds since the epoch.
     size
         Of its files, of a sweep those of its runs, bytes.
     parameters
@@ -81,6 +90,7 @@ class Entry:
     climbs: int | None = None
     points: Mapping[str, int] | None = None
     runs: Sequence[str] = ()
+    seen: float = field(default_factory=time.time)
 
     @property
     def is_sweep(self) -> bool:
@@ -90,7 +100,7 @@ class Entry:
     @property
     def age(self) -> float:
         """Since it was modified, s."""
-        return max(time.time() - self.modified, 0.0)
+        return max(self.seen - self.modified, 0.0)
 
 
 def inventory(out: Path) -> list[Entry]:
@@ -110,7 +120,9 @@ def inventory(out: Path) -> list[Entry]:
         raise InputError(str(out), [Problem("", None, "expected a folder of runs, this is a file")])
     runs = list(_runs(out))
     sweeps = [sweep for path in _folders(out) if (sweep := _sweep(path, runs)) is not None]
-    return [*sweeps, *sorted(runs, key=lambda run: (run.name, run.status != "finished"))]
+    found = [*sweeps, *sorted(runs, key=lambda run: (run.name, run.status != "finished"))]
+    now = time.time()
+    return [replace(entry, seen=now) for entry in found]
 
 
 def _folders(out: Path) -> list[Path]:
@@ -128,8 +140,9 @@ def _runs(out: Path) -> Iterator[Entry]:
             seen.add(run.place)
             yield run
     for ensemble in _folders(out / FOLDER):
-        for path in _folders(ensemble):
-            if (run := _run(path, out, whole=not ensemble.name.endswith((UNFINISHED, REPLACED)))) is not None:
+        name = _place_name(ensemble)
+        for path in _folders(ensemble) if name == ensemble.name or is_run_name(name) else ():
+            if (run := _run(path, out, whole=name == ensemble.name)) is not None:
                 seen.add(run.place)
                 yield run
     for lock in out.glob(f"*{_LOCK}"):  # a run whose directory is about to be made
@@ -138,15 +151,22 @@ def _runs(out: Path) -> Iterator[Entry]:
             yield Entry(place.name, place.name.rpartition("-")[0], "running", place, place, time.time(), 0)
 
 
+def _place_name(path: Path) -> str:
+    return path.name.removesuffix(UNFINISHED).removesuffix(REPLACED)
+
+
 def _run(path: Path, out: Path, *, whole: bool = True) -> Entry | None:
     """The run in a directory; None if there is none."""
-    name = path.name.removesuffix(UNFINISHED).removesuffix(REPLACED)
+    name = _place_name(path)
     finished = whole and name == path.name and (path / MANIFEST_NAME).is_file()
+    if not (finished or is_run_name(name)):  # a folder of somebody's, whatever is in it
+        return None
+    parameters: Mapping[str, Any]
     try:
         case = read_json(path / CASE_NAME)
         parameters, case_name = flattened(case), str(case["name"])
     except (OSError, ValueError, KeyError, TypeError):
-        if not finished and name == path.name:  # some other folder
+        if not is_run_name(name) or not (finished or (name != path.name and holds_unfinished(path))):
             return None
         parameters, case_name = {}, name.rpartition("-")[0]
     size, newest = weigh(path)

@@ -20,6 +20,7 @@ from walkers.runner.binary import Engine
 from walkers.runner.cost import pairs_of_beads
 from walkers.runner.ensemble import remove_remains
 from walkers.runner.locks import is_locked
+from walkers.sweeps.belongings import PARSL
 from walkers.sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, PlannedDeck, halves, pack, unfinished_parts
 from walkers.sweeps.record import PointState, SweepRecord, chains, states, velocity_of
 from walkers.sweeps.site import Site, pilots, threads
@@ -198,7 +199,7 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[_Workers]:
     """Start Parsl; at the end its workers and their engines have ended, however the block is left."""
     import parsl
 
-    folder = record.directory / "parsl"
+    folder = record.directory / PARSL
     sweep = uuid4().hex
     stop = STOPS[sweep] = threading.Event()
     config = threads(options.workers, folder) if options.site is None else pilots(options.site, folder)

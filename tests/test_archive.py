@@ -245,11 +245,15 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
         *("Deck", "Engine's", "Tables", "Tables", "Table")
     ]
 
+    assert call("verify", str(unpacked / "runs" / "angles"), check=True).stdout.startswith("angles: 2 points have")
     (deck,) = unpacked.glob("runs/ensembles/*/walker.lig")
     deck.write_text(deck.read_text().replace("gravity", "levity"))
     told = call("verify", str(unpacked / "runs" / "angles"))
     assert (told.returncode, "  changed    walker.lig" in told.stdout) == (1, True)
     shutil.rmtree(deck.parent)
+    gone = call("verify", str(unpacked / "runs" / "angles"))
+    assert (gone.returncode, gone.stdout.splitlines()[0]) == (1, "angles: 0 points have their run")
+    assert gone.stdout.count("(missing: point ") == 2
     refused = call("archive", str(unpacked / "runs" / "angles"), "--to", str(tmp_path / "two.zip"))
     assert (refused.returncode, "2 of 2 points are not finished" in refused.stderr) == (2, True)
 

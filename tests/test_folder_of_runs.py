@@ -13,13 +13,15 @@ from typing import Any
 import pytest
 
 import walkers
-from tests.conftest import call, document, to_toml
+from tests.conftest import call, document, mounted, to_toml
 from walkers.inputs.readable import differing, flattened
 from walkers.runner.directory import MANIFEST_NAME
 from walkers.runner.ensemble import finished_places
 from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import locked
+from walkers.sweeps.listing import bytes_text
 
+STEP = ["run.time_step", "run.steps_per_cycle"]
 SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
 
 
@@ -97,6 +99,9 @@ def test_list_filters_and_sorts(out: Path) -> None:
     runs = sorted(finished_places(out).values())
     for days, run in ((30, runs[0]), (2, runs[1])):
         os.utime(run / MANIFEST_NAME, (time.time() - days * 86400.0,) * 2)
+    then = time.time() - 3600.0
+    for number, run in enumerate(runs[2:]):  # of an ensemble the manifests are microseconds apart
+        os.utime(run / MANIFEST_NAME, (then + 1e-6 * number,) * 2)
     assert {entry["name"] for entry in _listed("--older-than", "7d")} == {runs[0].name}
     assert {entry["name"] for entry in _listed("--older-than", "24 h")} == {run.name for run in runs[:2]}
     assert _listed("--case", "other") == []
@@ -136,9 +141,34 @@ def test_what_follows_from_another_value_is_no_difference() -> None:
     assert differing(cases[:2]) == ["liquid.name"]
     assert differing([cases[0], cases[2]]) == ["drive.frequency"]
     ratio = flattened(walkers.load_case("fig1b", {"liquid.viscosity_ratio": 2.0}).as_dict())
-    assert differing([cases[0], ratio]) == ["liquid.dynamic_viscosity"]
+    assert differing([cases[0], ratio]) == ["liquid.viscosity_ratio"]
+    assert cases[0]["liquid.dynamic_viscosity"] == ratio["liquid.dynamic_viscosity"] == pytest.approx(4.6e-3)
+    assert (ratio["liquid.viscosity_ratio"], ratio["liquid.film_drag_ratio"]) == (2.0, 0.48)
     step = flattened(walkers.load_case("fig1b", {"run.time_step": "1 us"}).as_dict())
     assert "run.time_step" in differing([cases[0], step])
+
+
+def test_what_a_case_gives_is_a_difference_whatever_else_differs() -> None:
+    def between(*changes: dict[str, Any]) -> list[str]:
+        return differing([flattened(walkers.load_case("fig1b", one).as_dict()) for one in changes])
+
+    other, faster = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}
+    assert between({}, {**faster, "run.time_step": "2 us"}) == ["drive.frequency", *STEP]
+    same = {"run.time_step": "2 us"}
+    assert between(same, {**faster, **same}) == ["drive.frequency"], "fitted into another cycle"
+    assert "run.until_steady" in between({}, {**faster, "run.cycles": 60})
+    assert set(between({}, {**other, "liquid.viscosity_ratio": 1.0})) == {"liquid.name", "liquid.viscosity_ratio"}
+    given = {**other, "liquid.kinematic_viscosity": "20 mm^2/s"}
+    assert set(between({}, given)) == {"liquid.name", "liquid.dynamic_viscosity"}
+    assert set(between({}, {**other, "liquid.surface_tension": "30 mN/m"})) == {"liquid.name", "liquid.surface_tension"}
+
+
+def test_products_of_viscosity_are_called_so_where_nothing_was_recorded() -> None:
+    case = {**walkers.load_case("fig1b").as_dict(), "recorded": []}
+    flat = flattened(case)
+    assert flat["liquid.bridge_viscosity"] == pytest.approx(4.6e-3 * 8.69)
+    assert flat["liquid.film_viscosity"] == pytest.approx(4.6e-3 * 0.48)
+    assert "liquid.dynamic_viscosity" not in flat
 
 
 def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
@@ -259,3 +289,68 @@ def test_an_unfinished_ensemble_goes_as_a_whole(out: Path) -> None:
     call("clean", "--yes", check=True)
     assert not unfinished.exists()
     assert before.keys() - finished_places(out).keys() == set(names)
+
+
+def test_clean_removes_nothing_behind_a_symbolic_link(out: Path, tmp_path: Path) -> None:
+    alone = Path("alone.toml")
+    alone.write_text(to_toml(document(run=SHORTEST, drive={"peak_acceleration": "3 g"})))
+    call("run", "alone.toml", check=True)
+    (link,) = out.glob("alone-*")
+    kept = link.rename(tmp_path / "elsewhere")
+    link.symlink_to(kept)
+    before = {path: path.read_bytes() for path in kept.rglob("*") if path.is_file()}
+    told = call("clean", link.name, "--yes", check=True).stdout
+    assert "a symbolic link: what it leads to stays" in told
+    assert "1 finished run to remove, 0 B" in told
+    assert not link.is_symlink()
+    assert {path: path.read_bytes() for path in kept.rglob("*") if path.is_file()} == before
+
+
+def test_clean_reports_what_the_system_does_not_let_it_remove(out: Path) -> None:
+    places = finished_places(out)
+    name, directory = next((name, path) for name, path in places.items() if path.parent.parent.name == "ensembles")
+    with mounted(directory / "busy", "64k"):
+        done = call("clean", name, "--yes")
+        assert (done.returncode, directory.exists()) == (1, True)
+        assert f"{directory}: cannot be removed whole" in done.stderr
+    assert name not in finished_places(out)
+
+
+def test_clean_takes_no_folder_of_somebody_elses(out: Path) -> None:
+    """Unless it has a run's name and nothing in it but what an unfinished run has."""
+    shipped = next(iter(finished_places(out).values()))
+    theirs = ["thesis.incomplete", "data.replaced", "notes-0123456789ab.incomplete", "mine", "ensembles/old.incomplete"]
+    for name in theirs:
+        (out / name).mkdir()
+        (out / name / "chapter.txt").write_text("mine")
+    shutil.copy(shipped / "case.json", out / "mine")
+    shutil.copy(shipped / "case.json", out / "thesis.incomplete")
+    shutil.copytree(shipped, out / "ensembles" / "old.incomplete" / shipped.name)
+    begun = out / "killed-0123456789ab.incomplete"
+    (begun / "segments").mkdir(parents=True)
+    told = call("clean", "--yes", check=True).stdout
+    assert "1 interrupted run to remove" in told
+    assert not begun.exists()
+    assert all((out / name / "chapter.txt").exists() for name in theirs)
+    done = call("clean", "thesis.incomplete", "--yes")
+    assert (done.returncode, "no run or sweep" in done.stderr) == (2, True)
+
+
+def test_clean_leaves_what_somebody_put_into_a_sweeps_directory(out: Path) -> None:
+    sweep = out / "grid"
+    call("plot", "grid", check=True)
+    assert (sweep / "velocity.png").exists()
+    (sweep / "parsl").mkdir(exist_ok=True)
+    (sweep / "parsl" / "log.txt").write_bytes(b"x" * 3000)
+    written = sum(path.stat().st_size for path in sweep.rglob("*") if path.is_file())
+    theirs = {"notes/idea.txt": "mine", "measured.csv": "1,2", "sliding_1.png": "no figure of walkers"}
+    for name, text in theirs.items():
+        (sweep / name).parent.mkdir(exist_ok=True)
+        (sweep / name).write_text(text)
+    told = call("clean", "grid", "--dry-run", check=True).stdout
+    assert f"1 sweep to remove, {bytes_text(written)}" in told
+    assert "stays, for walkers did not write it: measured.csv, notes, sliding_1.png" in told
+    call("clean", "grid", "--yes", check=True)
+    assert {str(path.relative_to(sweep)): path.read_text() for path in sweep.rglob("*.*")} == theirs
+    call("clean", "rough", "--yes", check=True)
+    assert not (out / "rough").exists()

@@ -219,6 +219,12 @@ def test_set_on_the_command_line(in_folder: Path) -> None:
 
 def test_a_sweep_with_a_setting_has_a_directory_of_its_own(in_folder: Path) -> None:
     assert load_sweep("fig4", {"run.cycles": 8}).name == "fig4,run.cycles=8"
+    many = {
+        f"contact.{key}": 0.1 for key in ("friction.bead_bead", "friction.bead_wall", "restitution", "rolling_friction")
+    }
+    names = {load_sweep("fig4", {**many, "run.cycles": 8, "run.seed": seed}).name for seed in (1, 2)}
+    assert len(names) == 2, "names that are cut differ as their settings do"
+    assert max(map(len, names)) <= 120
     planned = call("sweep", "fig4", "--set", "run.cycles=8", "--dry-run", check=True).stdout
     assert "runs/fig4,run.cycles=8" in planned
     told = call("sweep", "fig4", "--set", "liquid.name=Si AK5")

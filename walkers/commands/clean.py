@@ -39,6 +39,6 @@ def command(
             print("nothing removed")
             return 0
     left = clean(plan)
-    for directory in left:
-        print(f"walkers: {directory}: a process has begun to make it, it stays", file=sys.stderr)
+    for directory, why in left.items():
+        print(f"walkers: {directory}: {why}", file=sys.stderr)
     return 1 if left else 0
