@@ -143,7 +143,7 @@ def _predicted(done: pd.DataFrame, column: str) -> dict[str, FloatArray]:
 
     predicted, reasons = predicted_column([case_of(Path(run)) for run in done["run"]], column)
     for reason, number in reasons.items():
-        _tell(f"no theory at {number} of {len(done)} points: {reason}")
+        _tell(f"not drawn at {number} of {len(done)} points: {reason}")
     return predicted
 
 
