@@ -7,6 +7,7 @@ import re
 import shutil
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,8 @@ from walkers.postprocess.motion import gathered
 from walkers.postprocess.quantities import rounded
 from walkers.postprocess.report.page import LARGEST, overhead
 from walkers.postprocess.report.run import report_run
-from walkers.postprocess.report.scene import scene_of
+from walkers.postprocess.report.scene import cameras_of, scene_of
+from walkers.postprocess.scene import camera_axes
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
@@ -238,6 +240,13 @@ def test_the_scene_is_the_motion(walked_run: Path) -> None:
         rolled[number % 2].append(way * motion.radius[number] / seconds)
     for bead, key in enumerate(("bead_1", "bead_2")):
         assert np.mean(rolled[bead]) == pytest.approx(rotation[key], rel=0.01, abs=2e-6)
+
+
+def test_a_scene_without_gravity_is_seen_as_the_floor_lies(walked_run: Path) -> None:
+    motion = read_motion(walked_run)
+    weightless = replace(motion, case=replace(motion.case, gravity=0.0))
+    assert cameras_of(weightless) == cameras_of(motion)
+    np.testing.assert_allclose(camera_axes(weightless), camera_axes(motion))
 
 
 def test_long_runs_are_thinned_out_and_say_so(walked_run: Path, pile_run: Path) -> None:
