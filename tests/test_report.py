@@ -29,6 +29,7 @@ from walkers.postprocess.report.page import LARGEST, overhead
 from walkers.postprocess.report.run import report_run
 from walkers.postprocess.report.scene import cameras_of, scene_of
 from walkers.postprocess.scene import camera_axes
+from walkers.runner.provenance import software
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
@@ -122,7 +123,11 @@ def pile_run(once: Once) -> Path:
 
 @pytest.fixture(scope="session")
 def pile_report(pile_run: Path, once: Once) -> Path:
-    return once("pile-report", lambda folder: report_run(pile_run, folder / "report.html")) / "report.html"
+    """Asked for by the run's name in the folder of the runs."""
+    return (
+        once("pile-report", lambda to: walkers.report(pile_run.name, to / "report.html", pile_run.parent))
+        / "report.html"
+    )
 
 
 @pytest.fixture(scope="session")
@@ -140,7 +145,8 @@ def swept(once: Once) -> Path:
 
 @pytest.fixture(scope="session")
 def swept_report(swept: Path, once: Once) -> Path:
-    return once("swept-report", lambda folder: report_sweep(swept, folder / "report.html")) / "report.html"
+    """Asked for by the sweep's name in the folder of the runs."""
+    return once("swept-report", lambda to: walkers.report(swept.name, to / "report.html", swept.parent)) / "report.html"
 
 
 @pytest.mark.parametrize("name", ["walked", "pile"])
@@ -240,6 +246,10 @@ def test_the_scene_is_the_motion(walked_run: Path) -> None:
         rolled[number % 2].append(way * motion.radius[number] / seconds)
     for bead, key in enumerate(("bead_1", "bead_2")):
         assert np.mean(rolled[bead]) == pytest.approx(rotation[key], rel=0.01, abs=2e-6)
+
+
+def test_the_page_says_what_wrote_it(walked_report: Path) -> None:
+    assert f"Written by granular-walkers {software().version}." in Page(walked_report).words
 
 
 def test_a_scene_without_gravity_is_seen_as_the_floor_lies(walked_run: Path) -> None:
