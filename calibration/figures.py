@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from walkers.calibration.calibrate import Outcome
 from walkers.calibration.report import Row, labelled
+from walkers.calibration.space import Space
 from walkers.calibration.waves import seen_in
 from walkers.inputs.calibration import Band
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, save_figure, styled
@@ -38,19 +39,31 @@ def draw(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
 
 def figures_of(found: Outcome, rows: list[Row]) -> dict[str, Figure]:
     """The figures of a calibration by name."""
-    figures = {"corner": _corner(found), "predictions": _predictions(rows), "sobol": _sobol(found)}
+    corners = draw_corners(found.space, found.posterior.unit, found.checks["best"].unit[0])
+    figures = {"corner": corners, "predictions": _predictions(rows), "sobol": _sobol(found)}
     return figures | ({"bands": _bands(found)} if found.calibration.file.bands else {})
 
 
 @styled
-def _corner(found: Outcome) -> Figure:
+def draw_corners(space: Space, sets: FloatArray, best: FloatArray) -> Figure:
+    """The distributions of K parameters and of each pair of them, and where the best set is.
+
+    Parameters
+    ----------
+    space
+        Of the parameters.
+    sets
+        Of the posterior, in the unit cube, shape (N, K).
+    best
+        In the unit cube, shape (K,).
+    """
     import corner
 
-    parameters, posterior = found.space.parameters, found.posterior
+    parameters, alone = space.parameters, len(space.parameters) == 1
     logs = np.array([one.log for one in parameters])
 
     def drawn(unit: FloatArray) -> FloatArray:
-        values = found.space.values(unit)
+        values = space.values(unit)
         return np.where(logs, np.log10(np.where(logs, values, 1.0)), values)
 
     figure, _ = new_figure(TWO_COLUMNS, TWO_COLUMNS, nrows=len(parameters), ncols=len(parameters))
@@ -58,12 +71,13 @@ def _corner(found: Outcome) -> Figure:
     figure.set_layout_engine("tight")
     figure.set_layout_engine("none")
     corner.corner(
-        drawn(posterior.unit),
+        drawn(sets),
         fig=figure,
         # A word on each line: panels of many parameters are no wider.
         labels=["\n".join(("log " + labelled(one) if one.log else labelled(one)).split()) for one in parameters],
         range=drawn(np.array([np.zeros(len(parameters)), np.ones(len(parameters))])).T.tolist(),
-        truths=drawn(found.checks["best"].unit[0]),
+        # Of one parameter corner has a panel, in which it cannot mark any.
+        truths=None if alone else drawn(best),
         truth_color="C1",
         quantiles=[0.05, 0.5, 0.95],
         label_kwargs={"fontsize": 7},
@@ -73,6 +87,8 @@ def _corner(found: Outcome) -> Figure:
         hist_kwargs={"linewidth": 0.8},
         contour_kwargs={"linewidths": 0.6},
     )
+    if alone:
+        figure.axes[0].axvline(float(drawn(best)[0]), color="C1")
     _make_room(figure)
     return figure
 

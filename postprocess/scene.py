@@ -59,6 +59,12 @@ def pointed_out(motion: Motion) -> Callable[[int], set[int]]:
     return lambda frame: walkers | {bead for track in climbing for bead in track.members_at(frame)}
 
 
+def against_gravity(motion: Motion) -> FloatArray:
+    """A unit vector against gravity in the boundary's frame; without gravity its normal."""
+    against = -np.array(motion.case.gravity_vector)
+    return against / np.linalg.norm(against) if against.any() else np.array([0.0, 0.0, 1.0])
+
+
 def camera_axes(motion: Motion) -> FloatArray:
     """Unit vectors to the right and up in the picture and toward the camera, in the boundary's frame, as rows.
 
@@ -75,9 +81,7 @@ def camera_axes(motion: Motion) -> FloatArray:
         toward = np.array([0.0, 0.0, sin(elevation)]) - cos(elevation) * across
     else:
         toward = np.array([0.0, 0.0, cos(_ASIDE)]) + sin(_ASIDE) * np.cross(uphill, [0.0, 0.0, 1.0])
-    against = -np.array(case.gravity_vector)
-    if not against.any():
-        against = np.array([0.0, 0.0, 1.0])
+    against = against_gravity(motion)
     up = against - (against @ toward) * toward
     up /= np.linalg.norm(up)
     return np.array([np.cross(up, toward), up, toward])

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from tests.conftest import PATIENCE, wait_for
 from tests.test_report import HOSTILE, pile_report, pile_run, swept, swept_report, walked_report, walked_run
@@ -32,6 +32,7 @@ def browser() -> Iterator[Browser]:
         started = playwright.chromium.launch(
             executable_path=CHROMIUM, headless=True, args=list(_FLAGS), timeout=MILLISECONDS
         )
+        expect.set_options(timeout=MILLISECONDS)
         yield started
         started.close()
 
@@ -66,23 +67,21 @@ def picture(page: Page) -> bytes:
     return page.locator(".scene:visible canvas").first.screenshot()
 
 
-def rested(page: Page) -> bytes:
-    """The picture as soon as it changes no more."""
+def frames(page: Page, number: int = 8) -> None:
+    """Let the page draw so many frames, however long they take."""
+    # Playwright asks once a frame, and no longer than its timeout.
+    page.wait_for_function(f"() => (window.drawn = (window.drawn ?? 0) + 1) % {number} === 0")
+
+
+def rested(page: Page, *others: bytes) -> bytes:
+    """The picture as soon as it is none of others and frames change it no more."""
 
     def same() -> bytes | None:
         before = picture(page)
-        page.wait_for_timeout(300)
-        return before if picture(page) == before else None
+        frames(page)
+        return before if before not in others and picture(page) == before else None
 
     return wait_for(same)
-
-
-def changed(page: Page, before: bytes) -> bytes:
-    def other() -> bytes | None:
-        now = picture(page)
-        return now if now != before else None
-
-    return wait_for(other)
 
 
 @pytest.mark.parametrize("name", ["walked_report", "pile_report"])
@@ -94,13 +93,14 @@ def test_beads_play_pause_and_turn(name: str, visit: Callable[..., Page], reques
     assert play.text_content() == "Play"
     assert time.text_content() == "0.0000 s"
     play.click()
-    changed(page, begin)
+    expect(play).to_have_text("Pause")
+    wait_for(lambda: picture(page) != begin and time.text_content() != "0.0000 s")
     play.click()
-    paused = rested(page)
-    assert paused != begin
+    expect(play).to_have_text("Play")
+    paused = rested(page, begin)
     stopped = time.text_content()
     assert float((stopped or "").removesuffix(" s")) > 0.0
-    page.wait_for_timeout(500)
+    frames(page)
     assert (picture(page), time.text_content()) == (paused, stopped)
     box = page.locator(".scene").bounding_box()
     assert box is not None
@@ -108,11 +108,10 @@ def test_beads_play_pause_and_turn(name: str, visit: Callable[..., Page], reques
     page.mouse.down()
     page.mouse.move(box["x"] + box["width"] / 2 + 90, box["y"] + box["height"] / 2 + 30, steps=4)
     page.mouse.up()
-    turned = changed(page, paused)
-    assert turned != begin
+    turned = rested(page, begin, paused)
     assert time.text_content() == stopped  # turned, not played
     page.get_by_role("button", name="onto the floor").click()
-    assert rested(page) not in {begin, paused, turned}
+    rested(page, begin, paused, turned)
     # As often slower as is chosen: what passes while it plays is so much less than on the clock.
     assert page.locator(".slower option:checked").count() == 1
     # Plots are there, drawn by Bokeh from what the page carries.
@@ -145,5 +144,5 @@ def test_a_sweep_opens_its_runs(swept_report: Path, visit: Callable[..., Page]) 
     page.wait_for_selector("#sweep:visible")
     page.locator("nav a", has_text="point 0").click()
     page.wait_for_selector("#point-0 .scene[data-ready]")
-    assert rested(page) != first
+    rested(page, first)
     assert page.locator("canvas:visible").count() > 0

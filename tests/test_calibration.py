@@ -19,7 +19,7 @@ from walkers.calibration.calibrate import FINAL, calibrate, first_wave, next_wav
 from walkers.calibration.convergence import effective_samples, rhat
 from walkers.calibration.emulator import fit_emulators
 from walkers.calibration.feasibility import fit_feasibility
-from walkers.calibration.figures import figures_of
+from walkers.calibration.figures import draw_corners, figures_of
 from walkers.calibration.likelihood import log_likelihood, observation_covariance
 from walkers.calibration.posterior import Density, sample_posterior
 from walkers.calibration.report import emulator_checks, intervals, rows_of, words_of
@@ -49,6 +49,17 @@ def observation(name: str, value: float, deviation: float, group: str = "all") -
 
 
 SPACE = Space((parameter("a", 0.1, 10.0, log=True), parameter("b", -1.0, 3.0)))
+
+
+@pytest.mark.parametrize("space", [Space(SPACE.parameters[:1]), SPACE], ids=["one", "two"])
+def test_corners_of_one_parameter_and_of_two_mark_the_best_set(space: Space) -> None:
+    best = np.full(space.dimensions, 0.25)
+    sets = np.random.default_rng(1).normal(0.5, 0.1, (400, space.dimensions)).clip(0.0, 1.0)
+    figure = draw_corners(space, sets, best)
+    assert len(figure.axes) == space.dimensions**2
+    marks = [line for line in figure.axes[0].lines if line.get_color() == "C1"]
+    assert [list(line.get_xdata()) for line in marks] == [pytest.approx([-0.5, -0.5])]  # a from 0.1 to 10, a quarter up
+    assert spoilt(figure) == []
 
 
 def test_the_cube_and_the_parameters_are_one() -> None:

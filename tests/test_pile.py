@@ -451,6 +451,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
         ["film", "--to", "box.png"],
         ["render", "--to", "box.jpg"],
         ["vtk", "--as-placed"],
+        ["paraview", "--as-placed"],
     ]
     for option in refusals:
         refused = call(option[0], str(run), *option[1:])

@@ -7,6 +7,7 @@ import re
 import shutil
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,9 @@ from walkers.postprocess.motion import gathered
 from walkers.postprocess.quantities import rounded
 from walkers.postprocess.report.page import LARGEST, overhead
 from walkers.postprocess.report.run import report_run
-from walkers.postprocess.report.scene import scene_of
+from walkers.postprocess.report.scene import cameras_of, scene_of
+from walkers.postprocess.scene import camera_axes
+from walkers.runner.provenance import software
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
@@ -120,7 +123,11 @@ def pile_run(once: Once) -> Path:
 
 @pytest.fixture(scope="session")
 def pile_report(pile_run: Path, once: Once) -> Path:
-    return once("pile-report", lambda folder: report_run(pile_run, folder / "report.html")) / "report.html"
+    """Asked for by the run's name in the folder of the runs."""
+    return (
+        once("pile-report", lambda to: walkers.report(pile_run.name, to / "report.html", pile_run.parent))
+        / "report.html"
+    )
 
 
 @pytest.fixture(scope="session")
@@ -138,7 +145,8 @@ def swept(once: Once) -> Path:
 
 @pytest.fixture(scope="session")
 def swept_report(swept: Path, once: Once) -> Path:
-    return once("swept-report", lambda folder: report_sweep(swept, folder / "report.html")) / "report.html"
+    """Asked for by the sweep's name in the folder of the runs."""
+    return once("swept-report", lambda to: walkers.report(swept.name, to / "report.html", swept.parent)) / "report.html"
 
 
 @pytest.mark.parametrize("name", ["walked", "pile"])
@@ -238,6 +246,17 @@ def test_the_scene_is_the_motion(walked_run: Path) -> None:
         rolled[number % 2].append(way * motion.radius[number] / seconds)
     for bead, key in enumerate(("bead_1", "bead_2")):
         assert np.mean(rolled[bead]) == pytest.approx(rotation[key], rel=0.01, abs=2e-6)
+
+
+def test_the_page_says_what_wrote_it(walked_report: Path) -> None:
+    assert f"Written by granular-walkers {software().version}." in Page(walked_report).words
+
+
+def test_a_scene_without_gravity_is_seen_as_the_floor_lies(walked_run: Path) -> None:
+    motion = read_motion(walked_run)
+    weightless = replace(motion, case=replace(motion.case, gravity=0.0))
+    assert cameras_of(weightless) == cameras_of(motion)
+    np.testing.assert_allclose(camera_axes(weightless), camera_axes(motion))
 
 
 def test_long_runs_are_thinned_out_and_say_so(walked_run: Path, pile_run: Path) -> None:

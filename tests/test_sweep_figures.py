@@ -14,11 +14,13 @@ from matplotlib.figure import Figure
 import walkers
 from tests.conftest import call
 from walkers.inputs.errors import InputError
+from walkers.inputs.reading import load_case
 from walkers.plotting import LeftOutWarning
 from walkers.runner.directory import case_of
 from walkers.sweeps.factors import factors_of
 from walkers.sweeps.figure_layout import layout_of
 from walkers.sweeps.record import SweepRecord
+from walkers.theory.columns import MODEL, PAPER, predicted_column
 from walkers.theory.prediction import predict
 
 
@@ -135,7 +137,7 @@ def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> N
     directory = looked_through / "grid"
     figure = walkers.sweep_figure(directory, theory=True)
     (axes,) = _panels(figure)
-    assert _legend(figure)[2:] == ["theory", "paper's model"]
+    assert _legend(figure)[2:] == ["theory", "paper's fit, κ = 0.033 s/mm"]
     lines = {line.get_linestyle(): line for line in axes.lines if line.get_color() == "C1"}
     table = walkers.load(directory)
     rows = table[table["drive.frequency"] == 80.0]
@@ -145,6 +147,26 @@ def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> N
         assert lines[style].get_ydata() == pytest.approx(wanted, rel=1e-6)  # type: ignore[arg-type]
     with pytest.warns(LeftOutWarning, match="6 of 6 points: the theory has no orientation_end"):
         walkers.sweep_figure(directory, y="orientation_end", theory=True)
+
+
+def test_the_papers_friction_is_drawn_only_of_what_it_was_fitted_to() -> None:
+    """Its velocities are of ruby in silicone oils: of glass in glycol they would be wrong tenfold, and unseen so."""
+    friction = {"contact.friction.bead_wall": 0.3, "contact.friction.bead_bead": 0.1}
+    changes: list[dict[str, Any]] = [
+        {},
+        {"liquid.name": "ethylene glycol"},
+        {"beads.material": "glass", "contact.rolling_friction": 0.0, **friction},
+        {"boundary.material": "polystyrene", "contact.rolling_friction": 0.0, **friction},
+    ]
+    ours, *others = [load_case("fig1b", one) for one in changes]
+    predicted, reasons = predicted_column([ours, *others], "velocity")
+    assert np.isfinite(predicted[MODEL]).all()
+    assert predicted[PAPER][0] == pytest.approx(predict(ours)["paper"]["velocity"])
+    assert np.isnan(predicted[PAPER][1:]).all()
+    told = "is one of ruby on level chromium-coated glass or glass in Si AK5 or Si AK10"
+    assert reasons == {f"the {PAPER}, {told}": 3}
+    assert list(predicted_column(others, "velocity")[0]) == [MODEL]
+    assert predicted_column(others, "rotation_1")[1] == {}
 
 
 def test_points_that_are_not_finished_are_left_out_and_counted(looked_through: Path, tmp_path: Path) -> None:

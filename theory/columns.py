@@ -11,11 +11,13 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.theory.motion import FloatArray
 from walkers.theory.prediction import check_applies, motion_of
-from walkers.theory.quasistatic import mean_velocity
+from walkers.theory.quasistatic import FRICTION_OF_THE_PAPER, mean_velocity
 
-MODEL, PAPER = "theory", "paper's model"
-"""Coulomb friction with the drag of bridges and film (`walkers.theory.prediction.motion_of`); the paper's own, with its
-friction of 0.033 s/mm (`walkers.theory.quasistatic.mean_velocity`)."""
+MODEL, PAPER = "theory", f"paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
+"""Coulomb friction with the drag of bridges and film (`walkers.theory.prediction.motion_of`); the paper's own model, of
+what its friction was fitted to (`walkers.theory.quasistatic.mean_velocity`)."""
+_BEADS, _BOUNDARIES, _LIQUIDS = "ruby", ("chromium-coated glass", "glass"), ("Si AK5", "Si AK10")
+"""Of the paper's walkers on a level substrate (its Figs. 2 to 4)."""
 
 
 def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, FloatArray], dict[str, int]]:
@@ -34,7 +36,7 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
         From the name of a model to its values, m/s, shape (N,); NaN where it says nothing. Empty where no model has the
         column, or says anything at any point.
     reasons
-        Why points have no prediction by `MODEL`, and how many.
+        Why points have none of `MODEL`, or velocities none of `PAPER`, and of how many that is so.
     """
     family, _, number = column.rpartition("_")
     is_velocity = column in ("velocity", "right_facing", "left_facing")
@@ -52,12 +54,17 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
     model[able] = np.where(known, values, np.nan)
     reasons.update({"a contact opens, or the motion does not repeat itself": int(np.sum(~known))})
     if is_velocity:
-        dimers = [dimer_of(case) for case in chosen]
-        gammas = [dimer.gamma0(case.drive.peak_acceleration) for dimer, case in zip(dimers, chosen, strict=True)]
-        level = np.array([case.axial_gravity == 0.0 for case in chosen])
-        paper[able] = np.where(level, mean_velocity(gammas, [dimer.sin_delta for dimer in dimers]), np.nan)
+        fitted = [place for place in able if not (why := _why_unfitted(cases[place])) or reasons.update([why])]
+        paper[fitted] = _by_the_paper([cases[place] for place in fitted])
     found = {MODEL: model, PAPER: paper}
     return {name: one for name, one in found.items() if np.isfinite(one).any()}, {k: v for k, v in reasons.items() if v}
+
+
+def _by_the_paper(cases: Sequence[Case]) -> FloatArray:
+    """Velocities by the paper's model, m/s."""
+    dimers = [dimer_of(case) for case in cases]
+    gammas = [dimer.gamma0(case.drive.peak_acceleration) for dimer, case in zip(dimers, cases, strict=True)]
+    return mean_velocity(gammas, [dimer.sin_delta for dimer in dimers])
 
 
 def _why_not(case: Case, column: str) -> str | None:
@@ -69,3 +76,12 @@ def _why_not(case: Case, column: str) -> str | None:
     if case.axial_gravity != 0.0 and column != "right_facing":
         return "on a slope the theory is one of walkers that go up it (right_facing)"
     return None
+
+
+def _why_unfitted(case: Case) -> str | None:
+    """Why the paper's friction says nothing of a case's velocity."""
+    same = case.material == _BEADS and case.boundary.material in _BOUNDARIES and case.liquid.name in _LIQUIDS
+    if same and case.axial_gravity == 0.0:
+        return None
+    boundaries, liquids = " or ".join(_BOUNDARIES), " or ".join(_LIQUIDS)
+    return f"the {PAPER}, is one of {_BEADS} on level {boundaries} in {liquids}"

@@ -362,10 +362,18 @@ def find_sweep(sweep: str | Path, out: Path = DEFAULT_OUT) -> Path | None:
     """The directory of a sweep, given itself or its name in the folder ``out``; None if there is none."""
     from walkers.sweeps.record import RECORD_NAME
 
-    for path in (Path(sweep), out / sweep):
-        if (path / RECORD_NAME).is_file():
-            return path
-    return None
+    return _with_record(RECORD_NAME, sweep, out)
+
+
+def find_calibration(calibration: str | Path, out: Path = DEFAULT_OUT) -> Path | None:
+    """As `find_sweep`, of the directory of a calibration's outcome."""
+    from walkers.calibration.report import RECORD_NAME
+
+    return _with_record(RECORD_NAME, calibration, out)
+
+
+def _with_record(record: str, name: str | Path, out: Path) -> Path | None:
+    return next((path for path in (Path(name), out / name) if (path / record).is_file()), None)
 
 
 def _named(run: str | Path, out: Path) -> Path | None:

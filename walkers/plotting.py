@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from walkers.theory.motion import FloatArray
 
-FORMATS = ("png", "pdf", "svg")
-
 
 class LeftOutWarning(UserWarning):
     """Something is not in a figure: points without a result, keys that are not told apart, a theory's prediction."""
@@ -31,7 +29,8 @@ def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: A
     directory
         A sweep's directory, such as ``runs/fig2``.
     to
-        The file, whose suffix is one of `FORMATS`; the sweep's directory and the name of ``y`` if left out.
+        The file, whose suffix is one of `walkers.postprocess.drawing.FORMATS`; the sweep's directory and the name of
+        ``y`` if left out.
     choices
         ``x``, ``y``, ``hue``, ``panels``, ``log``, ``theory`` of `sweep_figure`.
 
@@ -45,7 +44,7 @@ def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: A
     InputError
         As `sweep_figure`; or if the file's suffix is none of a figure.
     """
-    from walkers.postprocess.drawing import save_figure
+    from walkers.postprocess.drawing import FORMATS, save_figure
     from walkers.sweeps.table import load
 
     table = load(directory)
@@ -143,7 +142,7 @@ def _predicted(done: pd.DataFrame, column: str) -> dict[str, FloatArray]:
 
     predicted, reasons = predicted_column([case_of(Path(run)) for run in done["run"]], column)
     for reason, number in reasons.items():
-        _tell(f"no theory at {number} of {len(done)} points: {reason}")
+        _tell(f"not drawn at {number} of {len(done)} points: {reason}")
     return predicted
 
 

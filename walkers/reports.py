@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from walkers.pipeline import DEFAULT_OUT, find_run
+from walkers.pipeline import DEFAULT_OUT, find_calibration, find_run, find_sweep
 
 
 def report(what: str | Path, to: Path | None = None, out: Path = DEFAULT_OUT) -> Path:
@@ -13,7 +13,7 @@ def report(what: str | Path, to: Path | None = None, out: Path = DEFAULT_OUT) ->
     Parameters
     ----------
     what
-        The directory of one of them; or the name of one in ``out``, or a case, whose run is looked up there.
+        The directory of one of them, or its name in ``out``; or a case, whose run is looked up there.
     to
         The file; ``report.html`` in that directory if None.
     out
@@ -35,16 +35,13 @@ def report(what: str | Path, to: Path | None = None, out: Path = DEFAULT_OUT) ->
     'fig1b.html'
     """
     from walkers.calibration.page import report_calibration
-    from walkers.calibration.report import RECORD_NAME as CALIBRATION
     from walkers.postprocess.report.page import check_report
-    from walkers.sweeps.record import RECORD_NAME as SWEEP
     from walkers.sweeps.report import report_sweep
 
     if to is not None:
         check_report(to)
-    for place in (Path(what), out / what):
-        if (place / CALIBRATION).is_file():
-            return report_calibration(place, to)
-        if (place / SWEEP).is_file():
-            return report_sweep(place, to)
+    if (calibration := find_calibration(what, out)) is not None:
+        return report_calibration(calibration, to)
+    if (sweep := find_sweep(what, out)) is not None:
+        return report_sweep(sweep, to)
     return find_run(what, out).report(to)

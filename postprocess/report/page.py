@@ -12,13 +12,13 @@ import re
 import zlib
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.runner.files import write_text
+from walkers.runner.provenance import PROJECT, software
 
 if TYPE_CHECKING:
     from bokeh.models import Model
@@ -69,7 +69,7 @@ def write_page(path: Path, title: str, body: str, carried: Mapping[str, str]) ->
         libraries=libraries,
         unpacker=markup(_unpacker()) if carried else "",
         player=markup(_read("player.js")) if carried else "",
-        written_by=f"granular-walkers {version('granular-walkers')}",
+        written_by=f"{PROJECT} {software().version}",
     )
     write_text(path, page)
     return path

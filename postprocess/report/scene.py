@@ -17,7 +17,7 @@ import numpy.typing as npt
 from walkers.postprocess.motion import Motion, gathered, read_motion
 from walkers.postprocess.paraview import boundary_of
 from walkers.postprocess.rolling import turns_of
-from walkers.postprocess.scene import GLASS, RUBY, pointed_out
+from walkers.postprocess.scene import GLASS, RUBY, against_gravity, pointed_out
 
 if TYPE_CHECKING:
     import k3d
@@ -266,7 +266,7 @@ def cameras_of(motion: Motion) -> dict[str, list[float]]:
     margin = 1.5 * float(motion.radius.max()) * 1e3
     low, high = reached.min(axis=(0, 1)) - margin, reached.max(axis=(0, 1)) + margin
     corners = np.array([[(low, high)[bit][axis] for axis, bit in enumerate(bits)] for bits in np.ndindex(2, 2, 2)])
-    closed, upward = motion.case.boundary.closed, -np.array(motion.case.gravity_vector) / motion.case.gravity
+    closed, upward = motion.case.boundary.closed, against_gravity(motion)
     steep = upward[2] < 0.5
     first = np.array([-0.25, -1.0, 0.2] if closed else [-0.1, -0.7, 0.9] if steep else [-0.55, -0.8, 0.6])
     ways = {

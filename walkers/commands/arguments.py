@@ -62,6 +62,13 @@ AllowFailedAudit = Annotated[bool, typer.Option("--allow-failed-audit", help="Ru
 Formats = Annotated[
     list[str] | None, typer.Option("--format", help="Of the figures: png, svg or pdf; may be repeated.")
 ]
+VtkFolder = Annotated[
+    Path | None, typer.Option("--to", help="Folder to write, replaced if it holds nothing else; RUN/vtk if left out.")
+]
+AsPlaced = Annotated[bool, typer.Option("--as-placed", help="Walkers where the deck has them, not side by side.")]
+Every = Annotated[
+    int | None, typer.Option("--every", min=1, help="One of so many samples of the drive; one a cycle if left out.")
+]
 CaseName = Annotated[
     str | None,
     typer.Option(
@@ -98,6 +105,11 @@ def refuse(option: str, wrong: bool, told: str) -> None:
 
     if wrong:
         raise InputError(option, [Problem("", None, told)])
+
+
+def refuse_as_placed(as_placed: bool, case: ResolvedCase) -> None:
+    """Refuse ``--as-placed`` of walkers that are nowhere else."""
+    refuse("--as-placed", as_placed and not case.independent, "is for independent walkers: these stand where they are")
 
 
 def check_folder(option: str, folder: Path) -> None:

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from walkers.commands.arguments import Out, Run, refuse
-from walkers.commands.vtk import AsPlaced, Every, Folder
+from walkers.commands.arguments import AsPlaced, Every, Out, Run, VtkFolder, refuse_as_placed
 from walkers.pipeline import DEFAULT_OUT
 
 Colour = Annotated[str | None, typer.Option("--colour", help="Array to colour the beads by; walker, else speed.")]
@@ -17,7 +16,7 @@ Open = Annotated[bool, typer.Option("--open", help="Start ParaView with it.")]
 def command(
     run: Run,
     out: Out = DEFAULT_OUT,
-    to: Folder = None,
+    to: VtkFolder = None,
     as_placed: AsPlaced = False,
     every: Every = None,
     colour: Colour = None,
@@ -28,11 +27,7 @@ def command(
     from walkers.postprocess.paraview_script import open_paraview
 
     found = find_run(run, out)
-    refuse(
-        "--as-placed",
-        as_placed and not found.case.independent,
-        "is for independent walkers: these stand where they are",
-    )
+    refuse_as_placed(as_placed, found.case)
     script = found.paraview(to, colour=colour, every=every, as_placed=as_placed)
     print(script)
     if start:

@@ -7,11 +7,17 @@ from typing import Annotated
 
 import typer
 
+from walkers import completion
 from walkers.commands.arguments import Out
 from walkers.pipeline import DEFAULT_OUT
 
 What = Annotated[
-    str, typer.Argument(metavar="RUN|SWEEP|CALIBRATION", help="A directory, or a case whose run is looked up in --out.")
+    str,
+    typer.Argument(
+        metavar="RUN|SWEEP|CALIBRATION",
+        help="One of them: its directory, its name in --out, or a case.",
+        autocompletion=completion.runs_and_sweeps,
+    ),
 ]
 File = Annotated[Path | None, typer.Option("--to", help="The HTML file; report.html in the directory if left out.")]
 
