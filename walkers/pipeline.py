@@ -247,9 +247,7 @@ def _check_changed(case: Case) -> None:
 
     exceeded = [] if case.as_read else limits_of(case).exceeded_by(case.run.time_step)
     if exceeded:
-        told = (
-            f"beyond the {' and the '.join(exceeded)} limit of the case as changed: use load_case(name, changes)"
-        )
+        told = f"beyond the {' and the '.join(exceeded)} limit of the case as changed: use load_case(name, changes)"
         raise InputError(case.name, [Problem("run.time_step", f"{case.run.time_step:.3g} s", told)])
 
 
