@@ -33,7 +33,7 @@ def settings_of(words: Iterable[str]) -> dict[str, Value]:
     for word in words:
         key, separator, text = (part.strip() for part in word.partition("="))
         if not (key and separator and text):
-            raise InputError("--set", [Problem("", word, "expected key=value, such as drive.frequency=70Hz")])
+            raise InputError("--set", [Problem(word, None, "expected key=value, such as drive.frequency=70Hz")])
         if key in settings:
             raise InputError("--set", [Problem(key, text, "is given twice")])
         settings[key] = _value(text)

@@ -18,7 +18,7 @@ from walkers.inputs.sweep import Sweep
 from walkers.postprocess.walking import SEPARATED
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_name
-from walkers.sweeps.columns import analyses_of_all, headlines, result_columns
+from walkers.sweeps.columns import analyses_of_all, headlines, result_columns, row_of
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Failure, Options, SweepProgress
 
@@ -27,7 +27,11 @@ if TYPE_CHECKING:
 
 POINTS = 32
 """Enough for 5 and 95 %, and for ranks that tell what matters most; a power of two, as Sobol's sequence likes it."""
-_SEED = 1
+_SEEDS = range(1, 65)
+"""Of the scrambling, of which the one is taken whose columns hang together least: of few points in many dimensions some
+do by 0.7, and which of two values matters could not be told."""
+_LEAST_PER_VALUE = 3
+"""Points for each value that is drawn, below which ranks are chance."""
 _AT_REST = 2e-5
 """m/s: below, walkers are at rest, as in the sweeps that look for the threshold of motion."""
 
@@ -94,7 +98,7 @@ def uncertain(case: Case) -> tuple[Origin, ...]:
 
 
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
-    """A sweep over all that is uncertain in a case, by Sobol's sequence: more points go on where fewer ended.
+    """A sweep over all that is uncertain in a case: Sobol's sequence, scrambled so that its columns are least alike.
 
     Raises
     ------
@@ -109,7 +113,8 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         told = "nothing here is uncertain: say ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
         raise InputError(case.name, [Problem("", None, told)])
     ranges = {one.key: {"loguniform" if one.logarithmic else "uniform": list(one.range or ())} for one in varied}
-    axis = sampled("sobol", points, _SEED, ranges)
+    seed = min(_SEEDS, key=lambda one: _likeness(one, points, len(varied)))
+    axis = sampled("sobol", points, seed, ranges)
     units = tuple(unit_of(key, [row[number] for row in axis.rows]) for number, key in enumerate(axis.keys))
     return Sweep(
         name=f"{run_name(case, find_engine(engine))}-spread",
@@ -123,9 +128,24 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         descent=None,
         file={
             "case": case.name,
-            "sample": [{"method": "sobol", "points": points, "seed": _SEED, "ranges": ranges}],
+            "sample": [{"method": "sobol", "points": points, "seed": seed, "ranges": ranges}],
         },
     )
+
+
+def _likeness(seed: int, points: int, dimensions: int) -> float:
+    """Largest correlation of two columns of the sampler's points."""
+    import warnings
+
+    import numpy as np
+    from scipy.stats import qmc
+
+    if dimensions < 2:
+        return 0.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of points that are no power of two
+        cube = qmc.Sobol(d=dimensions, rng=np.random.default_rng(seed)).random(points)
+    return float(np.abs(np.corrcoef(cube.T) - np.eye(dimensions)).max())
 
 
 def run_spread(
@@ -192,7 +212,7 @@ def _band(values: pd.Series[float]) -> Band:
 def _ranks(table: pd.DataFrame, name: str, keys: tuple[str, ...]) -> dict[str, float]:
     """Rank correlations of a column with each key, the strongest first, if they are more than chance."""
     given = table[table[name].notna()]
-    if len(given) < 4 or given[name].nunique() < 2:
+    if len(given) < _LEAST_PER_VALUE * len(keys) or given[name].nunique() < 2:
         return {}
     ranks = {key: float(given[key].rank().corr(given[name].rank())) for key in keys}
     certain = {key: rank for key, rank in ranks.items() if abs(rank) > 2.0 / sqrt(len(given) - 1)}
@@ -219,8 +239,9 @@ _DIGITS = 5
 """After the point, of what is shown: less than 1e-5 mm/s is 0."""
 
 
-def describe(spread: Spread) -> str:
-    """A spread in a few lines: mm, mm/s."""
+def describe(spread: Spread, result: Mapping[str, Any] | None = None) -> str:
+    """A spread in a few lines: mm, mm/s; with the result of the case itself, whether that lies outside the band."""
+    own = row_of(result) if result else {}
     units = {key: unit for key, (unit, _) in _all_columns().items()}
     points = max((band.points for band in spread.bands.values()), default=0)
     lines = [f"  spread     over {points} points, each of these drawn from its range by itself:"]
@@ -235,6 +256,14 @@ def describe(spread: Spread) -> str:
             f"    {name:9}{shown['low']} to {shown['high']} {unit} (5 to 95 %), median {shown['median']}; "
             f"smallest {shown['smallest']}, largest {shown['largest']}"
         )
+        if name in own and not band.low <= own[name] <= band.high:
+            side = "above" if own[name] > band.high else "below"
+            lines.append(
+                f"             the case's own lies {side} that: some of its values stand at the end of their ranges"
+            )
+        if band.points < _LEAST_PER_VALUE * len(spread.varied):
+            lines.append("             too few points to say on what it depends, and for more than a rough band")
+            continue
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
         lines.append(
             f"             depends most on {ranks} (rank correlation)"

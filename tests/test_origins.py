@@ -7,11 +7,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import walkers
 from tests.conftest import REFERENCE, call, make_case, to_toml
 from walkers.inputs import InputError, library, load_case, shipped_cases
+from walkers.inputs.axes import plain
 from walkers.inputs.case import Case
 from walkers.inputs.changes import settings_of
 from walkers.inputs.origins import Origin
@@ -262,6 +264,8 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed}
     assert {one.key for one in spread.held} == {"contact.friction.bead_bead", "contact.rolling_friction"}
     assert "as given contact.friction.bead_bead 0.3" in describe(spread)
+    assert "too few points to say on what it depends" in describe(spread)
+    assert spread.depends == {"velocity": {}}
     table = walkers.load(spread.directory)
     assert table["contact.friction.bead_wall"].between(0.1, 0.6).all()
     assert (table["liquid.viscosity_ratio"] > 1.0).all()
@@ -274,6 +278,16 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     # A case of which all is given has none.
     with pytest.raises(InputError, match="nothing here is uncertain"):
         run_spread(resolve_case(REFERENCE), runs_folder, Options(2))
+
+
+def test_what_a_spread_draws_is_told_apart() -> None:
+    """Of Sobol's first 32 points in nine dimensions two columns went together by 0.75."""
+    case = load_case("fig1b")
+    sweep = spread_sweep(case, 32)
+    ranks = np.argsort(np.argsort(np.array([[plain(value) for value in row] for row in sweep.rows]), axis=0), axis=0)
+    alike = np.abs(np.corrcoef(ranks.T) - np.eye(len(sweep.keys)))
+    assert len(sweep.keys) == 9
+    assert alike.max() < 0.4
 
 
 def test_spread_on_the_command_line(in_folder: Path) -> None:

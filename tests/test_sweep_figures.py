@@ -209,7 +209,7 @@ def test_what_cannot_be_drawn_is_told(looked_through: Path, tmp_path: Path) -> N
         (["--y", "velocitty"], 'did you mean "velocity"?'),
         (["--y", "reason"], '"reason" has no number'),
         (["--x", "bead_wall"], '"bead_wall": expected one of'),
-        (["--to", str(tmp_path / "figure.jpg")], "ends in .png, .pdf, .svg"),
+        (["--to", str(tmp_path / "figure.jpg")], "ends in .png, .svg, .pdf"),
     ):
         done = call("plot", "grid", "--out", str(looked_through), *arguments)
         assert done.returncode == 2

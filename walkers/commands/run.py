@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -75,7 +75,7 @@ def command(
         else:
             print(done.describe())
         if band and not as_json:
-            print(_described(band))
+            print(_described(band, done.result))
         failed += bool(band and band.failures)
     return 1 if failed else 0
 
@@ -98,7 +98,7 @@ def _spread(case: Case, out: Path, points: int | None, engine: str | None, allow
         )
 
 
-def _described(band: Spread) -> str:
+def _described(band: Spread, result: dict[str, Any]) -> str:
     from walkers.sweeps.spread import describe
 
-    return describe(band)
+    return describe(band, result)

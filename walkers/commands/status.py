@@ -19,6 +19,7 @@ Directory = Annotated[
 
 def command(directory: Directory) -> None:
     """Say how many points of a sweep are finished, failed, running and missing, and why they failed."""
+    from walkers.pipeline import find_sweep
     from walkers.sweeps.summary import describe_status, sweeps_in
 
-    print("\n".join(describe_status(one) for one in sweeps_in(directory)))
+    print("\n".join(describe_status(one) for one in sweeps_in(find_sweep(directory) or directory)))

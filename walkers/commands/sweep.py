@@ -62,6 +62,7 @@ def command(
     for failure in failures:
         print(f"walkers: point {failure.point}, {failure.run}: {failure.message}", file=sys.stderr)
     print(describe_status(record.directory))
-    for line in lines_of_rest(rests_on(next(loaded.cases()).origins)):
+    same = [one for one in next(loaded.cases()).origins if one.key not in loaded.keys]  # what varies is in the table
+    for line in lines_of_rest(rests_on(same)):
         print(line)
     return 1 if failures else 0

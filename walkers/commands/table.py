@@ -13,7 +13,11 @@ from walkers.commands.arguments import refuse
 
 Directory = Annotated[
     Path,
-    typer.Argument(metavar="DIR", help="A sweep's directory, such as runs/fig2.", autocompletion=completion.sweeps),
+    typer.Argument(
+        metavar="DIR",
+        help="A sweep's directory, or its name in runs.",
+        autocompletion=completion.sweeps,
+    ),
 ]
 Csv = Annotated[bool, typer.Option("--csv", help="Comma-separated, units in the head.")]
 Parquet = Annotated[bool, typer.Option("--parquet", help="Parquet, units in the field metadata.")]
@@ -31,9 +35,11 @@ def command(
     thresholds: Thresholds = False,
 ) -> None:
     """Print the table of a sweep, one row per point: what varied, what follows, what came out, where the run is."""
+    from walkers.pipeline import find_sweep
     from walkers.sweeps.table import encoded, load, short_text, write_table_file
     from walkers.sweeps.table import thresholds as thresholds_of
 
+    directory = find_sweep(directory) or directory
     frame = thresholds_of(directory) if thresholds else load(directory)
     forms = [name for name, wanted in (("csv", csv), ("parquet", parquet), ("json", json)) if wanted]
     refuse("--csv, --parquet, --json, --to", len(forms) + (to is not None) > 1, "expected one of them")
