@@ -11,9 +11,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 from math import isfinite, log
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.units import split_quantity
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 Value = Any
 """A TOML value: text with a unit, a number, or a list of such."""
@@ -209,11 +213,28 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
     ranges
         For each key ``{ uniform = [low, high] }`` or ``{ loguniform = [low, high] }``.
     """
-    import warnings
-
     import numpy as np
-    from scipy.stats import qmc
 
+    ends = ends_of(ranges)
+    if not ends:
+        raise UnusableAxisError("sample.ranges", dict(ranges), "expected keys and their ranges")
+    columns = []
+    for share, (low, high, unit, logarithmic) in zip(
+        unit_cube(method, len(ends), points, seed).T, ends.values(), strict=True
+    ):
+        numbers = np.exp(log(low) + share * log(high / low)) if logarithmic else low + share * (high - low)
+        columns.append([written(float(number), unit) for number in numbers])
+    return Axis(tuple(ends), tuple(zip(*columns, strict=True)))
+
+
+def ends_of(ranges: Mapping[str, Any]) -> dict[str, tuple[float, float, str | None, bool]]:
+    """Both ends of the ranges of several keys, their unit, and whether they are of magnitudes.
+
+    Raises
+    ------
+    UnusableAxisError
+        If one is no ``{ uniform = [low, high] }`` or ``{ loguniform = [low, high] }``.
+    """
     ends: dict[str, tuple[float, float, str | None, bool]] = {}
     for key, given in flatten(ranges, is_axis).items():
         kind = next(iter(given)) if isinstance(given, Mapping) and len(given) == 1 else ""
@@ -223,8 +244,16 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
         if low >= high:
             raise UnusableAxisError(key, given, "expected the smaller value first")
         ends[key] = (low, high, unit, kind == "loguniform")
-    if not ends:
-        raise UnusableAxisError("sample.ranges", dict(ranges), "expected keys and their ranges")
+    return ends
+
+
+def unit_cube(method: str, dimensions: int, points: int, seed: int) -> npt.NDArray[np.float64]:
+    """Points of a sampler in the unit cube, shape (points, dimensions); as for `sampled`."""
+    import warnings
+
+    import numpy as np
+    from scipy.stats import qmc
+
     makers: dict[str, Callable[..., qmc.QMCEngine]] = {
         "sobol": qmc.Sobol,
         "halton": qmc.Halton,
@@ -232,12 +261,8 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
     }
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # a number of points that is no power of two is the user's choice
-        unit_cube = makers[method](d=len(ends), rng=np.random.default_rng(seed)).random(points)
-    columns = []
-    for share, (low, high, unit, logarithmic) in zip(unit_cube.T, ends.values(), strict=True):
-        numbers = np.exp(log(low) + share * log(high / low)) if logarithmic else low + share * (high - low)
-        columns.append([written(float(number), unit) for number in numbers])
-    return Axis(tuple(ends), tuple(zip(*columns, strict=True)))
+        cube: npt.NDArray[np.float64] = makers[method](d=dimensions, rng=np.random.default_rng(seed)).random(points)
+    return cube
 
 
 def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Value, ...]]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from math import isclose, pi
 from typing import Any
@@ -94,10 +94,7 @@ def flattened(case: Mapping[str, Any]) -> FlatCase:
         ``liquid.bridge_viscosity`` and ``liquid.film_viscosity`` stand for the liquid's viscosity and its ratios where
         these were not recorded.
     """
-    flat: dict[str, Any] = {}
-    for key, value in case.items():
-        if key not in _NOT_COMPARED:
-            _flatten(key, value, flat)
+    flat = dict(dotted({key: value for key, value in case.items() if key not in _NOT_COMPARED}))
     for listed, alone in _SOLE.items():
         if not any(key.startswith(listed.replace("0", "1")) for key in flat):
             flat = {alone + key.removeprefix(listed) if key.startswith(listed) else key: flat[key] for key in flat}
@@ -136,15 +133,16 @@ def _own_viscosity(flat: Mapping[str, Any], recorded: Mapping[str, Any]) -> tupl
     return viscosity, ratios
 
 
-def _flatten(key: str, value: Any, flat: dict[str, Any]) -> None:
+def dotted(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """Values of nested tables by dotted keys, entries of lists of tables one by one."""
     if isinstance(value, Mapping):
         for name, one in value.items():
-            _flatten(f"{key}.{name}", one, flat)
+            yield from dotted(one, f"{key}.{name}" if key else name)
     elif isinstance(value, list) and value and isinstance(value[0], Mapping):
         for number, one in enumerate(value):
-            _flatten(f"{key}[{number}]", one, flat)
+            yield from dotted(one, f"{key}[{number}]")
     else:
-        flat[key] = value
+        yield key, value
 
 
 def readable(key: str, value: Any) -> str:

@@ -287,15 +287,14 @@ class EnvironmentTable(Table):
 
 def _ranges(value: object) -> object:
     """Ranges by dotted keys: each two values of one unit, the smaller first."""
-    from walkers.inputs.axes import UnusableAxisError, flatten, is_axis, sampled
+    from walkers.inputs.axes import UnusableAxisError, ends_of, flatten, is_axis
 
     if not isinstance(value, dict):
         return value
     try:
         given = flatten(value, is_axis)
         ranges = {key: one if is_axis(one) else {"uniform": one} for key, one in given.items()}
-        if ranges:
-            sampled("latin-hypercube", 1, 0, ranges)
+        ends_of(ranges)
     except UnusableAxisError as unusable:
         told = f"{unusable.key}: {unusable.expected}".replace("{ uniform = [low, high] }", "[low, high]")
         raise PydanticCustomError("ranges", "{expected}", {"expected": told}) from unusable

@@ -49,7 +49,7 @@ def manifest(
         Names of folders in it that have manifests of their own: checksums of their files are there.
     """
     finished = time.time()
-    audit, made_by = read_audit(engine.sha256), software()
+    audit = read_audit(engine.sha256)
     files = {
         path.relative_to(directory).as_posix(): path.stat().st_size
         for path in sorted(directory.rglob("*"))
@@ -66,10 +66,7 @@ def manifest(
             "sha256": engine.sha256,
             "audit": audit.summary() if audit else None,
         },
-        "granular_walkers": made_by.version,
-        "commit": made_by.commit,
-        "python": made_by.python,
-        "packages": made_by.packages,
+        **_made_by(),
         "host": platform.node(),
         "platform": platform.platform(),
         "started": _iso(started),
@@ -120,20 +117,27 @@ def record_tables(directory: Path, names: Iterable[str]) -> None:
     path = directory / MANIFEST_NAME
     if not path.is_file():
         return
-    contents, made_by = read_json(path), software()
+    contents = read_json(path)
     sums = checksums(directory, names)
     contents.setdefault("files", {}).update({name: (directory / name).stat().st_size for name in sums})
     if "sha256" in contents:  # else one of a time when there were none: of these files alone they would mislead
         contents["sha256"].update(sums)
     contents["tabulated"] = {
-        "granular_walkers": made_by.version,
-        "commit": made_by.commit,
-        "python": made_by.python,
-        "packages": made_by.packages,
+        **_made_by(),
         "date": _iso(time.time()),
         "files": list(sums),
     }
     write_json(path, contents)
+
+
+def _made_by() -> dict[str, Any]:
+    made_by = software()
+    return {
+        "granular_walkers": made_by.version,
+        "commit": made_by.commit,
+        "python": made_by.python,
+        "packages": made_by.packages,
+    }
 
 
 def _iso(seconds: float) -> str:

@@ -182,13 +182,11 @@ def digest(cases: Iterable[Case]) -> str:
 def stale(docs: Path) -> list[str]:
     """Files of the documentation that are missing, or show other cases than today's."""
     record = recorded(docs)
-    return [
-        file
-        for one in ILLUSTRATIONS.values()
-        for today in [digest(one.cases())]
-        for file in one.files
-        if record.get(file) != today or not (docs / file).is_file()
-    ]
+    return [file for one in ILLUSTRATIONS.values() for file in _outdated(one, digest(one.cases()), record, docs)]
+
+
+def _outdated(one: Illustration, today: str, record: Mapping[str, str], docs: Path) -> list[str]:
+    return [file for file in one.files if record.get(file) != today or not (docs / file).is_file()]
 
 
 def recorded(docs: Path) -> dict[str, str]:
@@ -221,13 +219,15 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
     for name in only:
         if name not in ILLUSTRATIONS:
             raise InputError("illustrations", [Problem("", name, f"expected one of {', '.join(ILLUSTRATIONS)}")])
-    old = set(stale(docs))
     written = []
     for name, one in ILLUSTRATIONS.items():
-        if name in only or (not only and not old.isdisjoint(one.files)):
+        if only and name not in only:
+            continue
+        today = digest(one.cases())
+        if only or _outdated(one, today, recorded(docs), docs):
             print(f"walkers: {name}", file=sys.stderr)
             one.make(out, docs)
-            record = {**recorded(docs), **dict.fromkeys(one.files, digest(one.cases()))}
+            record = {**recorded(docs), **dict.fromkeys(one.files, today)}
             write_json(docs / RECORD, dict(sorted(record.items())))
             written += [docs / file for file in one.files]
     return written + refresh_pages(pages_of(docs), facts(docs), out)

@@ -9,7 +9,7 @@ the time would be one in a run that is long enough to show what became of it, an
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.readable import dotted
 from walkers.postprocess.clusters import Climb, ClimbCriteria
 from walkers.postprocess.piles import Pile, analyse, classified
 from walkers.runner.directory import CASE_NAME, finished_run
@@ -56,7 +57,7 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
     runs = [run for path in found if (run := finished_run(path)) is not None]
     try:
         piles = {run.directory.name.rpartition("-")[2]: run for run in runs if Pile().applies(run.case)}
-        cases = {run.directory: _conditions(run.case.determinants()) for run in piles.values()}
+        cases = {run.directory: dict(dotted(run.case.determinants())) for run in piles.values()}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(str(directory), [Problem("", None, f"a case cannot be read ({error})")]) from error
     if not cases:
@@ -70,17 +71,6 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
         if case.get("run.cycles", 0) > cases[before].get("run.cycles", 0):
             starts[case.get("seed")] = path
     return {label: list(starts.values()) for label, starts in groups.items()}
-
-
-def _conditions(value: Any, key: str = "") -> dict[str, Any]:
-    """Dotted keys of a resolved case, entries of lists of tables one by one."""
-    if isinstance(value, Mapping):
-        parts = {f"{key}.{name}" if key else name: one for name, one in value.items()}
-    elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-        parts = {f"{key}[{number}]": one for number, one in enumerate(value)}
-    else:
-        return {key: value}
-    return {name: one for part, within in parts.items() for name, one in _conditions(within, part).items()}
 
 
 def _short(value: Any) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.readable import differing, flattened, readable, readable_unit
 from walkers.sweeps.columns import result_columns, row_of
-from walkers.sweeps.listing import aligned
+from walkers.sweeps.listing import aligned, with_error
 from walkers.sweeps.record import result_in
 
 if TYPE_CHECKING:
@@ -86,16 +86,10 @@ class Pair:
     def cells(self) -> list[str]:
         """As text, in the usual unit."""
         unit, size = readable_unit(self.unit)
-        told = [_with_error(value / size, error / size) for value, error in zip(self.values, self.errors, strict=True)]
+        told = [with_error(value / size, error / size) for value, error in zip(self.values, self.errors, strict=True)]
         apart = f"{self.difference / size:+.3g}" if isfinite(self.difference) else "-"
         share = f"{self.standard_errors:+.3g}" if isfinite(self.standard_errors) else "-"
         return [f"{self.quantity} ({unit})" if unit else self.quantity, *told, apart, share]
-
-
-def _with_error(value: float, error: float) -> str:
-    if not isfinite(value):
-        return "-"
-    return f"{value:.4g} ± {error:.1g}" if isfinite(error) else f"{value:.4g}"
 
 
 def parameters_text(names: Sequence[str], parameters: Mapping[str, tuple[Any, Any]]) -> str:

@@ -23,7 +23,8 @@ NONE = "none"
 """Instead of a column: do not tell points apart so."""
 DEFAULTS = ("velocity", "climbs")
 """What is drawn if nothing else is asked for, the first that the table has."""
-_ERRORS = {"velocity": "standard_error"}
+ERRORS = {"velocity": "standard_error"}
+"""Columns with the standard errors of others."""
 _MOST_PANELS = 12
 """More combinations of what is left are not told apart by panels."""
 
@@ -84,8 +85,8 @@ def drawn_column(table: pd.DataFrame, name: str, theory: Mapping[str, FloatArray
     unit, size = readable_unit(table.attrs["units"].get(name, ""))
     values = _numbers(table, name, "--y") / size
     errors = np.full(len(table), np.nan)
-    if name in _ERRORS:
-        errors = table[_ERRORS[name]].to_numpy(dtype=float, na_value=np.nan) / size
+    if name in ERRORS:
+        errors = table[ERRORS[name]].to_numpy(dtype=float, na_value=np.nan) / size
     predicted = {model: numbers / size for model, numbers in (theory or {}).items()}
     return Drawn(with_unit(readable_key(name), unit), values, errors, predicted)
 

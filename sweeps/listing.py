@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite, nan
 from typing import Any, Literal
 
 from walkers.inputs.readable import differing, readable
@@ -98,9 +99,16 @@ def short_names(keys: Sequence[str]) -> list[str]:
 def outcome_text(run: Entry) -> str:
     """What a run gave, in a few words."""
     if run.velocity is not None:
-        error = "" if run.standard_error is None else f" ± {run.standard_error * 1e3:.1g}"
-        return f"{run.velocity * 1e3:.4g}{error} mm/s"
+        error = nan if run.standard_error is None else run.standard_error
+        return f"{with_error(run.velocity * 1e3, error * 1e3)} mm/s"
     return "-" if run.climbs is None else f"{run.climbs} climb{'' if run.climbs == 1 else 's'}"
+
+
+def with_error(value: float, error: float) -> str:
+    """A number with its standard error, if that is known; a dash for none."""
+    if not isfinite(value):
+        return "-"
+    return f"{value:.4g} ± {error:.1g}" if isfinite(error) else f"{value:.4g}"
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> str:

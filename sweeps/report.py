@@ -18,6 +18,7 @@ from walkers.postprocess.report.page import LARGEST, NAME, check_report, fill, o
 from walkers.postprocess.report.plots import COLOURS, error_bars, new_plot, with_legend
 from walkers.postprocess.report.run import RunReport
 from walkers.postprocess.tables import read_table
+from walkers.sweeps.figure_layout import DEFAULTS, ERRORS
 from walkers.sweeps.record import SweepRecord, read_record, states
 from walkers.sweeps.table import load
 
@@ -34,8 +35,6 @@ _SHOWN = (
     *("climbs", "onset", "speed", "highest", "led_by_large", "brazil_nut_end", "merged", "parted", "status"),
 )
 """Columns of a sweep's table that the report shows, of those that it has, after what varies."""
-_ERRORS = {"velocity": "standard_error"}
-"""Columns with the standard errors of others."""
 _MOST_LEGENDS = 10
 _MOST_MULTIPLES = 60
 """Small pictures; of more points some are left out, and the page says so."""
@@ -170,7 +169,7 @@ def _table(frame: pd.DataFrame, record: SweepRecord) -> tuple[list[str], list[li
     for _, row in frame.iterrows():
         cells = []
         for name, (_, factor) in zip(columns, labels, strict=True):
-            error = row.get(_ERRORS.get(name, ""))
+            error = row.get(ERRORS.get(name, ""))
             cells.append(_cell(row[name], factor, error))
         rows.append(cells)
     return [label for label, _ in labels], rows
@@ -193,7 +192,7 @@ def _cell(value: Any, factor: float, error: Any) -> Cell:
 
 def _overview(frame: pd.DataFrame, record: SweepRecord) -> Model | None:
     """What came out against the first number that varies; a colour for each value of what varies besides."""
-    result = next((name for name in ("velocity", "climbs") if name in frame and frame[name].notna().any()), None)
+    result = next((name for name in DEFAULTS if name in frame and frame[name].notna().any()), None)
     numeric = [name for name in _varied(record, frame) if frame[name].map(type).isin((int, float)).all()]
     if result is None or not numeric:
         return None
@@ -217,8 +216,8 @@ def _overview(frame: pd.DataFrame, record: SweepRecord) -> Model | None:
         colour = COLOURS[number % len(COLOURS)]
         plot.line(along, values, color=colour, line_alpha=0.4, **legend)
         plot.scatter(along, values, color=colour, size=7, **legend)
-        if result in _ERRORS:
-            error_bars(plot, along, values, ordered[_ERRORS[result]].to_numpy(float) * factor)
+        if result in ERRORS:
+            error_bars(plot, along, values, ordered[ERRORS[result]].to_numpy(float) * factor)
     if plot.legend:
         plot.legend.title = ", ".join(f"{name} ({units[name]})" if units[name] else name for name in others)
     return with_legend(plot)

@@ -8,7 +8,7 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.axes import sampled, unit_of
+from walkers.inputs.axes import sampled, unit_cube, unit_of
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import unmeasured
@@ -135,16 +135,11 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
 
 def _likeness(seed: int, points: int, dimensions: int) -> float:
     """Largest correlation of two columns of the sampler's points."""
-    import warnings
-
     import numpy as np
-    from scipy.stats import qmc
 
     if dimensions < 2:
         return 0.0
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of points that are no power of two
-        cube = qmc.Sobol(d=dimensions, rng=np.random.default_rng(seed)).random(points)
+    cube = unit_cube("sobol", dimensions, points, seed)
     return float(np.abs(np.corrcoef(cube.T) - np.eye(dimensions)).max())
 
 
@@ -198,7 +193,7 @@ def run_spread(
         held=tuple(one for one in case.origins if one.key in unmeasured() and one.range is None),
         bands={name: _band(together[name]) for name in shown if together[name].notna().any()},
         depends={name: _ranks(together, name, sweep.keys) for name in shown},
-        counts=_counts(table) if "velocity" in table else {},
+        counts=_counts(together, len(table)) if "velocity" in table else {},
         failures=tuple(failures),
     )
 
@@ -219,13 +214,12 @@ def _ranks(table: pd.DataFrame, name: str, keys: tuple[str, ...]) -> dict[str, f
     return dict(sorted(certain.items(), key=lambda one: -abs(one[1])))
 
 
-def _counts(table: pd.DataFrame) -> dict[str, int]:
-    together = table[table["separated_fraction"] <= SEPARATED]
+def _counts(together: pd.DataFrame, points: int) -> dict[str, int]:
     return {
         "forward": int((together["velocity"] > _AT_REST).sum()),
         "backward": int((together["velocity"] < -_AT_REST).sum()),
         "at_rest": int((together["velocity"].abs() <= _AT_REST).sum()),
-        "separated": len(table) - len(together),
+        "separated": points - len(together),
     }
 
 

@@ -275,19 +275,15 @@ def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     runner.EngineFailure
         If a case is given and there is no engine to look it up for.
     """
-    from walkers.inputs.reading import load_case
     from walkers.runner.directory import finished_run
 
-    place = place_of(run, out)
+    place, case = _found(run, out)
     if finished_run(place) is None:
         told = "not a finished run: expected a folder with a manifest.json"
         if find_sweep(place) is not None:
             told = "a sweep's directory: walkers plot, table and status take it, this takes one of its runs"
         raise InputError(str(run), [Problem("", None, told)])
-    if not isinstance(run, (str, Path)):
-        return replace(_readable(place), origins=run.origins)
-    by_place = Path(run).is_dir() or _named(run, out) is not None
-    return replace(_readable(place), origins=None if by_place else load_case(run).origins)
+    return replace(_readable(place), origins=None if case is None else case.origins)
 
 
 def place_of(run: Case | str | Path, out: Path = DEFAULT_OUT, *, archives: bool = False) -> Path:
@@ -307,21 +303,28 @@ def place_of(run: Case | str | Path, out: Path = DEFAULT_OUT, *, archives: bool 
     InputError
         If a case is given and has no finished run.
     """
+    if archives and isinstance(run, (str, Path)) and Path(run).suffix == ".zip" and Path(run).is_file():
+        return Path(run)
+    return _found(run, out)[0]
+
+
+def _found(run: Case | str | Path, out: Path) -> tuple[Path, Case | None]:
+    """Where something is (`place_of`), and the case by which it was found; None of what was found by its place."""
     from walkers.inputs.reading import load_case
 
     name = str(run) if isinstance(run, (str, Path)) else run.name
     if isinstance(run, (str, Path)):
         path = Path(run)
-        if path.is_dir() or (archives and path.suffix == ".zip" and path.is_file()):
-            return path
-        there = _named(run, out) or (find_sweep(run, out) if not path.is_file() else None)
-        if there is not None:
-            return there
+        if path.is_dir():
+            return path, None
+        named = _named(run, out) or (find_sweep(run, out) if not path.is_file() else None)
+        if named is not None:
+            return named, None
         run = load_case(run)
     there = _run_of(run, out)
     if there is None:
         raise InputError(name, [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
-    return there
+    return there, run
 
 
 def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:

@@ -11,6 +11,7 @@ from typing import Any
 
 from walkers.inputs.case import Case
 from walkers.inputs.origins import Origin, text_of
+from walkers.inputs.readable import dotted
 from walkers.postprocess.analysis import analyses_in, current_result, quantities_of, warnings_of
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.quantities import Quantity
@@ -205,16 +206,9 @@ def _parameter(one: Origin) -> Parameter:
     return Parameter(one.key, one.text, one.origin, one.source, ends)
 
 
-def flat(values: Any, key: str = "") -> Iterator[tuple[str, Any]]:
-    """Values of nested tables by dotted keys."""
-    if isinstance(values, dict):
-        for name, value in values.items():
-            yield from flat(value, f"{key}.{name}" if key else name)
-    elif isinstance(values, list) and values and isinstance(values[0], dict):
-        for number, value in enumerate(values):
-            yield from flat(value, f"{key}[{number}]")
-    elif values not in (None, "", [], ()):
-        yield key, values
+def flat(values: Any) -> Iterator[tuple[str, Any]]:
+    """Values of nested tables by dotted keys, of those that say something."""
+    return ((key, value) for key, value in dotted(values) if value not in (None, "", [], ()))
 
 
 def result_html(directory: Path, result: dict[str, Any], origins: tuple[Origin, ...] | None = None) -> str:
