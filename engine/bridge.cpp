@@ -413,6 +413,8 @@ template<bool ROLLS> void add_styles()
 struct Registration {
   Registration()
   {
+    // An abort loses what is in the buffers of an output that is a file.
+    setvbuf(stdout, 0, _IOLBF, 1 << 16);
     Factory::instance().addCohesionModel("bridge", BRIDGE_ID);
     add_styles<false>();
     add_styles<true>();
