@@ -90,11 +90,10 @@ class Span:
 
 @dataclass(frozen=True)
 class Room:
-    """Corners of the simulation box and places of the wall-velocity carriers, m."""
+    """Corners of the simulation box, m."""
 
     lower: Vector
     upper: Vector
-    carriers: tuple[Vector, ...]
 
 
 @dataclass(frozen=True)
@@ -153,7 +152,7 @@ class Boundary:
         return self.walls == (FLOOR,)
 
     @abstractmethod
-    def room(self, span: Span, ranks: int) -> Room:
+    def room(self, span: Span) -> Room:
         """The simulation box for beads that need so much, on so many MPI processes."""
 
     @abstractmethod
@@ -200,14 +199,12 @@ class Plane(Boundary):
         """The plane."""
         return (Face("z", 1, (0.0, 0.0, 0.0)),)
 
-    def room(self, span: Span, ranks: int) -> Room:
-        """A box about the ways of all walkers; the carrier is in its corner, beyond their reach and above it."""
-        del ranks
+    def room(self, span: Span) -> Room:
+        """A box about the ways of all walkers."""
         half_x, half_y, margin, height = span.half_x, span.half_y, span.margin, span.height
         return Room(
             lower=(-half_x - 2.0 * margin, -half_y - 2.0 * margin, -margin),
             upper=(half_x + 2.0 * margin, half_y + 2.0 * margin, height + 2.0 * margin),
-            carriers=((half_x + margin, half_y + margin, height + margin),),
         )
 
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
@@ -248,12 +245,10 @@ class Channel(_Row):
             Face("y", -1, (0.0, half, level), wall="+y"),
         )
 
-    def room(self, span: Span, ranks: int) -> Room:
-        """A box about the walkers' ways, the carriers below the floor."""
+    def room(self, span: Span) -> Room:
+        """A box about the walkers' ways."""
         half_x, half_y = span.half_x + 2.0 * span.margin, self.width / 2.0 + span.margin
-        return _room_above(
-            self, (half_x, half_y), max(span.height + 2.0 * span.margin, self.width), span.largest, ranks
-        )
+        return _room_above((half_x, half_y), max(span.height + 2.0 * span.margin, self.width), span.largest)
 
     def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
         """Distance from the nearer wall, m."""
@@ -291,10 +286,10 @@ class Groove(_Row):
         del x
         return z * sin(self.opening / 2.0) - abs(y) * cos(self.opening / 2.0)
 
-    def room(self, span: Span, ranks: int) -> Room:
-        """A box about the walkers' ways, the carriers below the walls."""
+    def room(self, span: Span) -> Room:
+        """A box about the walkers' ways."""
         half_x, half_y = span.half_x + 2.0 * span.margin, span.half_y + 2.0 * span.margin
-        return _room_above(self, (half_x, half_y), span.height + 2.0 * span.margin, span.largest, ranks)
+        return _room_above((half_x, half_y), span.height + 2.0 * span.margin, span.largest)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -320,10 +315,10 @@ class Container(Boundary):
         """The height, m."""
         return self.height
 
-    def room(self, span: Span, ranks: int) -> Room:
+    def room(self, span: Span) -> Room:
         """The container and a little more; climbers may rise above the rim."""
         edge = self.width / 2.0 + _RIM
-        return _room_above(self, (edge, edge), 2.0 * self.height, span.largest, ranks)
+        return _room_above((edge, edge), 2.0 * self.height, span.largest)
 
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
         """A square grid about the middle."""
@@ -417,25 +412,9 @@ def _turns() -> list[float]:
     return [2.0 * pi * (number + 0.5) / SIDES for number in range(SIDES)]
 
 
-def _room_above(boundary: Boundary, half: tuple[float, float], top: float, largest: float, ranks: int) -> Room:
-    """A box from far below the floor, where the carriers are: for each MPI rank one a triangle, in its own part."""
-    faces, below = boundary.faces(), 4.0 * largest
-    triangles = sum(face.triangles for face in faces)
-    width, depth = 2.0 * half[0] / ranks, 2.0 * half[1]
-    # Those of few faces stand in one column.
-    columns, rows = (max(1, int(size / below)) if triangles > len(faces) else 1 for size in (width, depth))
-    layers = ceil(triangles / (columns * rows))
-    lower = (-half[0], -half[1], -(layers + 2) * below)
-    places = [
-        ((column + 0.5) / columns, (row + 0.5) / rows * depth, -(layer + 1.5) * below)
-        for layer in range(layers)
-        for row in range(rows)
-        for column in range(columns)
-    ]
-    carriers = tuple(
-        (lower[0] + (rank + x) * width, lower[1] + y, z) for rank in range(ranks) for x, y, z in places[:triangles]
-    )
-    return Room(lower, (half[0], half[1], top), carriers)
+def _room_above(half: tuple[float, float], top: float, largest: float) -> Room:
+    """A box from below the floor."""
+    return Room((-half[0], -half[1], -4.0 * largest), (half[0], half[1], top))
 
 
 def _round(value: float) -> float:

@@ -8,7 +8,7 @@ from math import pi
 from typing import TYPE_CHECKING
 
 from walkers.physics import capillary
-from walkers.physics.contact import hertz_overlap, hertz_overlap_at_wall, reduced_modulus
+from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.dimer import Dimer
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def contact_loads(case: Case, walkers: Walkers | None = None) -> ContactLoads:
             capillary.capillary_force_at_wall(liquid.surface_tension, radius, volumes[-1], liquid.contact_angle)
         )
         weight = 4.0 / 3.0 * pi * radius**3 * case.density * case.pressing_gravity
-        overlaps.append(hertz_overlap_at_wall(forces[-1] + weight, radius, modulus))
+        overlaps.append(hertz_overlap(forces[-1] + weight, radius, modulus))
     for one, other in walkers.pairs:
         pair = (radii[one], radii[other])
         volumes.append(capillary.bridge_volume_between_beads(*pair, liquid.volume_fraction))

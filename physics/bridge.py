@@ -1,7 +1,7 @@
 """What a law of a liquid bridge says: the pull and the resistances of two surfaces against their gap.
 
-Two surfaces 1 and 2 (spheres, or a sphere and a plane) have the unit vector n from 2 to 1 between their centres, the gap
-h, and arms l1, l2 from the centres to the middle of the contact. Three velocities describe how they move apart:
+Two surfaces 1 and 2 (spheres, or a sphere and a plane) have the unit vector n from 2 to 1 between their centres, the
+gap h, and arms l1, l2 from the centres to the middle of the contact. Three velocities describe how they move apart:
 
     normal    w = (v1 - v2) · n
     sliding   s = (v1 - v2) - w n + n × (l1 ω1 + l2 ω2)       of the surfaces at the contact
@@ -27,6 +27,7 @@ from math import inf
 import numpy as np
 import numpy.typing as npt
 
+from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
 from walkers.physics.matter import Liquid
 
 FloatArray = npt.NDArray[np.float64]
@@ -55,6 +56,16 @@ class Surfaces:
     volume: float
     liquid: Liquid
     minimum_separation_ratio: float
+
+    @classmethod
+    def of(cls, radius: float, other_radius: float, liquid: Liquid, minimum_separation_ratio: float) -> Surfaces:
+        """A bead and another or a plane (a radius of infinity), with the liquid that their bridge has."""
+        if other_radius == inf:
+            volume = bridge_volume_at_wall(radius, liquid.volume_fraction)
+        else:
+            radius, other_radius = sorted((radius, other_radius))
+            volume = bridge_volume_between_beads(radius, other_radius, liquid.volume_fraction)
+        return cls(radius, other_radius, volume, liquid, minimum_separation_ratio)
 
     @property
     def at_wall(self) -> bool:

@@ -1,7 +1,7 @@
 """Capillary bridges: their liquid, their rupture, and F = πγ√(R1R2) (exp(A h/R2 + B) + C).
 
 The force is that of Soulié et al. (2006), Eqs. 13 and 14, R2 the larger radius and h the gap. At a wall
-(`walkers.physics.wall`) it is that between two equal spheres, taken twice.
+it is that between two equal spheres, taken twice.
 
 References
 ----------
@@ -13,8 +13,6 @@ G. Lian, C. Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138–14
 from __future__ import annotations
 
 from math import cbrt, exp, log, pi, sqrt
-
-from walkers.physics.wall import WALL_COPIES
 
 
 def bridge_volume_between_beads(radius_1: float, radius_2: float, volume_fraction: float) -> float:
@@ -71,8 +69,8 @@ def capillary_force(
 def capillary_force_at_wall(
     surface_tension: float, radius: float, volume: float, contact_angle: float, gap: float = 0.0
 ) -> float:
-    """Attraction by the bridge between a bead and a wall (`walkers.physics.wall`), N."""
-    return WALL_COPIES * capillary_force(surface_tension, radius, radius, volume, contact_angle, gap)
+    """Attraction by the bridge between a bead and a plane, N: twice that of two equal spheres."""
+    return 2.0 * capillary_force(surface_tension, radius, radius, volume, contact_angle, gap)
 
 
 def capillary_force_limit_at_wall(surface_tension: float, radius: float) -> float:

@@ -1,16 +1,13 @@
 """Contacts of softened beads: Hertz's repulsion 4/3 E* √R* δ^(3/2), its damping, Mindlin's tangential modulus.
 
 E* = E/(2(1 − ν²)) and G* = E/(4(1 + ν)(2 − ν)) of two bodies of the same modulus. Hertz 1881; Mindlin 1949; K. L.
-Johnson, Contact Mechanics (1985). Coulomb's limit is μ times the normal force of the contact without its bridge, its
-repulsion and its damping together: a bead that is pressed on rubs more than one that leaves (measured; the audit's
-`coulomb-limit`).
+Johnson, Contact Mechanics (1985). A wall is a sphere without end: R* is the bead's radius and m* its mass. Coulomb's
+limit is μ times the elastic repulsion, which carries the load of the bridge.
 """
 
 from __future__ import annotations
 
-from math import exp, log, pi, sqrt
-
-from walkers.physics.wall import WALL_COPIES
+from math import log, pi, sqrt
 
 
 def reduced_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
@@ -36,11 +33,6 @@ def hertz_repulsion(overlap: float, reduced_radius: float, reduced_modulus: floa
     return float(4.0 / 3.0 * reduced_modulus * sqrt(reduced_radius) * max(overlap, 0.0) ** 1.5)
 
 
-def hertz_repulsion_at_wall(overlap: float, radius: float, reduced_modulus: float) -> float:
-    """Repulsion of a bead of ``radius`` (m) by a wall (`walkers.physics.wall`), N."""
-    return WALL_COPIES * hertz_repulsion(overlap, radius, reduced_modulus)
-
-
 def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -> float:
     """Overlap at which the repulsion of two beads carries a load, m.
 
@@ -52,11 +44,6 @@ def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -
         R* in m, E* in Pa.
     """
     return float((3.0 * force / (4.0 * reduced_modulus * sqrt(reduced_radius))) ** (2.0 / 3.0))
-
-
-def hertz_overlap_at_wall(force: float, radius: float, reduced_modulus: float) -> float:
-    """Overlap at which a wall (`walkers.physics.wall`) carries a load (N), m; of a bead of ``radius`` (m)."""
-    return hertz_overlap(force / WALL_COPIES, radius, reduced_modulus)
 
 
 def normal_damping(overlap: float, reduced_radius: float, reduced_modulus: float, mass: float, ratio: float) -> float:
@@ -76,17 +63,6 @@ def normal_damping(overlap: float, reduced_radius: float, reduced_modulus: float
     """
     stiffness = 2.0 * reduced_modulus * sqrt(reduced_radius * max(overlap, 0.0))
     return 2.0 * sqrt(5.0 / 6.0) * ratio * sqrt(stiffness * mass)
-
-
-def normal_damping_at_wall(overlap: float, radius: float, reduced_modulus: float, mass: float, ratio: float) -> float:
-    """Coefficient of the damping of a bead of ``radius`` (m) by a wall (`walkers.physics.wall`), N s/m."""
-    return WALL_COPIES * normal_damping(overlap, radius, reduced_modulus, mass, ratio)
-
-
-def restitution_of_copies(restitution: float, copies: int) -> float:
-    """Restitution of so many contacts side by side: stiffness and damping add up, which makes it that of √copies β."""
-    ratio = sqrt(copies) * damping_ratio(restitution)
-    return exp(-pi * ratio / sqrt(1.0 - ratio**2)) if ratio < 1.0 else 0.0
 
 
 def damping_ratio(restitution: float) -> float:

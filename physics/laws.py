@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 from walkers.physics.bridge import BridgeLaw
+from walkers.physics.matter import Liquid
 
 LAWS = {
     "soulie": "walkers.physics.soulie",
@@ -46,6 +47,11 @@ def by_name(name: str) -> BridgeLaw:
     if not callable(law):
         raise ValueError(f"bridge law {name!r}: {place} has no function {function}")
     return law  # type: ignore[no-any-return]
+
+
+def law_of(liquid: Liquid) -> BridgeLaw:
+    """The law of a liquid's bridges (`by_name`)."""
+    return by_name(liquid.law)
 
 
 def _module(name: str, place: str) -> ModuleType:

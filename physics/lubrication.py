@@ -1,6 +1,7 @@
 """Viscous forces of a bridge: normal 6πηR*/max(ε, h/R*) and tangential 6πηR* (8/15 ln(1/max(ε, h/R*)) + 0.9588).
 
-η is the viscosity, R* = R1 R2/(R1 + R2), h the gap and ε the gap over R* below which the forces stop growing (surface
+η is the viscosity, R* = R1 R2/(R1 + R2), at a plane the radius, h the gap and
+ε the gap over R* below which the forces stop growing (surface
 roughness). Both are coefficients of a velocity, N s/m. After Nase et al. as in D. Shi, J. J. McCarthy, Powder
 Technology 184 (2008) 65–75, Eqs. 40, 41.
 """
@@ -8,8 +9,6 @@ Technology 184 (2008) 65–75, Eqs. 40, 41.
 from __future__ import annotations
 
 from math import log, pi
-
-from walkers.physics.wall import WALL_COPIES
 
 
 def normal_drag(
@@ -39,21 +38,3 @@ def tangential_drag(
     nearness = max(minimum_separation_ratio, gap / reduced_radius)
     stokes = 6.0 * pi * dynamic_viscosity * reduced_radius
     return stokes * (8.0 / 15.0 * log(1.0 / nearness) + 0.9588)
-
-
-def normal_drag_at_wall(
-    dynamic_viscosity: float, radius: float, minimum_separation_ratio: float, gap: float = 0.0
-) -> float:
-    """Coefficient of the normal force between a bead of ``radius`` (m) and a plane, 6πηR/max(ε, h/R), N s/m."""
-    return normal_drag(dynamic_viscosity, radius, minimum_separation_ratio, gap)
-
-
-def tangential_drag_at_wall(
-    dynamic_viscosity: float, radius: float, minimum_separation_ratio: float, gap: float = 0.0
-) -> float:
-    """Coefficient of the tangential force at a wall as the engine has it, N s/m; of a bead of ``radius`` (m).
-
-    It is that of two equal spheres, taken twice (`walkers.physics.wall`): that of a plane (`tangential_drag`, whose R*
-    is the radius) where they touch, up to a fifth less where they do not.
-    """
-    return WALL_COPIES * tangential_drag(dynamic_viscosity, radius / 2.0, minimum_separation_ratio, gap)

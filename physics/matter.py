@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+DEFAULT_LAW = "soulie"
+
 
 @dataclass(frozen=True)
 class Liquid:
@@ -11,8 +13,8 @@ class Liquid:
 
     The viscosity is that of the bridges: the liquid's, times the case's ``viscosity_ratio``. ``volume_fraction`` is the
     liquid on a bead over the bead's volume. ``film_viscosity`` (Pa s) is that of the film on the walls along
-    which beads plough: 6π R times it drags a bead's centre in proportion to its velocity there. ``law`` names the law of the bridges (`walkers.physics.laws`); None is what decks for the stock
-    engine have.
+    which beads plough: 6π R times it drags a bead's centre in proportion to its velocity there.
+    ``law`` names the law of the bridges (`walkers.physics.laws`).
     """
 
     surface_tension: float
@@ -22,7 +24,7 @@ class Liquid:
     contact_angle: float
     name: str | None
     film_viscosity: float = 0.0
-    law: str | None = None
+    law: str = DEFAULT_LAW
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from math import ceil, inf, pi, sqrt
 
 from walkers.physics.contact import reduced_modulus
 from walkers.physics.film import film_drag
-from walkers.physics.lubrication import normal_drag, normal_drag_at_wall
+from walkers.physics.lubrication import normal_drag
 from walkers.physics.matter import Contact, Liquid
 
 AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
@@ -109,7 +109,7 @@ def _viscous_limit(bridged: Bridged, density: float, contact: Contact, liquid: L
             * (1.0 / mass + 1.0 / _mass(other, density))
             for other in neighbours
         )
-        rates.append(normal_drag_at_wall(viscosity, radius, nearest) / mass + between)
+        rates.append(normal_drag(viscosity, radius, nearest) / mass + between)
         rates.append(film_drag(liquid.film_viscosity, radius) / mass)
     return 2.0 / max(rates) if max(rates) > 0.0 else inf
 

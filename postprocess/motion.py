@@ -311,7 +311,7 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
         if len(data) < 2:
             raise DumpError(f"{dump.path}: {len(data)} complete frames, too few for a motion")
         if data.shape[1] != layout.atoms:
-            raise DumpError(f"{segment}: {data.shape[1]} rows, expected {layout.atoms}: carriers and beads")
+            raise DumpError(f"{segment}: {data.shape[1]} rows, expected {layout.atoms}")
         truncated = truncated or dump.truncated
         begin = 1 if steps else 0  # the first frame is the last one of the segment before
         parts.append(data[begin:])
@@ -330,26 +330,25 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
         column = dump.column(name)
         return data[:, :, column : column + 3]
 
-    position, velocity, first = vectors("x"), vectors("vx"), layout.carriers
-    # In the laboratory frame the carriers move with the walls, in the container's they rest.
-    shift, speed = (position[:, 0] - position[:1, 0], velocity[:, 0]) if first else prescribed_motion(case.drive, time)
+    # In the laboratory frame the walls move, in the container's they rest.
+    shift, speed = prescribed_motion(case.drive, time)
     lab = case.drive.frame == "lab"
     substrate, substrate_velocity = (shift, speed) if lab else boundary_motion(case.drive, time)
     return Motion(
         case=case,
         time=time,
-        position=position[:, first:] - shift[:, None],
-        velocity=velocity[:, first:] - speed[:, None],
-        spin=vectors("omegax")[:, first:],
+        position=vectors("x") - shift[:, None],
+        velocity=vectors("vx") - speed[:, None],
+        spin=vectors("omegax"),
         substrate=substrate,
         substrate_velocity=substrate_velocity,
-        radius=data[0, first:, dump.column("radius")],
+        radius=data[0, :, dump.column("radius")],
         walkers=layout.walkers,
-        first_id=first + 1,
+        first_id=1,
         frames=frames,
         truncated=truncated,
         ended_early=ended_early,
-        mean_spin=vectors(MEAN_SPIN_COLUMNS[0])[:, first:] if MEAN_SPIN_COLUMNS[0] in layout.bead_columns else None,
+        mean_spin=vectors(MEAN_SPIN_COLUMNS[0]) if MEAN_SPIN_COLUMNS[0] in layout.bead_columns else None,
     )
 
 

@@ -46,7 +46,7 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
     walkers = iter(layout.walkers)
     for number, (place, case) in enumerate(cases.items()):
         own = [next(walkers) for make in case.walkers for _ in range(make.replicates)]
-        old = np.array([layout.carrier, *(bead for walker in own for bead in walker.beads)])
+        old = np.array([bead for walker in own for bead in walker.beads])
         new = np.arange(1, len(old) + 1)
         owner[old], renumbered[old] = number, new
         own_frames = frames[:, old - 1]
@@ -72,7 +72,7 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
 
 
 def _own_layout(layout: Layout, walkers: list[PlacedWalker]) -> Layout:
-    renumbered, bead = [], layout.carrier + 1
+    renumbered, bead = [], 1
     for number, walker in enumerate(walkers):
         after = bead + len(walker.beads)
         renumbered.append(replace(walker, walker=number, beads=tuple(range(bead, after))))

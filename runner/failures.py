@@ -47,8 +47,8 @@ class OtherEngine(EngineFailure):
         from walkers.templates.engine import AUDITED_VERSION
 
         super().__init__(
-            f"{path} is {version or 'no LIGGGHTS that names its version'}: decks need a contact model of their own, which "
-            f"is written for {AUDITED_VERSION}, as Debian packages it"
+            f"{path} is {version or 'no LIGGGHTS that names its version'}: decks need a contact model that is written "
+            f"for {AUDITED_VERSION}, as Debian packages it"
         )
 
 

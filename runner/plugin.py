@@ -86,7 +86,7 @@ def _compile(place: Path) -> None:
             made = Path(folder) / place.name
             linked = [f"-Wl,--version-script={_folder() / 'bridge.map'}", "-Wl,-Bsymbolic", "-l:libliggghts.so.3"]
             done = subprocess.run(
-                [compiler, *OPTIONS, *included, f"-I{_folder()}", str(_folder() / "bridge.cpp"), "-o", str(made), *linked],
+                [compiler, *OPTIONS, *included, str(_folder() / "bridge.cpp"), "-o", str(made), *linked],
                 capture_output=True, text=True, errors="replace", check=False,
             )  # fmt: skip
             if done.returncode:

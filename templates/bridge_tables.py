@@ -14,11 +14,10 @@ from math import inf, log2
 
 import numpy as np
 
-from walkers.inputs.case import Case
-from walkers.physics.bridge import BridgeLaw, Curve, FloatArray, Forces, Surfaces
-from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
-from walkers.physics.laws import by_name
+from walkers.physics.bridge import BridgeLaw, Curve, FloatArray, Surfaces
+from walkers.physics.laws import law_of
 from walkers.templates.scene import Bead
+from walkers.templates.sharing import Surface
 
 TOLERANCE = 1e-6
 """Of interpolated forces, relative to a column's largest value within a factor of two of the gap."""
@@ -128,8 +127,8 @@ def _checked(curve: Curve, gaps: FloatArray) -> FloatArray:
     gains = coupling**2 > (1.0 + 1e-9) * sliding * rolling
     if gains.any():
         raise UnusableLawError(
-            f"sliding and rolling together give energy at a gap of {gaps[gains][0]:g} m: the coupling's square is above "
-            "the product of both resistances"
+            f"sliding and rolling together give energy at a gap of {gaps[gains][0]:g} m: the square of the "
+            "coupling is above the product of both resistances"
         )
     return columns
 
@@ -141,8 +140,8 @@ def _error(table: Table) -> tuple[float, float]:
     exact = _checked(table.curve, gaps)
     error = np.abs(_cubics(table.rows, parts).reshape(exact.shape) - exact)
     # Errors count against what is near: forces fall by orders of magnitude, and some end at zero.
-    around = np.stack([np.abs(exact[np.searchsorted(gaps, 0.5 * gaps)]), np.abs(exact), 1e-3 * np.abs(table.rows[:1]) + 0.0 * exact])
-    size = around.max(axis=0)
+    nearer = np.abs(exact[np.searchsorted(gaps, 0.5 * gaps)])
+    size = np.maximum(np.maximum(nearer, np.abs(exact)), 1e-3 * np.abs(table.rows[:1]))
     relative = np.divide(error, size, out=np.zeros_like(error), where=size > 0.0).max(axis=1)
     worst = int(relative.argmax())
     return float(relative[worst]), float(gaps[worst])
@@ -164,34 +163,28 @@ def _cubics(rows: FloatArray, parts: FloatArray) -> FloatArray:
     return values
 
 
-def bridge_tables(case: Case, beads: Iterable[Bead], wall_type: int) -> str:
-    """The engine's file for a case: a table for every two surfaces that may meet.
+def bridge_tables(surfaces: Sequence[Surface], beads: Iterable[Bead]) -> str:
+    """The engine's file of a deck: a table for every two surfaces that may meet; beads of different types never do.
 
     Parameters
     ----------
+    surfaces
+        How beads of each atom type touch each other and the walls, whose type comes after theirs.
     beads
         Of the deck, whose atom types are their surfaces.
-    wall_type
-        Atom type of the walls.
 
     Raises
     ------
     UnusableLawError
         As for `tabulated`.
     """
-    assert case.liquid.law is not None
-    law, nearest = by_name(case.liquid.law), case.contact.minimum_separation_ratio
-    fraction = case.liquid.volume_fraction
-    sizes = sorted({(bead.surface, bead.radius) for bead in beads})
-    parts = [f'# Bridges by the law "{case.liquid.law}": gap (m), pull (N), resistances: normal, sliding (N s/m), ']
-    parts[0] += "coupling (N s), rolling (N m s)\n"
-    for kind, radius in sizes:
-        volume = bridge_volume_at_wall(radius, fraction)
-        table = tabulated(law, Surfaces(radius, inf, volume, case.liquid, nearest))
-        parts.append(f"bridge {kind} {wall_type} {radius!r} inf\n{table.text()}")
-        for other_kind, other in sizes:
-            if other_kind == kind and other >= radius:
-                volume = bridge_volume_between_beads(radius, other, fraction)
-                table = tabulated(law, Surfaces(radius, other, volume, case.liquid, nearest))
-                parts.append(f"bridge {kind} {kind} {radius!r} {other!r}\n{table.text()}")
+    parts = ["# Gap (m), pull (N), resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s).\n"]
+    radii = sorted({(bead.surface, bead.radius) for bead in beads})
+    for kind, (contact, liquid) in enumerate(surfaces, 1):
+        sizes = [radius for of, radius in radii if of == kind]
+        for number, radius in enumerate(sizes):
+            for other_kind, other in [(len(surfaces) + 1, inf), *((kind, size) for size in sizes[number:])]:
+                meeting = Surfaces.of(radius, other, liquid, contact.minimum_separation_ratio)
+                table = tabulated(law_of(liquid), meeting)
+                parts.append(f'# law "{liquid.law}"\nbridge {kind} {other_kind} {radius!r} {other!r}\n{table.text()}')
     return "".join(parts)

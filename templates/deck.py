@@ -4,25 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, degrees, pi, sqrt
+from math import ceil, inf, pi, sqrt
+
+import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import hop_height, reach
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import rendered
-from walkers.physics.capillary import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
-from walkers.physics.matter import Contact
+from walkers.physics.bridge import Surfaces
+from walkers.physics.laws import law_of
 from walkers.templates.bridge_tables import bridge_tables
-from walkers.templates.engine import (
-    ALL_WORKAROUNDS,
-    NO_WORKAROUNDS,
-    Workarounds,
-    contact_angle_setting,
-    separation_cap,
-    static_friction_settings,
-    wall_meshes,
-)
 from walkers.templates.layout import (
     BEAD_COLUMNS,
     MEAN_SPIN_COLUMNS,
@@ -34,16 +27,17 @@ from walkers.templates.layout import (
     PlacedWalker,
 )
 from walkers.templates.placement import place
-from walkers.templates.scene import Scene, without_carriers
-from walkers.templates.sharing import Loading, check_sharing, loading_of, loadings_of, surfaces_of
-from walkers.templates.wall_forces import WallForces, wall_forces
+from walkers.templates.scene import Scene
+from walkers.templates.sharing import Loading, Surface, check_sharing, loadings_of, surface_of, surfaces_of
+from walkers.templates.walls import wall_meshes
 
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
 BRIDGES_NAME = "bridges.txt"
+RUN_NAME = "run.sh"
 STATUS_LINES_PER_CYCLE = 4
-CONTENT_VERSION = 5
+CONTENT_VERSION = 6
 """Of what decks compute: to be raised where the same case gives another deck, comments aside. Runs are named by it."""
 
 RESTART_NAME = "state.restart"
@@ -134,12 +128,10 @@ class Plan:
         Length and sampling.
     walkers
         Which beads are whose.
-    workarounds
-        Which workarounds the deck carries; without carriers those of the scene are left out.
     prescribed
         Beads keep their velocities instead of following the forces.
     ranks
-        Number of MPI processes; the scene must have carriers for each.
+        Number of MPI processes.
     checkpoint
         Restart file to write or to go on from.
     surfaces, loadings
@@ -152,25 +144,20 @@ class Plan:
     skin
         How far beyond contact neighbours are looked for, m; if left out, the smallest radius, and wide bins, which
         suits few beads far apart.
-    static_ratio
-        Friction at rest over that in motion, by another of the engine's models, on linear springs; None for the one
-        that cases have. docs/explanation/validation.md tells what it does.
     """
 
     case: Case
     scene: Scene
     recording: Recording
     walkers: tuple[PlacedWalker, ...] = ()
-    workarounds: Workarounds = ALL_WORKAROUNDS
     prescribed: bool = False
     ranks: int = 1
     checkpoint: Checkpoint = NO_CHECKPOINT
-    surfaces: tuple[Contact, ...] = ()
+    surfaces: tuple[Surface, ...] = ()
     loadings: tuple[Loading, ...] = ()
     fastest: float | None = None
     drive_from: int | None = 0
     skin: float | None = None
-    static_ratio: float | None = None
 
     @property
     def shaken(self) -> bool:
@@ -209,7 +196,7 @@ def settling_steps(case: Case) -> int:
     return max(1, round(SETTLING_SECONDS / case.run.time_step / sample)) * sample
 
 
-def render_deck(case: Case, segment: Segment | None = None, workarounds: Workarounds = ALL_WORKAROUNDS) -> Deck:
+def render_deck(case: Case, segment: Segment | None = None) -> Deck:
     """Render a case.
 
     Parameters
@@ -218,15 +205,13 @@ def render_deck(case: Case, segment: Segment | None = None, workarounds: Workaro
         A resolved case.
     segment
         Of its run; the first one if left out.
-    workarounds
-        Which workarounds for the engine's defects the deck carries.
 
     Returns
     -------
     Deck
         Numbers in full precision (the shortest text that reads back as the same double).
     """
-    return compose(plan_of(case, segment=segment, workarounds=workarounds))
+    return compose(plan_of(case, segment=segment))
 
 
 def render_shared_deck(cases: Sequence[Case]) -> Deck:
@@ -240,7 +225,7 @@ def render_shared_deck(cases: Sequence[Case]) -> Deck:
     return compose(plan_of(*cases))
 
 
-def plan_of(*cases: Case, segment: Segment | None = None, workarounds: Workarounds = ALL_WORKAROUNDS) -> Plan:
+def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
     """The plan of a segment of cases that share a deck: their bodies on one boundary, recorded as the cases say."""
     check_sharing(cases)
     case, run = cases[0], cases[0].run
@@ -262,7 +247,6 @@ def plan_of(*cases: Case, segment: Segment | None = None, workarounds: Workaroun
         scene=scene,
         recording=recording,
         walkers=walkers,
-        workarounds=workarounds,
         ranks=run.ranks,
         checkpoint=checkpoint,
         surfaces=surfaces_of(cases),
@@ -275,19 +259,13 @@ def plan_of(*cases: Case, segment: Segment | None = None, workarounds: Workaroun
 
 def compose(plan: Plan) -> Deck:
     """Put a deck together from its blocks."""
-    case, workarounds = plan.case, plan.workarounds if plan.case.liquid.law is None else NO_WORKAROUNDS
-    scene, walkers = plan.scene, plan.walkers
-    if not workarounds.carriers:
-        gone = len(scene.carriers)
-        scene = without_carriers(scene)
-        walkers = tuple(replace(one, beads=tuple(bead - gone for bead in one.beads)) for one in walkers)
+    case, scene, walkers = plan.case, plan.scene, plan.walkers
     first = case.drive.harmonics[0]
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
-    angle = case.liquid.contact_angle
-    surfaces, at_rest = plan.surfaces or (case.contact,), plan.static_ratio or 1.0
-    moduli = [*(surface.youngs_modulus for surface in surfaces), case.contact.youngs_modulus]
-    moving = _moving(plan)
-    forces, of_walls = _forces(plan, scene), _wall_forces(plan, scene, moving)
+    surfaces = plan.surfaces or (surface_of(case),)
+    contacts = [contact for contact, _ in surfaces]
+    moduli = [*(contact.youngs_modulus for contact in contacts), case.contact.youngs_modulus]
+    forces = _forces(plan, scene)
     meshes = wall_meshes(scene.beads, scene.faces, max(scene.upper))
     text = rendered(
         "walkers.templates",
@@ -298,31 +276,25 @@ def compose(plan: Plan) -> Deck:
         recording=plan.recording,
         deck_name=DECK_NAME,
         output_name=OUTPUT_NAME,
-        bridges_name=BRIDGES_NAME,
         layout_name=LAYOUT_NAME,
+        bridges_name=BRIDGES_NAME,
+        run_name=RUN_NAME,
         meshes=meshes,
-        wall_copies=workarounds.wall_copies,
-        copies=[(f"{mesh.name}_{number}", mesh) for mesh in meshes for number in range(1, workarounds.wall_copies + 1)],
-        contact_model=_contact_model(plan),
+        contact_model=_contact_model(case),
         types=len(surfaces) + 1,
         moduli=moduli,
         stiff=max(moduli) > _STIFFEST,
-        friction=_pairs([(at_rest * one.friction_bead_bead, at_rest * one.friction_bead_wall) for one in surfaces]),
-        luding=static_friction_settings(at_rest, case.contact.restitution) if plan.static_ratio else {},
-        rolling_friction=_pairs([(surface.rolling_friction,) * 2 for surface in surfaces]),
-        restitution=_pairs([(surface.restitution,) * 2 for surface in surfaces]),
-        contact_angle_setting=contact_angle_setting(angle) if workarounds.contact_angle else degrees(angle),
-        separation_cap=separation_cap((bead.radius for bead in scene.beads), case.liquid.volume_fraction, angle),
+        friction=_pairs([(one.friction_bead_bead, one.friction_bead_wall) for one in contacts]),
+        rolling_friction=_pairs([(one.rolling_friction,) * 2 for one in contacts]),
+        restitution=_pairs([(one.restitution,) * 2 for one in contacts]),
         bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
         down=[component / case.gravity for component in case.gravity_vector] if case.gravity else [],
-        plan=replace(plan, workarounds=workarounds),
+        plan=plan,
         # Of a drive that moves the walls; it has one harmonic.
         amplitude=[first.amplitude * component for component in first.direction],
         peak_velocity=[first.peak_velocity * component for component in first.direction],
         forces=forces,
-        of_walls=of_walls,
-        loaded=[axis for axis in "xyz" if axis in of_walls.formulas or any(one.axis == axis for one in forces)],
-        moving=moving,
+        loaded=[axis for axis in "xyz" if any(one.axis == axis for one in forces)],
         pair_bridge_terms=_terms("pair_bridges", layout.pair_bridge_columns, " ".join(PAIR_BRIDGES).split()),
         wall_bridge_terms=_terms("wall_bridges", layout.wall_bridge_columns, " ".join(WALL_BRIDGES).split()),
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
@@ -333,9 +305,7 @@ def compose(plan: Plan) -> Deck:
     )  # fmt: skip
     files = {f"{mesh.name}.stl": mesh.text for mesh in meshes}
     files |= {one.file: _atom_file(one.shares) for one in forces}
-    files |= {f"{name}.txt": _atom_file(shares) for name, shares in of_walls.shares.items()}
-    if case.liquid.law is not None:
-        files[BRIDGES_NAME] = bridge_tables(case, scene.beads, len(surfaces) + 1)
+    files[BRIDGES_NAME] = bridge_tables(surfaces, scene.beads)
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, beyond)
@@ -375,30 +345,6 @@ def _forces(plan: Plan, scene: Scene) -> list[_Force]:
     return [one for one in forces if any(one.shares.values())]
 
 
-def _wall_forces(plan: Plan, scene: Scene, moving: str) -> WallForces:
-    """The forces of the walls, which move along some axes, that the engine lacks."""
-    if plan.case.liquid.law is not None:
-        return WallForces({}, {})
-    loadings = plan.loadings or (loading_of(plan.case),)
-    nearest = plan.case.contact.minimum_separation_ratio
-    return wall_forces(
-        scene.beads,
-        [one.film_viscosity for one in loadings],
-        plan.case.liquid,
-        scene.faces,
-        minimum_separation_ratio=nearest if plan.workarounds.open_bridges else None,
-        moving=moving,
-    )
-
-
-def _moving(plan: Plan) -> str:
-    """The axes along which the walls move in a deck."""
-    drive = plan.case.drive
-    if drive.frame != "lab" or not plan.shaken:
-        return ""
-    return "".join(axis for axis, part in zip("xyz", drive.harmonics[0].direction, strict=True) if part)
-
-
 def _atom_file(shares: Mapping[int, float]) -> str:
     """A number for each bead, by its id, as the engine reads it."""
     return f"{len(shares)}\n" + "".join(f"{bead} {share!r}\n" for bead, share in shares.items())
@@ -425,12 +371,9 @@ def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
     ]
 
 
-def _contact_model(plan: Plan) -> str:
-    rolling = " rolling_friction cdt" if plan.case.contact.rolling_friction > 0 else ""
-    if plan.case.liquid.law is not None:
-        return f"hertz tangential history cohesion bridge{rolling}"
-    contact = "hertz tangential history" if plan.static_ratio is None else "luding tangential tan_luding"
-    return f"{contact} cohesion easo/capillary/viscous{rolling}"
+def _contact_model(case: Case) -> str:
+    rolling = " rolling_friction cdt" if case.contact.rolling_friction > 0 else ""
+    return f"hertz tangential history cohesion bridge{rolling}"
 
 
 def _bin_size(scene: Scene) -> float:
@@ -452,11 +395,10 @@ def _most_neighbours(scene: Scene, skin: float | None) -> int:
 
 def fastest_of(case: Case, scene: Scene) -> float:
     """Ten times the boundary's peak velocity (20 in a pile), the deepest fall, and what a bridge can give, m/s."""
-    liquid, sizes = case.liquid, sorted(bead.radius for bead in scene.beads)
+    sizes = sorted(bead.radius for bead in scene.beads)
     mass = 4.0 / 3.0 * pi * sizes[0] ** 3 * case.density
-    volume = bridge_volume_at_wall(sizes[-1], liquid.volume_fraction)
-    pull = capillary_force_at_wall(liquid.surface_tension, sizes[-1], volume, liquid.contact_angle)
-    work = pull * rupture_distance(volume, liquid.contact_angle)
+    curve = law_of(case.liquid)(Surfaces.of(sizes[-1], inf, case.liquid, case.contact.minimum_separation_ratio))
+    work = float(curve.forces(np.zeros(1)).pull[0]) * curve.rupture
     deep = hop_height(case) if case.boundary.tilt == 0.0 else reach(case)
     fall = sqrt(2.0 * case.gravity * (max(scene.upper[2], deep) if case.loose else deep))
     return (20.0 if case.loose else 10.0) * case.drive.peak_velocity + fall + sqrt(2.0 * work / mass)
@@ -474,10 +416,8 @@ def _layout(case: Case, scene: Scene, recording: Recording, walkers: tuple[Place
         wall_bridge_columns=recording.wall_bridge_columns,
         bridge_every=recording.bridge_every,
         bridge_frames=(recording.steps - recording.begin) // recording.bridge_every + 1,
-        atoms=len(scene.carriers) + len(scene.beads),
+        atoms=len(scene.beads),
         steps=recording.steps,
         time_step=case.run.time_step,
-        carrier=1 if scene.carriers else 0,
-        carriers=len(scene.carriers),
         walkers=walkers,
     )

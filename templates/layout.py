@@ -28,8 +28,7 @@ WALL_BRIDGES = {
 PAIR_BRIDGE_COLUMNS = ("id1", "id2", "fx", "fy", "fz", "overlap")
 """Columns of the dump of bridges between beads; the force acts on bead ``id1``."""
 WALL_BRIDGE_COLUMNS = ("triangle", "id", "fx", "fy", "fz", "overlap")
-"""Columns of the dump of bridges to walls: number of the wall's face, force on bead ``id``.
-A wall that stands twice has two rows."""
+"""Columns of the dump of bridges to walls: number of the wall's face, force on bead ``id``."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +49,7 @@ class PlacedWalker:
 
 @dataclass(frozen=True)
 class Layout:
-    """Dumps of a deck (file names, columns, steps between frames, frames expected) and its walkers.
-
-    ``carrier`` is the id of the atom that moves with the substrate, 0 in a deck without one; ``carriers`` is how many
-    there are.
-    """
+    """Dumps of a deck (file names, columns, steps between frames, frames expected) and its walkers."""
 
     bead_dump: str
     bead_columns: tuple[str, ...]
@@ -69,10 +64,8 @@ class Layout:
     atoms: int
     steps: int
     time_step: float
-    carrier: int
     walkers: tuple[PlacedWalker, ...]
     ranks: int = 1
-    carriers: int = 1
 
     @property
     def bead_dump_bytes(self) -> int:

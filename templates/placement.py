@@ -10,7 +10,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import hop_height, reach
 from walkers.templates.layout import PlacedWalker
 from walkers.templates.scene import Bead, Scene
-from walkers.templates.sharing import loading_of, loadings_of, surfaces_of
+from walkers.templates.sharing import loading_of, loadings_of, surface_of, surfaces_of
 
 
 @lru_cache(maxsize=4)  # the segments of a run begin with the same scene
@@ -25,21 +25,21 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
     spacing = max((walkers.spacing for case in cases for walkers in case.walkers), default=0.0)
     boundary = cases[0].boundary
     grid = boundary.grid(walking, spacing) if walking else []
-    room = boundary.room(_span(cases, grid, spacing), cases[0].run.ranks)
+    room = boundary.room(_span(cases, grid, spacing))
     surfaces, loadings = surfaces_of(cases), loadings_of(cases)
     walkers: list[PlacedWalker] = []
     beads: list[Bead] = []
     for case, make, one in standing:
         origin = grid[len(walkers)] if one.walks else (0.0, 0.0)
-        first = len(room.carriers) + 1 + len(beads)
-        surface, loading = 1 + surfaces.index(case.contact), loadings.index(loading_of(case))
+        first = 1 + len(beads)
+        surface, loading = 1 + surfaces.index(surface_of(case)), loadings.index(loading_of(case))
         for number, bead in enumerate(one.beads, first):
             centre = (origin[0] + bead.x, origin[1] + bead.y, bead.z)
             beads.append(Bead(number, centre, bead.radius, surface=surface, loading=loading))
         if one.walks:
             ids = tuple(range(first, first + len(one.beads)))
             walkers.append(PlacedWalker(len(walkers), make, ids, one.facing, one.angle, origin))
-    return Scene(tuple(beads), boundary.faces(), room.carriers, room.lower, room.upper), tuple(walkers)
+    return Scene(tuple(beads), boundary.faces(), room.lower, room.upper), tuple(walkers)
 
 
 def _span(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> Span:

@@ -1,8 +1,8 @@
-"""What stands in the simulation box: beads, the faces of walls, and the carriers that move with them."""
+"""What stands in the simulation box: beads, and the faces of walls."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from walkers.inputs.boundary import Face
 from walkers.inputs.drive import Vector
@@ -36,16 +36,9 @@ class Bead:
 
 @dataclass(frozen=True)
 class Scene:
-    """Beads, faces, the carriers' places (one a face, in the order of the faces) and the box's corners, all in m."""
+    """Beads, faces and the box's corners, all in m."""
 
     beads: tuple[Bead, ...]
     faces: tuple[Face, ...]
-    carriers: tuple[Vector, ...]
     lower: Vector
     upper: Vector
-
-
-def without_carriers(scene: Scene) -> Scene:
-    """The scene with its carriers left out, the beads numbered from 1."""
-    gone = len(scene.carriers)
-    return replace(scene, carriers=(), beads=tuple(replace(bead, id=bead.id - gone) for bead in scene.beads))

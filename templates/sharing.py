@@ -1,9 +1,9 @@
 """Which cases may share a deck, and what tells their beads apart there.
 
-An engine deck has one liquid, time step and shape of boundary, and walls that do not move where walkers of several
+An engine deck has one time step and shape of boundary, and walls that do not move where walkers of several
 cases stand on them. What may differ from walker to walker are the beads' radii, how they start, their surfaces
-(frictions and restitution), which become atom types, and what loads them: how the boundary leans, along what axes and
-how strongly it is shaken, the film. Only the frequencies and phases of the drive are the same for all.
+(frictions and restitution) with their liquid, which become atom types, and what loads them: how the boundary leans,
+along what axes and how strongly it is shaken. Only the frequencies and phases of the drive are the same for all.
 """
 
 from __future__ import annotations
@@ -14,12 +14,20 @@ from dataclasses import dataclass, replace
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import reach
-from walkers.physics.matter import Contact
+from walkers.physics.matter import Contact, Liquid
+
+Surface = tuple[Contact, Liquid]
+"""How beads touch each other and the walls: an atom type of a deck."""
 
 
-def surfaces_of(cases: Sequence[Case]) -> tuple[Contact, ...]:
+def surface_of(case: Case) -> Surface:
+    """How the beads of a case touch each other and the walls."""
+    return case.contact, replace(case.liquid, name=None, density=None)
+
+
+def surfaces_of(cases: Sequence[Case]) -> tuple[Surface, ...]:
     """How the cases' beads touch each other and the walls, each way once, in the order of the cases."""
-    return tuple(dict.fromkeys(case.contact for case in cases))
+    return tuple(dict.fromkeys(surface_of(case) for case in cases))
 
 
 @dataclass(frozen=True)
@@ -32,20 +40,17 @@ class Loading:
         m/s².
     harmonics
         Amplitude of the inertial acceleration of each harmonic of the drive, m/s².
-    film_viscosity
-        Of the film that drags it, Pa s.
     """
 
     gravity: Vector
     harmonics: tuple[Vector, ...]
-    film_viscosity: float
 
 
 def loading_of(case: Case) -> Loading:
     """What the beads of a case feel."""
     amplitudes = [(one.peak_acceleration, one.direction) for one in case.drive.harmonics]
     inertia = tuple((a * x, a * y, a * z) for a, (x, y, z) in amplitudes)
-    return Loading(case.gravity_vector, inertia, case.liquid.film_viscosity)
+    return Loading(case.gravity_vector, inertia)
 
 
 def loadings_of(cases: Sequence[Case]) -> tuple[Loading, ...]:
@@ -71,12 +76,11 @@ def sharing_key(case: Case) -> Hashable:
         # The model of rolling friction is in the deck or not.
         rolling_friction=float(case.contact.rolling_friction > 0.0),
     )
-    liquid = replace(case.liquid, name=None, density=None, film_viscosity=case.liquid.film_viscosity if case.liquid.law else 0.0)
     boundary = replace(case.boundary, material="", tilt=0.0, uphill=0.0)
     if case.drive.frame == "lab":
-        return (boundary, liquid, contact, case.drive, loading_of(case), case.run, case.density, crowded)
+        return (boundary, contact, case.drive, loading_of(case), case.run, case.density, crowded)
     times = tuple((one.frequency, one.phase) for one in case.drive.harmonics)
-    return (boundary, liquid, contact, times, case.run, case.density, crowded)
+    return (boundary, contact, times, case.run, case.density, crowded)
 
 
 def check_sharing(cases: Sequence[Case]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
-from walkers.physics.lubrication import tangential_drag, tangential_drag_at_wall
+from walkers.physics.lubrication import tangential_drag
 from walkers.theory.friction import Friction
 from walkers.theory.mathieu import alignment, largest_stable_v
 from walkers.theory.motion import FloatArray, Motion, Walker, walk
@@ -31,7 +31,7 @@ def bridge_drag(case: Case) -> FloatArray:
     Lubrication of touching bridges (`walkers.physics.lubrication`).
     """
     viscosity, nearest = case.liquid.dynamic_viscosity, case.contact.minimum_separation_ratio
-    on_walls = [tangential_drag_at_wall(viscosity, radius, nearest) for radius in case.walkers[0].radii]
+    on_walls = [tangential_drag(viscosity, radius, nearest) for radius in case.walkers[0].radii]
     return np.array([*on_walls, tangential_drag(viscosity, dimer_of(case).reduced_radius, nearest)])
 
 
