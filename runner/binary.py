@@ -9,11 +9,14 @@ import shutil
 import subprocess
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib.resources import files
 from pathlib import Path
 
 from walkers.runner.failures import EngineMissing
 
 ENGINE_VARIABLE = "WALKERS_ENGINE"
+SOURCES = Path(str(files("walkers.engine")))
+"""Of the contact model that decks need (`walkers.runner.plugin`)."""
 _BANNER = re.compile(rb"\(Version ([^,\n]+),")
 _LIBRARY = re.compile(r"libliggghts\S* => (\S+)")
 
@@ -27,7 +30,8 @@ class Engine:
     path
         The executable.
     sha256
-        Of the executable and, where it is a thin front, of the ``libliggghts`` that it loads.
+        Of the executable, of the ``libliggghts`` that it loads, where it is a thin front, and of the sources of the
+        contact model.
     """
 
     path: Path
@@ -60,7 +64,11 @@ def _identity(path: Path, _modified: int) -> str:
     # Debian's executable is an 18 kB front; the physics is in the shared library.
     digest = hashlib.sha256()
     listing = subprocess.run(["ldd", str(path)], capture_output=True, text=True, errors="replace", check=False).stdout
-    for part in [path, *(Path(match) for match in _LIBRARY.findall(listing))]:
+    for part in [
+        path,
+        *(Path(match) for match in _LIBRARY.findall(listing)),
+        *(SOURCES / name for name in ("bridge.cpp", "table.h")),
+    ]:
         with part.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())
     return digest.hexdigest()

@@ -29,12 +29,10 @@ from walkers.runner.failures import (
     TimeLimitExceeded,
 )
 from walkers.runner.plugin import plugin_of
-from walkers.templates.deck import BRIDGES_NAME, DECK_NAME, OUTPUT_NAME, Deck
+from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, Deck
 from walkers.templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, RANKS, STEP_VARIABLES
 
 _POLL_SECONDS = 0.05
-# See templates.engine: without this the message of an abort is lost.
-_LINE_BUFFERED = ("stdbuf", "-oL")
 # The kernel ends the engine when whoever launched it dies, be it by SIGKILL.
 _MORTAL = ("setpriv", "--pdeathsig", "KILL")
 # Whoever died before that was asked of the kernel is not noticed by it: then the parent is another one by now.
@@ -118,7 +116,7 @@ def launch(
         One of the failures of `walkers.runner.failures`; the engine and its children have ended by then.
     """
     check_room(directory, deck.layout.bead_dump_bytes)
-    plugin = plugin_of(engine) if BRIDGES_NAME in deck.files else None
+    plugin = plugin_of(engine)
     for left in reversed(range(starts)):
         try:
             return _launch_once(deck, directory, engine, plugin, on_progress, time_limit, keep_open)
@@ -133,7 +131,7 @@ def _launch_once(
     deck: Deck,
     directory: Path,
     engine: Engine,
-    plugin: Path | None,
+    plugin: Path,
     on_progress: Callable[[Progress], None] | None,
     time_limit: float | None,
     keep_open: Sequence[int],
@@ -169,7 +167,7 @@ def check_room(folder: Path, needed: int) -> None:
 
 
 def _start(
-    directory: Path, engine: Engine, plugin: Path | None, ranks: int, keep_open: Sequence[int]
+    directory: Path, engine: Engine, plugin: Path, ranks: int, keep_open: Sequence[int]
 ) -> subprocess.Popen[bytes]:
     # Unless told otherwise mpirun refuses root, more ranks than cores, and binds all decks to the same cores.
     mortal = _MORTAL if shutil.which(_MORTAL[0]) else ()
@@ -179,7 +177,7 @@ def _start(
         if ranks > 1
         else []
     )
-    loading = _LINE_BUFFERED if plugin is None else ("env", f"LD_PRELOAD={plugin}")
+    loading = ("env", f"LD_PRELOAD={plugin}")
     with (directory / OUTPUT_NAME).open("wb") as output:
         return subprocess.Popen(
             [*mortal, *unless_orphan, *parallel, *loading, str(engine.path), "-log", "none", "-in", DECK_NAME],

@@ -9,24 +9,23 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shlex
 import shutil
 import subprocess
 import tempfile
-from functools import lru_cache
-from importlib.resources import files
 from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from walkers.runner.binary import Engine, version_in
+from walkers.runner.binary import SOURCES, Engine, version_in
 from walkers.runner.failures import ContactModelMissing, EngineFailure, OtherEngine
+from walkers.templates.deck import DECK_NAME, OUTPUT_NAME
 from walkers.templates.engine import ALONE, AUDITED_VERSION
 
 PACKAGES = ("g++", "libliggghts-dev", "libopenmpi-dev")
 HEADERS = Path("/usr/include/liggghts")
 # Plain -O2 keeps the numbers the same on all machines of an architecture: no fused operations, no reordering.
 OPTIONS = ("-shared", "-fPIC", "-std=gnu++11", "-O2", "-DNDEBUG", "-DOMPI_SKIP_MPICXX", "-Wall", "-Wextra")
-_SOURCES = ("bridge.cpp", "table.h", "bridge.map")
 
 
 def plugin_of(engine: Engine) -> Path:
@@ -39,7 +38,7 @@ def plugin_of(engine: Engine) -> Path:
     ContactModelMissing
         If it cannot be compiled: what is missing, or what the compiler says.
     """
-    name = hashlib.sha256("\0".join((engine.sha256, sources_sha256(), *OPTIONS)).encode()).hexdigest()[:16]
+    name = hashlib.sha256("\0".join((engine.sha256, *OPTIONS)).encode()).hexdigest()[:16]
     place = user_cache_path("granular-walkers") / f"bridge-{name}.so"
     if set(str(place)) & set(": "):
         raise ContactModelMissing(f"{place} has a space or a colon, which the system's loader takes for a separator")
@@ -47,19 +46,6 @@ def plugin_of(engine: Engine) -> Path:
         _check_version(engine)
         _compile(place)
     return place
-
-
-@lru_cache(maxsize=1)
-def sources_sha256() -> str:
-    """SHA-256 of the model's sources, which runs are named by."""
-    digest = hashlib.sha256()
-    for name in _SOURCES:
-        digest.update((_folder() / name).read_bytes())
-    return digest.hexdigest()
-
-
-def _folder() -> Path:
-    return Path(str(files("walkers.engine")))
 
 
 def _check_version(engine: Engine) -> None:
@@ -84,9 +70,9 @@ def _compile(place: Path) -> None:
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=place.parent) as folder:
             made = Path(folder) / place.name
-            linked = [f"-Wl,--version-script={_folder() / 'bridge.map'}", "-Wl,-Bsymbolic", "-l:libliggghts.so.3"]
+            linked = [f"-Wl,--version-script={SOURCES / 'bridge.map'}", "-Wl,-Bsymbolic", "-l:libliggghts.so.3"]
             done = subprocess.run(
-                [compiler, *OPTIONS, *included, str(_folder() / "bridge.cpp"), "-o", str(made), *linked],
+                [compiler, *OPTIONS, *included, str(SOURCES / "bridge.cpp"), "-o", str(made), *linked],
                 capture_output=True, text=True, errors="replace", check=False,
             )  # fmt: skip
             if done.returncode:
@@ -94,6 +80,15 @@ def _compile(place: Path) -> None:
             made.replace(place)
     except OSError as error:
         raise ContactModelMissing(f"{place} cannot be written ({error})") from error
+
+
+def run_script(plugin: Path, ranks: int) -> str:
+    """A shell script that runs a deck by hand: the model is loaded into the engine, its output goes to a file."""
+    parallel = f"mpirun -n {ranks} " if ranks > 1 else ""
+    return (
+        f'# Runs {DECK_NAME} with the contact model "cohesion bridge", which is loaded into liggghts.\n'
+        f"exec {parallel}env LD_PRELOAD={shlex.quote(str(plugin))} liggghts -in {DECK_NAME} > {OUTPUT_NAME}\n"
+    )
 
 
 def main() -> None:

@@ -17,13 +17,17 @@ Folder = Annotated[
 def command(case: Case, settings: Set = None, to: Folder = None) -> None:
     """Print the LIGGGHTS deck of a case (of a run in segments, the first), or write it with its files."""
     from walkers.inputs.errors import InputError, Problem
-    from walkers.templates.deck import DECK_NAME, render_deck
+    from walkers.templates.deck import DECK_NAME, RUN_NAME, render_deck
 
     deck = render_deck(load(case, settings))
     if to is None:
         print(deck.text, end="")
         return
+    from walkers.runner.binary import find_engine
     from walkers.runner.directory import write_deck
+    from walkers.runner.plugin import plugin_of, run_script
+
+    plugin = plugin_of(find_engine())
 
     try:
         to.mkdir(parents=True)
@@ -32,5 +36,5 @@ def command(case: Case, settings: Set = None, to: Folder = None) -> None:
             str(to), [Problem("", None, f"expected a folder that can be made ({error.strerror})")]
         ) from error
     write_deck(deck, to)
-    ranks = f"mpirun -n {deck.layout.ranks} " if deck.layout.ranks > 1 else ""
-    print(f"{to / DECK_NAME}    run it there with: {ranks}liggghts -in {DECK_NAME} > engine.log")
+    (to / RUN_NAME).write_text(run_script(plugin, deck.layout.ranks), encoding="utf-8")
+    print(f"{to / DECK_NAME}    run it there with: sh {RUN_NAME}")
