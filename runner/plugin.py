@@ -72,11 +72,12 @@ def _compile(place: Path) -> None:
             made = Path(folder) / place.name
             linked = [f"-Wl,--version-script={SOURCES / 'bridge.map'}", "-Wl,-Bsymbolic", "-l:libliggghts.so.3"]
             done = subprocess.run(
-                [compiler, *OPTIONS, *included, str(SOURCES / "bridge.cpp"), "-o", str(made), *linked],
+                [compiler, *OPTIONS, f"-I{SOURCES}", *included, str(SOURCES / "bridge.cpp"), "-o", str(made), *linked],
                 capture_output=True, text=True, errors="replace", check=False,
             )  # fmt: skip
             if done.returncode:
-                raise ContactModelMissing(f"the compiler says: {(done.stderr.strip().splitlines() or ['nothing'])[0]}")
+                said = next((line for line in done.stderr.splitlines() if "error" in line), "nothing")
+                raise ContactModelMissing(f"the compiler says: {said}")
             made.replace(place)
     except OSError as error:
         raise ContactModelMissing(f"{place} cannot be written ({error})") from error
