@@ -1,0 +1,70 @@
+"""Laws of liquid bridges by name: those that come with the program, and a user's own.
+
+A law is a function `Surfaces → Curve` (`walkers.physics.bridge`), in a file of its own with its equation and source. A
+user's own is named by where it is, ``package.module:function`` or ``path/to/file.py:function``.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+from walkers.physics.bridge import BridgeLaw
+
+LAWS = {
+    "soulie": "walkers.physics.soulie",
+    "young-laplace": "walkers.physics.young_laplace",
+    "willett": "walkers.physics.willett",
+    "rabinovich": "walkers.physics.rabinovich",
+    "van-der-waals": "walkers.physics.van_der_waals",
+}
+"""Modules whose function ``law`` is the law of that name."""
+
+
+def by_name(name: str) -> BridgeLaw:
+    """The law of a name.
+
+    Parameters
+    ----------
+    name
+        One of `LAWS`, ``package.module:function`` or ``file.py:function``; a file is sought from the working directory.
+
+    Raises
+    ------
+    ValueError
+        If there is none of this name; what a user's own file or module raises is the error's cause.
+    """
+    place, _, function = name.rpartition(":") if name not in LAWS else (LAWS[name], "", "law")
+    if not place or not function:
+        raise ValueError(
+            f"bridge law {name!r}: expected one of {', '.join(LAWS)}, package.module:function or file.py:function"
+        )
+    law = getattr(_module(name, place), function, None)
+    if not callable(law):
+        raise ValueError(f"bridge law {name!r}: {place} has no function {function}")
+    return law  # type: ignore[no-any-return]
+
+
+def _module(name: str, place: str) -> ModuleType:
+    try:
+        return _from_file(Path(place)) if place.endswith(".py") else import_module(place)
+    except Exception as error:
+        raise ValueError(f"bridge law {name!r}: {place} cannot be imported: {error}") from error
+
+
+def _from_file(path: Path) -> ModuleType:
+    """A file as a module, among the imported ones while it runs: its dataclasses look for it there."""
+    key = f"walkers_law_{path.resolve()}"
+    specification = spec_from_file_location(key, path)
+    assert specification is not None
+    assert specification.loader is not None
+    module = sys.modules[key] = module_from_spec(specification)
+    try:
+        specification.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[key]
+        raise
+    return module
