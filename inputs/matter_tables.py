@@ -91,7 +91,7 @@ def _liquid(table: LiquidTable, pair: Mapping[str, Known], choices: Choices) -> 
         return choices.choose(f"liquid.{key}", getattr(table, key), pair.get(key)) or 0.0
 
     film, bridges = (float(f"{viscosity * chosen(f'{of}_ratio'):.15g}") for of in ("film_drag", "viscosity"))
-    return Liquid(tension, bridges, density, chosen("volume_fraction"), chosen("contact_angle"), table.name, film)
+    return Liquid(tension, bridges, density, chosen("volume_fraction"), chosen("contact_angle"), table.name, film, table.law)
 
 
 def _contact(table: ContactTable, bead: str | None, wall: str, choices: Choices) -> Contact:

@@ -155,8 +155,8 @@ class LiquidTable(Table):
     """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
 
     ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag;
-    ``film_drag_ratio`` a drag on beads along near walls over that of Stokes in the liquid, 6π η R v. The last four,
-    left out, are the library's for the surfaces, else as in `walkers.inputs.matter_tables`.
+    ``film_drag_ratio`` a drag on beads along near walls over that of Stokes in the liquid, 6π η R v. The last four but
+    ``law``, left out, are the library's for the surfaces, else as in `walkers.inputs.matter_tables`.
     """
 
     name: str | None = None
@@ -168,6 +168,7 @@ class LiquidTable(Table):
     viscosity_ratio: Annotated[Number, Field(ge=1e-3, le=1e4)] | None = None
     film_drag_ratio: Annotated[Number, Field(ge=0, le=1e4)] | None = None
     contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] | None = None
+    law: str | None = None
 
 
 class BoundaryTable(Table):

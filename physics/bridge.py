@@ -102,11 +102,14 @@ class Curve:
         Gap at which the bridge breaks, m.
     formation
         Gap below which it forms, m: 0 where the surfaces must touch.
+    scale
+        Over which forces vary near contact, m; a kink may be there. 0 is for `Surfaces.closest`.
     """
 
     forces: Callable[[FloatArray], Forces]
     rupture: float
     formation: float = 0.0
+    scale: float = 0.0
 
 
 BridgeLaw = Callable[[Surfaces], Curve]

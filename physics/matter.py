@@ -11,7 +11,8 @@ class Liquid:
 
     The viscosity is that of the bridges: the liquid's, times the case's ``viscosity_ratio``. ``volume_fraction`` is the
     liquid on a bead over the bead's volume. ``film_viscosity`` (Pa s) is that of the film on the walls along
-    which beads plough: 6π R times it drags a bead's centre in proportion to its velocity there.
+    which beads plough: 6π R times it drags a bead's centre in proportion to its velocity there. ``law`` names the law of the bridges (`walkers.physics.laws`); None is what decks for the stock
+    engine have.
     """
 
     surface_tension: float
@@ -21,6 +22,7 @@ class Liquid:
     contact_angle: float
     name: str | None
     film_viscosity: float = 0.0
+    law: str | None = None
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 The pull is that of `walkers.physics.capillary`, the bridge breaks at (1 + θ/2) V^(1/3), and the resistances are those
 of `walkers.physics.lubrication`, which take the solids for immersed: no torque but by the sliding force. At a wall the
-pull is `WALL_COPIES` times that of two equal spheres; the resistances are a plane's, of R* = R. Such a deck's doubled
+pull is twice that of two equal spheres; the resistances are a plane's, of R* = R. Such a deck's doubled
 wall has less of the tangential one at gaps above εR/2, by a fifth at most: there this law differs from it.
 
 The film on the walls (`walkers.physics.film`) adds a drag c = 6πη_f R on the centre's velocity, v = s - Rq, up to the

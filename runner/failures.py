@@ -40,6 +40,25 @@ class EngineMissing(EngineFailure):
         )
 
 
+class OtherEngine(EngineFailure):
+    """The engine is another version than the one that the contact model was written for. Seen before it starts."""
+
+    def __init__(self, path: Path, version: str | None) -> None:
+        from walkers.templates.engine import AUDITED_VERSION
+
+        super().__init__(
+            f"{path} is {version or 'no LIGGGHTS that names its version'}: decks need a contact model of their own, which "
+            f"is written for {AUDITED_VERSION}, as Debian packages it"
+        )
+
+
+class ContactModelMissing(EngineFailure):
+    """The contact model that decks need cannot be compiled. Seen before the engine starts."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"no contact model for the engine: {why}")
+
+
 class EngineDiffers(EngineFailure):
     """A worker of a sweep has another engine than the one that the sweep was started with."""
 

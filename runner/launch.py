@@ -28,7 +28,8 @@ from walkers.runner.failures import (
     MissingFrames,
     TimeLimitExceeded,
 )
-from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, Deck
+from walkers.runner.plugin import plugin_of
+from walkers.templates.deck import BRIDGES_NAME, DECK_NAME, OUTPUT_NAME, Deck
 from walkers.templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, RANKS, STEP_VARIABLES
 
 _POLL_SECONDS = 0.05
@@ -117,9 +118,10 @@ def launch(
         One of the failures of `walkers.runner.failures`; the engine and its children have ended by then.
     """
     check_room(directory, deck.layout.bead_dump_bytes)
+    plugin = plugin_of(engine) if BRIDGES_NAME in deck.files else None
     for left in reversed(range(starts)):
         try:
-            return _launch_once(deck, directory, engine, on_progress, time_limit, keep_open)
+            return _launch_once(deck, directory, engine, plugin, on_progress, time_limit, keep_open)
         except EngineNeverStarted:
             if not left:
                 raise
@@ -131,6 +133,7 @@ def _launch_once(
     deck: Deck,
     directory: Path,
     engine: Engine,
+    plugin: Path | None,
     on_progress: Callable[[Progress], None] | None,
     time_limit: float | None,
     keep_open: Sequence[int],
@@ -140,7 +143,7 @@ def _launch_once(
     process = None
     try:
         with postponed_interrupts():
-            process = _start(directory, engine, deck.layout.ranks, keep_open)
+            process = _start(directory, engine, plugin, deck.layout.ranks, keep_open)
         while process.poll() is None:
             try:
                 process.wait(_POLL_SECONDS)
@@ -165,7 +168,9 @@ def check_room(folder: Path, needed: int) -> None:
         raise DiskFull(needed, free, folder)
 
 
-def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]) -> subprocess.Popen[bytes]:
+def _start(
+    directory: Path, engine: Engine, plugin: Path | None, ranks: int, keep_open: Sequence[int]
+) -> subprocess.Popen[bytes]:
     # Unless told otherwise mpirun refuses root, more ranks than cores, and binds all decks to the same cores.
     mortal = _MORTAL if shutil.which(_MORTAL[0]) else ()
     unless_orphan = (*_UNLESS_ORPHAN, str(os.getpid())) if mortal else ()
@@ -174,9 +179,10 @@ def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]
         if ranks > 1
         else []
     )
+    loading = _LINE_BUFFERED if plugin is None else ("env", f"LD_PRELOAD={plugin}")
     with (directory / OUTPUT_NAME).open("wb") as output:
         return subprocess.Popen(
-            [*mortal, *unless_orphan, *parallel, *_LINE_BUFFERED, str(engine.path), "-log", "none", "-in", DECK_NAME],
+            [*mortal, *unless_orphan, *parallel, *loading, str(engine.path), "-log", "none", "-in", DECK_NAME],
             cwd=directory,
             env=_environment(ranks),
             stdin=subprocess.DEVNULL,

@@ -13,8 +13,10 @@ from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import rendered
 from walkers.physics.capillary import bridge_volume_at_wall, capillary_force_at_wall, rupture_distance
 from walkers.physics.matter import Contact
+from walkers.templates.bridge_tables import bridge_tables
 from walkers.templates.engine import (
     ALL_WORKAROUNDS,
+    NO_WORKAROUNDS,
     Workarounds,
     contact_angle_setting,
     separation_cap,
@@ -39,6 +41,7 @@ from walkers.templates.wall_forces import WallForces, wall_forces
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
+BRIDGES_NAME = "bridges.txt"
 STATUS_LINES_PER_CYCLE = 4
 CONTENT_VERSION = 5
 """Of what decks compute: to be raised where the same case gives another deck, comments aside. Runs are named by it."""
@@ -272,7 +275,7 @@ def plan_of(*cases: Case, segment: Segment | None = None, workarounds: Workaroun
 
 def compose(plan: Plan) -> Deck:
     """Put a deck together from its blocks."""
-    case, workarounds = plan.case, plan.workarounds
+    case, workarounds = plan.case, plan.workarounds if plan.case.liquid.law is None else NO_WORKAROUNDS
     scene, walkers = plan.scene, plan.walkers
     if not workarounds.carriers:
         gone = len(scene.carriers)
@@ -295,6 +298,7 @@ def compose(plan: Plan) -> Deck:
         recording=plan.recording,
         deck_name=DECK_NAME,
         output_name=OUTPUT_NAME,
+        bridges_name=BRIDGES_NAME,
         layout_name=LAYOUT_NAME,
         meshes=meshes,
         wall_copies=workarounds.wall_copies,
@@ -311,7 +315,7 @@ def compose(plan: Plan) -> Deck:
         separation_cap=separation_cap((bead.radius for bead in scene.beads), case.liquid.volume_fraction, angle),
         bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
         down=[component / case.gravity for component in case.gravity_vector] if case.gravity else [],
-        plan=plan,
+        plan=replace(plan, workarounds=workarounds),
         # Of a drive that moves the walls; it has one harmonic.
         amplitude=[first.amplitude * component for component in first.direction],
         peak_velocity=[first.peak_velocity * component for component in first.direction],
@@ -330,6 +334,8 @@ def compose(plan: Plan) -> Deck:
     files = {f"{mesh.name}.stl": mesh.text for mesh in meshes}
     files |= {one.file: _atom_file(one.shares) for one in forces}
     files |= {f"{name}.txt": _atom_file(shares) for name, shares in of_walls.shares.items()}
+    if case.liquid.law is not None:
+        files[BRIDGES_NAME] = bridge_tables(case, scene.beads, len(surfaces) + 1)
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, beyond)
@@ -371,6 +377,8 @@ def _forces(plan: Plan, scene: Scene) -> list[_Force]:
 
 def _wall_forces(plan: Plan, scene: Scene, moving: str) -> WallForces:
     """The forces of the walls, which move along some axes, that the engine lacks."""
+    if plan.case.liquid.law is not None:
+        return WallForces({}, {})
     loadings = plan.loadings or (loading_of(plan.case),)
     nearest = plan.case.contact.minimum_separation_ratio
     return wall_forces(
@@ -419,6 +427,8 @@ def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
 
 def _contact_model(plan: Plan) -> str:
     rolling = " rolling_friction cdt" if plan.case.contact.rolling_friction > 0 else ""
+    if plan.case.liquid.law is not None:
+        return f"hertz tangential history cohesion bridge{rolling}"
     contact = "hertz tangential history" if plan.static_ratio is None else "luding tangential tan_luding"
     return f"{contact} cohesion easo/capillary/viscous{rolling}"
 

@@ -288,6 +288,8 @@ class Workarounds:
 
 
 ALL_WORKAROUNDS = Workarounds()
+NO_WORKAROUNDS = Workarounds(carriers=False, wall_copies=1, contact_angle=False, open_bridges=False)
+"""Of decks for the project's own contact model."""
 
 
 def contact_angle_setting(effective_angle: float) -> float:

@@ -71,7 +71,7 @@ def sharing_key(case: Case) -> Hashable:
         # The model of rolling friction is in the deck or not.
         rolling_friction=float(case.contact.rolling_friction > 0.0),
     )
-    liquid = replace(case.liquid, name=None, density=None, film_viscosity=0.0)
+    liquid = replace(case.liquid, name=None, density=None, film_viscosity=case.liquid.film_viscosity if case.liquid.law else 0.0)
     boundary = replace(case.boundary, material="", tilt=0.0, uphill=0.0)
     if case.drive.frame == "lab":
         return (boundary, liquid, contact, case.drive, loading_of(case), case.run, case.density, crowded)

@@ -1,0 +1,1 @@
+#include "cohesion_model_easo_capillary_viscous.h"

@@ -1,0 +1,172 @@
+/* Forces of a bridge against the gap, from a table: granular-walkers, GPL-2.0-or-later (see README.md).
+
+   A file holds one table for each two surfaces that may meet; '#' begins a comment. A table is
+
+       bridge TYPE TYPE RADIUS RADIUS           atom types, radii in m; of a plane the radius is "inf"
+       range FORMATION RUPTURE SCALE OCTAVES CELLS
+       GAP PULL NORMAL SLIDING COUPLING ROLLING (3 * CELLS * (OCTAVES + 2) + 1 such rows, by the gap)
+
+   Near contact the gap h is divided by octaves of 1 + h/SCALE, each into CELLS cells (a power of two), up to
+   m = SCALE * (2^OCTAVES - 1); beyond it are 2 * CELLS cells of sqrt((RUPTURE - h)/(RUPTURE - m)), for the pull of a
+   bridge that breaks ends with an infinite slope. Within a cell forces are cubic, through four rows. */
+#ifndef BRIDGE_TABLE_H
+#define BRIDGE_TABLE_H
+
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace bridge {
+
+enum { PULL, NORMAL, SLIDING, COUPLING, ROLLING, COLUMNS };
+
+struct Cell {
+  double begin, inverse_width;
+  double coefficient[4][COLUMNS];
+};
+
+class Table {
+public:
+  int type[2];
+  double radius[2], formation, rupture, contact[COLUMNS];
+
+  void at(const double gap, double *const forces) const
+  {
+    double t;
+    const Cell *cell;
+    if (gap <= 0.) {
+      std::memcpy(forces, contact, sizeof(contact));
+      return;
+    }
+    if (gap < middle) {
+      // The exponent and the first bits of the mantissa of 1 + h/SCALE number the cells.
+      const double x = 1. + gap * inverse_scale;
+      uint64_t bits;
+      std::memcpy(&bits, &x, sizeof(bits));
+      cell = &near_[(bits >> shift) - first];
+      t = (x - cell->begin) * cell->inverse_width;
+    } else {
+      const double y = (1. - std::sqrt(std::max(0., rupture - gap) * inverse_rest)) * far_.size();
+      const size_t number = std::min(static_cast<size_t>(y), far_.size() - 1);
+      cell = &far_[number];
+      t = y - number;
+    }
+    for (int c = 0; c < COLUMNS; c++)
+      forces[c] = ((cell->coefficient[3][c] * t + cell->coefficient[2][c]) * t + cell->coefficient[1][c]) * t
+                + cell->coefficient[0][c];
+  }
+
+  bool joins(const int type_1, const int type_2, const double radius_1, const double radius_2) const
+  {
+    return (type_1 == type[0] && type_2 == type[1] && same(radius_1, radius[0]) && same(radius_2, radius[1]))
+        || (type_1 == type[1] && type_2 == type[0] && same(radius_1, radius[1]) && same(radius_2, radius[0]));
+  }
+
+  void read(std::istream &in)
+  {
+    type[0] = static_cast<int>(number(in));
+    type[1] = static_cast<int>(number(in));
+    radius[0] = number(in);
+    radius[1] = number(in);
+    if (word(in) != "range") throw std::runtime_error("a table lacks its range");
+    formation = number(in);
+    rupture = number(in);
+    const double scale = number(in);
+    const int octaves = static_cast<int>(number(in)), cells = static_cast<int>(number(in));
+    int power = 0;
+    while ((1 << power) < cells) power++;
+    if (!(scale > 0. && rupture > 0. && formation >= 0. && formation <= rupture) || octaves < 0 || octaves > 60
+        || cells != (1 << power) || power > 12)
+      throw std::runtime_error("the range of a table is not usable");
+    inverse_scale = 1. / scale;
+    shift = 52 - power;
+    first = static_cast<uint64_t>(1023) << power;
+    middle = scale * (std::ldexp(1., octaves) - 1.);
+    if (!(middle < rupture)) throw std::runtime_error("the octaves of a table reach beyond the rupture");
+    inverse_rest = 1. / (rupture - middle);
+    std::vector<double> rows(COLUMNS * static_cast<size_t>(3 * cells * (octaves + 2) + 1));
+    double before = -1.;
+    for (size_t row = 0; row < rows.size(); row += COLUMNS) {
+      const double gap = number(in);
+      if (!(gap > before)) throw std::runtime_error("the gaps of a table do not grow");
+      before = gap;
+      for (int c = 0; c < COLUMNS; c++) rows[row + c] = number(in);
+    }
+    std::memcpy(contact, rows.data(), sizeof(contact));
+    near_.clear();
+    for (int octave = 0; octave < octaves; octave++)
+      for (int number = 0; number < cells; number++) {
+        const double width = std::ldexp(1., octave) / cells;
+        near_.push_back(cell(&rows[3 * COLUMNS * near_.size()], std::ldexp(1., octave) + number * width, width));
+      }
+    far_.clear();
+    for (int number = 0; number < 2 * cells; number++)
+      far_.push_back(cell(&rows[3 * COLUMNS * (near_.size() + far_.size())], number, 1.));
+  }
+
+  static std::string word(std::istream &in)
+  {
+    std::string text;
+    while (in >> text && text[0] == '#') in.ignore(1 << 20, '\n');
+    return in ? text : "";
+  }
+
+private:
+  double middle, inverse_scale, inverse_rest;
+  int shift;
+  uint64_t first;
+  std::vector<Cell> near_, far_;
+
+  static double number(std::istream &in)
+  {
+    const std::string text = word(in);
+    char *end;
+    const double value = std::strtod(text.c_str(), &end);  // takes "inf", which >> does not
+    if (text.empty() || *end) throw std::runtime_error("expected a number, not \"" + text + "\"");
+    if (std::isnan(value)) throw std::runtime_error("a number of a table is nan");
+    return value;
+  }
+
+  static bool same(const double a, const double b)
+  {
+    return a == b || std::fabs(a - b) <= 1e-9 * std::fabs(a);
+  }
+
+  static Cell cell(const double *const row, const double begin, const double width)
+  {
+    Cell made;
+    made.begin = begin;
+    made.inverse_width = 1. / width;
+    for (int c = 0; c < COLUMNS; c++) {
+      const double f0 = row[c], f1 = row[c + COLUMNS], f2 = row[c + 2 * COLUMNS], f3 = row[c + 3 * COLUMNS];
+      made.coefficient[0][c] = f0;
+      made.coefficient[1][c] = -5.5 * f0 + 9. * f1 - 4.5 * f2 + f3;
+      made.coefficient[2][c] = 9. * f0 - 22.5 * f1 + 18. * f2 - 4.5 * f3;
+      made.coefficient[3][c] = -4.5 * f0 + 13.5 * f1 - 13.5 * f2 + 4.5 * f3;
+    }
+    return made;
+  }
+};
+
+inline std::vector<Table> read_tables(const std::string &file)
+{
+  std::ifstream in(file.c_str());
+  if (!in) throw std::runtime_error("cannot be read");
+  std::vector<Table> tables;
+  for (std::string text = Table::word(in); !text.empty(); text = Table::word(in)) {
+    if (text != "bridge") throw std::runtime_error("expected \"bridge\", not \"" + text + "\"");
+    tables.push_back(Table());
+    tables.back().read(in);
+  }
+  if (tables.empty()) throw std::runtime_error("holds no table");
+  return tables;
+}
+
+}
+#endif

@@ -1,0 +1,197 @@
+"""Tables of a bridge law that the contact model ``cohesion bridge`` interpolates (its format: engine/table.h).
+
+Near contact the gap h is divided by octaves of 1 + h/scale into cells; from the last octave to the rupture cells are
+even in sqrt((rupture - h)/(rupture - m)). A law may have a kink at h = scale, between two cells, and end with an
+infinite slope. Within a cell the engine's forces are cubic, through four rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import inf, log2
+
+import numpy as np
+
+from walkers.inputs.case import Case
+from walkers.physics.bridge import BridgeLaw, Curve, FloatArray, Forces, Surfaces
+from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
+from walkers.physics.laws import by_name
+from walkers.templates.scene import Bead
+
+TOLERANCE = 1e-6
+"""Of interpolated forces, relative to a column's largest value within a factor of two of the gap."""
+_COARSEST, _FINEST = 8, 256
+_COLUMNS = ("pull", "normal resistance", "sliding resistance", "coupling", "rolling resistance")
+
+
+class UnusableLawError(ValueError):
+    """A law that cannot be tabulated: what is wrong with it."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A law for two surfaces, as the engine has it.
+
+    Attributes
+    ----------
+    curve
+        Where the bridge forms and breaks.
+    scale, octaves, cells
+        Of the grid: see the module; ``scale`` in m.
+    rows
+        Forces at the gaps of the grid, shape (3 cells (octaves + 2) + 1, 5), in the order of
+        `walkers.physics.bridge.Forces`.
+    """
+
+    curve: Curve
+    scale: float
+    octaves: int
+    cells: int
+    rows: FloatArray
+
+    @property
+    def gaps(self) -> FloatArray:
+        """Of the rows, m."""
+        return _gaps(self.curve.rupture, self.scale, self.octaves, self.cells, (0.0, 1.0 / 3.0, 2.0 / 3.0), end=True)
+
+    def text(self) -> str:
+        """The table's part of the engine's file after its first line."""
+        head = f"range {self.curve.formation!r} {self.curve.rupture!r} {self.scale!r} {self.octaves} {self.cells}"
+        numbers = np.column_stack([self.gaps, self.rows]).tolist()
+        return "\n".join([head, *(" ".join(map(repr, row)) for row in numbers)]) + "\n"
+
+
+@lru_cache(maxsize=4096)
+def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) -> Table:
+    """Tabulate a law as finely as the tolerance asks for.
+
+    Parameters
+    ----------
+    tolerance
+        Of the interpolated forces (`TOLERANCE`).
+
+    Raises
+    ------
+    UnusableLawError
+        If forces are no numbers, resistances are negative or would give energy, the rupture is no positive number or
+        closer than the formation, or no table is fine enough.
+    """
+    curve = law(surfaces)
+    if not (np.isfinite(curve.rupture) and curve.rupture > 0.0):
+        raise UnusableLawError(f"the bridge breaks at a gap of {curve.rupture:g} m; expected a positive number")
+    if not 0.0 <= curve.formation <= curve.rupture:
+        raise UnusableLawError(
+            f"the bridge forms at a gap of {curve.formation:g} m; expected 0 to its rupture, {curve.rupture:g} m"
+        )
+    scale = curve.scale or surfaces.closest
+    octaves = max(int(log2(1.0 + 0.5 * curve.rupture / scale)), int(curve.rupture > scale))
+    cells = _COARSEST
+    while cells <= _FINEST:
+        table = Table(curve, scale, octaves, cells, np.empty(0))
+        table = Table(curve, scale, octaves, cells, _checked(curve, table.gaps))
+        worst, gap = _error(table)
+        if worst <= tolerance:
+            return table
+        cells *= 2
+    raise UnusableLawError(
+        f"the finest table, of {_FINEST} cells an octave, is off by {worst:.1g} at a gap of {gap:g} m; expected a law "
+        f"that is smooth between contact, {scale:g} m and its rupture, {curve.rupture:g} m"
+    )
+
+
+def _gaps(
+    rupture: float, scale: float, octaves: int, cells: int, within: Sequence[float], *, end: bool = False
+) -> FloatArray:
+    """Gaps at some parts of all cells, m."""
+    parts = np.array(within)
+    mantissas = (1.0 + (np.arange(cells)[:, None] + parts).ravel() / cells)[None, :]
+    near = scale * ((2.0 ** np.arange(octaves)[:, None] * mantissas).ravel() - 1.0)
+    middle = scale * (2.0**octaves - 1.0)
+    even = (np.arange(2 * cells)[:, None] + parts).ravel() / (2 * cells)
+    far = middle + (rupture - middle) * (1.0 - (1.0 - even) ** 2)
+    return np.concatenate([near, far, [rupture] if end else []])
+
+
+def _checked(curve: Curve, gaps: FloatArray) -> FloatArray:
+    """Forces at some gaps, if they are usable."""
+    with np.errstate(all="ignore"):
+        forces = curve.forces(gaps)
+    columns = np.array(np.broadcast_to(forces.columns(), (len(gaps), len(_COLUMNS))), dtype=np.float64)
+    for name, column in zip(_COLUMNS, columns.T, strict=True):
+        if not np.isfinite(column).all():
+            raise UnusableLawError(f"the {name} is no number at a gap of {gaps[~np.isfinite(column)][0]:g} m")
+        if name.endswith("resistance") and (column < 0.0).any():
+            raise UnusableLawError(f"the {name} is negative at a gap of {gaps[column < 0.0][0]:g} m")
+    _, _, sliding, coupling, rolling = columns.T
+    gains = coupling**2 > (1.0 + 1e-9) * sliding * rolling
+    if gains.any():
+        raise UnusableLawError(
+            f"sliding and rolling together give energy at a gap of {gaps[gains][0]:g} m: the coupling's square is above "
+            "the product of both resistances"
+        )
+    return columns
+
+
+def _error(table: Table) -> tuple[float, float]:
+    """The largest relative error between rows, and its gap (m)."""
+    parts = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])
+    gaps = _gaps(table.curve.rupture, table.scale, table.octaves, table.cells, parts.tolist())
+    exact = _checked(table.curve, gaps)
+    error = np.abs(_cubics(table.rows, parts).reshape(exact.shape) - exact)
+    # Errors count against what is near: forces fall by orders of magnitude, and some end at zero.
+    around = np.stack([np.abs(exact[np.searchsorted(gaps, 0.5 * gaps)]), np.abs(exact), 1e-3 * np.abs(table.rows[:1]) + 0.0 * exact])
+    size = around.max(axis=0)
+    relative = np.divide(error, size, out=np.zeros_like(error), where=size > 0.0).max(axis=1)
+    worst = int(relative.argmax())
+    return float(relative[worst]), float(gaps[worst])
+
+
+def _cubics(rows: FloatArray, parts: FloatArray) -> FloatArray:
+    """What the engine makes of the rows at some parts of each cell, shape (cells, parts, 5)."""
+    first, second, third, last = rows[0:-1:3], rows[1::3], rows[2::3], rows[3::3]
+    t = parts[None, :, None]
+    shares = (
+        -4.5 * (t - 1 / 3) * (t - 2 / 3) * (t - 1),
+        13.5 * t * (t - 2 / 3) * (t - 1),
+        -13.5 * t * (t - 1 / 3) * (t - 1),
+        4.5 * t * (t - 1 / 3) * (t - 2 / 3),
+    )
+    values: FloatArray = sum(
+        share * row[:, None, :] for share, row in zip(shares, (first, second, third, last), strict=True)
+    )  # type: ignore[assignment]
+    return values
+
+
+def bridge_tables(case: Case, beads: Iterable[Bead], wall_type: int) -> str:
+    """The engine's file for a case: a table for every two surfaces that may meet.
+
+    Parameters
+    ----------
+    beads
+        Of the deck, whose atom types are their surfaces.
+    wall_type
+        Atom type of the walls.
+
+    Raises
+    ------
+    UnusableLawError
+        As for `tabulated`.
+    """
+    assert case.liquid.law is not None
+    law, nearest = by_name(case.liquid.law), case.contact.minimum_separation_ratio
+    fraction = case.liquid.volume_fraction
+    sizes = sorted({(bead.surface, bead.radius) for bead in beads})
+    parts = [f'# Bridges by the law "{case.liquid.law}": gap (m), pull (N), resistances: normal, sliding (N s/m), ']
+    parts[0] += "coupling (N s), rolling (N m s)\n"
+    for kind, radius in sizes:
+        volume = bridge_volume_at_wall(radius, fraction)
+        table = tabulated(law, Surfaces(radius, inf, volume, case.liquid, nearest))
+        parts.append(f"bridge {kind} {wall_type} {radius!r} inf\n{table.text()}")
+        for other_kind, other in sizes:
+            if other_kind == kind and other >= radius:
+                volume = bridge_volume_between_beads(radius, other, fraction)
+                table = tabulated(law, Surfaces(radius, other, volume, case.liquid, nearest))
+                parts.append(f"bridge {kind} {kind} {radius!r} {other!r}\n{table.text()}")
+    return "".join(parts)
