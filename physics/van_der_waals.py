@@ -49,4 +49,4 @@ def law(surfaces: Surfaces, hamaker_constant: float = 6.5e-20, cutoff: float = 0
         return Forces(pull, *np.zeros((4, len(gaps))))
 
     reach = (1.0 / sqrt(SMALLEST) - 1.0) * cutoff
-    return Curve(forces, rupture=reach, formation=reach)
+    return Curve(forces, rupture=reach, formation=reach, scale=cutoff)
