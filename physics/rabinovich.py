@@ -1,7 +1,8 @@
 """The closed form of Rabinovich et al. (2005): F = 2πRγ (cos θ / (1 + h/2d) + sin α sin(θ + α)), for small volumes.
 
 It was made for equal spheres of radius R; unequal ones and planes are taken in Derjaguin's way, R = 2R*
-(`walkers.physics.capillary.derjaguin_radius`). They give no distance of rupture: that of Lian et al. (1993) is taken
+(`walkers.physics.capillary.derjaguin_radius`). At a volume of 0.09 R³ on a plane its pull at contact is twice
+Young–Laplace's. They give no distance of rupture: that of Lian et al. (1993) is taken
 (`walkers.physics.capillary.rupture_distance`). The resistances are those of `walkers.physics.reynolds`. Numbers of
 equations are those in the source of YADE (its ViscElCapPhys).
 
