@@ -178,7 +178,3 @@ class AuditFailed(EngineFailure):
 
 class UnauditedEngineWarning(UserWarning):
     """The engine's binary was never audited."""
-
-
-class EngineVersionWarning(UserWarning):
-    """The engine is another version than the one that the decks' workarounds were measured on."""

@@ -10,7 +10,6 @@ import signal
 import subprocess
 import threading
 import time
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -24,8 +23,8 @@ from walkers.runner.failures import (
     EngineError,
     EngineKilled,
     EngineNeverStarted,
-    EngineVersionWarning,
     MissingFrames,
+    OtherEngine,
     TimeLimitExceeded,
 )
 from walkers.runner.plugin import plugin_of, run_script
@@ -138,7 +137,7 @@ def _launch_once(
     keep_open: Sequence[int],
 ) -> EngineReport:
     begin = time.perf_counter()
-    watch = _Watch(deck, directory, begin)
+    watch = _Watch(deck, directory, engine.path, begin)
     process = None
     try:
         with postponed_interrupts():
@@ -262,9 +261,10 @@ def complete_local_frames(path: Path) -> int:
 class _Watch:
     """Reads the engine's output as it grows, and keeps of it what is asked for later."""
 
-    def __init__(self, deck: Deck, directory: Path, begin: float) -> None:
+    def __init__(self, deck: Deck, directory: Path, engine: Path, begin: float) -> None:
         self.deck = deck
         self.directory = directory
+        self.engine = engine
         self.begin = begin
         self.status: _Status | None = None
         self.failure: BlowUp | BeadsLost | None = None
@@ -334,6 +334,8 @@ class _Watch:
 
     def check(self, time_limit: float | None) -> None:
         """Raise the failure that shows while the engine runs, if any."""
+        if self.version not in (None, AUDITED_VERSION):
+            raise OtherEngine(self.engine, self.version)
         if self.failure is not None:
             raise self.failure
         if time_limit is not None and time.perf_counter() - self.begin > time_limit:
@@ -368,11 +370,7 @@ def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
         found = complete_local_frames(directory / name)
         if found != layout.bridge_frames:
             raise MissingFrames(found, layout.bridge_frames, directory)
-    version = watch.version or "unknown"
-    if version != AUDITED_VERSION:
-        message = f"the engine is {version}; the decks' workarounds were measured on {AUDITED_VERSION}"
-        warnings.warn(message, EngineVersionWarning, stacklevel=4)
-    return EngineReport(version, wall_seconds, watch.loop_seconds, layout.steps)
+    return EngineReport(watch.version or "unknown", wall_seconds, watch.loop_seconds, layout.steps)
 
 
 def _text(line: bytes) -> str:

@@ -80,7 +80,7 @@ def unnumbered(tmp_path: Path) -> str:
         "#!/bin/sh\n"
         "last=$(awk '/^run /{print $2 - 20}' walker.lig)\n"
         'awk -v last="$last" \'/^fix +motion/{print "variable late equal (step>" last ")*(1e308*100-1e308*100)"; '
-        'print "fix late beads addforce v_late 0 0"} {print}\' walker.lig > late.lig && mv late.lig walker.lig\n'
+        'print "fix late all addforce v_late 0 0"} {print}\' walker.lig > late.lig && mv late.lig walker.lig\n'
         f'exec liggghts "$@" # {late}\n'
     )
     front.chmod(0o755)
