@@ -3,7 +3,7 @@
 HOSTILE: dict[str, str] = {
     "three double quotes": '"""; open("pwned", "w"); """',
     "three single quotes": "'''; open('pwned', 'w'); '''",
-    "quotes": "\"a\" 'b' \"",
+    "quotes": '"a" \'b\' "',
     "braces": "{0} {x!r} }{",
     "backslashes": r"C:\Users\new\x \N{BULLET}",
     "backslash at the end": "ends in \\",
