@@ -45,7 +45,7 @@ def styled(draw: Callable[_Given, _Drawn]) -> Callable[_Given, _Drawn]:
 
 
 def plain_text(text: str) -> str:
-    """A text of the user's as matplotlib shows it literally: a dollar begins no formula, SVG has no control characters."""
+    """A text of the user's as matplotlib shows it literally: no formula begins, no control character is left."""
     return "\n".join(map(printable, text.split("\n"))).replace("$", r"\$")
 
 
