@@ -24,7 +24,7 @@ from walkers.runner.binary import Engine
 from walkers.runner.failures import DiskFull
 from walkers.runner.files import fsync_path, read_json, settle, write_json
 from walkers.runner.launch import EngineReport
-from walkers.runner.manifest import FORMAT, MANIFEST_NAME
+from walkers.runner.manifest import FORMAT, MANIFEST_NAME, check_unchanged
 from walkers.templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck, Segment
 from walkers.templates.layout import Layout
 
@@ -96,8 +96,9 @@ def case_of(directory: Path) -> Case:
     Raises
     ------
     OSError, ValueError
-        If its ``case.json`` cannot be read.
+        If its ``case.json`` cannot be read, or of a finished run is not what it was.
     """
+    check_unchanged(directory, [CASE_NAME])
     return Case.from_dict(read_json(directory / CASE_NAME))
 
 
