@@ -89,7 +89,7 @@ class MissingFrames(EngineFailure):
     """The engine ended without complaint but its dump is short."""
 
     def __init__(self, found: float, expected: int, directory: Path) -> None:
-        super().__init__(f"the engine wrote {found:.10g} of {expected} frames and reported no error", directory)
+        super().__init__(f"the engine wrote {int(found)} of {expected} frames and reported no error", directory)
 
 
 class BeadsLost(EngineFailure):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from walkers.inputs.case import Case
+from walkers.inputs.errors import check_utf8
 from walkers.inputs.sweep import Sweep
 from walkers.runner.binary import Engine, find_engine
 from walkers.runner.cost import predicted_seconds
@@ -104,6 +105,7 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     runner.EngineFailure
         If there is no engine.
     """
+    check_utf8(out.absolute())
     binary = find_engine(engine)
     cases = list(sweep.cases())
     options = options.for_ranks(max(case.run.ranks for case in cases))

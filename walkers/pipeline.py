@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.errors import InputError, Problem, WalkersError, check_utf8
 from walkers.notebook import Pictures
 
 if TYPE_CHECKING:
@@ -223,6 +223,8 @@ def run(
     from walkers.sweeps.shared_deck import check_audit, make_runs
 
     case = load_case(case) if isinstance(case, (str, Path)) else case
+    for one in (Path(out).absolute(), case.name):
+        check_utf8(one)
     _check_changed(case)
     binary = find_engine(engine)
     place = run_place(case, binary, out)
