@@ -126,6 +126,13 @@ class DiskFull(EngineFailure):
         super().__init__(f"disk full: {wanted}{free / 1e6:.3g} MB are free", directory)
 
 
+class OutputGone(EngineFailure):
+    """Somebody removed the directory of a run, or of a sweep, while it was made."""
+
+    def __init__(self, directory: Path) -> None:
+        super().__init__(f"{directory} was removed while it was written")
+
+
 class TimeLimitExceeded(EngineFailure):
     """The run took longer than it was allowed to."""
 

@@ -197,6 +197,13 @@ def test_a_reader_who_has_had_enough_is_no_failure(short_case: Path, command: st
     assert (done.stdout.strip(), "Traceback" in done.stderr, "BrokenPipe" in done.stderr) == ("0", False, False)
 
 
+@pytest.mark.parametrize("command", ["show short.toml", "list", "--help", "theory short.toml --json"])
+def test_a_standard_output_without_room_is_told_by_its_name(short_case: Path, command: str) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([PROGRAM, *command.split()], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "walkers: standard output: No space left on device\n")
+
+
 def test_progress_that_nobody_reads_stops_nothing(in_folder: Path) -> None:
     """A line of progress is due each time that there is some, when the reader has gone."""
     (in_folder / "base.toml").write_text(to_toml(document(run=SHORT)))
