@@ -19,7 +19,10 @@ def read_json(path: Path) -> dict[str, Any]:
     OSError, ValueError
         If the file cannot be read or holds something else.
     """
-    contents = json.loads(path.read_text("utf-8"))
+    try:
+        contents = json.loads(path.read_text("utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{path}: no JSON ({error})") from error
     if not isinstance(contents, dict):
         raise ValueError(f"{path}: expected a JSON object")
     return contents
