@@ -8,7 +8,11 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
+
+LARGEST_TEXT = 64 << 20
+"""Bytes: larger than any file that is read whole. Of a run's manifest it is a thousandth that is used, of a sweep of
+ten thousand points a tenth; whoever made a file has not filled the memory of who reads it."""
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -17,11 +21,28 @@ def read_json(path: Path) -> dict[str, Any]:
     Raises
     ------
     OSError, ValueError
-        If the file cannot be read or holds something else.
+        If the file cannot be read, is larger than `LARGEST_TEXT`, or holds something else.
     """
-    contents = json.loads(path.read_text("utf-8"))
+    with path.open("rb") as file:
+        return json_object(str(path), read_text(str(path), file))
+
+
+def read_text(name: str, file: IO[bytes]) -> str:
+    """Read a text of at most `LARGEST_TEXT` from an open file; ``name`` is for the message."""
+    contents = file.read(LARGEST_TEXT + 1)
+    if len(contents) > LARGEST_TEXT:
+        raise ValueError(f"{name}: expected at most {LARGEST_TEXT >> 20} MB")
+    return contents.decode("utf-8")
+
+
+def json_object(name: str, text: str) -> dict[str, Any]:
+    """The JSON object that a text is; ``name`` is for the message."""
+    try:
+        contents = json.loads(text)
+    except RecursionError as error:
+        raise ValueError(f"{name}: nested too deeply") from error
     if not isinstance(contents, dict):
-        raise ValueError(f"{path}: expected a JSON object")
+        raise ValueError(f"{name}: expected a JSON object")
     return contents
 
 
