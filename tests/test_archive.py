@@ -4,6 +4,7 @@ import hashlib
 import importlib.resources
 import io
 import json
+import re
 import shutil
 import subprocess
 import zipfile
@@ -517,3 +518,135 @@ def test_archives_whose_lists_are_not_what_they_hold(
             opened.writestr(place, contents)
     done = call("verify", str(archive))
     assert (done.returncode, told in done.stdout + done.stderr) == (status, True), (done.stdout, done.stderr)
+
+
+_CENTRAL = b"PK\x01\x02"
+
+
+def _in_both_headers(contents: bytearray, place: str, at: int, value: bytes) -> None:
+    """Set a field of a member, given by its distance from the name's in the local header, here and in the list."""
+    name = place.encode()
+    for found in re.finditer(re.escape(name), bytes(contents)):
+        for start, shift in ((found.start() - 30, 0), (found.start() - 46, 2)):
+            if contents[start : start + 4] == (_CENTRAL if shift else b"PK\x03\x04"):
+                contents[start + shift + at : start + shift + at + len(value)] = value
+
+
+def _encrypted(contents: bytearray, place: str) -> None:
+    _in_both_headers(contents, place, 6, b"\x01\x00")
+
+
+def _by_method(number: int) -> Callable[[bytearray, str], None]:
+    return lambda contents, place: _in_both_headers(contents, place, 8, bytes([number, 0]))
+
+
+def _wrong_sum(contents: bytearray, place: str) -> None:
+    _in_both_headers(contents, place, 14, b"abcd")
+
+
+def _declared(size: int) -> Callable[[bytearray, str], None]:
+    return lambda contents, place: _in_both_headers(contents, place, 22, size.to_bytes(4, "little"))
+
+
+def _broken(contents: bytearray, place: str) -> None:
+    at = contents.index(place.encode()) + len(place) + 20
+    contents[at : at + 40] = b"\xff" * 40
+
+
+def _linked(contents: bytearray, place: str) -> None:
+    at = contents.index(place.encode(), contents.index(_CENTRAL))
+    contents[at - 8 : at - 4] = (0o120777 << 16).to_bytes(4, "little")
+
+
+def _overlapping(contents: bytearray, place: str) -> None:
+    at = contents.index(place.encode(), contents.index(_CENTRAL))
+    contents[at - 4 : at] = (0).to_bytes(4, "little")
+
+
+def _long_list(contents: bytearray, _: str) -> None:
+    end = contents.rindex(b"PK\x05\x06")
+    contents[end + 12 : end + 16] = (33 << 20).to_bytes(4, "little")
+    contents[:0] = bytes(33 << 20)
+
+
+@pytest.mark.parametrize(
+    ("damage", "status", "told"),
+    [
+        (_encrypted, 1, "  doubtful   {place} (encrypted)"),
+        (_by_method(12), 1, "  doubtful   {place} (compressed by method 12, expected deflated or stored)"),
+        (_by_method(14), 1, "  doubtful   {place} (compressed by method 14, expected deflated or stored)"),
+        (_by_method(99), 1, "  doubtful   {place} (compressed by method 99, expected deflated or stored)"),
+        (_linked, 1, "  doubtful   {place} (a symbolic link)"),
+        (_wrong_sum, 1, "  changed    {place}"),
+        (_broken, 1, "  changed    {place}"),
+        (_declared(10), 1, "  changed    {place}"),
+        (_declared(1 << 28), 2, "expected at most 100 times its"),
+        (_overlapping, 2, "expected members that follow each other, they overlap"),
+        (_long_list, 2, "expected a list of members of at most 32 MB"),
+    ],
+)
+@pytest.mark.parametrize("name", ["walker.lig", "sha256sums.txt"])
+def test_zip_files_that_are_not_what_they_should_be(
+    whole: Path, tmp_path: Path, damage: Callable[[bytearray, str], None], status: int, told: str, name: str
+) -> None:
+    """Each is told in a sentence, also where it is the list itself that cannot be read."""
+    contents = bytearray(whole.read_bytes())
+    with zipfile.ZipFile(whole) as opened:
+        place = next(place for place in opened.namelist() if place.endswith(name))
+    damage(contents, place)
+    archive = tmp_path / "run.zip"
+    archive.write_bytes(contents)
+    done = call("verify", str(archive))
+    expected = told.format(place=place)
+    if name == "sha256sums.txt":
+        expected = expected.replace("  changed    ", "  doubtful   ")
+        expected = expected.replace(f"{place} (", f"{place} (cannot be read: ")
+    assert (done.returncode, expected in done.stdout + done.stderr) == (status, True), (done.stdout, done.stderr)
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        *(
+            (command, "an archive: unpack it")
+            for command in ("result", "plot", "report", "render", "export --to a.xyz")
+        ),
+        ("table", "not a sweep: expected a folder"),
+        ("status", "neither a sweep's directory"),
+    ],
+)
+def test_archives_are_unpacked_for_all_else(whole: Path, tmp_path: Path, command: str, told: str) -> None:
+    shutil.copy(whole, tmp_path / "run.zip")
+    name, *options = command.split()
+    done = call(name, "run.zip", *options, folder=tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert done.stderr.startswith(f"walkers: run.zip: {told}")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.zip"]
+
+
+def test_what_an_unpacked_archive_does_not_list(whole: Path, shared: Path, tmp_path: Path) -> None:
+    """What was drawn there since is no change; what is put into a run, or beside the points of a sweep, is told."""
+    unpacked = tmp_path / "unpacked"
+    shutil.unpack_archive(whole, unpacked)
+    (run,) = unpacked.glob("runs/*")
+    call("plot", str(run), check=True)
+    assert f"  made since runs/{run.name}/ (2 files)\n" in call("verify", str(unpacked), check=True).stdout
+    (run / "segments" / "0001").mkdir()
+    (run / "result.json").unlink()
+    (run / "result.json").symlink_to("nowhere")
+    told = call("verify", str(unpacked))
+    assert told.returncode == 1
+    assert told.stdout.splitlines()[1:3] == [
+        f"  missing    runs/{run.name}/result.json",
+        f"  not listed runs/{run.name}/segments/0001/",
+    ]
+    sweep = Path(shutil.copytree(shared, tmp_path / "runs")) / "angles"
+    call("plot", str(sweep), check=True)
+    assert "  made since velocity.png\n" in call("verify", str(sweep), check=True).stdout
+    (sweep / "sweep.old.json").write_text("{}")
+    (deck,) = sweep.parent.glob("ensembles/*/manifest.json")
+    deck.write_text("{")
+    told = call("verify", str(sweep))
+    assert told.returncode == 1
+    assert "  not listed sweep.old.json\n" in told.stdout
+    assert "  doubtful   manifest.json (it, or what it names, cannot be read" in told.stdout
