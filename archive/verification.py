@@ -191,6 +191,7 @@ class _Archive:
         self.wanted: dict[str, str] = {}
         self.changed: list[str] = []
         self.doubtful = _clashes(places)
+        self.unread: list[str] = []
 
     def compared(self) -> Verification:
         """What has become of its files."""
@@ -212,6 +213,7 @@ class _Archive:
             unlisted=tuple(place for place in others if not self.may_be_added(place)),
             doubtful=tuple(dict.fromkeys(self.doubtful)),
             since=tuple(place for place in others if self.may_be_added(place)),
+            unread=tuple(self.unread),
         )
 
     def _is_intact(self, place: str) -> bool:
@@ -246,6 +248,9 @@ class _Archive:
             self.doubtful.append(f"{SUMS_NAME} (it lists no run)")
         in_order = sorted(self.wanted)
         for place in lists:
+            if place == METADATA_NAME and self.sizes[place] > LARGEST_TEXT:
+                self.unread.append(f"{place} (larger than {LARGEST_TEXT >> 20} MB: compared by its checksum alone)")
+                continue
             if place == METADATA_NAME:
                 said = self._read(place, lambda text: _said_by_crate(json_object(METADATA_NAME, text)))
                 own = [one for one in in_order if one not in (METADATA_NAME, PREVIEW_NAME)]

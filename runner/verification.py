@@ -42,6 +42,8 @@ class Verification:
         Names of those that cannot be compared, or on which the lists disagree, each with the reason in brackets.
     since
         Names of what was made from the run since (`made_since`): no result rests on it.
+    unread
+        Lists that are what they were, and too large to be compared with the others, each with the reason in brackets.
     left_out
         How many were left out of an archive on purpose.
     by_size
@@ -57,6 +59,7 @@ class Verification:
     unlisted: tuple[str, ...] = ()
     doubtful: tuple[str, ...] = ()
     since: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
     left_out: int = 0
     by_size: bool = False
     of_points: bool = False
@@ -78,6 +81,7 @@ class Verification:
             *_lines("missing", self.missing),
             *_lines("not listed", self.unlisted),
             *_lines("doubtful", self.doubtful),
+            *_lines("not read", self.unread),
             *_lines("made since", _by_folder(self.since)),
         ]
         return "\n".join([told, *lines])
@@ -203,9 +207,12 @@ def listed_by(manifest: Mapping[str, Any]) -> Listed:
 
     Raises
     ------
-    ValueError, KeyError, TypeError, AttributeError
+    ValueError, TypeError, AttributeError
         If it is no manifest, or names what is not below its folder.
     """
+    lacking = [key for key in ("name", "files") if key not in manifest]
+    if lacking:
+        raise ValueError(f"expected the key {lacking[0]}")
     elsewhere = frozenset(manifest.get("shared_deck", {}).get("names", ()))
 
     def own(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -243,7 +250,7 @@ def verify_run(directory: Path) -> Verification:
         return _verified(name, directory, listed)
     except FileNotFoundError as error:
         return Verification(name, 0, missing=(Path(error.filename or MANIFEST_NAME).name,))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, TypeError, AttributeError) as error:
         return Verification(name, 0, doubtful=(f"{MANIFEST_NAME} (it, or what it names, cannot be read: {error})",))
 
 

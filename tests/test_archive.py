@@ -169,7 +169,10 @@ def _with(name: str) -> Callable[[dict[str, Any]], None]:
         (_without("sha256"), "  doubtful   walkers.parquet (manifest.json has its size or its checksum, not both)\n"),
         (_without("files"), "  doubtful   walkers.parquet (manifest.json has its size or its checksum, not both)\n"),
         (lambda manifest: manifest["files"].update({"result.json": 1}), "  changed    result.json\n"),
-        (lambda manifest: manifest.pop("files"), "  doubtful   manifest.json (it, or what it names, cannot be read"),
+        (
+            lambda manifest: manifest.pop("files"),
+            "manifest.json (it, or what it names, cannot be read: expected the key files)",
+        ),
         (lambda manifest: manifest.update(shared_deck=[]), "  doubtful   manifest.json (it, or what it names, cannot"),
         (_with("../stranger"), "expected paths below it, found '../stranger'"),
         (_with("/etc/hostname"), "expected paths below it, found '/etc/hostname'"),
@@ -192,9 +195,10 @@ def test_manifests_that_do_not_say_what_is_there(
     [
         (b"[" * 200_000, "nested too deeply"),
         (b"\n" * (65 << 20), "expected at most 64 MB"),
+        (b"[" + b"[]," * 2_000_000 + b"[]]", "expected at most 2000000 lists and tables"),
         (b'{"files": {}', "cannot be read"),
     ],
-    ids=["nested", "large", "cut"],
+    ids=["nested", "large", "many", "cut"],
 )
 def test_manifests_that_cannot_be_read(run: Path, contents: bytes, told: str) -> None:
     (run / "manifest.json").write_bytes(contents)
@@ -456,6 +460,11 @@ def _empty_crate(parts: dict[str, bytes]) -> None:
     _summed(parts)
 
 
+def _large_crate(parts: dict[str, bytes]) -> None:
+    parts["ro-crate-metadata.json"] += b" " * (65 << 20)
+    _summed(parts)
+
+
 def _another_result(parts: dict[str, bytes]) -> None:
     parts[_place(parts, "result.json")] = b"{}"
     _summed(parts)
@@ -491,6 +500,7 @@ def _folder_of_a_file(parts: dict[str, bytes]) -> None:
         (_shorter_list, 1, "result.json\n"),
         (_shorter_manifest, 1, "walkers.parquet (sha256sums.txt and runs/"),
         (_empty_crate, 1, "case.json (sha256sums.txt and ro-crate-metadata.json disagree)"),
+        (_large_crate, 0, "  not read   ro-crate-metadata.json (larger than 64 MB: compared by its checksum alone)"),
         (_another_result, 1, "result.json (sha256sums.txt and ro-crate-metadata.json disagree)"),
         (_no_run, 1, "  doubtful   sha256sums.txt (it lists no run)\n"),
         (_added("film.mp4"), 1, "  not listed film.mp4\n"),
