@@ -56,8 +56,8 @@ def verify(path: Path) -> list[Verification]:
     All that is listed must be there and unchanged, and nothing else be there. What was made from finished runs since,
     and is read by nobody, is named and no failure: pictures, films, pages, files for ParaView, exports and hidden files
     (`walkers.runner.verification.made_since`), but in a zip file, which is written whole. The lists of an archive
-    (its checksums, its RO-Crate, the manifests of its runs) must agree, and no two names may
-    differ by upper and lower case alone.
+    (its checksums, its RO-Crate, the manifests of its runs) must agree, and no two names may differ by upper and lower
+    case alone. A sweep's directory is held to the same rule; its record has a checksum in archives only.
 
     Parameters
     ----------
