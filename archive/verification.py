@@ -17,7 +17,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import IO, Any
 from urllib.parse import unquote
 
@@ -203,8 +203,9 @@ class _Archive:
         wanted = self.wanted = _listed(self.path, text)
         intact = [place for place in wanted if place in self.sizes and self._is_intact(place)]
         self._compare_lists(intact)
-        known = {*wanted, SUMS_NAME, *_folders(wanted)}
+        known, in_order = {*wanted, SUMS_NAME}, sorted(wanted)
         others = [place for place in dict.fromkeys(self.places) if place not in known]
+        others = [place for place in others if not (place.endswith("/") and _is_start(place, in_order))]
         return Verification(
             self.path.name,
             len(intact),
@@ -272,7 +273,7 @@ class _Archive:
 def _said_by_manifest(folder: str, listed: Listed) -> dict[str, tuple[object, object]]:
     """Checksums (None in older manifests) and sizes of a run's files, by their places in the archive."""
     return {
-        f"{folder}{name}": (None if listed.sums is None else listed.sums.get(name, ""), listed.sizes.get(name))
+        f"{folder}{name}": (None if listed.sums is None else str(listed.sums.get(name)), listed.sizes.get(name))
         for name in listed.names
         if name not in listed.left_out
     }
@@ -286,7 +287,7 @@ def _is_beside(name: str, listed: Listed) -> bool:
 def _said_by_crate(metadata: Mapping[str, Any]) -> dict[str, tuple[object, object]]:
     """Checksums and sizes of the files that an RO-Crate describes."""
     files = [entity for entity in metadata["@graph"] if entity.get("@type") == "File"]
-    return {unquote(entity["@id"]): (entity.get("sha256", ""), entity.get("contentSize")) for entity in files}
+    return {unquote(entity["@id"]): (str(entity.get("sha256")), entity.get("contentSize")) for entity in files}
 
 
 def _listed(path: Path, text: str) -> dict[str, str]:
@@ -304,20 +305,18 @@ def _name(place: str) -> str:
     return place.rpartition("/")[2]
 
 
-def _folders(places: Iterable[str]) -> set[str]:
-    """The folders that files are in, with a slash, as zip files have them."""
-    parents = {place.rpartition("/")[0] for place in places}
-    return {
-        f"{one}/" for parent in parents for one in (parent, *PurePosixPath(parent).parents) if str(one) not in ("", ".")
-    }
+def _is_start(folder: str, in_order: Sequence[str]) -> bool:
+    """Whether one of some places, sorted, is in a folder (with its slash)."""
+    first = bisect_left(in_order, folder)
+    return first < len(in_order) and in_order[first].startswith(folder)
 
 
 def _clashes(places: Sequence[str]) -> list[str]:
     """What would take another's place when unpacked: files and folders of one name, or of names that differ by case."""
-    count = Counter(place.rstrip("/").casefold() for place in places)
-    folders = {folder.rstrip("/").casefold() for folder in _folders(places)}
+    folded = [place.rstrip("/").casefold() for place in places]
+    count, in_order = Counter(folded), sorted(folded)
     return [
         f"{place} (another file or folder has its name)"
-        for place in dict.fromkeys(places)
-        if count[place.rstrip("/").casefold()] > 1 or (not place.endswith("/") and place.casefold() in folders)
+        for place, one in dict(zip(places, folded, strict=True)).items()
+        if count[one] > 1 or (not place.endswith("/") and _is_start(f"{one}/", in_order))
     ]

@@ -470,6 +470,12 @@ def _another_result(parts: dict[str, bytes]) -> None:
     _summed(parts)
 
 
+def _crate_without_sums(parts: dict[str, bytes]) -> None:
+    crate = re.sub(rb'"sha256": "[^"]*"', b'"sha256": null', parts["ro-crate-metadata.json"])
+    parts["ro-crate-metadata.json"] = crate
+    _summed(parts)
+
+
 def _no_run(parts: dict[str, bytes]) -> None:
     for place in [place for place in parts if place.startswith("runs/")]:
         del parts[place]
@@ -502,6 +508,8 @@ def _folder_of_a_file(parts: dict[str, bytes]) -> None:
         (_empty_crate, 1, "case.json (sha256sums.txt and ro-crate-metadata.json disagree)"),
         (_large_crate, 0, "  not read   ro-crate-metadata.json (larger than 64 MB: compared by its checksum alone)"),
         (_another_result, 1, "result.json (sha256sums.txt and ro-crate-metadata.json disagree)"),
+        (_crate_without_sums, 1, "case.json (sha256sums.txt and ro-crate-metadata.json disagree)"),
+        (_added("a/" * 32_000 + "a"), 1, "  not listed a/a/"),
         (_no_run, 1, "  doubtful   sha256sums.txt (it lists no run)\n"),
         (_added("film.mp4"), 1, "  not listed film.mp4\n"),
         (_added("empty/", b""), 1, "  not listed empty/\n"),
