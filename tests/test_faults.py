@@ -189,6 +189,14 @@ def test_closed_streams_do_not_matter(short_case: Path, in_folder: Path, closed:
     assert b"walkers" not in (directory / FIRST_SEGMENT / "engine.log").read_bytes()
 
 
+def test_cleaning_without_input_asks_for_yes(in_folder: Path) -> None:
+    begun = in_folder / "runs" / "short-0123456789ab.incomplete"
+    begun.mkdir(parents=True)
+    done = subprocess.run(["sh", "-c", f"{PROGRAM} clean <&-"], capture_output=True, text=True, check=False)
+    assert (done.returncode, begun.is_dir()) == (2, True)
+    assert done.stderr == "walkers: --yes: expected, for there is no terminal at which to ask\n"
+
+
 @pytest.mark.parametrize("command", ["run short.toml", "deck short.toml", "--help"])
 def test_a_reader_who_has_had_enough_is_no_failure(short_case: Path, command: str) -> None:
     """By the program, by the print of a long text, by who prints the help."""

@@ -320,6 +320,9 @@ def _found(run: Case | str | Path, out: Path) -> tuple[Path, Case | None]:
         path = Path(run)
         if path.is_dir():
             return path, None
+        if path.suffix == ".zip" and path.is_file():
+            told = "an archive: unpack it and give a run or a sweep in it; walkers verify takes it as it is"
+            raise InputError(name, [Problem("", None, told)])
         named = _named(run, out) or (find_sweep(run, out) if not path.is_file() else None)
         if named is not None:
             return named, None
