@@ -108,7 +108,7 @@ class MissingFrames(EngineFailure):
     """The engine ended without complaint but its dump is short."""
 
     def __init__(self, found: float, expected: int, directory: Path) -> None:
-        super().__init__(f"the engine wrote {found:.10g} of {expected} frames and reported no error", directory)
+        super().__init__(f"the engine wrote {int(found)} of {expected} frames and reported no error", directory)
 
 
 class BeadsLost(EngineFailure):
@@ -143,6 +143,13 @@ class DiskFull(EngineFailure):
     def __init__(self, needed: int | None, free: int, directory: Path) -> None:
         wanted = "" if needed is None else f"{needed / 1e6:.3g} MB are still to be written, "
         super().__init__(f"disk full: {wanted}{free / 1e6:.3g} MB are free", directory)
+
+
+class OutputGone(EngineFailure):
+    """Somebody removed the directory of a run, or of a sweep, while it was made."""
+
+    def __init__(self, directory: Path) -> None:
+        super().__init__(f"{directory} was removed while it was written")
 
 
 class TimeLimitExceeded(EngineFailure):

@@ -355,7 +355,7 @@ def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
     """Judge a run that has ended: raise its failure or report what it took."""
     layout, directory = watch.deck.layout, watch.directory
     if status > 0 and watch.version is None and not (watch.error or b"").startswith(b"ERROR"):
-        raise EngineNeverStarted(f"exit status {status}, last words: {_text(watch.last_line)}", directory)
+        raise EngineNeverStarted(_ending(status, watch.last_line), directory)
     if watch.error is not None:
         if POSITION_IS_NO_NUMBER.encode() in watch.error:
             raise BlowUp(math.nan, watch.deck.fastest, watch.step, directory)
@@ -363,7 +363,7 @@ def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
     if status < 0:
         raise EngineKilled(-status, directory)
     if status > 0:
-        raise EngineError(f"exit status {status}, last words: {_text(watch.last_line)}", directory)
+        raise EngineError(_ending(status, watch.last_line), directory)
     if watch.written != layout.bead_dump_bytes:
         raise MissingFrames(watch.written / layout.bead_dump_bytes * layout.frames, layout.frames, directory)
     for name in (layout.pair_bridge_dump, layout.wall_bridge_dump):
@@ -371,6 +371,10 @@ def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
         if found != layout.bridge_frames:
             raise MissingFrames(found, layout.bridge_frames, directory)
     return EngineReport(watch.version or "unknown", wall_seconds, watch.loop_seconds, layout.steps)
+
+
+def _ending(status: int, last_line: bytes) -> str:
+    return f"exit status {status}" + (f", last words: {_text(last_line)}" if last_line else ", without a word")
 
 
 def _text(line: bytes) -> str:

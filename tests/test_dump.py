@@ -16,6 +16,7 @@ from walkers.postprocess.dump import BinaryDump, DumpError
 from walkers.postprocess.local_dump import read_local_dump
 from walkers.runner import finished_run
 from walkers.runner.directory import FIRST_SEGMENT
+from walkers.runner.manifest import FileChanged
 from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
 
 
@@ -118,6 +119,9 @@ def test_truncated_dumps_are_tabulated_with_a_warning(directory: Path, tmp_path:
     shutil.copytree(directory, copy)
     dump = copy / FIRST_SEGMENT / "beads.bin"
     dump.write_bytes(dump.read_bytes()[:-100])
+    with pytest.raises(FileChanged, match=r"beads\.bin is not what it was"):
+        tabulate(copy)
+    (copy / "manifest.json").unlink()  # of a run that is not finished it is no damage
     result = tabulate(copy)
     assert result["truncated"]
     assert result["velocity"]["mean"] > 0

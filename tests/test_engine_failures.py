@@ -164,6 +164,33 @@ def test_exit_without_the_expected_frames(tmp_path: Path) -> None:
     assert _remains(tmp_path)["reason"] == "MissingFrames"
 
 
+@pytest.mark.parametrize(("found", "told"), [(120.9399038, "wrote 120 of 121"), (0.0, "wrote 0 of 121")])
+def test_frames_are_told_in_whole_numbers(found: float, told: str, tmp_path: Path) -> None:
+    assert told in str(MissingFrames(found, 121, tmp_path))
+
+
+def test_an_engine_that_says_nothing_is_quoted_with_nothing(tmp_path: Path) -> None:
+    silent = tmp_path / "silent"
+    silent.write_text("#!/bin/sh\nexit 7\n")
+    silent.chmod(0o755)
+    with pytest.raises(EngineFailure, match="exit status 7, without a word") as failure:
+        run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(silent))
+    assert "last words" not in str(failure.value)
+
+
+@pytest.mark.parametrize("what", ["run long.toml", "sweep sweep.toml"])
+def test_an_output_that_was_removed_meanwhile_is_told(what: str, in_folder: Path) -> None:
+    (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
+    (in_folder / "sweep.toml").write_text('case = "long.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+    with subprocess.Popen([PROGRAM, *what.split()], stderr=subprocess.PIPE, text=True) as program:
+        wait_for(lambda: list(in_folder.glob("runs/**/beads.bin")))
+        shutil.rmtree(in_folder / "runs", ignore_errors=True)
+        _, told = program.communicate()
+    assert program.returncode == 1, told
+    assert "was removed while it was written" in told
+    assert "Traceback" not in told
+
+
 def test_lost_beads(tmp_path: Path) -> None:
     """A box whose wall stands one and a half millimetres ahead of the walker."""
 
