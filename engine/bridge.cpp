@@ -5,7 +5,7 @@
    Loaded with LD_PRELOAD into Debian's liggghts, it makes the engine know
 
        pair_style gran model hertz tangential history cohesion bridge [rolling_friction cdt] table FILE
-       fix ID all wall/gran model hertz tangential history cohesion bridge [rolling_friction cdt] table FILE mesh ...
+       fix ID all wall/gran model hertz tangential history cohesion bridge [rolling_friction cdt] mesh ... table FILE
 
    Spheres repel each other by Hertz's law, damped, and hold each other by Mindlin's spring, damped, up to Coulomb's
    limit: mu times the elastic repulsion, damping included. Rolling friction is cdt's. A bridge (table.h) forms when the

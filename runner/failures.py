@@ -181,4 +181,4 @@ class UnauditedEngineWarning(UserWarning):
 
 
 class EngineVersionWarning(UserWarning):
-    """The engine is another version than the one that the decks' workarounds were measured on."""
+    """The engine is another version than the one that the decks were written for."""

@@ -369,7 +369,7 @@ def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
             raise MissingFrames(found, layout.bridge_frames, directory)
     version = watch.version or "unknown"
     if version != AUDITED_VERSION:
-        message = f"the engine is {version}; the decks' workarounds were measured on {AUDITED_VERSION}"
+        message = f"the engine is {version}; the decks were written for {AUDITED_VERSION}"
         warnings.warn(message, EngineVersionWarning, stacklevel=4)
     return EngineReport(version, wall_seconds, watch.loop_seconds, layout.steps)
 
