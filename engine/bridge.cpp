@@ -17,7 +17,8 @@
    with the torques that conserve momentum and angular momentum. Overlapping surfaces have the bridge of gap 0.
 
    The engine's loops are written out for spheres: no heat, energies, rigid bodies, stored contact forces, virial of
-   walls. A contact's history is the number of its table, 0 without a bridge, and the spring. */
+   walls. A contact's history is the number of its table, 0 without a bridge, and the spring; the number is negative
+   where i is the second bead of the table, for which the coupling has the other sign (n and s turn round, q does not). */
 #include "granular_pair_style.h"
 #include "granular_wall.h"
 #include "contact_models.h"
@@ -76,7 +77,7 @@ class Law : protected Pointers {
 public:
   Law(LAMMPS *lmp, IContactHistorySetup *const history, const bool rolls) : Pointers(lmp), rolls_(rolls), formed_(0.)
   {
-    history->add_history_value("bridge", "0");
+    history->add_history_value("bridge", "1");  // "1": the sign changes where the engine swaps i and j
     history->add_history_value("shearx", "1");
     history->add_history_value("sheary", "1");
     history->add_history_value("shearz", "1");
@@ -139,18 +140,19 @@ protected:
       if (gap > formed_) return 0;
       const int number = find(type_i, type_j, radius_i, radius_j);
       if (gap > tables_[number].formation) return 0;
-      history[TABLE] = 1. + number;
+      history[TABLE] = tables_[number].begins_with(radius_i) ? 1. + number : -1. - number;
     }
-    const bridge::Table *const table = &tables_[static_cast<int>(history[TABLE]) - 1];
+    const bridge::Table *const table = &tables_[static_cast<int>(std::fabs(history[TABLE])) - 1];
     if (gap < table->rupture) return table;
     history[TABLE] = 0.;
     return 0;
   }
 
-  inline void wet(Contact &c, const bridge::Table &table) const
+  inline void wet(Contact &c, const bridge::Table &table, const double *const history) const
   {
     double f[bridge::COLUMNS];
     table.at(c.gap, f);
+    if (history[TABLE] < 0.) f[bridge::COUPLING] = -f[bridge::COUPLING];
     c.force = c.force - (f[bridge::PULL] + f[bridge::NORMAL] * c.apart) * c.n
             - (f[bridge::SLIDING] * c.sliding + f[bridge::COUPLING] * c.rolling);
     c.couple = c.couple - cross(c.n, -1. * (f[bridge::COUPLING] * c.sliding + f[bridge::ROLLING] * c.rolling));
@@ -311,7 +313,7 @@ private:
       c.reduced_mass = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
       touch(c, history + SPRING, update, time_step);
     }
-    if (table) wet(c, *table);
+    if (table) wet(c, *table, history);
     return true;
   }
 
@@ -373,7 +375,7 @@ public:
       c.reduced_mass = atom->rmass[i];
       touch(c, history + SPRING, wall->computeflag() && wall->shearupdate(), update->dt);
     }
-    if (table) wet(c, *table);
+    if (table) wet(c, *table, history);
     const Vec torque = c.couple - arm * cross(c.n, c.force);
     if (wall->computeflag()) {
       add_to(atom->f[i], c.force);

@@ -70,6 +70,8 @@ public:
         || (type_1 == type[1] && type_2 == type[0] && same(radius_1, radius[1]) && same(radius_2, radius[0]));
   }
 
+  bool begins_with(const double radius_1) const { return same(radius_1, radius[0]); }
+
   void read(std::istream &in)
   {
     type[0] = static_cast<int>(number(in));

@@ -28,8 +28,8 @@ from walkers.runner.failures import (
     MissingFrames,
     TimeLimitExceeded,
 )
-from walkers.runner.plugin import plugin_of
-from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, Deck
+from walkers.runner.plugin import plugin_of, run_script
+from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME, Deck
 from walkers.templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, RANKS, STEP_VARIABLES
 
 _POLL_SECONDS = 0.05
@@ -117,6 +117,7 @@ def launch(
     """
     check_room(directory, deck.layout.bead_dump_bytes)
     plugin = plugin_of(engine)
+    (directory / RUN_NAME).write_text(run_script(plugin, deck.layout.ranks), encoding="utf-8")
     for left in reversed(range(starts)):
         try:
             return _launch_once(deck, directory, engine, plugin, on_progress, time_limit, keep_open)

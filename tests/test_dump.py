@@ -41,9 +41,9 @@ def test_all_frames_are_read(directory: Path, beads: Path) -> None:
     assert not dump.truncated
     np.testing.assert_array_equal(np.diff(dump.steps), run.layout.sample_every)
     frames = dump.stack()
-    assert frames.shape == (61, 5, len(COLUMNS))
-    np.testing.assert_array_equal(frames[:, :, dump.column("id")], np.tile(np.arange(1, 6), (61, 1)))
-    np.testing.assert_allclose(frames[0, 1:, dump.column("radius")], [3e-4, 2e-4, 3e-4, 2e-4], rtol=1e-15)
+    assert frames.shape == (61, 4, len(COLUMNS))
+    np.testing.assert_array_equal(frames[:, :, dump.column("id")], np.tile(np.arange(1, 5), (61, 1)))
+    np.testing.assert_allclose(frames[0, :, dump.column("radius")], [3e-4, 2e-4, 3e-4, 2e-4], rtol=1e-15)
     assert beads.stat().st_size == run.layout.bead_dump_bytes
 
 
