@@ -67,10 +67,6 @@ test-slow: setup ## Run what `make test` leaves out: what only a release needs
 audit: setup ## Prove what the installed engine does, against published formulas
 	@$(WALKERS) audit
 
-.PHONY: docs-audit
-docs-audit: setup ## Write docs/explanation/engine.md from an audit of the installed engine
-	@$(WALKERS) audit --markdown docs/explanation/engine.md
-
 .PHONY: validate
 validate: setup ## Check it against published benchmarks, exact solutions and a second engine (under ten minutes)
 	@$(WALKERS) validate --out $(OUT)
