@@ -24,7 +24,9 @@ from walkers.runner.failures import (
     EngineError,
     EngineKilled,
     EngineNeverStarted,
+    EngineSilent,
     EngineVersionWarning,
+    LogTooLong,
     MissingFrames,
     TimeLimitExceeded,
 )
@@ -40,6 +42,9 @@ _MORTAL = ("setpriv", "--pdeathsig", "KILL")
 _UNLESS_ORPHAN = ("sh", "-c", '[ "$PPID" = "$0" ] && exec "$@"')
 _PAUSE_SECONDS = 0.2
 _GRACE_SECONDS = 2.0
+_LONGEST_LOOK = 1.0
+"""Between two looks no more than this counts as silence, in s: whoever was stopped meanwhile, as SLURM does with whole
+jobs, has heard nothing of an engine that was stopped too."""
 _CHUNK_BYTES = 1 << 20
 """Read of the engine's output at once; a line is shorter."""
 _SPARE_BYTES = 64 * 1024
@@ -152,6 +157,7 @@ def _launch_once(
     finally:
         if process is not None:
             _end(process)
+            watch.cut_log()
     wall_seconds = time.perf_counter() - begin
     watch.end()
     watch.check(None)
@@ -269,6 +275,9 @@ class _Watch:
         self.last_line = b""
         self._read = 0
         self._rest = b""
+        self._looked = begin
+        self._silent = 0.0
+        self._grown = 0
 
     @property
     def step(self) -> int:
@@ -281,15 +290,28 @@ class _Watch:
         return Progress(self.step, layout.steps, self.step * layout.time_step, elapsed, self.step)
 
     def look(self) -> None:
-        """Take in what the engine has written since the last look."""
-        with (self.directory / OUTPUT_NAME).open("rb") as output:
+        """Take in what the engine has written since the last look, as far as its log may go."""
+        with self._log.open("rb") as output:
             output.seek(self._read)
-            while chunk := output.read(_CHUNK_BYTES):
+            while self._read <= self.deck.log_limit and (chunk := output.read(_CHUNK_BYTES)):
                 self._read += len(chunk)
                 whole, newline, self._rest = (self._rest + chunk).rpartition(b"\n")
                 self._take_in(whole + newline)
                 if len(self._rest) > _CHUNK_BYTES:  # a line without end
                     self._rest = b""
+        self._listen()
+
+    def _listen(self) -> None:
+        """How long the engine has written nothing."""
+        now, grown = time.perf_counter(), self._read + self.written
+        self._silent = 0.0 if grown != self._grown else self._silent + min(now - self._looked, _LONGEST_LOOK)
+        self._looked, self._grown = now, grown
+
+    def cut_log(self) -> None:
+        """Cut a log that became too long before its engine had ended."""
+        with suppress(OSError):  # a folder that is gone
+            if self._log.stat().st_size > self.deck.log_limit:
+                os.truncate(self._log, int(self.deck.log_limit))
 
     def end(self) -> None:
         """Take in the last line, which may lack its end."""
@@ -331,12 +353,20 @@ class _Watch:
         """Raise the failure that shows while the engine runs, if any."""
         if self.failure is not None:
             raise self.failure
+        if self._read > self.deck.log_limit:
+            raise LogTooLong(self.deck.log_limit, self.step, self.directory)
+        if self._silent > self.deck.silence:
+            raise EngineSilent(self.deck.silence, self.step, self.deck.layout.steps, self.directory)
         if time_limit is not None and time.perf_counter() - self.begin > time_limit:
             raise TimeLimitExceeded(time_limit, self.step, self.deck.layout.steps, self.directory)
         missing = self.deck.layout.bead_dump_bytes - self.written
         free = shutil.disk_usage(self.directory).free
         if missing > 0 and free < _SPARE_BYTES:
             raise DiskFull(missing, free, self.directory)
+
+    @property
+    def _log(self) -> Path:
+        return self.directory / OUTPUT_NAME
 
     @property
     def written(self) -> int:

@@ -111,7 +111,7 @@ class SweepProgress:
 
 _WORST_FIRST = (
     *("EngineMissing", "EngineDiffers", "ProgramDiffers", "DiskFull", "EngineNeverStarted"),  # threaten all points
-    *("EngineError", "MissingFrames", "EngineKilled"),
+    *("EngineError", "MissingFrames", "EngineKilled", "EngineSilent", "LogTooLong"),
     "",  # what is not in this list
     *("BlowUp", "BeadsLost", "WalkersMet", "TimeLimitExceeded", "RunBusy"),
 )

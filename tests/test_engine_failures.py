@@ -32,8 +32,11 @@ from tests.conftest import (
     wait_for_engines,
 )
 from walkers import run as run_case
+from walkers.inputs import load_case
 from walkers.inputs.case import Case
+from walkers.inputs.readable import differing, flattened
 from walkers.runner import Engine, FinishedRun, find_engine, open_run
+from walkers.runner.directory import run_name
 from walkers.runner.failures import (
     BeadsLost,
     BlowUp,
@@ -42,7 +45,9 @@ from walkers.runner.failures import (
     EngineFailure,
     EngineKilled,
     EngineMissing,
+    EngineSilent,
     EngineVersionWarning,
+    LogTooLong,
     MissingFrames,
     TimeLimitExceeded,
 )
@@ -203,6 +208,74 @@ def test_time_limit(tmp_path: Path) -> None:
         _launch(make_case(run=LONG), tmp_path, time_limit=0.6)
     assert not engines_in(tmp_path)
     assert _remains(tmp_path)["reason"] == "TimeLimitExceeded"
+
+
+STRANGE_ENGINES = {
+    "says nothing": ("exec sleep 4711", EngineSilent, r"nothing for 0\.5 s \(run\.silence\) after step 0 of \d+"),
+    "and does not care for SIGTERM": ("trap '' TERM; while :; do sleep 0.1; done", EngineSilent, "nothing for"),
+    "stops saying anything": ("liggghts -log none -in walker.lig; exec sleep 4711", EngineSilent, r"step (\d+) of \1,"),
+    "writes a line without end": ("exec tr '\\0' x < /dev/zero", LogTooLong, r"beyond 2 MB \(run\.log_limit\)"),
+    "writes lines without end": ("exec yes", LogTooLong, "beyond 2 MB"),
+    "and does not mind SIGTERM": ("trap '' TERM; yes | tee -i /dev/null", LogTooLong, "beyond 2 MB"),
+    "ends after too long a log": ('yes | head -c 2100000; exec liggghts "$@"', LogTooLong, "beyond 2 MB"),
+}
+
+
+@pytest.mark.parametrize("name", STRANGE_ENGINES)
+def test_engines_that_say_nothing_or_too_much_are_ended(tmp_path: Path, name: str) -> None:
+    script, kind, told = STRANGE_ENGINES[name]
+    front = tmp_path / "front"
+    front.write_text(f"#!/bin/sh\n{script}\n")
+    front.chmod(0o755)
+    case = make_case(run={**SHORT, "silence": "0.5 s", "log_limit": "2 MB"})
+    with pytest.raises(kind, match=told):
+        run_case(case, tmp_path / "runs", engine=str(front), time_limit=PATIENCE)
+    assert not processes_in(tmp_path)
+    assert _remains(tmp_path / "runs")["reason"] == kind.__name__
+    (log,) = tmp_path.glob("runs/*/segments/*/engine.log")
+    assert log.stat().st_size <= 2_000_000
+
+
+def test_an_engine_that_writes_now_and_then_is_not_silent(tmp_path: Path) -> None:
+    """Five times a quarter of what would be silence."""
+    front = tmp_path / "front"
+    front.write_text('#!/bin/sh\nfor i in 1 2 3 4 5; do sleep 1; echo; done\nexec liggghts "$@"\n')
+    front.chmod(0o755)
+    run_case(make_case(run={**SHORT, "silence": "4 s"}), tmp_path / "runs", engine=str(front))
+
+
+def test_a_launcher_that_was_stopped_does_not_take_that_for_silence(tmp_path: Path) -> None:
+    """As a job is that SLURM suspends: launcher and engine stop, and go on together."""
+    (tmp_path / "long.toml").write_text(to_toml(document(run={**LONG, "silence": "3 s"})))
+    command = [PROGRAM, "run", "long.toml"]
+    program = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    try:
+        everybody = [program.pid, *wait_for_engines(tmp_path, program)]
+        for number in (signal.SIGSTOP, signal.SIGCONT):
+            for process in everybody:
+                os.kill(process, number)
+            time.sleep(4.0 if number == signal.SIGSTOP else 1.0)
+        assert program.poll() is None
+    finally:
+        program.terminate()
+        program.communicate(timeout=PATIENCE)
+
+
+def test_bounds_of_the_engine_are_no_matter_of_a_runs_name(tmp_path: Path) -> None:
+    """Nor a difference between runs; `walkers show` says them, and with slow decks they are larger."""
+    (tmp_path / "a.toml").write_text(to_toml(document(run=SHORT)))
+    (tmp_path / "b.toml").write_text(to_toml(document(run={**SHORT, "silence": "20 s", "log_limit": "5 MB"})))
+    usual, bounded = (load_case(tmp_path / f"{name}.toml").renamed("same") for name in "ab")
+    assert run_name(usual, find_engine()) == run_name(bounded, find_engine())
+    assert not differing([flattened(usual.as_dict()), flattened(bounded.as_dict())])
+    assert Case.from_dict(bounded.as_dict()).run == bounded.run
+    for name, told in (("a", ("600 s", "64 MB")), ("b", ("20 s", "5 MB"))):
+        shown = call("show", f"{name}.toml", folder=tmp_path, check=True).stdout
+        assert re.findall(r"^    (?:silence|log_limit) +(\S+ \S+)", shown, re.MULTILINE) == list(told)
+    slow = make_case(drive={"frequency": "0.01 Hz"}, run={**SHORT, "time_step": "1 us", "samples_per_cycle": 1})
+    assert slow.run.longest_silence(slow.count) > 20.0 * 2.7e-6 * slow.run.steps_per_cycle
+    long = make_case(run={"cycles": 600_000, "samples_per_cycle": 1})
+    assert long.run.most_log > 10.0 * 600_000 * 500.0
 
 
 @pytest.fixture
