@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from walkers.runner.binary import Engine, version_in
@@ -40,6 +41,10 @@ _LINE_BUFFERED = ("stdbuf", "-oL")
 _MORTAL = ("setpriv", "--pdeathsig", "KILL")
 # Whoever died before that was asked of the kernel is not noticed by it: then the parent is another one by now.
 _UNLESS_ORPHAN = ("sh", "-c", '[ "$PPID" = "$0" ] && exec "$@"')
+# Where there is but a loopback nobody reaches mpirun, which listens on every address that it sees, whatever it is told.
+_LOOPBACK_ALONE = ("sh", "-c", 'PATH="$PATH:/usr/sbin:/sbin" ip link set lo up && exec "$@"', "sh")
+_UNSHARED = (("unshare", "--net"), ("unshare", "--net", "--map-current-user", "--keep-caps"))
+"""For root, and for others."""
 _PAUSE_SECONDS = 0.2
 _GRACE_SECONDS = 2.0
 _LONGEST_LOOK = 1.0
@@ -175,14 +180,22 @@ def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]
     # Unless told otherwise mpirun refuses root, more ranks than cores, and binds all decks to the same cores.
     mortal = _MORTAL if shutil.which(_MORTAL[0]) else ()
     unless_orphan = (*_UNLESS_ORPHAN, str(os.getpid())) if mortal else ()
-    parallel = (
-        ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), *mortal]
-        if ranks > 1
-        else []
-    )
+    together = ("mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), *mortal)
+    parallel, apart = (together, _off_the_network()) if ranks > 1 else ((), ())
     with (directory / OUTPUT_NAME).open("wb") as output:
         return subprocess.Popen(
-            [*mortal, *unless_orphan, *parallel, *_LINE_BUFFERED, str(engine.path), "-log", "none", "-in", DECK_NAME],
+            [
+                *apart,
+                *mortal,
+                *unless_orphan,
+                *parallel,
+                *_LINE_BUFFERED,
+                str(engine.path),
+                "-log",
+                "none",
+                "-in",
+                DECK_NAME,
+            ],
             cwd=directory,
             env=_environment(ranks),
             stdin=subprocess.DEVNULL,
@@ -191,6 +204,19 @@ def _start(directory: Path, engine: Engine, ranks: int, keep_open: Sequence[int]
             start_new_session=True,
             pass_fds=tuple(keep_open),
         )
+
+
+@cache
+def _off_the_network() -> tuple[str, ...]:
+    """What starts a program where there is no network but the loopback; nothing where the system lets nobody do so."""
+    for unshared in _UNSHARED:
+        with suppress(OSError):
+            prefix = (*unshared, *_LOOPBACK_ALONE)
+            if not subprocess.run(
+                [*prefix, "true"], stdin=subprocess.DEVNULL, capture_output=True, check=False
+            ).returncode:
+                return prefix
+    return ()
 
 
 def _environment(ranks: int) -> dict[str, str]:
