@@ -53,6 +53,8 @@ jobs, has heard nothing of an engine that was stopped too."""
 _CHUNK_BYTES = 1 << 20
 """Read of the engine's output at once; a line is shorter."""
 _SPARE_BYTES = 64 * 1024
+_TEMPORARY_BYTES = 16_000_000
+"""In TMPDIR, of mpirun and its processes: with 6 MB they wait for each other without end."""
 _STATUS_LINE = re.compile(rb"^ *(\d+) +(\d+) +(\S+)((?: +[-+.\w]+){6}) *$", re.MULTILINE)
 _ERROR_LINE = re.compile(rb"^.*\bERROR\b.*$", re.MULTILINE)
 _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
@@ -127,6 +129,9 @@ def launch(
         One of the failures of `walkers.runner.failures`; the engine and its children have ended by then.
     """
     check_room(directory, deck.layout.bead_dump_bytes)
+    temporary = Path(os.environ.get("TMPDIR", "/tmp"))
+    if deck.layout.ranks > 1 and temporary.is_dir():
+        check_room(temporary, _TEMPORARY_BYTES)
     for left in reversed(range(starts)):
         try:
             return _launch_once(deck, directory, engine, on_progress, time_limit, keep_open)
@@ -220,7 +225,12 @@ def _off_the_network() -> tuple[str, ...]:
 
 
 def _environment(ranks: int) -> dict[str, str]:
-    inherited = {name: value for name, value in os.environ.items() if name not in STEP_VARIABLES}
+    # What a user has Open MPI do on a cluster, such as by which network to meet, may leave no way on one machine.
+    inherited = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in STEP_VARIABLES and not name.startswith("OMPI_MCA_")
+    }
     return {**inherited, **(RANKS if ranks > 1 else ALONE)}
 
 
