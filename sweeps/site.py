@@ -60,8 +60,9 @@ _SCHEDULERS = {
 
 _SHELL_TEXTS = ("scheduler_options", "worker_init", "launch_cmd", "interchange_launch_cmd", "regex_job_id")
 """Settings of Parsl's that are lines or commands by what they are, and one that no shell sees."""
-_ODD = re.compile(r"[^\w./+@%=,:-]")
-_TAKEN = "expected letters, digits and . _ / + @ % = , : -"
+# SLURM fills in what stands behind a per cent sign, and its jobs end at once where their output cannot go.
+_ODD = re.compile(r"[^\w./+@=,:-]")
+_TAKEN = "expected letters, digits and . _ / + @ = , : -"
 MOST = 10_000
 """Of anything that a site file counts."""
 

@@ -98,7 +98,11 @@ def test_what_parsl_is_told(tmp_path: Path) -> None:
     assert not provider.exclusive
 
 
-@pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE)
+# Of the last one SLURM makes something else: jobs end at once whose output goes to a folder that is not there.
+SHELL = {**HOSTILE, "variable of SLURM": "100%N"}
+
+
+@pytest.mark.parametrize("text", SHELL.values(), ids=SHELL)
 def test_texts_that_a_shell_would_take_for_more_are_refused_or_quoted(in_folder: Path, text: str) -> None:
     """Settings and folder stand in scripts and commands of schedulers; names of modules are quoted there."""
     for key in ("partition", "account", "provider.qos", "provider.clusters", "provider.gres", "executor.address"):
