@@ -12,22 +12,7 @@ from walkers.studies.crosscheck.laws import Laws
 
 def matter_of(case: Case) -> Matter:
     """What a case's beads, walls and liquid are made of."""
-    contact, liquid = case.contact, case.liquid
-    return Matter(
-        density=case.density,
-        youngs_modulus=contact.youngs_modulus,
-        poissons_ratio=contact.poissons_ratio,
-        restitution=contact.restitution,
-        friction_beads=contact.friction_bead_bead,
-        friction_walls=contact.friction_bead_wall,
-        rolling_friction=contact.rolling_friction,
-        surface_tension=liquid.surface_tension,
-        viscosity=liquid.dynamic_viscosity,
-        film_viscosity=liquid.film_viscosity,
-        volume_fraction=liquid.volume_fraction,
-        contact_angle=liquid.contact_angle,
-        separation_ratio=contact.minimum_separation_ratio,
-    )
+    return Matter(case.density, case.contact, case.liquid)
 
 
 def surroundings_of(case: Case) -> Surroundings:
