@@ -15,7 +15,7 @@ from walkers.commands.arguments import EngineName, Json
 
 Only = Annotated[list[str] | None, typer.Option("--only", help="Name of a check; may be repeated.")]
 Quick = Annotated[bool, typer.Option("--quick", help="Leave out the checks that take longest.")]
-Markdown = Annotated[Path | None, typer.Option("--markdown", help="Write a page of the defects and the table.")]
+Markdown = Annotated[Path | None, typer.Option("--markdown", help="Write a page with the table.")]
 
 
 def command(
@@ -25,7 +25,7 @@ def command(
     markdown: Markdown = None,
     engine: EngineName = None,
 ) -> int:
-    """Measure the engine's forces and our workarounds against published formulas; exit status 1 if a line fails."""
+    """Measure what engine and contact model do against a second engine and closed forms; exit status 1 if a line fails."""
     from walkers.audit.run import CheckedLines, record, run_audit, selected
     from walkers.audit.table import as_dict, as_markdown, as_text
     from walkers.inputs.errors import InputError, Problem
