@@ -132,8 +132,9 @@ def read_series(deck: Deck, directory: Path) -> Measured:
         start = dump.column(name)
         return frames[:, :, start : start + 3]
 
-    series = (vectors(name) for name in ("x", "vx", "omegax", "fx", "tqx"))
-    return Measured(dump.steps * deck.layout.time_step, *series, directory=directory)
+    time = dump.steps.astype(np.float64) * deck.layout.time_step
+    position, velocity, spin, force, torque = (vectors(name) for name in ("x", "vx", "omegax", "fx", "tqx"))
+    return Measured(time, position, velocity, spin, force, torque, directory)
 
 
 def bench_recording(steps: int, sample_every: int = 1) -> Recording:

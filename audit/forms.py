@@ -86,7 +86,9 @@ def rolling_lines(bench: Bench) -> Iterator[Line]:
     yield Line("a bead slides until it rolls: u - μgt, at most off by", 0.0, error, _STEP)
     error = farthest(RADIUS * series.spin[:, 0, 1, None], 2.5 * friction * GRAVITY * slid[:, None])
     yield Line("its Rω: 5/2 μgt, at most off by", 0.0, error, _STEP)
-    yield Line("its velocity at the end over that at the start", 5.0 / 7.0, float(series.velocity[-1, 0, 0]) / speed, _STEP)
+    yield Line(
+        "its velocity at the end over that at the start", 5.0 / 7.0, float(series.velocity[-1, 0, 0]) / speed, _STEP
+    )
     rolling, speed = 0.01, 5e-3
     slowing = 5.0 / 7.0 * rolling * GRAVITY
     series = _way(bench, _heavy_case(rolling_friction=rolling), speed, speed / RADIUS, 1.3 * speed / slowing)

@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from walkers.audit.bench import DRY, Bench, Measured, bench_case, bench_recording, bench_scene, free_run
+from walkers.audit.bench import DRY, Bench, Measured, bench_case, bench_recording, bench_scene, dry, free_run
 from walkers.inputs.case import Case
+from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import reduced_modulus, reduced_shear_modulus
 from walkers.physics.impact import Impact
 from walkers.postprocess.dump import FloatArray
-from walkers.templates.deck import Plan
+from walkers.templates.bridge_tables import tabulated
+from walkers.templates.deck import BRIDGES_NAME, Plan, compose
 from walkers.templates.scene import Bead
 
 _STEPS = 1000
@@ -116,7 +118,13 @@ def _grid(number: int, spacing: float) -> list[tuple[float, float]]:
 
 def _run(bench: Bench, case: Case, beads: Sequence[Bead], steps: int, sample_every: int, **options: Any) -> Measured:
     room = max(max(map(abs, bead.centre)) + 6.0 * bead.radius for bead in beads)
-    return bench.run(Plan(case, bench_scene(beads, edge=room), bench_recording(steps, sample_every), **options))
+    deck = compose(Plan(case, bench_scene(beads, edge=room), bench_recording(steps, sample_every), **options))
+    tables = deck.files[BRIDGES_NAME]
+    if "surfaces" in options:  # decks have no tables of unlike surfaces, which never meet there
+        for one, other in {(beads[0].radius, bead.radius) for bead in beads}:
+            meeting = Surfaces.of(one, other, case.liquid, case.contact.minimum_separation_ratio)
+            tables += f"bridge 1 2 {one!r} {other!r}\n{tabulated(dry, meeting).text()}"
+    return bench.run(replace(deck, files={**deck.files, BRIDGES_NAME: tables}))
 
 
 def _steps(impact: Impact, launches: Sequence[Launch]) -> tuple[float, int]:

@@ -96,14 +96,18 @@ def prescribed(case: Case, scene: Scene, steps: int = _STEPS, **options: object)
 def follows(case: Callable[[], Case], scene: Scene, name: str, bench: Bench) -> Iterator[Line]:
     """Lines of a scene."""
     made = case()
-    for what, error in zip(("force", "torque"), deviation(made, scene, bench.run(prescribed(made, scene))), strict=True):
+    for what, error in zip(
+        ("force", "torque"), deviation(made, scene, bench.run(prescribed(made, scene))), strict=True
+    ):
         yield Line(f"{name}: {what} beside the second engine's", 0.0, error, EQUAL)
 
 
-def over(face: Face, gap: float, radius: float, velocity: Vector = (0.0, 0.0, 0.0), spin: Vector = _SPIN) -> Bead:
-    """A bead at a gap (m) from a face, its velocity in the face's own axes."""
+def over(
+    face: Face, gap: float, radius: float, velocity: Vector = (0.0, 0.0, 0.0), spin: Vector = _SPIN, x: float = 0.0
+) -> Bead:
+    """A bead at a gap (m) from a face, its velocity in the face's own axes, and so far along x (m) from its middle."""
     centre = [at + (radius + gap) * n for at, n in zip(face.centroid, face.normal, strict=True)]
-    return Bead(0, (centre[0], centre[1], centre[2]), radius, face.turned(velocity), spin)
+    return Bead(0, (centre[0] + x, centre[1], centre[2]), radius, face.turned(velocity), spin)
 
 
 def pair(
@@ -131,9 +135,7 @@ _ROLL: Vector = (0.0, 0.03 / R, 0.0)
 _STILL: Vector = (0.0, 0.0, 0.0)
 _OWN = partial(full_case)
 _LAB = partial(full_case, drive={"frame": "lab", "frequency": "300 Hz", "peak_acceleration": "8 g"})
-_UPRIGHT = partial(
-    full_case, drive={"frame": "lab", "frequency": "300 Hz", "peak_acceleration": "25 g", "axis": "z"}
-)
+_UPRIGHT = partial(full_case, drive={"frame": "lab", "frequency": "300 Hz", "peak_acceleration": "25 g", "axis": "z"})
 _DRIVEN = partial(
     full_case,
     drive={"frequency": "300 Hz", "peak_acceleration": "8 g", "axis": "z"},
@@ -142,19 +144,25 @@ _DRIVEN = partial(
 _SOULIE = partial(full_case, liquid={"law": "soulie"})
 
 SCENES: dict[str, tuple[Callable[[], Case], Scene]] = {
-    "a bead leaves the floor": (_OWN, bench_scene([over(FLOOR, -_DEEP, R, _WAY), over(FLOOR, 2e-5, S, _WAY)])),
+    "a bead leaves the floor": (_OWN, bench_scene([over(FLOOR, -_DEEP, R, _WAY), over(FLOOR, 2e-5, S, _WAY, x=2e-3)])),
     "a bead comes to the floor": (_OWN, bench_scene([over(FLOOR, 9e-5, R, (0.031, 0.023, -0.053))])),
     "a bead slides": (_OWN, bench_scene([over(FLOOR, -_DEEP, R, (0.02, 0.013, 0.0), _STILL)])),
     "a bead rolls": (_OWN, bench_scene([over(FLOOR, -_DEEP, R, (0.03, 0.0, 0.0), _ROLL)])),
-    "a bead spins where it is": (_OWN, bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, 2e-6, S)])),
+    "a bead spins where it is": (_OWN, bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, 2e-6, S, x=2e-3)])),
     "a bead leaves a leaning wall": (_OWN, bench_scene([over(_LEANING, -_DEEP, R, _WAY)], [_LEANING])),
     "a bead in a corner": (_OWN, bench_scene([_IN_CORNER], [FLOOR, _SIDE])),
     "two beads part": (_OWN, bench_scene(pair(-_DEEP, 0.043, (0.02, -0.011, 0.005)))),
     "two beads meet": (_OWN, bench_scene(pair(4.1e-5, -0.023, (0.004, -0.003, 0.002)))),
     "two beads roll on each other": (_OWN, bench_scene(pair(-_DEEP, 0.0, _STILL))),
     "three beads on the floor": (_OWN, bench_scene(_CLIMBING)),
-    "the floor moves to and fro": (_LAB, bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, -5e-7, S, spin=_STILL)])),
-    "the floor moves up and down": (_UPRIGHT, bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, 3e-6, S, spin=_ROLL)])),
+    "the floor moves to and fro": (
+        _LAB,
+        bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, -5e-7, S, spin=_STILL, x=2e-3)]),
+    ),
+    "the floor moves up and down": (
+        _UPRIGHT,
+        bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, 3e-6, S, spin=_ROLL, x=2e-3)]),
+    ),
     "weight and drive": (_DRIVEN, bench_scene([over(FLOOR, -_DEEP, R), Bead(0, (2e-3, 0.0, 5e-3), S)])),
     "a bead leaves the floor (soulie)": (_SOULIE, bench_scene([over(FLOOR, -_DEEP, R, _WAY)])),
     "two beads part (soulie)": (_SOULIE, bench_scene(pair(-_DEEP, 0.043, (0.02, -0.011, 0.005)))),
@@ -261,7 +269,9 @@ def _around(bench: Bench, case: Case, radius: float, way: float) -> float:
 
 def stock_lines(bench: Bench) -> Iterator[Line]:
     """Two beads that part by Debian's own ``cohesion easo/capillary/viscous``, against the contact model's Soulié."""
-    bare = bench_case(liquid={"dynamic_viscosity": "4.6 mPa*s", "contact_angle": "20 deg"}, contact={"restitution": 0.5})
+    bare = bench_case(
+        liquid={"dynamic_viscosity": "4.6 mPa*s", "contact_angle": "20 deg"}, contact={"restitution": 0.5}
+    )
     scene = bench_scene(pair(-_DEEP, 0.05, _STILL, (_STILL, _STILL)))
     deck = compose(prescribed(bare, scene))
     meeting = Surfaces.of(S, R, bare.liquid, bare.contact.minimum_separation_ratio)

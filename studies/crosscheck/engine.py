@@ -178,7 +178,7 @@ def _bridges(radius: FloatArray, matter: Matter, laws: Laws) -> Bridges:
     sizes, kind = np.unique(radius, return_inverse=True)
     others = [*sizes.tolist(), inf]
     between = np.empty((len(sizes), len(others)), dtype=np.int64)
-    made = []
+    made: list[tuple[FloatArray, FloatArray]] = []
     for row, one in enumerate(sizes.tolist()):
         for column, other in enumerate(others):
             if column < row:
