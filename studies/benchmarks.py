@@ -1,4 +1,4 @@
-"""The eight benchmark tests of Chung and Ooi for contact models, on the installed engine, with the published points drawn.
+"""The eight benchmark tests of Chung and Ooi for contact models, on the installed engine, beside their points.
 
 What each line is judged by:
 
@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -242,8 +242,9 @@ def head_on_lines(found: Tests) -> Iterator[Line]:
             yield Line(f"{test}: {name}, duration", impact.duration(closing), course.duration, STEP, "s")
             yield Line(f"{test}: {name}, speed after", leaving, course.rebound_speed, STEP, "m/s")
     for what, course, force in (
-        ("1: limestone", found.pair["limestone"][1], 7108.0), ("2: magnesium alloy", found.plane["magnesium alloy"][1], 7233.0)
-    ):  # fmt: skip
+        ("1: limestone", found.pair["limestone"][1], 7108.0),
+        ("2: magnesium alloy", found.plane["magnesium alloy"][1], 7233.0),
+    ):
         yield Line(f"{what}: published largest force", force, course.peak, STEP, "N")
     for what, (_, course), time, overlap in (
         ("1: glass", found.pair["glass"], published.SPHERES_FORCE_TIME, published.SPHERES_FORCE_OVERLAP),

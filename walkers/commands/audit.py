@@ -25,7 +25,7 @@ def command(
     markdown: Markdown = None,
     engine: EngineName = None,
 ) -> int:
-    """Measure the forces of engine and contact model against a second engine and closed forms; exit 1 if a line fails."""
+    """Measure forces of engine and contact model beside a second engine and closed forms; exit 1 if a line fails."""
     from walkers.audit.run import CheckedLines, record, run_audit, selected
     from walkers.audit.table import as_dict, as_markdown, as_text
     from walkers.inputs.errors import InputError, Problem
