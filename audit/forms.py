@@ -27,6 +27,7 @@ from walkers.inputs.reading import load_case
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.impact import Impact
 from walkers.templates.deck import Plan, plan_of
+from walkers.templates.layout import BEAD_COLUMNS, FORCE_COLUMNS
 from walkers.templates.scene import Bead
 
 GRAVITY, RADIUS = 9.81, 3e-4
@@ -112,10 +113,22 @@ def flight_lines(bench: Bench) -> Iterator[Line]:
     yield Line("free flight: spin, at most off by", 0.0, farthest(series.spin[:, 0], expected), 1e-12)
 
 
+def _walker(cycles: int) -> Case:
+    """The walker of Fig. 1b, alone, for so many cycles."""
+    case = load_case("fig1b")
+    run = replace(case.run, cycles=cycles, cycles_per_segment=cycles, until_steady=False)
+    return replace(case, walkers=(replace(case.walkers[0], replicates=1),), run=run)
+
+
+def _recorded(*cases: Case) -> Plan:
+    """The plan of cases that share a deck, with forces."""
+    plan = plan_of(*cases)
+    return replace(plan, recording=replace(plan.recording, bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS)))
+
+
 def step_lines(bench: Bench) -> Iterator[Line]:
     """A walker's way in four cycles, with the step that ``auto`` takes, its half and its quarter."""
-    whole = load_case("fig1b")
-    case = replace(whole, walkers=(replace(whole.walkers[0], replicates=1),))
+    case = _walker(4)
     ways = []
     for finer in (1, 2, 4):
         plan = plan_of(replace(case, run=free_run(case.run, case.run.time_step / finer)))
@@ -127,9 +140,24 @@ def step_lines(bench: Bench) -> Iterator[Line]:
     yield Line("the same with a whole step", 0.0, coarse, 5e-3)
 
 
+def company_lines(bench: Bench) -> Iterator[Line]:
+    """A walker among others of its deck, driven otherwise or not, beside the same one alone; and a rerun."""
+    alone = _walker(10)
+    alone = replace(alone, contact=replace(alone.contact, rolling_friction=0.0))  # which amplifies rounding
+    other = replace(alone, drive=alone.drive.with_peak(2.0 * alone.drive.peak_acceleration))
+    sloping = replace(alone, boundary=replace(alone.boundary, tilt=0.3))
+    first, again = (bench.run(_recorded(alone)) for _ in range(2))
+    together = bench.run(_recorded(other, alone, sloping))
+    ways = (first.position[:, :2] - first.position[0, :2], together.position[:, 2:4] - together.position[0, 2:4])
+    yield Line("a walker's way among others beside that alone, off by", 0.0, farthest(ways[1], ways[0]), 1e-9)
+    dumps = [(series.directory / "beads.bin").read_bytes() for series in (first, again)]
+    yield Line("a rerun is the same to the last bit: 0", 0.0, float(dumps[0] != dumps[1]), 0.0)
+
+
 CHECKS = (
     Check("impacts", "impacts: Hertz, restitution, Coulomb", impact_lines),
     Check("rolling", "a bead that slides until it rolls, and one that rolls to rest", rolling_lines),
     Check("flight", "a bead in the air", flight_lines),
+    Check("company", "a walker among others, and a rerun", company_lines),
     Check("step", "a walker's way with smaller steps", step_lines, quick=False),
 )
