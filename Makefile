@@ -64,12 +64,8 @@ test-slow: setup ## Run what `make test` leaves out: what only a release needs
 	.venv/bin/pytest -q -n 2 -m slow
 
 .PHONY: audit
-audit: setup ## Prove what the installed engine does, against published formulas
+audit: setup ## Prove what the installed engine does, beside a second engine and closed forms
 	@$(WALKERS) audit
-
-.PHONY: docs-audit
-docs-audit: setup ## Write docs/explanation/engine.md from an audit of the installed engine
-	@$(WALKERS) audit --markdown docs/explanation/engine.md
 
 .PHONY: validate
 validate: setup ## Check it against published benchmarks, exact solutions and a second engine (under ten minutes)
@@ -113,7 +109,8 @@ clean: ## Remove the environment and caches, never the runs
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/api docs/reference/generated
 
 .PHONY: setup
-setup: engine .venv/ready ## Install what is missing: liggghts (apt-get) and .venv
+setup: engine .venv/ready ## Install what is missing: liggghts and what compiles its contact model (apt-get), and .venv
+	@.venv/bin/python -c "from walkers.runner.plugin import main; main()"
 
 # As root, through sudo, or with one message for whoever is root. $(1): packages, $(2): what they are for.
 define debian
@@ -124,10 +121,10 @@ define debian
 endef
 
 .PHONY: engine
-ifeq ($(shell command -v liggghts),)
+ifeq ($(shell command -v liggghts >/dev/null && command -v g++ >/dev/null && command -v mpicxx >/dev/null && test -d /usr/include/liggghts && echo all),)
 engine:
-	@echo "installing the engine, liggghts"
-	$(call debian,liggghts,liggghts)
+	@echo "installing the engine, liggghts, and what its contact model is compiled with"
+	$(call debian,liggghts g++ libliggghts-dev libopenmpi-dev,liggghts or what its contact model is compiled with)
 else
 engine:
 endif

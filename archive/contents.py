@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from walkers.inputs.errors import InputError, Problem
-from walkers.runner.directory import CASE_NAME, FinishedRun
+from walkers.runner.directory import CASE_NAME, FinishedRun, name_of
 from walkers.runner.ensemble import FOLDER
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_record, states
@@ -205,7 +205,7 @@ def contents_of_sweep(directory: Path, *, dumps: bool = True) -> Contents:
         raise InputError(str(directory), [Problem("", None, told)])
     places = list(dict.fromkeys(state.directory for state in found if state.directory is not None))
     return Contents(
-        record.name,
+        name_of(record.directory.name),
         record.title,
         [_run(place, dumps) for place in places],
         _ensembles(places, dumps),
@@ -217,13 +217,14 @@ def contents_of_sweep(directory: Path, *, dumps: bool = True) -> Contents:
 def _sweep_items(record: SweepRecord) -> list[Item]:
     from walkers.sweeps.table import encoded, load
 
-    place = f"{RUNS}/{record.name}"
+    name = name_of(record.directory.name)
+    place = f"{RUNS}/{name}"
     table = load(record.directory)
     table["run"] = [f"{RUNS}/{Path(one).name}" if one else "" for one in table["run"]]  # not where this machine has it
     items = [Item(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)]
     items += [Item(f"{place}/table.{form}", encoded(table, form)) for form in ("csv", "parquet")]
     if record.file:
-        items.append(Item(f"{place}/{record.name}.toml", _toml(record.file), told=_SWEEP))
+        items.append(Item(f"{place}/{name}.toml", _toml(record.file), told=_SWEEP))
     return items
 
 
@@ -236,7 +237,9 @@ def _run(directory: Path, dumps: bool) -> PackedFolder:
     shares = f"{RUNS}/{FOLDER}/{directory.resolve().parent.name}" if _in_ensemble(directory) else None
     folder = _folder(directory, f"{shares or RUNS}/{directory.resolve().name}", dumps, shares=shares)
     case = FinishedRun(directory).case
-    given = [Item(f"{folder.place}/{case.name}.toml", _toml(case.document), told=_GIVEN)] if case.document else []
+    given = (
+        [Item(f"{folder.place}/{name_of(case.name)}.toml", _toml(case.document), told=_GIVEN)] if case.document else []
+    )
     return PackedFolder(folder.directory, folder.place, folder.manifest, [*given, *folder.items], shares)
 
 

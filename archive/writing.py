@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shlex
 import time
 import zipfile
 from calendar import timegm
@@ -17,7 +18,7 @@ from walkers.archive.contents import Contents, Item, contents_of_run, contents_o
 from walkers.archive.crate import METADATA_NAME, PREVIEW_NAME, as_bytes, describe_crate
 from walkers.archive.verification import SUMS_NAME, verify
 from walkers.inputs.errors import InputError, Problem, WalkersError
-from walkers.inputs.text import rendered
+from walkers.postprocess.report.page import fill
 from walkers.runner.files import beside
 from walkers.runner.manifest import checksum
 from walkers.sweeps.record import RECORD_NAME
@@ -176,9 +177,9 @@ def _preview(contents: Contents, options: ArchiveOptions) -> bytes:
         result = short_text(table)
     first = contents.runs[0]
     given = next((item for item in first.items if item.name.endswith(".toml")), None)
-    text = rendered(
-        "walkers.archive",
+    text = fill(
         "preview.html.j2",
+        "walkers.archive",
         contents=contents,
         options=options,
         result=result,
@@ -188,6 +189,7 @@ def _preview(contents: Contents, options: ArchiveOptions) -> bytes:
         first=first,
         licence=LICENCES[options.licence],
         paper=PAPER,
+        quote=shlex.quote,
         sums_name=SUMS_NAME,
         metadata_name=METADATA_NAME,
     )

@@ -1,4 +1,4 @@
-"""The audit's table, as text, as JSON, and as docs/explanation/engine.md."""
+"""The audit's table, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any
 
 from walkers.audit.check import Verdict
 from walkers.audit.run import AuditReport
-from walkers.inputs.text import rendered
 
 
 def _number(value: float) -> str:
@@ -66,8 +65,3 @@ def as_dict(report: AuditReport) -> dict[str, Any]:
             for checked in report.checked
         ],
     }
-
-
-def as_markdown(report: AuditReport) -> str:
-    """docs/explanation/engine.md: what the audit measured."""
-    return rendered("walkers.audit", "engine.md.j2", verdict=verdict(report), checked=report.checked)

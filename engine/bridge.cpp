@@ -1,9 +1,11 @@
-/* A contact model for LIGGGHTS: liquid bridges whose forces are tables. granular-walkers, GPL-2.0-or-later.
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Copyright (c) 2026, the granular-walkers developers
+/* A contact model for LIGGGHTS: liquid bridges whose forces are tables.
 
    Loaded with LD_PRELOAD into Debian's liggghts, it makes the engine know
 
        pair_style gran model hertz tangential history cohesion bridge [rolling_friction cdt] table FILE
-       fix ID all wall/gran model hertz tangential history cohesion bridge [rolling_friction cdt] table FILE mesh ...
+       fix ID all wall/gran model hertz tangential history cohesion bridge [rolling_friction cdt] mesh ... table FILE
 
    Spheres repel each other by Hertz's law, damped, and hold each other by Mindlin's spring, damped, up to Coulomb's
    limit: mu times the elastic repulsion, damping included. Rolling friction is cdt's. A bridge (table.h) forms when the
@@ -15,7 +17,8 @@
    with the torques that conserve momentum and angular momentum. Overlapping surfaces have the bridge of gap 0.
 
    The engine's loops are written out for spheres: no heat, energies, rigid bodies, stored contact forces, virial of
-   walls. A contact's history is the number of its table, 0 without a bridge, and the spring. */
+   walls. A contact's history is the number of its table, 0 without a bridge, and the spring; the number is negative
+   where i is the second bead of the table, for which the coupling has the other sign (n and s turn round, q does not). */
 #include "granular_pair_style.h"
 #include "granular_wall.h"
 #include "contact_models.h"
@@ -40,7 +43,9 @@ enum { BRIDGE_ID = 21 };  // of a cohesion model; Debian's engine has none of th
 enum { TABLE, SPRING, HISTORY = SPRING + 3 };
 const char *const NAME = "cohesion_model bridge";
 
-struct Vec { double x, y, z; };
+struct Vec {
+  double x, y, z;
+};
 inline Vec operator+(const Vec a, const Vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Vec operator-(const Vec a, const Vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Vec operator*(const double s, const Vec a) { return {s * a.x, s * a.y, s * a.z}; }
@@ -72,7 +77,7 @@ class Law : protected Pointers {
 public:
   Law(LAMMPS *lmp, IContactHistorySetup *const history, const bool rolls) : Pointers(lmp), rolls_(rolls), formed_(0.)
   {
-    history->add_history_value("bridge", "0");
+    history->add_history_value("bridge", "1");  // "1": the sign changes where the engine swaps i and j
     history->add_history_value("shearx", "1");
     history->add_history_value("sheary", "1");
     history->add_history_value("shearz", "1");
@@ -80,7 +85,8 @@ public:
 
   void settings(const int n, char **const args)
   {
-    if (n != 2 || std::string(args[0]) != "table") error->all(FLERR, "cohesion bridge: expected the keyword table and a file");
+    if (n != 2 || std::string(args[0]) != "table")
+      error->all(FLERR, "cohesion bridge: expected the keyword table and a file");
     file_ = args[1];
     try {
       tables_ = bridge::read_tables(file_);
@@ -109,7 +115,8 @@ public:
     // The engine looks for neighbours up to a multiple of the sum of the radii, at a wall of the radius.
     double reach = 0.;
     for (const bridge::Table &one : tables_)
-      reach = std::max(reach, one.rupture / (std::isinf(one.radius[1]) ? one.radius[0] : one.radius[0] + one.radius[1]));
+      reach =
+        std::max(reach, one.rupture / (std::isinf(one.radius[1]) ? one.radius[0] : one.radius[0] + one.radius[1]));
     neighbor->register_contact_dist_factor(1. + 1.01 * reach);
   }
 
@@ -133,18 +140,19 @@ protected:
       if (gap > formed_) return 0;
       const int number = find(type_i, type_j, radius_i, radius_j);
       if (gap > tables_[number].formation) return 0;
-      history[TABLE] = 1. + number;
+      history[TABLE] = tables_[number].begins_with(radius_i) ? 1. + number : -1. - number;
     }
-    const bridge::Table *const table = &tables_[static_cast<int>(history[TABLE]) - 1];
+    const bridge::Table *const table = &tables_[static_cast<int>(std::fabs(history[TABLE])) - 1];
     if (gap < table->rupture) return table;
     history[TABLE] = 0.;
     return 0;
   }
 
-  inline void wet(Contact &c, const bridge::Table &table) const
+  inline void wet(Contact &c, const bridge::Table &table, const double *const history) const
   {
     double f[bridge::COLUMNS];
     table.at(c.gap, f);
+    if (history[TABLE] < 0.) f[bridge::COUPLING] = -f[bridge::COUPLING];
     c.force = c.force - (f[bridge::PULL] + f[bridge::NORMAL] * c.apart) * c.n
             - (f[bridge::SLIDING] * c.sliding + f[bridge::COUPLING] * c.rolling);
     c.couple = c.couple - cross(c.n, -1. * (f[bridge::COUPLING] * c.sliding + f[bridge::ROLLING] * c.rolling));
@@ -201,8 +209,8 @@ private:
     for (size_t number = 0; number < tables_.size(); number++)
       if (tables_[number].joins(type_i, type_j, radius_i, radius_j)) return number;
     char text[512];
-    snprintf(text, sizeof(text), "cohesion bridge: %s has no table of types %d and %d, radii %g and %g m", file_.c_str(), type_i,
-             type_j, radius_i, radius_j);
+    snprintf(text, sizeof(text), "cohesion bridge: %s has no table of types %d and %d, radii %g and %g m",
+             file_.c_str(), type_i, type_j, radius_i, radius_j);
     error->one(FLERR, text);
     return -1;
   }
@@ -281,7 +289,8 @@ private:
   const int64_t hash_;
 
   /* Fills in a contact whose gap and normal are known; false if nothing acts. */
-  inline bool act(Contact &c, const int i, const int j, double *const history, const bool update, const double time_step, int &flag)
+  inline bool act(Contact &c, const int i, const int j, double *const history, const bool update,
+                  const double time_step, int &flag)
   {
     const double ri = atom->radius[i], rj = atom->radius[j];
     const bool touching = c.gap < 0.;
@@ -289,7 +298,9 @@ private:
     c.type_j = atom->type[j];
     if (!touching) history[SPRING] = history[SPRING + 1] = history[SPRING + 2] = 0.;
     const bridge::Table *const table = bridge_of(history, c.gap, c.type_i, c.type_j, ri, rj);
-    flag = touching ? CONTACT_NORMAL_MODEL | CONTACT_COHESION_MODEL | CONTACT_TANGENTIAL_MODEL : table ? CONTACT_COHESION_MODEL : 0;
+    flag = touching ? CONTACT_NORMAL_MODEL | CONTACT_COHESION_MODEL | CONTACT_TANGENTIAL_MODEL
+         : table    ? CONTACT_COHESION_MODEL
+                    : 0;
     if (!flag) return false;
     const Vec v = vec(atom->v[i]) - vec(atom->v[j]), wi = vec(atom->omega[i]), wj = vec(atom->omega[j]);
     c.apart = dot(v, c.n);
@@ -302,12 +313,12 @@ private:
       c.reduced_mass = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
       touch(c, history + SPRING, update, time_step);
     }
-    if (table) wet(c, *table);
+    if (table) wet(c, *table, history);
     return true;
   }
 
-  __attribute__((noinline)) void report(PairGran *pair, const int i, const int j, const bool newton, const int add, const Vec d,
-                                        const Vec of, const Vec torque, double *const history)
+  __attribute__((noinline)) void report(PairGran *pair, const int i, const int j, const bool newton, const int add,
+                                        const Vec d, const Vec of, const Vec torque, double *const history)
   {
     if (pair->cpl() && add) {
       SurfacesIntersectData surfaces;
@@ -332,8 +343,8 @@ public:
   int get_history_offset(const std::string) { return -1; }
   bool contact_match(const std::string kind, const std::string model) { return match(kind, model); }
 
-  void compute_force(FixWallGran *wall, SurfacesIntersectData &surfaces, bool touching, double *velocity, FixMeshSurface *fix_mesh,
-                     int mesh_number, TriMesh *mesh, int triangle)
+  void compute_force(FixWallGran *wall, SurfacesIntersectData &surfaces, bool touching, double *velocity,
+                     FixMeshSurface *fix_mesh, int mesh_number, TriMesh *mesh, int triangle)
   {
     const int i = surfaces.i;
     double *const history = surfaces.contact_history;
@@ -344,8 +355,8 @@ public:
     c.type_i = atom->type[i];
     c.type_j = wall->atom_type_wall();
     if (!touching) history[SPRING] = history[SPRING + 1] = history[SPRING + 2] = 0.;
-    const bridge::Table *const table
-      = bridge_of(history, c.gap, c.type_i, c.type_j, radius, std::numeric_limits<double>::infinity());
+    const bridge::Table *const table =
+      bridge_of(history, c.gap, c.type_i, c.type_j, radius, std::numeric_limits<double>::infinity());
     if (!touching && !table && !tell) return;
     surfaces.r = radius + c.gap;
     surfaces.rsq = surfaces.r * surfaces.r;
@@ -364,7 +375,7 @@ public:
       c.reduced_mass = atom->rmass[i];
       touch(c, history + SPRING, wall->computeflag() && wall->shearupdate(), update->dt);
     }
-    if (table) wet(c, *table);
+    if (table) wet(c, *table, history);
     const Vec torque = c.couple - arm * cross(c.n, c.force);
     if (wall->computeflag()) {
       add_to(atom->f[i], c.force);
@@ -372,7 +383,8 @@ public:
     }
     if (tell) report(wall, surfaces, velocity, c, torque, mesh_number, mesh, triangle);
     double acted[3] = {c.force.x, c.force.y, c.force.z};
-    if (wall->store_force()) vectorAdd3D(wall->fix_wallforce()->array_atom[i], acted, wall->fix_wallforce()->array_atom[i]);
+    if (wall->store_force())
+      vectorAdd3D(wall->fix_wallforce()->array_atom[i], acted, wall->fix_wallforce()->array_atom[i]);
     if (fix_mesh && (touching || table)) {
       double delta[3] = {-surfaces.delta[0], -surfaces.delta[1], -surfaces.delta[2]};
       fix_mesh->add_particle_contribution(i, acted, delta, triangle, velocity);
@@ -380,15 +392,17 @@ public:
   }
 
 private:
-  __attribute__((noinline)) void report(FixWallGran *wall, SurfacesIntersectData &surfaces, double *velocity, const Contact &c,
-                                        const Vec torque, const int mesh_number, TriMesh *mesh, const int triangle)
+  __attribute__((noinline)) void report(FixWallGran *wall, SurfacesIntersectData &surfaces, double *velocity,
+                                        const Contact &c, const Vec torque, const int mesh_number, TriMesh *mesh,
+                                        const int triangle)
   {
     const int i = surfaces.i;
     double at[3], normal[3] = {-c.n.x, -c.n.y, -c.n.z};
     vectorSubtract3D(atom->x[i], surfaces.delta, at);
     ComputePairGranLocal *const rows = wall->compute_wall_gran_local();
     rows->add_wall_1(mesh_number, mesh ? mesh->id(triangle) : 0, i, at, velocity);
-    rows->add_wall_2(i, c.force.x, c.force.y, c.force.z, torque.x, torque.y, torque.z, surfaces.contact_history, surfaces.rsq, normal);
+    rows->add_wall_2(i, c.force.x, c.force.y, c.force.z, torque.x, torque.y, torque.z, surfaces.contact_history,
+                     surfaces.rsq, normal);
   }
 };
 

@@ -1,4 +1,6 @@
-/* Forces of a bridge against the gap, from a table: granular-walkers, GPL-2.0-or-later (see README.md).
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Copyright (c) 2026, the granular-walkers developers
+/* Forces of a bridge against the gap, from a table, whose format README.md describes.
 
    A file holds one table for each two surfaces that may meet; '#' begins a comment. A table is
 
@@ -68,6 +70,8 @@ public:
         || (type_1 == type[1] && type_2 == type[0] && same(radius_1, radius[1]) && same(radius_2, radius[0]));
   }
 
+  bool begins_with(const double radius_1) const { return same(radius_1, radius[0]); }
+
   void read(std::istream &in)
   {
     type[0] = static_cast<int>(number(in));
@@ -133,10 +137,7 @@ private:
     return value;
   }
 
-  static bool same(const double a, const double b)
-  {
-    return a == b || std::fabs(a - b) <= 1e-9 * std::fabs(a);
-  }
+  static bool same(const double a, const double b) { return a == b || std::fabs(a - b) <= 1e-9 * std::fabs(a); }
 
   static Cell cell(const double *const row, const double begin, const double width)
   {

@@ -6,8 +6,16 @@ an engine runs derives from `WalkersError` too and is listed in `walkers.runner.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+
+from walkers.inputs.text import printable
+
+_LONGEST_VALUE = 80
+_LONGEST_TEXT = 1000
+"""Letters of a value, and of a file's name or what was expected, that a message quotes."""
 
 
 class WalkersError(Exception):
@@ -37,8 +45,29 @@ class Problem:
     expected: str
 
     def __str__(self) -> str:
-        where = f"{self.key} = {self.value}" if self.value is not None else self.key
-        return f"{where}: {self.expected}" if where else self.expected
+        where = " = ".join(shortened(printable(part)) for part in (self.key, self.value) if part is not None)
+        expected = shortened(self.expected, _LONGEST_TEXT)
+        return f"{where}: {expected}" if where else expected
+
+
+def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
+    """A text as a message quotes it."""
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
+
+
+def check_utf8(word: str | Path) -> None:
+    """Refuse a path or a word that is no UTF-8, which neither tables nor decks could name.
+
+    Raises
+    ------
+    InputError
+        If it is one; its odd bytes are written out.
+    """
+    try:
+        str(word).encode("utf-8")
+    except UnicodeEncodeError as error:
+        shown = os.fsencode(str(word)).decode("utf-8", "backslashreplace")
+        raise InputError(shown, [Problem("", None, "expected UTF-8 text")]) from error
 
 
 class InputError(WalkersError):
@@ -55,7 +84,8 @@ class InputError(WalkersError):
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         self.source = source
         self.problems = tuple(problems)
-        super().__init__("\n".join(f"{source}: {problem}" for problem in self.problems))
+        named = shortened(source, _LONGEST_TEXT)
+        super().__init__("\n".join(f"{named}: {problem}" for problem in self.problems))
 
 
 class UnusableKeyError(Exception):

@@ -10,7 +10,7 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import InputError, Problem, shortened
 from walkers.inputs.library import suggestion
 from walkers.inputs.schema import CaseFile
 
@@ -62,7 +62,7 @@ def quoted(document: Mapping[str, Any], location: Sequence[str | int]) -> str | 
         text = json.dumps(value, ensure_ascii=False, default=str)
     except (ValueError, RecursionError):  # integers of thousands of digits, brackets without end
         return "..."
-    return text if len(text) <= 80 else text[:77] + "..."
+    return shortened(text)
 
 
 def validated(model: type[File], document: Mapping[str, Any], source: str, whole: str = "a case") -> File:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import InputError, Problem, UnusableKeyError
+from walkers.inputs.errors import InputError, Problem, UnusableKeyError, check_utf8, shortened
 from walkers.inputs.kinds import check_kind
 from walkers.inputs.library import suggestion
 
@@ -87,6 +87,7 @@ def find_input(name: str | Path, shipped: Mapping[str, Path], kind: str) -> Path
     InputError
         If there is neither; ``kind`` is what the message calls it.
     """
+    check_utf8(name)
     path = Path(name)
     try:
         if path.is_file() or (path.exists() and str(name) not in shipped):
@@ -94,7 +95,7 @@ def find_input(name: str | Path, shipped: Mapping[str, Path], kind: str) -> Path
                 raise InputError(str(name), [Problem("", None, "expected a name before .toml")])
             return path
     except OSError as error:
-        raise InputError(str(name)[:80], [Problem("", None, f"cannot be read: {error.strerror}")]) from error
+        raise InputError(shortened(str(name)), [Problem("", None, f"cannot be read: {error.strerror}")]) from error
     if str(name) in shipped:
         return shipped[str(name)]
     told = f"no such file, nor a shipped {kind} ({', '.join(shipped)}){suggestion(str(name), shipped)}"

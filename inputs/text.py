@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from math import isfinite
@@ -15,7 +16,8 @@ def rendered(package: str, template: str, **values: Any) -> str:
     """The text of a template of a package.
 
     Filters: ``number`` (shortest text that reads back as the same double) and ``numbers`` of several, ``format`` as
-    Python's for numbers, a dash for what is none, ``cell`` for a table's.
+    Python's for numbers, a dash for what is none, ``cell`` for a table's, ``code`` of Python for a value, ``plain`` for
+    a user's text in Markdown.
 
     Raises
     ------
@@ -23,6 +25,17 @@ def rendered(package: str, template: str, **values: Any) -> str:
         If it names a value that is not given.
     """
     return _environment(package).get_template(template).render(**values)
+
+
+def printable(text: str) -> str:
+    r"""A user's text on one line: white space is a space, and what cannot be seen is written out.
+
+    Examples
+    --------
+    >>> printable("one\ntwo \x1b[31m")
+    'one two \\x1b[31m'
+    """
+    return "".join(one if one.isprintable() else repr(one)[1:-1] for one in " ".join(text.split()))
 
 
 def _number(value: float) -> str:
@@ -41,11 +54,17 @@ def _cell(text: object) -> str:
     return str(text).replace("|", "\\|")
 
 
+def _plain(text: str) -> str:
+    return re.sub(r"[\\`*_<>|&\[\]]", r"\\\g<0>", printable(text))
+
+
 _FILTERS: Mapping[str, Callable[..., Any]] = {
     "number": _number,
     "numbers": _numbers,
     "format": _formatted,
     "cell": _cell,
+    "code": repr,
+    "plain": _plain,
     "any": any,
     "zip": zip,
 }

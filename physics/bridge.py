@@ -15,6 +15,9 @@ the torques are -l1 n × F - n × M on 1 and -l2 n × F + n × M on 2, so that m
 and the dissipated power N w² + S s² + 2 C s·q + Q q² is not negative where N, S, Q ≥ 0 and C² ≤ S Q. A drag c on the
 velocity of a centre along a plane, v = s - l1 q, is S = c, C = -c l1, Q = c l1².
 
+Body 1 is `Surfaces.radius`, the bead at a plane and the smaller one of two. For the other one as body 1, n and s turn
+round while q does not: C changes its sign, and nothing else.
+
 Surfaces that overlap (h < 0) have the pull and the resistances of h = 0.
 """
 

@@ -15,6 +15,11 @@ from __future__ import annotations
 from math import cbrt, exp, log, pi, sqrt
 
 
+def derjaguin_radius(radius_1: float, radius_2: float) -> float:
+    """Radius of the equal spheres whose surfaces part as these do, 2 R1 R2 / (R1 + R2); infinity is a plane."""
+    return 2.0 / (1.0 / radius_1 + 1.0 / radius_2)
+
+
 def bridge_volume_between_beads(radius_1: float, radius_2: float, volume_fraction: float) -> float:
     """Liquid in the bridge between two beads, m³ (Shi and McCarthy 2008).
 

@@ -18,9 +18,9 @@ from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin
 from walkers.postprocess.drawing import check_formats
-from walkers.runner.directory import case_of
+from walkers.runner.directory import SEGMENTS, case_of
 from walkers.runner.files import read_json, write_json
-from walkers.runner.manifest import record_tables
+from walkers.runner.manifest import FileChanged, check_unchanged, forget_tables, record_tables
 
 if TYPE_CHECKING:  # how far a sweep is can be told without numpy
     import numpy.typing as npt
@@ -162,11 +162,15 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
     ------
     postprocess.dump.DumpError
         If a dump cannot be read.
+    runner.manifest.FileChanged
+        If a file of a finished run is not what it was.
     """
     from walkers.postprocess.motion import read_motion
     from walkers.postprocess.tables import write_table
 
     directory = Path(directory)
+    files = (path.relative_to(directory) for path in (directory / SEGMENTS).rglob("*"))
+    check_unchanged(directory, [path.as_posix() for path in files])
     motion = read_motion(directory)
     case = motion.case
     result: dict[str, Any] = {
@@ -180,25 +184,45 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
         "truncated": motion.truncated,
         "rests_on": rests_on(case.origins),
     }
-    written: list[str] = []
+    tables: dict[str, Columns] = {}
     for one in analyses_of(case):
         measured = one.of(motion)
-        for name, columns in measured.tables.items():
-            write_table(directory, name, columns)
-            written.append(name)
+        tables |= measured.tables
         result |= measured.summary
+    names = [RESULT_NAME, *(f"{name}.parquet" for name in tables)]
+    forget_tables(directory, names)
+    for name, columns in tables.items():
+        write_table(directory, name, columns)
     write_json(directory / RESULT_NAME, result)
-    record_tables(directory, [RESULT_NAME, *(f"{name}.parquet" for name in written)])
+    record_tables(directory, names)
     return result
 
 
 def read_result(directory: str | Path) -> dict[str, Any]:
-    """The result of a run, as `tabulate` wrote it."""
-    return read_json(Path(directory) / RESULT_NAME)
+    """The result of a run, as `tabulate` wrote it.
+
+    Raises
+    ------
+    OSError, ValueError
+        If it cannot be read.
+    runner.manifest.FileChanged
+        If it is not what it was when the run was finished.
+    """
+    result = read_json(Path(directory) / RESULT_NAME)
+    check_unchanged(Path(directory), [RESULT_NAME])
+    return result
 
 
 def current_result(directory: str | Path) -> dict[str, Any]:
-    """The result of a finished run; tabulated anew if it or a table is gone or damaged, or of an earlier method."""
+    """The result of a finished run; tabulated anew if it or a table is gone or damaged, or of an earlier method.
+
+    Raises
+    ------
+    postprocess.dump.DumpError, OSError, ValueError
+        If it cannot be made anew.
+    runner.manifest.FileChanged
+        If it was edited.
+    """
     from walkers.postprocess.tables import intact
 
     directory = Path(directory)
@@ -208,9 +232,12 @@ def current_result(directory: str | Path) -> dict[str, Any]:
         tables = [name for one in wanted for name in one.tables]
         result.setdefault("rests_on", [])  # of runs that did not say it
         known = result.get("analyses") == {one.name: one.version for one in wanted} and intact(directory, tables)
-        if known and all(one.can_show(result) for one in wanted):
+        if known and check_unchanged(directory, [RESULT_NAME]) and all(one.can_show(result) for one in wanted):
+            lines_of_rest(result["rests_on"])
             return result
-    except (OSError, ValueError):
+    except FileChanged:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         pass
     return tabulate(directory)
 
@@ -250,7 +277,7 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _listed(head: str, chosen: Sequence[Mapping[str, Any]]) -> list[str]:
-    told = ", ".join(f"{one['key'].split('.', 1)[1]} {one['value']}" for one in chosen)
+    told = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
     indent = {"initial_indent": f"  {head:10} ", "subsequent_indent": " " * 13}
     return textwrap.wrap(told, _WIDTH, **indent, break_on_hyphens=False) if told else []  # type: ignore[arg-type]
 

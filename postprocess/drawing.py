@@ -10,6 +10,7 @@ from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.text import printable
 from walkers.runner.files import beside
 
 if TYPE_CHECKING:
@@ -44,8 +45,8 @@ def styled(draw: Callable[_Given, _Drawn]) -> Callable[_Given, _Drawn]:
 
 
 def plain_text(text: str) -> str:
-    """A text of the user's as matplotlib shows it literally: a dollar begins no formula."""
-    return text.replace("$", r"\$")
+    """A text of the user's as matplotlib shows it literally: no formula begins, no control character is left."""
+    return "\n".join(map(printable, text.split("\n"))).replace("$", r"\$")
 
 
 def new_figure(width: float, height: float, *, mosaic: Any = None, **options: Any) -> tuple[Figure, Any]:
@@ -176,7 +177,7 @@ def save_figure(
     """
     check_formats(formats)
     path.parent.mkdir(parents=True, exist_ok=True)
-    name, runs = title or path.stem, " ".join(dict.fromkeys(sources))
+    name, runs = printable(title or path.stem), " ".join(dict.fromkeys(sources))
     # Without a date the same figure is the same file. PDF knows no source.
     metadata: dict[str, dict[str, str | None]] = {
         "png": {"Title": name, "Source": runs, "Software": _MAKER},

@@ -25,6 +25,10 @@ class DumpError(WalkersError):
     """A file that is no binary dump, or one of other columns than expected."""
 
 
+class NoNumberError(DumpError):
+    """A dump with a NaN or an infinity: the engine goes on with them and says nothing, and a disk can make them."""
+
+
 @dataclass(frozen=True)
 class _Frame:
     step: int
@@ -127,15 +131,15 @@ class BinaryDump:
 
         Raises
         ------
-        DumpError
-            If it holds a NaN or an infinity: the engine goes on with them and says nothing.
+        NoNumberError
+            If it holds a NaN or an infinity.
         """
         frame = self._frame(number)
         parts = [self._bytes[start : start + 8 * count].view(np.float64) for start, count in frame.blocks]
         values = np.concatenate(parts).reshape(frame.rows, frame.columns)
         if not np.isfinite(values).all():
             column = self.columns[int(np.flatnonzero(~np.isfinite(values).all(axis=0))[0])]
-            raise DumpError(f"{self.path}: {column} is no number at step {frame.step}: the beads' motion blew up")
+            raise NoNumberError(f"{self.path}: {column} is no number at step {frame.step}")
         return values
 
     def stack(self) -> FloatArray:

@@ -14,10 +14,11 @@ import numpy.typing as npt
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive
-from walkers.postprocess.dump import BinaryDump, DumpError, FloatArray
+from walkers.postprocess.dump import BinaryDump, DumpError, FloatArray, NoNumberError
 from walkers.postprocess.local_dump import local_frames
 from walkers.runner.directory import SEGMENT_NAME, case_of, layout_of, segment_directories
 from walkers.runner.files import read_json
+from walkers.runner.manifest import MANIFEST_NAME
 from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 
 IntArray = npt.NDArray[np.int64]
@@ -284,7 +285,12 @@ def read_motion(directory: str | Path) -> Motion:
     segments = segment_directories(directory)
     if not segments:
         raise DumpError(f"{directory}: no segment of the run is finished yet")
-    return motion_of(case, segments, [_segment(segment) for segment in segments])
+    try:
+        return motion_of(case, segments, [_segment(segment) for segment in segments])
+    except NoNumberError as error:
+        finished = (directory / MANIFEST_NAME).is_file()  # then it was tabulated, without such numbers
+        told = "the dump was damaged since the run was finished" if finished else "the beads' motion blew up"
+        raise DumpError(f"{error}: {told}") from error
 
 
 def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -> Motion:

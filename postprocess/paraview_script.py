@@ -112,7 +112,7 @@ def _script(motion: Motion, colour: str, folder: Path) -> str:
         title=motion.case.title or motion.case.name,
         name=SCRIPT_NAME,
         collection=COLLECTION_NAME,
-        folder=repr(str(folder)),
+        folder=str(folder),
         colour=colour,
         scale=_SCALES.get(colour),
         extent=_extent(motion, colour),

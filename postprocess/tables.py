@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.runner.files import beside
+from walkers.runner.manifest import check_unchanged
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -244,6 +245,8 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
         If there is no table of that name.
     FileNotFoundError
         If the directory has none.
+    runner.manifest.FileChanged
+        If it is not what it was when the run was finished.
     """
     import pyarrow.parquet as pq
 
@@ -253,6 +256,7 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     if not path.exists():
         there = [one for one in TABLES if path.with_stem(one).exists()]
         raise FileNotFoundError(f"{directory} has no table {name}; it has {', '.join(there) or 'none'}")
+    check_unchanged(Path(directory), [path.name])
     frame: pd.DataFrame = pq.read_table(path).to_pandas()
     frame.attrs["units"] = {column: unit for column, (unit, _) in described(name, frame.columns).items()}
     return frame

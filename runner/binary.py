@@ -61,17 +61,17 @@ def find_engine(wanted: str | None = None) -> Engine:
 
 @lru_cache(maxsize=8)
 def _identity(path: Path, _modified: int) -> str:
-    # Debian's executable is an 18 kB front; the physics is in the shared library.
     digest = hashlib.sha256()
-    listing = subprocess.run(["ldd", str(path)], capture_output=True, text=True, errors="replace", check=False).stdout
-    for part in [
-        path,
-        *(Path(match) for match in _LIBRARY.findall(listing)),
-        *(SOURCES / name for name in ("bridge.cpp", "table.h")),
-    ]:
+    for part in [*parts_of(path), *(SOURCES / name for name in ("bridge.cpp", "table.h"))]:
         with part.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())
     return digest.hexdigest()
+
+
+def parts_of(path: Path) -> tuple[Path, ...]:
+    """An executable and the ``libliggghts`` that it loads: Debian's is a front of 18 kB."""
+    listing = subprocess.run(["ldd", str(path)], capture_output=True, text=True, errors="replace", check=False).stdout
+    return path, *(Path(match) for match in _LIBRARY.findall(listing))
 
 
 def version_in(output: bytes) -> str | None:

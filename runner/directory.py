@@ -21,10 +21,10 @@ from typing import Any
 
 from walkers.inputs.case import Case
 from walkers.runner.binary import Engine
-from walkers.runner.failures import DiskFull
+from walkers.runner.failures import DiskFull, OutputGone
 from walkers.runner.files import fsync_path, read_json, settle, write_json
 from walkers.runner.launch import EngineReport
-from walkers.runner.manifest import FORMAT, MANIFEST_NAME
+from walkers.runner.manifest import FORMAT, MANIFEST_NAME, check_unchanged
 from walkers.templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck, Segment
 from walkers.templates.layout import Layout
 
@@ -96,8 +96,9 @@ def case_of(directory: Path) -> Case:
     Raises
     ------
     OSError, ValueError
-        If its ``case.json`` cannot be read.
+        If its ``case.json`` cannot be read, or of a finished run is not what it was.
     """
+    check_unchanged(directory, [CASE_NAME])
     return Case.from_dict(read_json(directory / CASE_NAME))
 
 
@@ -175,12 +176,17 @@ def holds_unfinished(directory: Path) -> bool:
 
 @contextmanager
 def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
-    """Turn the system's word for a full disk into a `DiskFull`; so many bytes are still to be written."""
+    """Turn the system's word for a full disk into a `DiskFull`, of a removed directory into an `OutputGone`.
+
+    So many bytes are still to be written.
+    """
     import errno
 
     try:
         yield
     except OSError as error:
+        if error.errno == errno.ENOENT and not incomplete.exists():
+            raise OutputGone(incomplete) from error
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
         raise DiskFull(needed, shutil.disk_usage(incomplete.parent).free, incomplete) from error

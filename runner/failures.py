@@ -108,7 +108,7 @@ class MissingFrames(EngineFailure):
     """The engine ended without complaint but its dump is short."""
 
     def __init__(self, found: float, expected: int, directory: Path) -> None:
-        super().__init__(f"the engine wrote {found:.10g} of {expected} frames and reported no error", directory)
+        super().__init__(f"the engine wrote {int(found)} of {expected} frames and reported no error", directory)
 
 
 class BeadsLost(EngineFailure):
@@ -145,6 +145,13 @@ class DiskFull(EngineFailure):
         super().__init__(f"disk full: {wanted}{free / 1e6:.3g} MB are free", directory)
 
 
+class OutputGone(EngineFailure):
+    """Somebody removed the directory of a run, or of a sweep, while it was made."""
+
+    def __init__(self, directory: Path) -> None:
+        super().__init__(f"{directory} was removed while it was written")
+
+
 class TimeLimitExceeded(EngineFailure):
     """The run took longer than it was allowed to."""
 
@@ -178,7 +185,3 @@ class AuditFailed(EngineFailure):
 
 class UnauditedEngineWarning(UserWarning):
     """The engine's binary was never audited."""
-
-
-class EngineVersionWarning(UserWarning):
-    """The engine is another version than the one that the decks' workarounds were measured on."""

@@ -10,7 +10,6 @@ import signal
 import subprocess
 import threading
 import time
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -24,12 +23,12 @@ from walkers.runner.failures import (
     EngineError,
     EngineKilled,
     EngineNeverStarted,
-    EngineVersionWarning,
     MissingFrames,
+    OtherEngine,
     TimeLimitExceeded,
 )
-from walkers.runner.plugin import plugin_of
-from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, Deck
+from walkers.runner.plugin import plugin_of, run_script
+from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME, Deck
 from walkers.templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, RANKS, STEP_VARIABLES
 
 _POLL_SECONDS = 0.05
@@ -117,6 +116,7 @@ def launch(
     """
     check_room(directory, deck.layout.bead_dump_bytes)
     plugin = plugin_of(engine)
+    (directory / RUN_NAME).write_text(run_script(plugin, deck.layout.ranks), encoding="utf-8")
     for left in reversed(range(starts)):
         try:
             return _launch_once(deck, directory, engine, plugin, on_progress, time_limit, keep_open)
@@ -137,7 +137,7 @@ def _launch_once(
     keep_open: Sequence[int],
 ) -> EngineReport:
     begin = time.perf_counter()
-    watch = _Watch(deck, directory, begin)
+    watch = _Watch(deck, directory, engine.path, begin)
     process = None
     try:
         with postponed_interrupts():
@@ -261,9 +261,10 @@ def complete_local_frames(path: Path) -> int:
 class _Watch:
     """Reads the engine's output as it grows, and keeps of it what is asked for later."""
 
-    def __init__(self, deck: Deck, directory: Path, begin: float) -> None:
+    def __init__(self, deck: Deck, directory: Path, engine: Path, begin: float) -> None:
         self.deck = deck
         self.directory = directory
+        self.engine = engine
         self.begin = begin
         self.status: _Status | None = None
         self.failure: BlowUp | BeadsLost | None = None
@@ -333,6 +334,8 @@ class _Watch:
 
     def check(self, time_limit: float | None) -> None:
         """Raise the failure that shows while the engine runs, if any."""
+        if self.version not in (None, AUDITED_VERSION):
+            raise OtherEngine(self.engine, self.version)
         if self.failure is not None:
             raise self.failure
         if time_limit is not None and time.perf_counter() - self.begin > time_limit:
@@ -352,7 +355,7 @@ def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
     """Judge a run that has ended: raise its failure or report what it took."""
     layout, directory = watch.deck.layout, watch.directory
     if status > 0 and watch.version is None and not (watch.error or b"").startswith(b"ERROR"):
-        raise EngineNeverStarted(f"exit status {status}, last words: {_text(watch.last_line)}", directory)
+        raise EngineNeverStarted(_ending(status, watch.last_line), directory)
     if watch.error is not None:
         if POSITION_IS_NO_NUMBER.encode() in watch.error:
             raise BlowUp(math.nan, watch.deck.fastest, watch.step, directory)
@@ -360,18 +363,18 @@ def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
     if status < 0:
         raise EngineKilled(-status, directory)
     if status > 0:
-        raise EngineError(f"exit status {status}, last words: {_text(watch.last_line)}", directory)
+        raise EngineError(_ending(status, watch.last_line), directory)
     if watch.written != layout.bead_dump_bytes:
         raise MissingFrames(watch.written / layout.bead_dump_bytes * layout.frames, layout.frames, directory)
     for name in (layout.pair_bridge_dump, layout.wall_bridge_dump):
         found = complete_local_frames(directory / name)
         if found != layout.bridge_frames:
             raise MissingFrames(found, layout.bridge_frames, directory)
-    version = watch.version or "unknown"
-    if version != AUDITED_VERSION:
-        message = f"the engine is {version}; the decks' workarounds were measured on {AUDITED_VERSION}"
-        warnings.warn(message, EngineVersionWarning, stacklevel=4)
-    return EngineReport(version, wall_seconds, watch.loop_seconds, layout.steps)
+    return EngineReport(watch.version or "unknown", wall_seconds, watch.loop_seconds, layout.steps)
+
+
+def _ending(status: int, last_line: bytes) -> str:
+    return f"exit status {status}" + (f", last words: {_text(last_line)}" if last_line else ", without a word")
 
 
 def _text(line: bytes) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from walkers.inputs.case import Case
+from walkers.inputs.errors import WalkersError
 from walkers.runner.audits import read_audit
 from walkers.runner.binary import Engine
 from walkers.runner.files import read_json, write_json
@@ -104,8 +105,50 @@ def checksum(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+class FileChanged(WalkersError, ValueError):
+    """A file of a finished run is not what it was."""
+
+
+def check_unchanged(directory: Path, names: Collection[str]) -> bool:
+    """Refuse files of a finished run that are not what its manifest says.
+
+    Parameters
+    ----------
+    directory
+        A run directory, finished or not.
+    names
+        Of files in it.
+
+    Returns
+    -------
+    bool
+        Whether nothing is left to be said of them; of an unfinished run, or one older than checksums, nothing is said.
+
+    Raises
+    ------
+    FileChanged
+        If one differs.
+    OSError, ValueError
+        If the manifest, or a file, cannot be read.
+    """
+    try:
+        sums = read_json(directory / MANIFEST_NAME).get("sha256")
+    except FileNotFoundError:
+        return True
+    if not isinstance(sums, dict):
+        return True
+    wanted = {name: sums[name] for name in names if name in sums}
+    for name, now in checksums(directory, wanted).items():
+        if now != wanted[name]:
+            told = "is not what it was when the run was finished; what else is not: walkers verify"
+            raise FileChanged(f"{directory / name} {told} {directory}")
+    return len(wanted) == len(names)
+
+
 def record_tables(directory: Path, names: Iterable[str]) -> None:
     """Say in the manifest of a finished run that files were made anew from its dumps: by what, when, what they are now.
+
+    Between `forget_tables` and this, the manifest says nothing of them: who is killed there leaves no false alarm.
 
     Parameters
     ----------
@@ -128,6 +171,18 @@ def record_tables(directory: Path, names: Iterable[str]) -> None:
         "files": list(sums),
     }
     write_json(path, contents)
+
+
+def forget_tables(directory: Path, names: Collection[str]) -> None:
+    """Say no more in the manifest of a finished run what files are that are about to be made anew."""
+    path = directory / MANIFEST_NAME
+    if not path.is_file():
+        return
+    contents = read_json(path)
+    sums = contents.get("sha256")
+    if isinstance(sums, dict) and not sums.keys().isdisjoint(names):
+        contents["sha256"] = {name: one for name, one in sums.items() if name not in names}
+        write_json(path, contents)
 
 
 def _made_by() -> dict[str, Any]:

@@ -1,29 +1,31 @@
 """The contact model of decks, a shared library that the engine loads: compiled where it is first needed, then kept.
 
-The engine's binary interface is that of its very package: headers and compiler options are taken from this machine, and
-only the version that the model was written for is served. A library is kept in the user's cache under a name that tells
-of the engine, of the sources and of the options.
+The engine's binary interface is that of its very package: headers and library are those of this machine, and only the
+version that the model was written for is served. What was compiled is kept in the user's cache.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
+import mmap
+import re
 import shlex
 import shutil
 import subprocess
 import tempfile
+from functools import lru_cache
 from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from walkers.runner.binary import SOURCES, Engine, version_in
+from walkers.runner.binary import SOURCES, Engine, parts_of
 from walkers.runner.failures import ContactModelMissing, EngineFailure, OtherEngine
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME
-from walkers.templates.engine import ALONE, AUDITED_VERSION
+from walkers.templates.engine import AUDITED_VERSION
 
 PACKAGES = ("g++", "libliggghts-dev", "libopenmpi-dev")
 HEADERS = Path("/usr/include/liggghts")
+_VERSION = re.compile(rb"LIGGGHTS[\w-]* [\d.]+(?=, compiled)")
 # Plain -O2 keeps the numbers the same on all machines of an architecture: no fused operations, no reordering.
 OPTIONS = ("-shared", "-fPIC", "-std=gnu++11", "-O2", "-DNDEBUG", "-DOMPI_SKIP_MPICXX", "-Wall", "-Wextra")
 
@@ -38,26 +40,33 @@ def plugin_of(engine: Engine) -> Path:
     ContactModelMissing
         If it cannot be compiled: what is missing, or what the compiler says.
     """
-    name = hashlib.sha256("\0".join((engine.sha256, *OPTIONS)).encode()).hexdigest()[:16]
-    place = user_cache_path("granular-walkers") / f"bridge-{name}.so"
+    place = user_cache_path("granular-walkers") / f"bridge-{_fingerprint()}.so"
     if set(str(place)) & set(": "):
         raise ContactModelMissing(f"{place} has a space or a colon, which the system's loader takes for a separator")
+    _check_version(engine)
     if not place.is_file():
-        _check_version(engine)
         _compile(place)
     return place
 
 
+def _fingerprint() -> str:
+    """Of sources, options, and the library that is linked to, which is another file after an upgrade."""
+    digest = hashlib.sha256("\0".join(OPTIONS).encode())
+    for name in ("bridge.cpp", "table.h"):
+        digest.update((SOURCES / name).read_bytes())
+    for library in sorted(Path("/usr/lib").glob("*/libliggghts.so.3")):
+        digest.update(f"{library.resolve()} {library.stat().st_mtime_ns} {library.stat().st_size}".encode())
+    return digest.hexdigest()[:16]
+
+
+@lru_cache(maxsize=8)
 def _check_version(engine: Engine) -> None:
-    environment = {**os.environ, **ALONE}
-    try:
-        done = subprocess.run(
-            [str(engine.path), "-log", "none"], input=b"", capture_output=True, env=environment, timeout=60, check=False
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise ContactModelMissing(f"{engine.path} does not tell its version ({error})") from error
-    if (version := version_in(done.stdout)) != AUDITED_VERSION:
-        raise OtherEngine(engine.path, version)
+    """Refuse a binary that says to be another version; of one that does not say it, the banner is looked at later."""
+    for part in parts_of(engine.path):
+        with part.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as contents:
+            version = said[0].decode() if (said := _VERSION.search(contents)) else AUDITED_VERSION
+        if version != AUDITED_VERSION:
+            raise OtherEngine(engine.path, version)
 
 
 def _compile(place: Path) -> None:

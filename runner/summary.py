@@ -10,6 +10,7 @@ from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.run_tables import limits_of
+from walkers.inputs.text import printable
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics.capillary import capillary_force_limit_at_wall
 from walkers.physics.time_step import TimeStepLimits, auto_fractions
@@ -119,7 +120,7 @@ def describe(summary: dict[str, Any]) -> str:
 
 def _text_of_case(case: dict[str, Any]) -> str:
     """A resolved case, one line per value: its key, the value in the units of a case file, where it comes from."""
-    lines = [f"{case['name']}: {case['title']}".rstrip(": ")]
+    lines = [printable(f"{case['name']}: {case['title']}").rstrip(": ")]
     table = None
     for one in case["recorded"]:
         within, _, key = one["key"].rpartition(".")

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from pathlib import Path, PurePosixPath
+from typing import Any, NoReturn
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.runner.directory import CASE_NAME, SEGMENTS
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
+from walkers.templates.deck import DECK_NAME
+
+_SHOWN = (
+    *(".png", ".pdf", ".svg", ".gif", ".mp4", ".html", ".htm"),
+    *(".vtp", ".vtu", ".pvd", ".py", ".xyz", ".lammpstrj", ".csv"),
+)
+"""Suffixes of pictures, films, pages, files for ParaView (with their script) and exports: the program writes them on
+demand and never reads them again."""
+_MOST_LINES = 1000
+_LONGEST_NAME = 300
 
 
 @dataclass(frozen=True)
@@ -24,6 +36,14 @@ class Verification:
         How many files are what they were.
     changed, missing
         Names of those that differ and that are gone.
+    unlisted
+        Names of those that are there, that no list has, and that are not of the kinds of ``since``.
+    doubtful
+        Names of those that cannot be compared, or on which the lists disagree, each with the reason in brackets.
+    since
+        Names of what was made from the run since (`made_since`): no result rests on it.
+    unread
+        Lists that are what they were, and too large to be compared with the others, each with the reason in brackets.
     left_out
         How many were left out of an archive on purpose.
     by_size
@@ -36,68 +56,228 @@ class Verification:
     intact: int
     changed: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
+    unlisted: tuple[str, ...] = ()
+    doubtful: tuple[str, ...] = ()
+    since: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
     left_out: int = 0
     by_size: bool = False
     of_points: bool = False
 
     @property
     def passed(self) -> bool:
-        """Whether nothing has changed and nothing is missing."""
-        return not (self.changed or self.missing)
+        """Whether all that is listed is what it was, and nothing else is there that a result could rest on."""
+        return not (self.changed or self.missing or self.unlisted or self.doubtful)
 
     def describe(self) -> str:
-        """The outcome, and a line for each file that is not what it was."""
+        """The outcome, and a line for each file that is not what it was, or is not listed."""
         told = f"{self.name}: {self.intact} {'points have their run' if self.of_points else 'files are what they were'}"
         if self.by_size:
             told += " by their sizes (the run is older than checksums)"
         if self.left_out:
             told += f", {self.left_out} left out of the archive"
-        return "\n".join(
-            [
-                told,
-                *(f"  changed    {name}" for name in self.changed),
-                *(f"  missing    {name}" for name in self.missing),
-            ]
-        )
+        lines = [
+            *_lines("changed", self.changed),
+            *_lines("missing", self.missing),
+            *_lines("not listed", self.unlisted),
+            *_lines("doubtful", self.doubtful),
+            *_lines("not read", self.unread),
+            *_lines("made since", _by_folder(self.since)),
+        ]
+        return "\n".join([told, *lines])
 
 
-def verify_run(directory: Path, *, own: bool = False) -> Verification:
+def _lines(word: str, names: Collection[str]) -> list[str]:
+    lines = [f"  {word:<10} {_shown(name)}" for name in list(names)[:_MOST_LINES]]
+    return [*lines, f"  {word:<10} {len(names) - _MOST_LINES} more"] if len(names) > _MOST_LINES else lines
+
+
+def _shown(name: str) -> str:
+    """A name as it may be printed: whoever made an archive chose it, and may have put escape sequences into it."""
+    short = name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}…"
+    return short if short.isprintable() else ascii(short)
+
+
+def _by_folder(names: Iterable[str]) -> list[str]:
+    """Files of the same folder as one, but those of the topmost: ``vtk`` holds one a frame."""
+    names = list(names)
+    count = Counter(name.rpartition("/")[0] for name in names)
+    told = (
+        f"{folder}/ ({count[folder]} files)" if folder and count[folder] > 1 else name
+        for name in names
+        for folder in [name.rpartition("/")[0]]
+    )
+    return list(dict.fromkeys(told))
+
+
+def made_since(name: str) -> bool:
+    """Whether a file that no list has counts as made from a run: by its name it is nothing that a result rests on.
+
+    These are pictures, films, pages, files for ParaView, exports (by their suffixes), and hidden files. Nothing in
+    ``segments`` is among them: each folder there is taken for a part of the run.
+
+    Parameters
+    ----------
+    name
+        Path relative to the run, or to what the run is in.
+    """
+    path = PurePosixPath(name)
+    hidden = any(part.startswith(".") and part != ".." for part in path.parts)
+    return SEGMENTS not in path.parts and (hidden or path.suffix.lower() in _SHOWN)
+
+
+def is_within(name: object) -> bool:
+    """Whether a name of a list is a plain path to something below the folder that the list is for."""
+    return (
+        isinstance(name, str)
+        and name not in ("", ".")
+        and not name.startswith("/")
+        and ".." not in name.split("/")
+        and PurePosixPath(name).as_posix() == name
+    )
+
+
+def files_below(folder: Path, without: Collection[str] = ()) -> list[str]:
+    """Relative paths of all that is in a folder: files, folders that are empty (with a slash), links to folders.
+
+    Parameters
+    ----------
+    folder
+        Links to folders in it are not followed.
+    without
+        Names of folders in it that are not looked into.
+
+    Raises
+    ------
+    OSError
+        If a folder cannot be read.
+    """
+    found: list[str] = []
+    for place, folders, names in os.walk(folder, onerror=_raise):
+        here = Path(place)
+        if here == folder:
+            folders[:] = [name for name in folders if name not in without]
+        links = [name for name in folders if (here / name).is_symlink()]
+        found += [(here / name).relative_to(folder).as_posix() for name in (*names, *links)]
+        if here != folder and not names and not folders:
+            found.append(f"{here.relative_to(folder).as_posix()}/")
+    return sorted(found)
+
+
+def _raise(error: OSError) -> NoReturn:
+    raise error
+
+
+@dataclass(frozen=True)
+class Listed:
+    """What a manifest says of the files beside it.
+
+    Attributes
+    ----------
+    sizes
+        Of the files, bytes.
+    sums
+        Their SHA-256; None in manifests that are older than checksums.
+    left_out
+        Those that an archive was made without.
+    elsewhere
+        Names of folders with manifests of their own: the runs of an ensemble.
+    case_file
+        What an archive calls the case as it was given, beside the manifest.
+    """
+
+    sizes: Mapping[str, Any]
+    sums: Mapping[str, Any] | None
+    left_out: frozenset[str]
+    elsewhere: frozenset[str]
+    case_file: str
+
+    @property
+    def names(self) -> list[str]:
+        """Of all files that it lists."""
+        return list(dict.fromkeys([*self.sizes, *(self.sums or ())]))
+
+    def is_at_odds(self, name: str) -> bool:
+        """Whether only one of its two lists has a file."""
+        return self.sums is not None and (name in self.sizes) != (name in self.sums)
+
+
+def listed_by(manifest: Mapping[str, Any]) -> Listed:
+    """Read what a manifest says of files.
+
+    Raises
+    ------
+    ValueError, TypeError, AttributeError
+        If it is no manifest, or names what is not below its folder.
+    """
+    lacking = [key for key in ("name", "files") if key not in manifest]
+    if lacking:
+        raise ValueError(f"expected the key {lacking[0]}")
+    elsewhere = frozenset(manifest.get("shared_deck", {}).get("names", ()))
+
+    def own(table: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: one for name, one in table.items() if name.partition("/")[0] not in elsewhere}
+
+    sums = manifest.get("sha256")
+    listed = Listed(
+        own(manifest["files"]),
+        None if sums is None else own(sums),
+        frozenset(manifest.get("left_out", ())),
+        elsewhere,
+        f"{manifest['name']}.toml",
+    )
+    outside = [name for name in listed.names if not is_within(name)]
+    if outside:
+        raise ValueError(f"expected paths below it, found {_shown(outside[0])!r}")
+    return listed
+
+
+def verify_run(directory: Path) -> Verification:
     """Compare the files of a run directory, or of an ensemble's, with its manifest.
+
+    Passed is what has all files of the manifest as they were, and none else but what was made from them since
+    (`made_since`) and the case file that an archive puts beside it. The runs of an ensemble have manifests of their
+    own.
 
     Parameters
     ----------
     directory
-        With a manifest.
-    own
-        Of an ensemble: leave out its runs, which have manifests of their own.
-
-    Raises
-    ------
-    InputError
-        If there is no manifest, or it cannot be read.
+        With a manifest; what has none, or one that cannot be read, does not pass.
     """
+    name = directory.resolve().name
     try:
-        manifest = read_json(directory / MANIFEST_NAME)
-        sizes, sums = manifest["files"], manifest.get("sha256")
-        left_out = set(manifest.get("left_out", ()))
-        names = [name for name in (sizes if sums is None else sums) if not (own and "/" in name)]
-        there = [name for name in names if name not in left_out and (directory / name).is_file()]
-        now: Mapping[str, Any] = (
-            {name: (directory / name).stat().st_size for name in there} if sums is None else checksums(directory, there)
-        )
-        wanted: Mapping[str, Any] = sizes if sums is None else sums
-        changed = tuple(name for name in there if now[name] != wanted[name])
+        listed = listed_by(read_json(directory / MANIFEST_NAME))
+        return _verified(name, directory, listed)
     except FileNotFoundError as error:
-        told = f"not a finished run: expected a folder with a {MANIFEST_NAME}"
-        raise InputError(str(directory), [Problem("", None, told)]) from error
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        told = f"the run's {MANIFEST_NAME}, or what it names, cannot be read ({error})"
-        raise InputError(str(directory), [Problem("", None, told)]) from error
+        return Verification(name, 0, missing=(Path(error.filename or MANIFEST_NAME).name,))
+    except (OSError, ValueError, TypeError, AttributeError) as error:
+        return Verification(name, 0, doubtful=(f"{MANIFEST_NAME} (it, or what it names, cannot be read: {error})",))
+
+
+def _verified(run: str, directory: Path, listed: Listed) -> Verification:
+    names, sums = listed.names, listed.sums
+    there = [name for name in names if (directory / name).is_file()]
+    sizes = {name: (directory / name).stat().st_size for name in there}
+    whole = [name for name in there if sizes[name] == listed.sizes.get(name, sizes[name])]
+    # What has another size is not read: it may be of any size by now.
+    now = {} if sums is None else checksums(directory, [name for name in whole if name in sums])
+    changed = {name for name in there if name not in whole or (name in now and sums and now[name] != sums[name])}
+    odd = [name for name in names if listed.is_at_odds(name)]
+    gone = [name for name in names if name not in sizes and name not in listed.left_out]
+    needed = DECK_NAME if listed.elsewhere else CASE_NAME
+    if needed not in names and not (directory / needed).is_file():
+        gone.append(needed)
+    known = {*names, MANIFEST_NAME}
+    others = [name for name in files_below(directory, listed.elsewhere) if name not in known]
+    since = [name for name in others if made_since(name) or name == listed.case_file]
     return Verification(
-        name=directory.resolve().name,
-        intact=len(there) - len(changed),
-        changed=changed,
-        missing=tuple(name for name in names if name not in there and name not in left_out),
-        left_out=len(left_out.intersection(names)),
+        name=run,
+        intact=len(set(there) - changed - set(odd)),
+        changed=tuple(name for name in there if name in changed),
+        missing=tuple(gone),
+        unlisted=tuple(name for name in others if name not in since),
+        doubtful=tuple(f"{name} ({MANIFEST_NAME} has its size or its checksum, not both)" for name in odd),
+        since=tuple(since),
+        left_out=len(listed.left_out.intersection(names) - set(there)),
         by_size=sums is None,
     )

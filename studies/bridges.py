@@ -17,10 +17,10 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics import capillary
+from walkers.physics.laplace import POINTS, FloatArray, ForceCurve, bridge, force_curve
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, styled
 from walkers.studies.bridge_laws import ENGINE, LAWS, Law
 from walkers.studies.chapter import Chapter
-from walkers.studies.laplace import POINTS, FloatArray, ForceCurve, bridge, force_curve
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import friction_of
 
@@ -117,7 +117,7 @@ class ContactError:
         Its bridge.
     engine_pull, pull
         At contact, N, the engine's and Young–Laplace's.
-    gaps, forces : ndarray, shape (`walkers.studies.laplace.POINTS`,)
+    gaps, forces : ndarray, shape (`walkers.physics.laplace.POINTS`,)
         m and N: Young–Laplace's pull from contact to rupture, for whoever runs walkers with it.
     deviation
         The engine's law in ratios.

@@ -29,7 +29,7 @@ from walkers.runner.directory import (
 from walkers.runner.ensemble import FOLDER
 from walkers.runner.files import read_json
 from walkers.runner.locks import is_locked
-from walkers.runner.manifest import MANIFEST_NAME
+from walkers.runner.manifest import MANIFEST_NAME, check_unchanged
 from walkers.sweeps.columns import velocity_in
 from walkers.sweeps.record import RECORD_NAME, read_record, states
 
@@ -189,6 +189,7 @@ def _failure(path: Path) -> tuple[str, dict[str, Any]]:
 def _outcome(path: Path) -> dict[str, Any]:
     """Velocity and climbs as the result says that is there, of whatever version of the analyses."""
     try:
+        check_unchanged(path, [RESULT_NAME])
         result = read_json(path / RESULT_NAME)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
         return {

@@ -150,7 +150,7 @@ def read_record(directory: str | Path) -> SweepRecord:
             analyses=contents["analyses"],
             file=contents.get("file", {}),
         )
-    except FileNotFoundError as error:
+    except (FileNotFoundError, NotADirectoryError) as error:
         told = f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"
         raise InputError(str(given), [Problem("", None, told)]) from error
     except (OSError, ValueError, KeyError, TypeError) as error:

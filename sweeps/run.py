@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from walkers.inputs.case import Case
+from walkers.inputs.errors import check_utf8
 from walkers.inputs.sweep import Sweep
 from walkers.runner.binary import Engine, find_engine
 from walkers.runner.cost import predicted_seconds
+from walkers.runner.failures import OutputGone
 from walkers.sweeps.packing import PlannedDeck, makespan, pack, unfinished_parts
-from walkers.sweeps.record import SweepRecord, describe_sweep, states, write_record
+from walkers.sweeps.record import RECORD_NAME, SweepRecord, describe_sweep, states, write_record
 from walkers.sweeps.scheduler import Failure, Options, SweepProgress, final_failures, schedule
 from walkers.sweeps.shared_deck import check_audit
 from walkers.sweeps.site import check_path
@@ -104,6 +106,7 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     runner.EngineFailure
         If there is no engine.
     """
+    check_utf8(out.absolute())
     binary = find_engine(engine)
     cases = list(sweep.cases())
     options = options.for_ranks(max(case.run.ranks for case in cases))
@@ -157,7 +160,7 @@ def run_sweep(
     InputError
         If a point cannot be used.
     runner.EngineFailure
-        If there is no engine, or its audit failed.
+        If there is no engine, its audit failed, or somebody removed the sweep's directory meanwhile.
     sweeps.scheduler.ClusterFailed
         If the cluster's jobs end without having worked.
     """
@@ -168,4 +171,7 @@ def run_sweep(
     if not plan.decks:
         return plan.record, plan.final
     options = options.for_ranks(max(case.run.ranks for case in plan.cases))
-    return plan.record, schedule(plan.record, plan.cases, plan.engine, options, on_progress)
+    failures = schedule(plan.record, plan.cases, plan.engine, options, on_progress)
+    if not (plan.record.directory / RECORD_NAME).is_file():
+        raise OutputGone(plan.record.directory)
+    return plan.record, failures

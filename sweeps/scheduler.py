@@ -110,7 +110,14 @@ class SweepProgress:
 
 
 _WORST_FIRST = (
-    *("EngineMissing", "EngineDiffers", "ProgramDiffers", "DiskFull", "EngineNeverStarted"),  # threaten all points
+    *(
+        "EngineMissing",
+        "EngineDiffers",
+        "ProgramDiffers",
+        "DiskFull",
+        "OutputGone",
+        "EngineNeverStarted",
+    ),  # threaten all points
     *("EngineError", "MissingFrames", "EngineKilled"),
     "",  # what is not in this list
     *("BlowUp", "BeadsLost", "WalkersMet", "TimeLimitExceeded", "RunBusy"),

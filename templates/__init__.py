@@ -1,7 +1,7 @@
 """Decks: what LIGGGHTS is told, and why.
 
-Knows the cases (`inputs`); knows nothing of processes, files on disk or results. Everything that is peculiar to the
-engine, and every workaround for what it gets wrong, is in `walkers.templates.engine`.
+Knows the cases (`inputs`); knows nothing of processes, files on disk or results. Why decks look as they do is told in
+docs/explanation/engine.md.
 """
 
 from walkers.templates.deck import Deck, render_deck

@@ -10,12 +10,13 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
+from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.loads import hop_height, reach
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import rendered
 from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import law_of
-from walkers.templates.bridge_tables import bridge_tables
+from walkers.templates.bridge_tables import UnusableLawError, bridge_tables
 from walkers.templates.layout import (
     BEAD_COLUMNS,
     MEAN_SPIN_COLUMNS,
@@ -258,7 +259,13 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
 
 
 def compose(plan: Plan) -> Deck:
-    """Put a deck together from its blocks."""
+    """Put a deck together from its blocks.
+
+    Raises
+    ------
+    InputError
+        If the law of the bridges cannot be tabulated.
+    """
     case, scene, walkers = plan.case, plan.scene, plan.walkers
     first = case.drive.harmonics[0]
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
@@ -305,7 +312,10 @@ def compose(plan: Plan) -> Deck:
     )  # fmt: skip
     files = {f"{mesh.name}.stl": mesh.text for mesh in meshes}
     files |= {one.file: _atom_file(one.shares) for one in forces}
-    files[BRIDGES_NAME] = bridge_tables(surfaces, scene.beads)
+    try:
+        files[BRIDGES_NAME] = bridge_tables(surfaces, scene.beads)
+    except UnusableLawError as error:
+        raise InputError(case.name, [Problem("liquid.law", case.liquid.law, str(error))]) from error
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, beyond)

@@ -4,11 +4,13 @@ import hashlib
 import importlib.resources
 import io
 import json
+import re
 import shutil
 import subprocess
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -47,6 +49,12 @@ def run(run_directory: Callable[..., Path], tmp_path: Path) -> Path:
     """A copy of a finished run, to be changed."""
     there = run_directory(run=SHORT)
     return Path(shutil.copytree(there, tmp_path / "runs" / there.name))
+
+
+@pytest.fixture(scope="session")
+def whole(run_directory: Callable[..., Path], once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+    """The archive of a run, to be copied and damaged."""
+    return once("archived-run", lambda folder: write_archive(run_directory(run=SHORT), folder / "run.zip")) / "run.zip"
 
 
 @pytest.fixture(scope="session")
@@ -127,10 +135,112 @@ def test_what_changed_is_named(run: Path) -> None:
         f"{run.name}: {files - 2} files are what they were",
         "  changed    segments/0000/beads.bin",
         "  missing    walkers.parquet",
+        "  made since walk.png",
     ]
     refused = call("archive", str(run), "--to", str(run.parent / "run.zip"))
     assert (refused.returncode, "walkers.parquet" in refused.stderr) == (1, True)
     assert [path.name for path in run.parent.iterdir()] == [run.name]
+
+
+def _emptied(manifest: dict[str, Any]) -> None:
+    manifest |= {"files": {}, "sha256": {}}
+
+
+def _without(*lists: str) -> Callable[[dict[str, Any]], None]:
+    def change(manifest: dict[str, Any]) -> None:
+        for one in lists:
+            del manifest[one]["walkers.parquet"]
+
+    return change
+
+
+def _with(name: str) -> Callable[[dict[str, Any]], None]:
+    def change(manifest: dict[str, Any]) -> None:
+        manifest["files"][name], manifest["sha256"][name] = 0, hashlib.sha256().hexdigest()
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (_emptied, "  not listed case.json\n"),
+        (_without("files", "sha256"), "  not listed walkers.parquet\n"),
+        (_without("sha256"), "  doubtful   walkers.parquet (manifest.json has its size or its checksum, not both)\n"),
+        (_without("files"), "  doubtful   walkers.parquet (manifest.json has its size or its checksum, not both)\n"),
+        (lambda manifest: manifest["files"].update({"result.json": 1}), "  changed    result.json\n"),
+        (
+            lambda manifest: manifest.pop("files"),
+            "manifest.json (it, or what it names, cannot be read: expected the key files)",
+        ),
+        (lambda manifest: manifest.update(shared_deck=[]), "  doubtful   manifest.json (it, or what it names, cannot"),
+        (_with("../stranger"), "expected paths below it, found '../stranger'"),
+        (_with("/etc/hostname"), "expected paths below it, found '/etc/hostname'"),
+        (_with("\x1b[2J"), r"  missing    '\x1b[2J'"),
+    ],
+)
+def test_manifests_that_do_not_say_what_is_there(
+    run: Path, change: Callable[[dict[str, Any]], object], told: str
+) -> None:
+    path = run / "manifest.json"
+    manifest = json.loads(path.read_text())
+    change(manifest)
+    path.write_text(json.dumps(manifest))
+    done = call("verify", str(run))
+    assert (done.returncode, told in done.stdout) == (1, True), (done.stdout, done.stderr)
+
+
+@pytest.mark.parametrize(
+    ("contents", "told"),
+    [
+        (b"[" * 200_000, "nested too deeply"),
+        (b"\n" * (65 << 20), "expected at most 64 MB"),
+        (b"[" + b"[]," * 2_000_000 + b"[]]", "expected at most 2000000 lists and tables"),
+        (b'{"files": {}', "cannot be read"),
+    ],
+    ids=["nested", "large", "many", "cut"],
+)
+def test_manifests_that_cannot_be_read(run: Path, contents: bytes, told: str) -> None:
+    (run / "manifest.json").write_bytes(contents)
+    done = call("verify", str(run))
+    assert (done.returncode, told in done.stdout, done.stdout.count("\n")) == (1, True, 2), (done.stdout, done.stderr)
+
+
+@pytest.mark.parametrize(
+    ("name", "status", "told"),
+    [
+        ("film.mp4", 0, "  made since film.mp4\n"),
+        ("vtk/walkers_0000.vtp", 0, "  made since vtk/walkers_0000.vtp\n"),
+        (".DS_Store", 0, "  made since .DS_Store\n"),
+        ("test.toml", 0, "  made since test.toml\n"),
+        ("notes.txt", 1, "  not listed notes.txt\n"),
+        ("events.parquet", 1, "  not listed events.parquet\n"),
+        ("segments/0001/beads.bin", 1, "  not listed segments/0001/beads.bin\n"),
+        ("segments/0000/walk.png", 1, "  not listed segments/0000/walk.png\n"),
+    ],
+)
+def test_what_a_run_does_not_list(run: Path, name: str, status: int, told: str) -> None:
+    """Nothing is read from pictures and films; a folder of segments is taken for a part of the run."""
+    (run / name).parent.mkdir(parents=True, exist_ok=True)
+    (run / name).write_bytes(b"new")
+    done = call("verify", str(run))
+    assert (done.returncode, told in done.stdout) == (status, True), done.stdout
+
+
+def test_folders_and_links_that_a_run_does_not_list(run: Path, tmp_path: Path) -> None:
+    (run / "segments" / "0001").mkdir()
+    (run / "segments" / "0002").symlink_to(tmp_path)
+    lines = call("verify", str(run)).stdout.splitlines()
+    assert lines[1:] == ["  not listed segments/0001/", "  not listed segments/0002"]
+
+
+def test_what_was_drawn_since_is_no_change(run: Path) -> None:
+    for number in range(3):
+        call("vtk", str(run), check=True)
+        (run / "vtk" / f"{number}.vtp").write_bytes(b"")
+    call("plot", str(run), check=True)
+    done = call("verify", str(run), check=True)
+    assert [line.split()[2] for line in done.stdout.splitlines()[1:]] == ["gait.png", "vtk/", "walk.png"]
 
 
 def test_tables_made_anew_are_what_the_manifest_says(run: Path) -> None:
@@ -307,3 +417,254 @@ def test_what_fails_leaves_the_older_archive(run: Path, tmp_path: Path) -> None:
         write_archive(run, archive, ArchiveOptions(dumps=False))
     assert archive.read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.zip", "runs"]
+
+
+def _parts(archive: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(archive) as opened:
+        return {place: opened.read(place) for place in opened.namelist()}
+
+
+def _summed(parts: dict[str, bytes], *lacking: str) -> None:
+    """Give an archive the checksums of what it holds now, but of some of it."""
+    lines = [
+        f"{hashlib.sha256(contents).hexdigest()}  {place}\n"
+        for place, contents in parts.items()
+        if not place.endswith("/") and place not in ("sha256sums.txt", *lacking)
+    ]
+    parts["sha256sums.txt"] = "".join(lines).encode()
+
+
+def _place(parts: dict[str, bytes], name: str) -> str:
+    (place,) = (place for place in parts if place.endswith(f"/{name}"))
+    return place
+
+
+def _shorter_list(parts: dict[str, bytes]) -> None:
+    _summed(parts, _place(parts, "result.json"))
+
+
+def _empty_list(parts: dict[str, bytes]) -> None:
+    parts["sha256sums.txt"] = b""
+
+
+def _shorter_manifest(parts: dict[str, bytes]) -> None:
+    place = _place(parts, "manifest.json")
+    manifest = json.loads(parts[place])
+    _without("files", "sha256")(manifest)
+    parts[place] = json.dumps(manifest).encode()
+    _summed(parts)
+
+
+def _empty_crate(parts: dict[str, bytes]) -> None:
+    parts["ro-crate-metadata.json"] = b'{"@graph": []}'
+    _summed(parts)
+
+
+def _large_crate(parts: dict[str, bytes]) -> None:
+    parts["ro-crate-metadata.json"] += b" " * (65 << 20)
+    _summed(parts)
+
+
+def _another_result(parts: dict[str, bytes]) -> None:
+    parts[_place(parts, "result.json")] = b"{}"
+    _summed(parts)
+
+
+def _crate_without_sums(parts: dict[str, bytes]) -> None:
+    crate = re.sub(rb'"sha256": "[^"]*"', b'"sha256": null', parts["ro-crate-metadata.json"])
+    parts["ro-crate-metadata.json"] = crate
+    _summed(parts)
+
+
+def _no_run(parts: dict[str, bytes]) -> None:
+    for place in [place for place in parts if place.startswith("runs/")]:
+        del parts[place]
+    _empty_crate(parts)
+
+
+def _added(place: str, contents: bytes = b"new") -> Callable[[dict[str, bytes]], None]:
+    def change(parts: dict[str, bytes]) -> None:
+        parts[place] = contents
+
+    return change
+
+
+def _twin(parts: dict[str, bytes]) -> None:
+    place = _place(parts, "result.json")
+    parts[place.upper()] = parts[place]
+
+
+def _folder_of_a_file(parts: dict[str, bytes]) -> None:
+    parts[f"{_place(parts, 'result.json')}/inside"] = b""
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "told"),
+    [
+        (_empty_list, 1, "  doubtful   sha256sums.txt (it lists no run)\n"),
+        (_empty_list, 1, "  not listed ro-crate-metadata.json\n"),
+        (_shorter_list, 1, "result.json\n"),
+        (_shorter_manifest, 1, "walkers.parquet (sha256sums.txt and runs/"),
+        (_empty_crate, 1, "case.json (sha256sums.txt and ro-crate-metadata.json disagree)"),
+        (_large_crate, 0, "  not read   ro-crate-metadata.json (larger than 64 MB: compared by its checksum alone)"),
+        (_another_result, 1, "result.json (sha256sums.txt and ro-crate-metadata.json disagree)"),
+        (_crate_without_sums, 1, "case.json (sha256sums.txt and ro-crate-metadata.json disagree)"),
+        (_added("a/" * 32_000 + "a"), 1, "  not listed a/a/"),
+        (_no_run, 1, "  doubtful   sha256sums.txt (it lists no run)\n"),
+        (_added("film.mp4"), 1, "  not listed film.mp4\n"),
+        (_added("empty/", b""), 1, "  not listed empty/\n"),
+        (_added("../above"), 1, "  not listed ../above\n"),
+        (_added("/etc/hostname"), 1, "  not listed /etc/hostname\n"),
+        (_added("\x1b[2J"), 1, r"  not listed '\x1b[2J'"),
+        (_twin, 1, "RESULT.JSON (another file or folder has its name)\n"),
+        (_folder_of_a_file, 1, "result.json (another file or folder has its name)\n"),
+        (_added("sha256sums.txt", b"\n" * 1000), 2, "expected a checksum and a path"),
+        (_added("sha256sums.txt", b"\xff"), 1, "  doubtful   sha256sums.txt (cannot be read"),
+        (_added("sha256sums.txt", b"0" * 64 + b"  ../above\n"), 2, "expected a checksum and a path"),
+        (_added("sha256sums.txt", b"\n" * (65 << 20)), 2, "sha256sums.txt: expected at most 64 MB"),
+        (_added("zeros", bytes(300 << 20)), 2, "unpacks to 315 MB, expected at most 100 times its"),
+    ],
+)
+def test_archives_whose_lists_are_not_what_they_hold(
+    whole: Path, tmp_path: Path, change: Callable[[dict[str, bytes]], None], status: int, told: str
+) -> None:
+    parts = _parts(whole)
+    change(parts)
+    archive = tmp_path / "run.zip"
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as opened:
+        for place, contents in parts.items():
+            opened.writestr(place, contents)
+    done = call("verify", str(archive))
+    assert (done.returncode, told in done.stdout + done.stderr) == (status, True), (done.stdout, done.stderr)
+
+
+_CENTRAL = b"PK\x01\x02"
+
+
+def _in_both_headers(contents: bytearray, place: str, at: int, value: bytes) -> None:
+    """Set a field of a member, given by its distance from the name's in the local header, here and in the list."""
+    name = place.encode()
+    for found in re.finditer(re.escape(name), bytes(contents)):
+        for start, shift in ((found.start() - 30, 0), (found.start() - 46, 2)):
+            if contents[start : start + 4] == (_CENTRAL if shift else b"PK\x03\x04"):
+                contents[start + shift + at : start + shift + at + len(value)] = value
+
+
+def _encrypted(contents: bytearray, place: str) -> None:
+    _in_both_headers(contents, place, 6, b"\x01\x00")
+
+
+def _by_method(number: int) -> Callable[[bytearray, str], None]:
+    return lambda contents, place: _in_both_headers(contents, place, 8, bytes([number, 0]))
+
+
+def _wrong_sum(contents: bytearray, place: str) -> None:
+    _in_both_headers(contents, place, 14, b"abcd")
+
+
+def _declared(size: int) -> Callable[[bytearray, str], None]:
+    return lambda contents, place: _in_both_headers(contents, place, 22, size.to_bytes(4, "little"))
+
+
+def _broken(contents: bytearray, place: str) -> None:
+    at = contents.index(place.encode()) + len(place) + 20
+    contents[at : at + 40] = b"\xff" * 40
+
+
+def _linked(contents: bytearray, place: str) -> None:
+    at = contents.index(place.encode(), contents.index(_CENTRAL))
+    contents[at - 8 : at - 4] = (0o120777 << 16).to_bytes(4, "little")
+
+
+def _overlapping(contents: bytearray, place: str) -> None:
+    at = contents.index(place.encode(), contents.index(_CENTRAL))
+    contents[at - 4 : at] = (0).to_bytes(4, "little")
+
+
+def _long_list(contents: bytearray, _: str) -> None:
+    end = contents.rindex(b"PK\x05\x06")
+    contents[end + 12 : end + 16] = (33 << 20).to_bytes(4, "little")
+    contents[:0] = bytes(33 << 20)
+
+
+@pytest.mark.parametrize(
+    ("damage", "status", "told"),
+    [
+        (_encrypted, 1, "  doubtful   {place} (encrypted)"),
+        (_by_method(12), 1, "  doubtful   {place} (compressed by method 12, expected deflated or stored)"),
+        (_by_method(14), 1, "  doubtful   {place} (compressed by method 14, expected deflated or stored)"),
+        (_by_method(99), 1, "  doubtful   {place} (compressed by method 99, expected deflated or stored)"),
+        (_linked, 1, "  doubtful   {place} (a symbolic link)"),
+        (_wrong_sum, 1, "  changed    {place}"),
+        (_broken, 1, "  changed    {place}"),
+        (_declared(10), 1, "  changed    {place}"),
+        (_declared(1 << 28), 2, "expected at most 100 times its"),
+        (_overlapping, 2, "expected members that follow each other, they overlap"),
+        (_long_list, 2, "expected a list of members of at most 32 MB"),
+    ],
+)
+@pytest.mark.parametrize("name", ["walker.lig", "sha256sums.txt"])
+def test_zip_files_that_are_not_what_they_should_be(
+    whole: Path, tmp_path: Path, damage: Callable[[bytearray, str], None], status: int, told: str, name: str
+) -> None:
+    """Each is told in a sentence, also where it is the list itself that cannot be read."""
+    contents = bytearray(whole.read_bytes())
+    with zipfile.ZipFile(whole) as opened:
+        place = next(place for place in opened.namelist() if place.endswith(name))
+    damage(contents, place)
+    archive = tmp_path / "run.zip"
+    archive.write_bytes(contents)
+    done = call("verify", str(archive))
+    expected = told.format(place=place)
+    if name == "sha256sums.txt":
+        expected = expected.replace("  changed    ", "  doubtful   ")
+        expected = expected.replace(f"{place} (", f"{place} (cannot be read: ")
+    assert (done.returncode, expected in done.stdout + done.stderr) == (status, True), (done.stdout, done.stderr)
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        *(
+            (command, "an archive: unpack it")
+            for command in ("result", "plot", "report", "render", "export --to a.xyz")
+        ),
+        ("table", "not a sweep: expected a folder"),
+        ("status", "neither a sweep's directory"),
+    ],
+)
+def test_archives_are_unpacked_for_all_else(whole: Path, tmp_path: Path, command: str, told: str) -> None:
+    shutil.copy(whole, tmp_path / "run.zip")
+    name, *options = command.split()
+    done = call(name, "run.zip", *options, folder=tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert done.stderr.startswith(f"walkers: run.zip: {told}")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.zip"]
+
+
+def test_what_an_unpacked_archive_does_not_list(whole: Path, shared: Path, tmp_path: Path) -> None:
+    """What was drawn there since is no change; what is put into a run, or beside the points of a sweep, is told."""
+    unpacked = tmp_path / "unpacked"
+    shutil.unpack_archive(whole, unpacked)
+    (run,) = unpacked.glob("runs/*")
+    call("plot", str(run), check=True)
+    assert f"  made since runs/{run.name}/ (2 files)\n" in call("verify", str(unpacked), check=True).stdout
+    (run / "segments" / "0001").mkdir()
+    (run / "result.json").unlink()
+    (run / "result.json").symlink_to("nowhere")
+    told = call("verify", str(unpacked))
+    assert told.returncode == 1
+    assert told.stdout.splitlines()[1:3] == [
+        f"  missing    runs/{run.name}/result.json",
+        f"  not listed runs/{run.name}/segments/0001/",
+    ]
+    sweep = Path(shutil.copytree(shared, tmp_path / "runs")) / "angles"
+    call("plot", str(sweep), check=True)
+    assert "  made since velocity.png\n" in call("verify", str(sweep), check=True).stdout
+    (sweep / "sweep.old.json").write_text("{}")
+    (deck,) = sweep.parent.glob("ensembles/*/manifest.json")
+    deck.write_text("{")
+    told = call("verify", str(sweep))
+    assert told.returncode == 1
+    assert "  not listed sweep.old.json\n" in told.stdout
+    assert "  doubtful   manifest.json (it, or what it names, cannot be read" in told.stdout

@@ -316,6 +316,37 @@ def test_misuse_of_the_program(arguments: list[str]) -> None:
     assert _message(*arguments).strip()
 
 
+LONG = "x" * 100_000
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("show", "base.toml", "--set", f"drive.frequency={LONG}"),
+        ("show", "base.toml", "--set", f"{LONG}=3"),
+        ("show", "base.toml", "--set", f"liquid.name={LONG}"),
+        ("sweep", "value.toml"),
+        ("sweep", "key.toml"),
+        ("plot", "base.toml", "--format", LONG),
+    ],
+)
+def test_long_values_are_quoted_in_part(words: tuple[str, ...], in_folder: Path) -> None:
+    (in_folder / "base.toml").write_text(to_toml(document()))
+    (in_folder / "value.toml").write_text(f'case = "base.toml"\n[axes]\ndrive.frequency = ["{LONG}"]\n')
+    (in_folder / "key.toml").write_text(f'case = "base.toml"\n[axes]\n"{LONG}" = [1]\n')
+    message = _message(*words)
+    assert message.count("\n") == 1
+    assert "xxx" in message or "no finished run" in message
+    assert len(message) < 1500
+
+
+def test_a_value_of_several_lines_is_one_line_of_a_message(in_folder: Path) -> None:
+    (in_folder / "sweep.toml").write_text('case = "one\\ntwo\\u001b[31m"\n')
+    message = _message("sweep", "sweep.toml")
+    assert message.count("\n") == 1
+    assert message.rstrip("\n").isprintable()
+
+
 def test_misuse_of_the_program_as_a_module() -> None:
     done = subprocess.run([sys.executable, "-m", "walkers.main", "show"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")

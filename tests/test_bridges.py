@@ -14,7 +14,9 @@ from tests.printed import spoilt
 from walkers.inputs import resolve_case
 from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import load_case, read_toml, shipped_cases
-from walkers.studies.bridge_laws import ENGINE, LAWS, Law, derjaguin_radius
+from walkers.physics.capillary import derjaguin_radius
+from walkers.physics.laplace import FloatArray, force_curve
+from walkers.studies.bridge_laws import ENGINE, LAWS, Law
 from walkers.studies.bridges import (
     CASES,
     CONTACT_NAMES,
@@ -27,7 +29,6 @@ from walkers.studies.bridges import (
     shipped,
     speeds,
 )
-from walkers.studies.laplace import FloatArray, force_curve
 
 MUCH_LIQUID = Condition("wall", 3e-4, inf, 0.171, radians(38.2))
 

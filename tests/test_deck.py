@@ -1,9 +1,10 @@
-"""The deck: readable, exact, and with every workaround for what the engine gets wrong."""
+"""The deck: readable and exact."""
 
 import re
 from dataclasses import replace
 from hashlib import sha256
-from math import radians
+from itertools import combinations_with_replacement
+from math import inf
 from typing import Literal
 
 import numpy as np
@@ -12,12 +13,11 @@ import pytest
 from tests.conftest import document, make_case
 from walkers.inputs import load_case, resolve_case, shipped_cases
 from walkers.inputs.boundary import SIDES, Cylinder, Face
-from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, rupture_distance
 from walkers.postprocess.dump import FloatArray
 from walkers.templates import render_deck
 from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_shared_deck, settling_steps
-from walkers.templates.engine import contact_angle_setting, face_triangle, separation_cap, strip
 from walkers.templates.placement import place
+from walkers.templates.walls import face_triangle, strip
 
 
 @pytest.fixture(scope="module")
@@ -29,20 +29,28 @@ def _lines(deck: str, start: str) -> list[list[str]]:
     return [line.split() for line in deck.splitlines() if line.startswith(start)]
 
 
-def test_the_rider_is_created_first_and_atoms_are_not_sorted(deck: str) -> None:
-    case = load_case("fig1b")
-    first = _lines(deck, "create_atoms")[0]
-    assert tuple(map(float, first[3:6])) == place((case,))[0].carriers[0]
-    assert _lines(deck, "group           carrier") == [["group", "carrier", "id", "<=", "1"]]
-    assert ["atom_modify", "map", "array", "sort", "0", "0"] in _lines(deck, "atom_modify")
-
-
-def test_the_substrate_stands_twice_as_one_triangle(deck: str) -> None:
-    meshes = [line[1] for line in _lines(deck, "fix") if line[3] == "mesh/surface"]
-    assert len(meshes) == 2
+def test_the_walls_stand_once_and_all_contacts_have_the_tables(deck: str) -> None:
+    (mesh,) = [line[1] for line in _lines(deck, "fix") if line[3] == "mesh/surface"]
     (wall,) = [line for line in _lines(deck, "fix") if line[3] == "wall/gran"]
-    assert wall[-5:] == ["n_meshes", "2", "meshes", *meshes]
+    assert wall[-7:] == ["mesh", "n_meshes", "1", "meshes", mesh, "table", "bridges.txt"]
+    (pair,) = _lines(deck, "pair_style")
+    assert pair[-2:] == ["table", "bridges.txt"]
     assert render_deck(load_case("fig1b")).files["walls.stl"].count("facet normal") == 1
+
+
+def test_each_two_surfaces_that_may_meet_have_a_table() -> None:
+    cases = [
+        make_case(),
+        make_case(liquid={"volume_fraction": 0.02}),
+        make_case(dimers={"radii": ["0.4 mm", "0.2 mm"]}),
+    ]
+    tables = _lines(render_shared_deck(cases).files["bridges.txt"], "bridge")
+    met = {(int(one), int(two), float(radius), float(other)) for _, one, two, radius, other in tables}
+    assert len(met) == len(tables)
+    radii = {1: (2e-4, 3e-4, 4e-4), 2: (2e-4, 3e-4)}
+    walls = {(kind, 3, radius, inf) for kind, sizes in radii.items() for radius in sizes}
+    pairs = {(kind, kind, *pair) for kind, sizes in radii.items() for pair in combinations_with_replacement(sizes, 2)}
+    assert met == walls | pairs
 
 
 def test_the_triangle_is_far_larger_than_the_box_and_its_centroid_in_it() -> None:
@@ -59,10 +67,8 @@ def test_beads_start_with_the_substrate_in_the_laboratory_frame() -> None:
     case = make_case(drive={"frame": "lab"})
     deck = render_deck(case).text
     velocities = _lines(deck, "velocity")
-    assert {velocity[1]: float(velocity[3]) for velocity in velocities} == dict.fromkeys(
-        ("beads", "carrier"), case.drive.peak_velocity
-    )
-    assert len([line for line in _lines(deck, "fix") if "wiggle" in line]) == 3  # two meshes and the carrier
+    assert [(line[1], float(line[3])) for line in velocities] == [("all", case.drive.peak_velocity)]
+    assert len([line for line in _lines(deck, "fix") if "wiggle" in line]) == 1
 
 
 def test_the_container_frame_has_a_signed_gravity_and_walls_at_rest() -> None:
@@ -72,29 +78,7 @@ def test_the_container_frame_has_a_signed_gravity_and_walls_at_rest() -> None:
     (drive,) = [line for line in _lines(deck, "fix") if "v_drive_1" in line]
     assert drive[-4:] == ["vector", "1.0", "0.0", "0.0"]
     (gravity,) = [line for line in _lines(deck, "fix") if line[1] == "gravity"]
-    assert gravity[2:5] == ["beads", "gravity", "9.81"]
-
-
-@pytest.mark.parametrize("degrees", [0.0, 10.0, 30.0, 60.0])
-def test_contact_angle_is_translated(degrees: float) -> None:
-    """The engine computes half the product of the two types' angles, in radians."""
-    deck = render_deck(make_case(liquid={"contact_angle": f"{degrees} deg"})).text
-    (angle,) = [line for line in _lines(deck, "fix") if "contactAngle" in line]
-    given = [radians(float(value)) for value in angle[-2:]]
-    assert 0.5 * given[0] * given[1] == pytest.approx(radians(degrees), rel=1e-12, abs=1e-15)
-
-
-def test_no_bridge_is_cut_before_it_ruptures() -> None:
-    radii = (3e-4, 2e-4)
-    assert separation_cap(radii, 0.01, 0.0) == 1.2
-    for fraction, angle in ((0.2, 0.0), (0.05, 1.0), (0.5, 1.5)):
-        cap = separation_cap(radii, fraction, angle)
-        for radius in radii:
-            at_wall = bridge_volume_at_wall(radius, fraction)
-            assert (cap - 1) * 2 * radius > rupture_distance(at_wall, angle)
-            assert (1.1 * cap - 1) * radius > rupture_distance(at_wall, angle)
-        between = bridge_volume_between_beads(*radii, fraction)
-        assert (cap - 1) * sum(radii) > rupture_distance(between, angle)
+    assert gravity[2:5] == ["all", "gravity", "9.81"]
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
@@ -122,15 +106,14 @@ def test_a_round_wall_has_a_mesh_for_each_size_of_beads_whose_faces_are_shared_b
     meshes = [line for line in _lines(deck.text, "fix") if line[3] == "mesh/surface"]
     groups = _lines(deck.text, "group           walls_")
     assert sorted(int(one) for line in groups for one in line[3:]) == [bead.id for bead in scene.beads]
-    assert len({tuple(line[5:6]) for line in meshes}) == len(meshes) / 2 > 1
+    assert len({line[5] for line in meshes}) == len(meshes) > 1
     faces = round_one.faces()
-    assert len(scene.carriers) == 1 + (len(faces) - 1) * faces[1].triangles
-    for line in meshes[::2]:
+    for line in meshes:
         precision = float(line[line.index("precision") + 1])
         ids = {int(one) for group in groups if group[1] == line[2] for one in group[3:]}
         radii = [bead.radius for bead in scene.beads if bead.id in ids]
         corners = _triangles(deck.files[line[5]])
-        assert len(corners) == len(scene.carriers)
+        assert len(corners) == 1 + (len(faces) - 1) * faces[1].triangles
         wound = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals = np.array([faces[0].normal, *(one.normal for one in faces[1:] for _ in range(one.triangles))])
         np.testing.assert_allclose(wound / np.linalg.norm(wound, axis=1)[:, None], normals, atol=1e-12)
@@ -166,13 +149,12 @@ def test_numbers_are_rendered_in_full_precision(name: str) -> None:
     assert f"timestep        {case.run.time_step!r}\n" in deck
     scene, _ = place((case,))
     starts = [tuple(map(float, line[3:6])) for line in _lines(deck, "create_atoms")]
-    assert starts == [*scene.carriers, *(bead.centre for bead in scene.beads)]
-    assert contact_angle_setting(0.0) == 0.0
+    assert starts == [bead.centre for bead in scene.beads]
 
 
 def test_every_block_says_why_it_is_as_it_is(deck: str) -> None:
     blocks = re.split(r"^# --- .*$", deck, flags=re.MULTILINE)[1:]
-    assert len(blocks) == 9
+    assert len(blocks) == 8
     assert all(block.lstrip("\n").startswith("# ") for block in blocks)
 
 
@@ -219,7 +201,6 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
     square = piles[0].boundary
     round_one = Cylinder(material=square.material, width=square.width, height=square.height)
     piles += [replace(piles[0], run=replace(piles[0].run, ranks=2)), replace(piles[0], boundary=round_one)]
-    piles += [replace(pile, liquid=replace(pile.liquid, film_viscosity=0.1)) for pile in (piles[0], piles[-1])]
     for case in piles:
         settled = settling_steps(case)
         end = settled + case.run.cycles_per_segment * case.run.steps_per_cycle

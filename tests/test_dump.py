@@ -16,6 +16,7 @@ from walkers.postprocess.dump import BinaryDump, DumpError
 from walkers.postprocess.local_dump import read_local_dump
 from walkers.runner import finished_run
 from walkers.runner.directory import FIRST_SEGMENT
+from walkers.runner.manifest import FileChanged
 from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
 
 
@@ -41,9 +42,9 @@ def test_all_frames_are_read(directory: Path, beads: Path) -> None:
     assert not dump.truncated
     np.testing.assert_array_equal(np.diff(dump.steps), run.layout.sample_every)
     frames = dump.stack()
-    assert frames.shape == (61, 5, len(COLUMNS))
-    np.testing.assert_array_equal(frames[:, :, dump.column("id")], np.tile(np.arange(1, 6), (61, 1)))
-    np.testing.assert_allclose(frames[0, 1:, dump.column("radius")], [3e-4, 2e-4, 3e-4, 2e-4], rtol=1e-15)
+    assert frames.shape == (61, 4, len(COLUMNS))
+    np.testing.assert_array_equal(frames[:, :, dump.column("id")], np.tile(np.arange(1, 5), (61, 1)))
+    np.testing.assert_allclose(frames[0, :, dump.column("radius")], [3e-4, 2e-4, 3e-4, 2e-4], rtol=1e-15)
     assert beads.stat().st_size == run.layout.bead_dump_bytes
 
 
@@ -118,6 +119,9 @@ def test_truncated_dumps_are_tabulated_with_a_warning(directory: Path, tmp_path:
     shutil.copytree(directory, copy)
     dump = copy / FIRST_SEGMENT / "beads.bin"
     dump.write_bytes(dump.read_bytes()[:-100])
+    with pytest.raises(FileChanged, match=r"beads\.bin is not what it was"):
+        tabulate(copy)
+    (copy / "manifest.json").unlink()  # of a run that is not finished it is no damage
     result = tabulate(copy)
     assert result["truncated"]
     assert result["velocity"]["mean"] > 0

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import threading
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -33,20 +33,22 @@ from tests.conftest import (
 )
 from walkers import run as run_case
 from walkers.inputs.case import Case
-from walkers.runner import Engine, FinishedRun, find_engine, open_run
+from walkers.runner import Engine, find_engine, open_run
 from walkers.runner.failures import (
     BeadsLost,
     BlowUp,
+    ContactModelMissing,
     DiskFull,
     EngineError,
     EngineFailure,
     EngineKilled,
     EngineMissing,
-    EngineVersionWarning,
     MissingFrames,
+    OtherEngine,
     TimeLimitExceeded,
 )
 from walkers.runner.launch import Progress, postponed_interrupts
+from walkers.runner.plugin import plugin_of
 from walkers.templates import Deck, render_deck
 from walkers.templates.deck import Segment
 
@@ -78,20 +80,40 @@ def test_engine_missing(tmp_path: Path) -> None:
     assert not (tmp_path / "runs").exists()
 
 
-def test_another_version_of_the_engine_is_a_warning(tmp_path: Path) -> None:
+def test_another_version_of_the_engine_is_refused(tmp_path: Path) -> None:
     """The real engine behind a front that changes the version in its banner."""
     front = tmp_path / "liggghts-next"
     front.write_text('#!/bin/sh\nliggghts "$@" | sed "s/LIGGGHTS-PUBLIC 3.8.0/LIGGGHTS-PUBLIC 4.0.0/"\n')
     front.chmod(0o755)
-    with pytest.warns(EngineVersionWarning, match=r"4\.0\.0.*3\.8\.0"):
-        outcome = run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front))
-    assert FinishedRun(outcome.directory).manifest["engine"]["version"] == "LIGGGHTS-PUBLIC 4.0.0"
+    with pytest.raises(OtherEngine, match=r"4\.0\.0.*3\.8\.0"):
+        run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front))
 
 
-def test_the_audited_version_gives_no_warning(tmp_path: Path) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", EngineVersionWarning)
-        run_case(make_case(run=SHORT), tmp_path)
+def test_a_binary_that_says_to_be_another_version_is_never_started(tmp_path: Path) -> None:
+    front, started = tmp_path / "front", tmp_path / "started"
+    front.write_text(f'#!/bin/sh\n# LIGGGHTS-PUBLIC 3.9.1, compiled\ntouch {started}\nexec liggghts "$@"\n')
+    front.chmod(0o755)
+    with pytest.raises(OtherEngine, match=r"3\.9\.1"):
+        run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(front))
+    assert not started.exists()
+
+
+def test_a_contact_model_that_cannot_be_compiled_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a compiler, and with one that fails; nothing is started, and nothing stays in the cache."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    compiler = tmp_path / "bin" / "g++"
+    compiler.parent.mkdir()
+    needed = [*filter(None, map(shutil.which, ("liggghts", "mpicxx", "ldd", "sh", "bash")))]
+    for program in needed:
+        (tmp_path / "bin" / Path(program).name).symlink_to(program)
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    with pytest.raises(ContactModelMissing, match=r"apt-get install g\+\+ libliggghts-dev libopenmpi-dev"):
+        plugin_of(find_engine())
+    compiler.write_text("#!/bin/sh\necho 'bridge.cpp:1: error: no such thing' >&2\nexit 1\n")
+    compiler.chmod(0o755)
+    with pytest.raises(ContactModelMissing, match=r"the compiler says: .*no such thing"):
+        plugin_of(find_engine())
+    assert not list((tmp_path / "cache").rglob("*.so"))
 
 
 def test_error_line_is_quoted(tmp_path: Path) -> None:
@@ -142,6 +164,33 @@ def test_exit_without_the_expected_frames(tmp_path: Path) -> None:
     assert _remains(tmp_path)["reason"] == "MissingFrames"
 
 
+@pytest.mark.parametrize(("found", "told"), [(120.9399038, "wrote 120 of 121"), (0.0, "wrote 0 of 121")])
+def test_frames_are_told_in_whole_numbers(found: float, told: str, tmp_path: Path) -> None:
+    assert told in str(MissingFrames(found, 121, tmp_path))
+
+
+def test_an_engine_that_says_nothing_is_quoted_with_nothing(tmp_path: Path) -> None:
+    silent = tmp_path / "silent"
+    silent.write_text("#!/bin/sh\nexit 7\n")
+    silent.chmod(0o755)
+    with pytest.raises(EngineFailure, match="exit status 7, without a word") as failure:
+        run_case(make_case(run=SHORT), tmp_path / "runs", engine=str(silent))
+    assert "last words" not in str(failure.value)
+
+
+@pytest.mark.parametrize("what", ["run long.toml", "sweep sweep.toml"])
+def test_an_output_that_was_removed_meanwhile_is_told(what: str, in_folder: Path) -> None:
+    (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
+    (in_folder / "sweep.toml").write_text('case = "long.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+    with subprocess.Popen([PROGRAM, *what.split()], stderr=subprocess.PIPE, text=True) as program:
+        wait_for(lambda: list(in_folder.glob("runs/**/beads.bin")))
+        shutil.rmtree(in_folder / "runs", ignore_errors=True)
+        _, told = program.communicate()
+    assert program.returncode == 1, told
+    assert "was removed while it was written" in told
+    assert "Traceback" not in told
+
+
 def test_lost_beads(tmp_path: Path) -> None:
     """A box whose wall stands one and a half millimetres ahead of the walker."""
 
@@ -168,7 +217,7 @@ def test_too_large_a_time_step_blows_up(tmp_path: Path) -> None:
 
 def test_a_position_that_is_no_number(tmp_path: Path) -> None:
     """A force that becomes infinity minus infinity a few hundred steps on."""
-    bad = "variable        bad equal (step>300)*(1e308*100-1e308*100)\nfix             bad beads addforce v_bad 0 0\n"
+    bad = "variable        bad equal (step>300)*(1e308*100-1e308*100)\nfix             bad all addforce v_bad 0 0\n"
     with pytest.raises(BlowUp, match="no number"):
         _launch(make_case(run=SHORT), tmp_path, lambda text: text.replace("fix             motion", f"{bad}fix motion"))
     assert _remains(tmp_path)["reason"] == "BlowUp"

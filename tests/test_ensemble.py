@@ -35,7 +35,7 @@ def test_walkers_of_an_ensemble_move_as_they_do_alone(trajectory: Callable[..., 
     alone = trajectory(_started(ensemble, replicates=1))
     way_together = together.position[:, 0] - together.position[0, 0].mean(axis=0)
     way_alone = alone.position[:, 0] - alone.position[0, 0].mean(axis=0)
-    assert np.abs(way_together - way_alone).max() < 1e-6 * np.abs(way_alone).max()
+    assert np.abs(way_together - way_alone).max() < 3e-6 * np.abs(way_alone).max()
     assert walk(together).velocity[0] == pytest.approx(walk(alone).velocity[0], rel=1e-6)
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,11 +28,14 @@ from walkers.postprocess.analysis import current_result, describe_result
 from walkers.postprocess.drawing import new_figure, save_figure, styled
 from walkers.postprocess.dump import DumpError
 from walkers.postprocess.local_dump import local_frames, read_local_dump
+from walkers.postprocess.motion import read_motion
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, write_deck
 from walkers.runner.failures import DiskFull, EngineError, EngineFailure
 from walkers.runner.launch import launch
+from walkers.runner.manifest import FileChanged, forget_tables
 from walkers.sweeps.scheduler import Failure, Options, _severity
+from walkers.sweeps.table import load as load_table
 from walkers.sweeps.worker import Task, work
 from walkers.templates import render_deck
 
@@ -80,7 +84,7 @@ def unnumbered(tmp_path: Path) -> str:
         "#!/bin/sh\n"
         "last=$(awk '/^run /{print $2 - 20}' walker.lig)\n"
         'awk -v last="$last" \'/^fix +motion/{print "variable late equal (step>" last ")*(1e308*100-1e308*100)"; '
-        'print "fix late beads addforce v_late 0 0"} {print}\' walker.lig > late.lig && mv late.lig walker.lig\n'
+        'print "fix late all addforce v_late 0 0"} {print}\' walker.lig > late.lig && mv late.lig walker.lig\n'
         f'exec liggghts "$@" # {late}\n'
     )
     front.chmod(0o755)
@@ -101,7 +105,12 @@ def test_a_dump_that_holds_no_number_is_not_tabulated(run_directory: Callable[..
     shutil.copytree(run_directory(dimers={"replicates": 2}, run=SHORT), directory)
     dump = (directory / FIRST_SEGMENT / "beads.bin").read_bytes()
     (directory / FIRST_SEGMENT / "beads.bin").write_bytes(dump[:-8] + struct.pack("=d", np.nan))
-    with pytest.raises(DumpError, match=r"beads\.bin: .* is no number at step"):
+    with pytest.raises(FileChanged, match=r"beads\.bin is not what it was"):
+        tabulate(directory)
+    with pytest.raises(DumpError, match=r"beads\.bin: .* is no number at step .*: the dump was damaged since"):
+        read_motion(directory)
+    (directory / "manifest.json").unlink()
+    with pytest.raises(DumpError, match=r"beads\.bin: .* is no number at step .*: the beads' motion blew up"):
         tabulate(directory)
 
 
@@ -180,12 +189,27 @@ def test_closed_streams_do_not_matter(short_case: Path, in_folder: Path, closed:
     assert b"walkers" not in (directory / FIRST_SEGMENT / "engine.log").read_bytes()
 
 
+def test_cleaning_without_input_asks_for_yes(in_folder: Path) -> None:
+    begun = in_folder / "runs" / "short-0123456789ab.incomplete"
+    begun.mkdir(parents=True)
+    done = subprocess.run(["sh", "-c", f"{PROGRAM} clean <&-"], capture_output=True, text=True, check=False)
+    assert (done.returncode, begun.is_dir()) == (2, True)
+    assert done.stderr == "walkers: --yes: expected, for there is no terminal at which to ask\n"
+
+
 @pytest.mark.parametrize("command", ["run short.toml", "deck short.toml", "--help"])
 def test_a_reader_who_has_had_enough_is_no_failure(short_case: Path, command: str) -> None:
     """By the program, by the print of a long text, by who prints the help."""
     script = f'{PROGRAM} {command} | true; echo "${{PIPESTATUS[0]}}"'
     done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
     assert (done.stdout.strip(), "Traceback" in done.stderr, "BrokenPipe" in done.stderr) == ("0", False, False)
+
+
+@pytest.mark.parametrize("command", ["show short.toml", "list", "--help", "theory short.toml --json"])
+def test_a_standard_output_without_room_is_told_by_its_name(short_case: Path, command: str) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([PROGRAM, *command.split()], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "walkers: standard output: No space left on device\n")
 
 
 def test_progress_that_nobody_reads_stops_nothing(in_folder: Path) -> None:
@@ -219,6 +243,117 @@ def test_what_is_no_file_to_read_is_refused_at_once(tmp_path: Path) -> None:
 def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
     (tmp_path / "windows.toml").write_text(to_toml(document()), encoding="utf-8-sig")
     assert load_case(tmp_path / "windows.toml") == make_case().renamed("windows")
+
+
+def _cut(name: str, size: int) -> Callable[[Path], None]:
+    return lambda run: os.truncate(run / name, size)
+
+
+def _edited(name: str, change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
+    def edit(run: Path) -> None:
+        contents = json.loads((run / name).read_text())
+        change(contents)
+        (run / name).write_text(json.dumps(contents))
+
+    return edit
+
+
+def _tampered_dump(run: Path) -> None:
+    """As a disk could; the result is gone, so that it is made of the dump."""
+    with (run / FIRST_SEGMENT / "beads.bin").open("r+b") as file:
+        file.seek(-64, 2)
+        file.write(b"\xff" * 64)
+    (run / "result.json").unlink()
+
+
+DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
+    "a case that was cut": (_cut("case.json", 800), "case.json"),
+    "a case that is no table": (lambda run: (run / "case.json").write_text("[]") and None, "case.json"),
+    "an edited case": (
+        _edited("case.json", lambda case: case["drive"]["harmonics"][0].update(frequency=81.0)),
+        "case.json is not what it was",
+    ),
+    "a manifest that was cut": (_cut("manifest.json", 100), "manifest.json"),
+    "a manifest that is no table": (lambda run: (run / "manifest.json").write_text("[]") and None, "manifest.json"),
+    "a layout that was cut": (_cut(f"{FIRST_SEGMENT}/layout.json", 100), "layout.json"),
+    "an edited result": (
+        _edited("result.json", lambda result: result["velocity"].update(mean=99.0)),
+        "result.json is not what it was",
+    ),
+    "an edited origin": (
+        _edited("result.json", lambda result: result["rests_on"][0].update(key="x")),
+        "result.json is not what it was",
+    ),
+    "a damaged dump": (_tampered_dump, "beads.bin is not what it was"),
+}
+READERS = (
+    *("run short.toml", "result {run}", "plot {run}", "vtk {run} --to vtk", "paraview {run} --to vtk"),
+    *("export {run} --to out.xyz", "report {run} --to out.html", "archive {run} --to out.zip"),
+    *("compare {run} {run}", "compare short.toml fig1b", "theory short.toml", "run short.toml --json"),
+)
+"""Commands that read a run's directory."""
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_a_run_that_was_damaged_is_told_in_a_line_by_all_that_read_it(name: str, short_case: Path) -> None:
+    damage, told = DAMAGES[name]
+    call("run", "short.toml", check=True)
+    (run,) = Path("runs").glob("short-*")
+    damage(run)
+    files = {path: path.read_bytes() for path in run.rglob("*") if path.is_file() and path.suffix != ".lock"}
+    for command in READERS:
+        done = call(*command.format(run=run).split())
+        assert "Traceback" not in done.stderr, (command, done.stderr)
+        assert "99" not in done.stdout.replace("996", "")
+        if command.startswith(("theory", "compare")) and done.returncode == 0:
+            continue  # they may not need what is damaged
+        lines = [line for line in done.stderr.splitlines() if "never audited" not in line]
+        assert done.returncode in (1, 2), (command, done)
+        assert str(run) in lines[0], (command, lines)
+        if not command.startswith("archive"):  # which tells the files, a line each
+            assert told in lines[0], (command, lines)
+            assert len(lines) == 1, (command, lines)
+    assert all(path.read_bytes() == contents for path, contents in files.items()), "nothing on disk is lost"
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_a_sweep_goes_on_without_a_damaged_run_and_says_which(name: str, short_case: Path) -> None:
+    damage, _ = DAMAGES[name]
+    Path("sweep.toml").write_text('case = "short.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+    call("sweep", "sweep.toml", check=True)
+    runs = load_table("runs/sweep")["run"]
+    damage(Path(runs[0]))
+    table = load_table("runs/sweep")
+    whole = name.startswith("a layout")  # not asked for by the table
+    assert list(table["status"]) == ["finished" if whole else "failed", "finished"]
+    assert list(table["run"]) == list(runs)
+    for command in ("sweep sweep.toml", "table runs/sweep", "status runs/sweep", "plot runs/sweep", "list"):
+        done = call(*command.split())
+        assert "Traceback" not in done.stderr, (command, done.stderr)
+        assert "99000" not in done.stdout
+        assert done.returncode in (0, 1, 2)
+    assert call("report", "runs/sweep", "--to", "sweep.html").returncode in (0, 1, 2)
+
+
+def test_a_run_of_before_there_were_checksums_is_read(short_case: Path) -> None:
+    call("run", "short.toml", check=True)
+    (run,) = Path("runs").glob("short-*")
+    _edited("manifest.json", lambda manifest: manifest.pop("sha256"))(run)
+    _edited("result.json", lambda result: result["velocity"].update(mean=2e-3))(run)
+    _edited("result.json", lambda result: result["rests_on"][0].update(key="x"))(run)
+    assert "2.000 mm/s" in call("result", str(run), check=True).stdout
+
+
+def test_a_result_whose_making_was_killed_is_made_anew(short_case: Path) -> None:
+    """Between the table that is new and the manifest that does not yet say so."""
+    call("run", "short.toml", check=True)
+    (run,) = Path("runs").glob("short-*")
+    names = ["result.json", "walkers.parquet", "trajectory.parquet"]
+    known = read_result(run)
+    forget_tables(run, names)
+    _edited("result.json", lambda result: result["velocity"].update(mean=99.0))(run)
+    assert current_result(run) == known
+    assert json.loads((run / "manifest.json").read_text())["sha256"].keys() >= set(names)
 
 
 BAD_SWEEPS = {

@@ -8,8 +8,7 @@ from math import acos, asin, atan2, cbrt, cos, cosh, hypot, inf, pi, radians, si
 import numpy as np
 import pytest
 
-from walkers.studies.bridge_laws import LAWS, rupture_of_lian, rupture_of_willett
-from walkers.studies.laplace import (
+from walkers.physics.laplace import (
     POINTS,
     NoBridgeError,
     bridge,
@@ -17,6 +16,8 @@ from walkers.studies.laplace import (
     force_table,
     rupture_distance,
 )
+from walkers.physics.willett import rupture as rupture_of_willett
+from walkers.studies.bridge_laws import LAWS, rupture_of_lian
 
 # Radii, volume, contact angle: the paper's bridges between beads and at walls in units of a bead's radius, and others.
 BRIDGES = [

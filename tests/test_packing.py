@@ -37,7 +37,6 @@ def test_what_may_differ_within_a_deck() -> None:
     others = [
         make_case(run=STEP, drive={"frequency": "60 Hz"}),
         make_case(run=STEP, drive={"phase": "90 deg"}),
-        make_case(run=STEP, liquid={"volume_fraction": 0.02}),
         make_case(run=STEP, contact={"rolling_friction": 0.003}),
         make_case(run=STEP, contact={"youngs_modulus": "40 MPa"}),
         make_case(run=STEP, beads={"density": "3.9 g/cm^3"}),

@@ -1,11 +1,14 @@
 """Names and folders that a shell, a deck or a file name could stumble over."""
 
+import os
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from tests.conftest import SHORT, call, document, to_toml
+from tests.conftest import PROGRAM, SHORT, call, document, to_toml
+from walkers import run as run_case
 from walkers.inputs import InputError, load_case
 from walkers.inputs.sweep import load_sweep
 from walkers.sweeps.site import SiteFile, _worker_init, check_path
@@ -88,6 +91,38 @@ def test_modules_of_a_site_reach_the_shell_as_one_word() -> None:
     script = f'module() {{ echo "$# $2"; }}\n{lines}\n'
     told = subprocess.run(["sh", "-c", script], capture_output=True, text=True, check=True).stdout
     assert told.splitlines() == ["2 gcc/12", "2 a; touch executed"]
+
+
+NO_UTF8 = os.fsdecode(b"x\xff")
+
+
+@pytest.mark.parametrize("command", [f"run base.toml --out {NO_UTF8}", f"run {NO_UTF8}.toml", f"result runs/{NO_UTF8}"])
+def test_paths_that_are_no_utf8_are_refused_before_anything_is_done(
+    command: str, case_file: Path, in_folder: Path
+) -> None:
+    (in_folder / f"{NO_UTF8}.toml").write_bytes(case_file.read_bytes())
+    before = sorted(in_folder.rglob("*"))
+    done = subprocess.run([PROGRAM, *command.split()], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, len(done.stderr.splitlines())) == (2, "", 1)
+    assert r"x\xff" in done.stderr
+    assert "expected UTF-8 text" in done.stderr
+    assert sorted(in_folder.rglob("*")) == before
+
+
+def test_a_folder_that_is_no_utf8_is_refused_before_anything_is_done(case_file: Path, in_folder: Path) -> None:
+    """The tables' and ParaView's libraries take whole paths, and no others."""
+    folder = in_folder / NO_UTF8
+    folder.mkdir()
+    done = subprocess.run([PROGRAM, "run", "../base.toml"], cwd=folder, capture_output=True, text=True, check=False)
+    assert (done.returncode, len(done.stderr.splitlines()), list(folder.iterdir())) == (2, 1, [])
+    tries: list[Callable[[], object]] = [
+        lambda: run_case("base.toml", folder),
+        lambda: load_case(f"{NO_UTF8}.toml"),
+        lambda: run_case(load_case("base.toml").renamed(NO_UTF8), in_folder),
+    ]
+    for attempt in tries:
+        with pytest.raises(InputError, match=r"x\\xff.*: expected UTF-8 text"):
+            attempt()
 
 
 @pytest.mark.parametrize("name", ["...toml", "..toml"])

@@ -19,6 +19,7 @@ from walkers.postprocess.steady_state import steady_walkers
 from walkers.postprocess.tables import FAMILIES, TABLES
 from walkers.postprocess.walking import Walking, walkers_met
 from walkers.runner.files import write_json
+from walkers.runner.manifest import record_tables
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +97,7 @@ def test_a_result_of_before_is_made_anew(directory: Path, tmp_path: Path) -> Non
     lacking = {key: value for key, value in known.items() if key not in ("separated_fraction", "analyses")}
     for old in ({**lacking, "analyses": {"walking": Walking.version - 1}}, lacking):
         write_json(copy / RESULT_NAME, old)
+        record_tables(copy, [RESULT_NAME])
         assert current_result(copy) == known
         assert read_result(copy) == known
 

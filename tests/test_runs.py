@@ -153,9 +153,9 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     }
     assert {path.name for path in (run.directory / "segments").iterdir()} == {"0000"}
     assert {path.name for path in (run.directory / FIRST_SEGMENT).iterdir()} == {
-        *("layout.json", "walker.lig", "walls.stl", "engine.log", "segment.json"),
+        *("layout.json", "walker.lig", "walls.stl", "engine.log", "segment.json", "run.sh"),
         *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
-        *("reach.txt", "radius.txt", "open_drag.txt"),
+        "bridges.txt",
     }
     assert run.case == case
     assert run.layout == render_deck(case).layout
@@ -171,8 +171,7 @@ def test_the_deck_of_a_run_can_be_run_by_hand(tmp_path: Path) -> None:
     made = run_case(make_case(run=SHORT), tmp_path / "runs")
     call("deck", _toml(tmp_path), "--to", str(tmp_path / "byhand"), check=True)
     by_hand = tmp_path / "byhand"
-    with (by_hand / "engine.log").open("wb") as log:
-        subprocess.run(["liggghts", "-in", "walker.lig"], cwd=by_hand, stdout=log, check=True)
+    subprocess.run(["sh", "run.sh"], cwd=by_hand, check=True)
     assert (by_hand / "beads.bin").read_bytes() == (made.directory / FIRST_SEGMENT / "beads.bin").read_bytes()
 
 

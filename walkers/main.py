@@ -6,11 +6,13 @@ import os
 import signal
 import sys
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from io import TextIOBase, TextIOWrapper
+from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, NoReturn, TextIO
+from typing import Annotated, Any, BinaryIO, NoReturn, TextIO
 
 import typer
 
@@ -23,6 +25,7 @@ COMMANDS = (
 
 
 INTERRUPTED = 130
+_STDOUT = "standard output"
 _COMPLETION = "_WALKERS_COMPLETE"
 """Variable in which a shell's completion script says what it wants."""
 
@@ -58,6 +61,35 @@ class Forgiving(TextIOBase):
         return self.stream.encoding
 
 
+class Named(Forgiving):
+    """Standard output: what cannot be written there is told by its name."""
+
+    @property
+    def buffer(self) -> BinaryIO:
+        """Its bytes."""
+        return self.stream.buffer
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        with self._told():
+            return self.stream.write(text)
+
+    def flush(self) -> None:
+        """Flush the stream."""
+        with self._told():
+            self.stream.flush()
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            error.filename = _STDOUT
+            raise
+
+
 class _Terminated(BaseException):
     """SIGTERM, or SIGHUP of a terminal that is closed, as an exception: engines are stopped on the way out."""
 
@@ -90,12 +122,13 @@ def _open_streams() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
+    sys.stdin = sys.stdin or open(0, closefd=False)  # noqa: SIM115
     sys.stdout = sys.stdout or open(1, "w", closefd=False)  # noqa: SIM115
     sys.stderr = sys.stderr or open(2, "w", closefd=False)  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    sys.stderr = Forgiving(sys.stderr)
+    sys.stdout, sys.stderr = Named(sys.stdout), Forgiving(sys.stderr)
 
 
 def _show_warning(
@@ -113,6 +146,7 @@ def _show_warning(
 def _status(arguments: list[str] | None) -> int:
     """Run the program: its exit status. What is not known to happen is raised."""
     try:
+        _check_words(sys.argv[1:] if arguments is None else arguments)
         outcome: Any = _program(_words() if arguments is None else arguments)(
             arguments, standalone_mode=False, prog_name="walkers"
         )
@@ -122,6 +156,17 @@ def _status(arguments: list[str] | None) -> int:
     if outcome == INTERRUPTED:  # typer turns Ctrl-C into a status
         return _tell("interrupted", INTERRUPTED)
     return outcome if isinstance(outcome, int) else 0
+
+
+def _check_words(words: list[str]) -> None:
+    """Refuse what is no UTF-8, and a folder that is none, before anything is done."""
+    with suppress(OSError):  # a folder that is gone
+        words = [str(Path.cwd()), *words]
+    if not all(word.isascii() for word in words):
+        from walkers.inputs.errors import check_utf8
+
+        for word in words:
+            check_utf8(word)
 
 
 def _program(arguments: list[str]) -> typer.Typer:
@@ -174,15 +219,22 @@ def _told(stop: BaseException) -> int:
         return _tell(str(stop) or "interrupted", status)
     # So it ends where nobody reads what is printed: it is no failure that the reader has had enough.
     if isinstance(stop if isinstance(stop, OSError) else stop.__context__, BrokenPipeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        _drop_stdout()
         return 0
     if isinstance(stop, OSError):  # a path that was given cannot be read or written
+        if stop.filename == _STDOUT:
+            _drop_stdout()
         return _tell(f"{stop.filename}: {stop.strerror}" if stop.filename else str(stop), 2)
     # Typer's usage errors know how to show themselves and which status they are.
     if hasattr(stop, "show") and hasattr(stop, "exit_code"):
         stop.show()
         return int(stop.exit_code)
     raise stop
+
+
+def _drop_stdout() -> None:
+    """Let what is left to be printed go nowhere, that the interpreter's end is no failure of its own."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def _tell(message: str, status: int) -> int:

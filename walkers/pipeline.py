@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.errors import InputError, Problem, WalkersError, check_utf8
 from walkers.notebook import Pictures
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from walkers.inputs.origins import Origin
     from walkers.postprocess.films import FilmOptions
     from walkers.postprocess.motion import Motion
+    from walkers.runner.directory import FinishedRun
     from walkers.runner.launch import Progress
     from walkers.sweeps.comparison import Side
 
@@ -214,7 +215,6 @@ def run(
     {'facing': [1, -1], 'steady': [True, True]}
     """
     from walkers.inputs.reading import load_case
-    from walkers.postprocess.analysis import current_result
     from walkers.progress import progress_of, shown_if
     from walkers.runner.binary import find_engine
     from walkers.runner.directory import run_place, unfinished
@@ -223,12 +223,15 @@ def run(
     from walkers.sweeps.shared_deck import check_audit, make_runs
 
     case = load_case(case) if isinstance(case, (str, Path)) else case
+    for one in (Path(out).absolute(), case.name):
+        check_utf8(one)
     _check_changed(case)
     binary = find_engine(engine)
     place = run_place(case, binary, out)
     there = finished_place(out, place.name)
     if there is not None and not force:
-        current_result(there)
+        _check_described(there)
+        _check_result(there)
         return Run(there, origins=case.origins)
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
@@ -317,6 +320,9 @@ def _found(run: Case | str | Path, out: Path) -> tuple[Path, Case | None]:
         path = Path(run)
         if path.is_dir():
             return path, None
+        if path.suffix == ".zip" and path.is_file():
+            told = "an archive: unpack it and give a run or a sweep in it; walkers verify takes it as it is"
+            raise InputError(name, [Problem("", None, told)])
         named = _named(run, out) or (find_sweep(run, out) if not path.is_file() else None)
         if named is not None:
             return named, None
@@ -395,16 +401,9 @@ def _run_of(case: Case, out: Path) -> Path | None:
 
 def _readable(directory: Path) -> Run:
     """The run, if its description can be read; its tables are made anew if need be."""
-    from walkers.postprocess.analysis import current_result
-    from walkers.runner.directory import FinishedRun, layout_of
+    from walkers.runner.directory import layout_of
 
-    run = FinishedRun(directory)
-    for name in ("manifest", "case", "layout"):
-        try:
-            getattr(run, name)
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
-            raise InputError(str(directory), [problem]) from error
+    run = _check_described(directory)
     left_out = run.manifest.get("left_out", ())  # of an archive
     for segment in run.segments:
         layout = layout_of(segment)
@@ -416,11 +415,32 @@ def _readable(directory: Path) -> Run:
         if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
             told = f"{dump} is incomplete: what is drawn or written ends early"
             warnings.warn(told, IncompleteRunWarning, stacklevel=3)
+    _check_result(directory)
+    return Run(directory)
+
+
+def _check_described(directory: Path) -> FinishedRun:
+    """Refuse a finished run whose manifest, case or layout cannot be read."""
+    from walkers.runner.directory import FinishedRun
+
+    run = FinishedRun(directory)
+    for name in ("manifest", "case", "layout"):
+        try:
+            getattr(run, name)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
+            raise InputError(str(directory), [problem]) from error
+    return run
+
+
+def _check_result(directory: Path) -> None:
+    """Refuse a finished run that has no result, and none can be made."""
+    from walkers.postprocess.analysis import current_result
+
     try:
         current_result(directory)
-    except (OSError, ValueError, KeyError, TypeError, WalkersError) as error:
+    except (OSError, ValueError, KeyError, TypeError, IndexError, WalkersError) as error:
         raise InputError(str(directory), [Problem("", None, f"the run cannot be read ({error})")]) from error
-    return Run(directory)
 
 
 class IncompleteRunWarning(UserWarning):

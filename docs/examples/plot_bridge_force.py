@@ -14,8 +14,8 @@ import numpy as np
 
 import walkers
 from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
+from walkers.physics.laplace import force_curve
 from walkers.studies.bridge_laws import ENGINE
-from walkers.studies.laplace import force_curve
 
 case = walkers.load_case("fig1b")
 large, small = case.walkers[0].radii

@@ -117,11 +117,12 @@ class Pairs(NamedTuple):
 class Meeting(NamedTuple):
     """How two surfaces meet: number of the bridge, gap, reduced radius and mass, friction, normal, and velocities.
 
-    ``apart`` is that of the centres along the normal, ``slide`` that of the surfaces along each other (m/s), ``turn``
+    ``order`` is -1 where the first is the larger bead, for which a law's coupling has the other sign; ``apart`` is that of the centres along the normal, ``slide`` that of the surfaces along each other (m/s), ``turn``
     the difference of the spins (rad/s).
     """
 
     bridge: int
+    order: float
     gap: float
     radius: float
     mass: float
@@ -218,7 +219,7 @@ def meet(c: Constants, m: Meeting, spring: FloatArray, bridged: bool, moves: boo
         normal, tangential, couple = touch(c, m, spring, moves)
     if bridged:
         pull, resists, slides, couples, rolls = bridge_forces(c.bridges, m.bridge, m.gap)
-        q = cross(m.n, m.turn)
+        q, couples = cross(m.n, m.turn), m.order * couples
         normal -= pull + resists * m.apart
         tangential = plus(plus(tangential, -slides, m.slide), -couples, q)
         couple = plus(plus(couple, couples, cross(m.n, m.slide)), rolls, cross(m.n, q))
@@ -279,7 +280,7 @@ def wall_forces(c: Constants, state: State, moves: bool) -> None:
                     continue
             arm, apart = radius + 0.5 * gap, dot(velocity, n)
             slide = plus(plus(velocity, -apart, n), arm, cross(n, spin))
-            m = Meeting(bridge, gap, radius, c.mass[bead], c.friction_walls, n, apart, slide, spin)
+            m = Meeting(bridge, 1.0, gap, radius, c.mass[bead], c.friction_walls, n, apart, slide, spin)
             push(state, bead, 1.0, arm, n, meet(c, m, state.wall_spring[bead, wall], bridged, moves))
 
 
@@ -304,7 +305,8 @@ def pair_forces(c: Constants, state: State, pairs: Pairs, moves: bool) -> None:
         turning = plus(plus((0.0, 0.0, 0.0), arm_i, spin_i), arm_j, spin_j)
         slide = plus(plus(between, -apart, n), 1.0, cross(n, turning))
         mass, radius = c.mass[i] * c.mass[j] / (c.mass[i] + c.mass[j]), c.radius[i] * c.radius[j] / together
-        m = Meeting(bridge, gap, radius, mass, c.friction_beads, n, apart, slide, plus(spin_i, -1.0, spin_j))
+        order, turn = (-1.0 if c.radius[i] > c.radius[j] else 1.0), plus(spin_i, -1.0, spin_j)
+        m = Meeting(bridge, order, gap, radius, mass, c.friction_beads, n, apart, slide, turn)
         acting = meet(c, m, pairs.spring[at], pairs.bridged[at], moves)
         push(state, i, 1.0, arm_i, n, acting)
         push(state, j, -1.0, arm_j, n, acting)

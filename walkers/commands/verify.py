@@ -15,7 +15,7 @@ What = Annotated[
 
 
 def command(what: What, out: Out = DEFAULT_OUT) -> int:
-    """Compare files of a run, a sweep's runs or an archive with their checksums; status 1 if any differ."""
+    """Compare files of a run, a sweep or an archive with their lists; status 1 if any differ or are not listed."""
     from walkers.archive.verification import verify
     from walkers.pipeline import place_of
 

@@ -1,0 +1,50 @@
+"""The closed form of Rabinovich et al. (2005): F = 2πRγ (cos θ / (1 + h/2d) + sin α sin(θ + α)), for small volumes.
+
+It was made for equal spheres of radius R; unequal ones and planes are taken in Derjaguin's way, R = 2R*
+(`walkers.physics.capillary.derjaguin_radius`). At a volume of 0.09 R³ on a plane its pull at contact is twice
+Young–Laplace's. They give no distance of rupture: that of Lian et al. (1993) is taken
+(`walkers.physics.capillary.rupture_distance`). The resistances are those of `walkers.physics.reynolds`. Numbers of
+equations are those in the source of YADE (its ViscElCapPhys).
+
+References
+----------
+Y. I. Rabinovich, M. S. Esayanur, B. M. Moudgil, Langmuir 21 (2005) 10992–10997, doi 10.1021/la0517639.
+P. Lambert, A. Chau, A. Delchambre, S. Régnier, Langmuir 24 (2008) 3157–3163, doi 10.1021/la7036444.
+"""
+
+from __future__ import annotations
+
+from math import cos, pi
+
+import numpy as np
+
+from walkers.physics import reynolds
+from walkers.physics.bridge import Curve, FloatArray, Surfaces
+from walkers.physics.capillary import derjaguin_radius, rupture_distance
+
+
+def lambert(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
+    """Rabinovich et al.'s without its second term, as Lambert et al. (2008) correct it: 2πRγ cos θ / (1 + h / 2d).
+
+    d, half the immersed height, from the volume: 2d/h = -1 + √(1 + 2V / πRh²) (Rabinovich et al., Eq. 20).
+    Parameters and result as for `walkers.physics.soulie.pull`.
+    """
+    radius = derjaguin_radius(radius_1, radius_2)
+    # h / 2d without a division by h.
+    immersed = np.sqrt(gaps**2 + 2.0 * volume / (pi * radius)) - gaps
+    return 2.0 * pi * radius * cos(contact_angle) / (1.0 + gaps / immersed)
+
+
+def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
+    """Rabinovich et al. (2005), Eq. 19: `lambert`, and 2πRγ sin α sin(θ + α) with α² = 2d/R (their Eq. A3)."""
+    radius = derjaguin_radius(radius_1, radius_2)
+    immersed = np.sqrt(gaps**2 + 2.0 * volume / (pi * radius)) - gaps
+    embracing = np.sqrt(immersed / radius)
+    pressed = lambert(radius_1, radius_2, volume, contact_angle, gaps)
+    return pressed + 2.0 * pi * radius * np.sin(embracing) * np.sin(contact_angle + embracing)
+
+
+def law(surfaces: Surfaces) -> Curve:
+    """Rabinovich et al.'s pull (their Eq. 19), Lian et al.'s rupture, and Reynolds' resistances."""
+    bridge = (surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle)
+    return reynolds.curve(surfaces, lambda gaps: pull(*bridge, gaps), rupture_distance(*bridge[2:]))

@@ -1,0 +1,111 @@
+"""Resistances of a bridge by the Reynolds equation in its wetted disc, the liquid's edge at ambient pressure.
+
+Between surfaces 1 and 2 (spheres of radii R1 ≤ R2, or a sphere and a plane; `walkers.physics.bridge` has the signs and
+the velocities w, s, q) the gap is H = h + r²/2R*. With κ = (1/R1 - 1/R2)/2, the curvature of the disc's mid-surface,
+the pressure obeys
+
+    ∇ · (H³ ∇p) = 12η (w + r · (q - κ s)),        p = 0 at the wetted radius r_w,
+
+for q tilts the surfaces against each other, and sliding surfaces close the gap as far as the disc is bent. Force and
+couple follow from the pressure and the shear stress of sliding,
+
+    F = -∫ ηs/H dA - κ ∫ p r dA,                  M = ∫ p r dA = -K (q - κ s).
+
+The disc holds the volume of the bridge, π r_w² h + π r_w⁴/4R*, as Pitois et al. (2000) have it:
+
+    H_w = h + r_w²/2R* = √(h² + V/πR*).
+
+With y = H_w/h - 1 the resistances are, in closed form,
+
+    N = 6πηR*²/h (1 - h/H_w)²                     (their X²)
+    S = 2πηR* ln(1 + y) + κ² K,    C = -κ K,      Q = K = 96πηR*³ J(y).
+
+J (`_tilted`) is for the pressure's shape f along a radius, x² = r²/2R*h: f = -x/10(1 + x²)² solves the equation
+(Goldman et al. 1967, O'Neill and Stewartson 1967), and is brought to zero at r_w by the solution of ∇ · (H³ ∇p) = 0,
+that is x ₂F₁(2 - √10/2, 2 + √10/2; 2; -x²).
+
+The matrix of S, C, Q is symmetric (Onsager), and C² ≤ S Q, S Q - C² being 2πηR* ln(1 + y) K. A motion of the pair as
+one rigid body has w = s = q = 0. Where the disc is wide against the gap, all three go with ln(H_w/h): S = 6πηR 8/15,
+C = -6πηR² 2/5, Q = 6πηR³ 4/5 times it at a plane, which gives a sphere that translates the force 8/15 and the torque
+2/15, one that rotates 2/5 · 4/3 (Goldman et al.), and between spheres the coefficients of Jeffrey and Onishi (1984). As
+the bridge thins, r_w → 0, all vanish: N as y², S as y, C and Q as y³. Gaps below `Surfaces.closest` count as that one:
+surfaces are rough (Adams and Perchard 1985).
+
+What is left out: the shear of liquid outside the wedge (immersed spheres have 0.9588 besides 8/15 ln; a small bridge
+has no such liquid); moving contact lines; at the edge a pressure other than the air's (that by the surface tension is
+in the pull, as long as the edge is round); cavitation, where the pressure is below the air's.
+
+References
+----------
+O. Pitois, P. Moucheront, X. Chateau, J. Colloid Interface Sci. 231 (2000) 26-31, doi 10.1006/jcis.2000.7096.
+A. J. Goldman, R. G. Cox, H. Brenner, Chem. Eng. Sci. 22 (1967) 637-651, doi 10.1016/0009-2509(67)80047-2.
+M. E. O'Neill, K. Stewartson, J. Fluid Mech. 27 (1967) 705-724, doi 10.1017/S0022112067002551.
+D. J. Jeffrey, Y. Onishi, J. Fluid Mech. 139 (1984) 261-290, doi 10.1017/S0022112084000355.
+M. J. Adams, V. Perchard, I. Chem. E. Symp. Ser. 91 (1985) 147-160.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi, sqrt
+
+import numpy as np
+from scipy.special import hyp2f1
+
+from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
+
+_A, _B = 2.0 - sqrt(2.5), 2.0 + sqrt(2.5)
+_THIN = 1e-5
+
+
+def curve(surfaces: Surfaces, pull: Callable[[FloatArray], FloatArray], rupture: float) -> Curve:
+    """A law of a pull and these resistances, for a bridge that forms on contact.
+
+    Parameters
+    ----------
+    surfaces
+        The pair.
+    pull
+        Pull over the surface tension, m, of gaps, m, both of shape (n,).
+    rupture
+        m.
+    """
+
+    def forces(gaps: FloatArray) -> Forces:
+        return Forces(surfaces.liquid.surface_tension * pull(gaps), *resistances(surfaces, gaps))
+
+    return Curve(forces, rupture)
+
+
+def resistances(surfaces: Surfaces, gaps: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """N and S (N s/m), C (N s), Q (N m s) of a bridge at gaps, m, each of shape (n,)."""
+    viscosity, reduced = surfaces.liquid.dynamic_viscosity, surfaces.reduced_radius
+    gaps = np.maximum(gaps, surfaces.closest)
+    edge = wetted_gap(surfaces, gaps)
+    deep = edge / gaps - 1.0
+    bend = 0.5 * (1.0 / surfaces.radius - 1.0 / surfaces.other_radius)
+    tilting = 96.0 * pi * viscosity * reduced**3 * _tilted(deep)
+    normal = 6.0 * pi * viscosity * reduced**2 / gaps * (1.0 - gaps / edge) ** 2
+    shear = 2.0 * pi * viscosity * reduced * np.log1p(deep)
+    return normal, shear + bend**2 * tilting, -bend * tilting, tilting
+
+
+def wetted_gap(surfaces: Surfaces, gaps: FloatArray) -> FloatArray:
+    """H_w, distance of the surfaces at the liquid's edge, m (Pitois et al. 2000, theirs for equal spheres)."""
+    return np.sqrt(gaps**2 + surfaces.volume / (pi * surfaces.reduced_radius))
+
+
+def _tilted(deep: FloatArray) -> FloatArray:
+    """J(y) = -∫ f x² dx from 0 to √y, for x⁻¹ (x (1 + x²)³ f')' - (1 + x²)³ f/x² = x, f = 0 at both ends.
+
+    With the particular solution and the homogeneous one, of logarithmic slope L = d ln f/d ln x at the edge,
+
+        J = (ln(1 + y) - y/(1 + y)) / 20 + y/(100 (1 + y)) ((1 - 3y)/(1 + y) - L),
+
+    the second term by Green's identity; y³/96 where y is small and the terms cancel.
+    """
+    lifted = hyp2f1(_A, _B, 2.0, -deep)
+    slope = 1.0 - _A * _B * deep * hyp2f1(_A + 1.0, _B + 1.0, 3.0, -deep) / lifted
+    wide = 1.0 + deep
+    exact = (np.log1p(deep) - deep / wide) / 20.0 + deep / (100.0 * wide) * ((1.0 - 3.0 * deep) / wide - slope)
+    return np.where(deep < _THIN, deep**3 / 96.0, exact)

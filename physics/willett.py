@@ -1,0 +1,67 @@
+"""The fit of Willett et al. (2000) to their solutions of the Young–Laplace equation, F = 2πRγ exp(f1 - f2 exp(…)).
+
+It was made for equal spheres of radius R, volumes of 0.1 to 10 per cent of R³ and contact angles up to 50°; unequal
+ones and planes are taken in Derjaguin's way, R = 2R* (`walkers.physics.capillary.derjaguin_radius`). The resistances
+are those of `walkers.physics.reynolds`. Coefficients are those in the source of YADE (its ViscElCapPhys).
+
+References
+----------
+C. D. Willett, M. J. Adams, S. A. Johnson, J. P. K. Seville, Langmuir 16 (2000) 9396–9405, doi 10.1021/la000657y.
+"""
+
+from __future__ import annotations
+
+from math import cbrt, log, pi, sqrt
+
+import numpy as np
+
+from walkers.physics import reynolds
+from walkers.physics.bridge import Curve, FloatArray, Surfaces
+from walkers.physics.capillary import derjaguin_radius
+
+
+def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
+    """Willett et al. (2000), appendix: ln(F / 2πRγ) = f1 - f2 exp(f3 ln s + f4 ln² s), s half the gap over √(V/R).
+
+    Parameters and result as for `walkers.physics.soulie.pull`.
+    """
+    radius = derjaguin_radius(radius_1, radius_2)
+    v, t = log(volume / radius**3), np.array([1.0, contact_angle, contact_angle**2])
+    f1 = (
+        t @ [-0.44507, 0.050832, -1.1466]
+        + t @ [-0.1119, -0.000411, -0.1490] * v
+        + t @ [-0.012101, -0.0036456, -0.01255] * v**2
+        + t @ [-0.0005, -0.0003505, -0.00029076] * v**3
+    )
+    f2 = (
+        t @ [1.9222, -0.57473, -1.2918]
+        + t @ [-0.0668, -0.1201, -0.22574] * v
+        + t @ [-0.0013375, -0.0068988, -0.01137] * v**2
+    )
+    f3 = (
+        t @ [1.268, -0.01396, -0.23566]
+        + t @ [0.198, 0.092, -0.06418] * v
+        + t @ [0.02232, 0.02238, -0.009853] * v**2
+        + t @ [0.0008585, 0.001318, -0.00053] * v**3
+    )
+    f4 = (
+        t @ [-0.010703, 0.073776, -0.34742]
+        + t @ [0.03345, 0.04543, -0.09056] * v
+        + t @ [0.0018574, 0.004456, -0.006257] * v**2
+    )
+    # At contact ln s is -∞: a gap so small that the force is the one there.
+    s = np.log(np.maximum(gaps, 1e-9 * radius) / 2.0 / sqrt(volume / radius))
+    apart = np.where(gaps > 0.0, np.exp(f3 * s + f4 * s**2), 0.0)
+    return 2.0 * pi * radius * np.exp(f1 - f2 * apart)
+
+
+def rupture(radius_1: float, radius_2: float, volume: float, contact_angle: float) -> float:
+    """Willett et al. (2000), Eq. 15, for equal spheres: (1 + θ/2) (V^(1/3) + 0.1 V^(2/3) / R), m."""
+    radius = derjaguin_radius(radius_1, radius_2)
+    return (1.0 + 0.5 * contact_angle) * (cbrt(volume) + 0.1 * cbrt(volume) ** 2 / radius)
+
+
+def law(surfaces: Surfaces) -> Curve:
+    """Willett et al.'s pull (their appendix) and rupture (their Eq. 15), and Reynolds' resistances."""
+    bridge = (surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle)
+    return reynolds.curve(surfaces, lambda gaps: pull(*bridge, gaps), rupture(*bridge))

@@ -1,0 +1,132 @@
+"""The reports of docs/engine-reports: each deck shows its defect on the installed engine, with its page's number."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from walkers.templates.engine import ALONE
+
+REPORTS = Path(__file__).resolve().parents[1] / "docs" / "engine-reports"
+DEFAULT_PAGE = ("-var", "page", "100000", "-var", "one", "2000")
+_RESULT = re.compile(r"^RESULT (.*)", re.MULTILINE)
+_NUMBER = re.compile(r": (-?\d\S*?)(?=,|\s|$)")
+_LOOP_TIME = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
+
+
+@pytest.fixture
+def decks(tmp_path: Path) -> Path:
+    """The decks, where their output may be written."""
+    for file in (*REPORTS.glob("*.lig"), *REPORTS.glob("*.stl")):
+        shutil.copy(file, tmp_path)
+    return tmp_path
+
+
+def run(folder: Path, name: str, *options: str, buffered: bool = False) -> subprocess.CompletedProcess[str]:
+    """Run a deck with the engine as it is packaged: without a contact model of ours."""
+    environment = {name: value for name, value in os.environ.items() if name != "LD_PRELOAD"} | ALONE
+    lines = () if buffered else ("stdbuf", "-oL")
+    command = [*lines, "liggghts", "-log", "none", *options, "-in", f"{name}.lig"]
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, errors="replace", timeout=60, check=False
+    )
+
+
+def results(folder: Path, name: str, *options: str) -> list[float]:
+    """The numbers of the lines that a deck prints as results."""
+    done = run(folder, name, *options)
+    assert done.returncode == 0, done.stdout[-500:]
+    return [float(number) for line in _RESULT.findall(done.stdout) for number in _NUMBER.findall(line)]
+
+
+# Deck, options, and each number that it prints: what the formula says, what the engine gives.
+NUMBERS = [
+    ("coulomb-limit", (), [(0.5, 0.5), (1.0, 1.140)]),
+    ("coulomb-limit", ("-var", "e", "0.3"), [(0.3, 0.3), (1.0, 1.358)]),
+    ("wall-takes-a-strangers-velocity", (), [(1.0, -2.0), (1.0, 0.0)]),
+    ("contact-angle", (), [(30.0, 7.854)]),
+    ("page-second-run", (), [(1.0, 0.0)]),
+    ("page-second-run", DEFAULT_PAGE, [(1.0, 1.0)]),
+    ("page-write-restart", (), [(1.0, 1.0), (1.0, 0.0)]),
+    ("page-write-restart", DEFAULT_PAGE, [(1.0, 1.0), (1.0, 1.0)]),
+    ("delete-atoms", (), [(1.0, 0.0)]),
+    ("delete-atoms", ("-var", "compress", "no"), [(1.0, 1.0)]),
+    ("washino-wall", (), [(1.0, 1.0), (1.0, 0.0)]),
+    ("wall-is-a-sphere", (), [(1.0, 0.435), (1.0, 0.25)]),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "numbers"), NUMBERS, ids=lambda value: value if isinstance(value, str) else ""
+)
+def test_deck_gives_the_number_of_its_report(
+    decks: Path, name: str, options: tuple[str, ...], numbers: list[tuple[float, float]]
+) -> None:
+    measured = results(decks, name, *options)
+    assert len(measured) == len(numbers)
+    for value, (expected, stated) in zip(measured, numbers, strict=True):
+        assert value == pytest.approx(stated, rel=3e-3, abs=1e-6)
+        assert expected == stated or abs(value - expected) > 0.1 * abs(expected)
+
+
+def test_liquid_content_of_1_is_not_1_per_cent(decks: Path) -> None:
+    rupture, expected, ratio = (
+        float(number) for number in re.findall(r": (\d\S*)", _RESULT.findall(run(decks, "liquid-content").stdout)[0])
+    )
+    assert expected == pytest.approx(88.85e-6, rel=1e-3)
+    assert rupture == pytest.approx(412.4e-6, rel=1e-3)
+    assert ratio == pytest.approx(100.0 ** (1.0 / 3.0), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [("primitive-wall-reads-before-the-array", ()), ("screen-none", ("-screen", "none"))],
+    ids=["primitive", "screen"],
+)
+def test_deck_crashes(decks: Path, name: str, options: tuple[str, ...]) -> None:
+    # A shell between would give 128 more than the signal instead.
+    assert run(decks, name, *options).returncode in {-signal.SIGSEGV, 128 + signal.SIGSEGV}
+
+
+def test_mesh_is_read_where_there_is_a_screen(decks: Path) -> None:
+    done = run(decks, "screen-none")
+    assert done.returncode == 0
+    assert _RESULT.findall(done.stdout) == ["reached the end"]
+
+
+def test_binary_local_dump_has_a_byte_of_a_row(decks: Path) -> None:
+    assert run(decks, "dump-local-binary").returncode == 0
+    text, binary = ((decks / f"dump-local.{suffix}").read_bytes() for suffix in ("txt", "bin"))
+    header = text[: text.index(b"\n", text.index(b"ITEM: ENTRIES")) + 1]
+    assert len(text[len(header) :].split()) == 3
+    assert binary.startswith(header)
+    assert len(binary) - len(header) == 1
+
+
+def test_abort_loses_its_message(decks: Path) -> None:
+    name, message = "abort-loses-its-message", "ERROR on proc 0: Cannot open gzipped file"
+    lost, told = run(decks, name, buffered=True), run(decks, name)
+    assert lost.returncode == told.returncode == 1
+    assert message in told.stdout
+    assert message not in lost.stdout + lost.stderr
+
+
+def test_mesh_clears_a_page_in_every_step(decks: Path) -> None:
+    """Times of a busy machine: the least of some runs, far above 1 where the report has 3."""
+    times = [[float(time) for time in _LOOP_TIME.findall(run(decks, "mesh-page").stdout)] for _ in range(3)]
+    default, small = (min(column) for column in zip(*times, strict=True))
+    assert default > 1.5 * small
+
+
+def test_every_deck_is_in_a_report_and_run_here() -> None:
+    decks = {deck.stem for deck in REPORTS.glob("*.lig")}
+    reports = "".join(page.read_text("utf-8") for page in REPORTS.glob("*.md"))
+    assert all(f"({deck}.lig)" in reports for deck in decks)
+    here = Path(__file__).read_text("utf-8")
+    assert all(f'"{deck}"' in here for deck in decks)

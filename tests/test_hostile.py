@@ -1,0 +1,175 @@
+"""A user's texts in other languages: what a template makes of them is the same program, page and deck."""
+
+import ast
+import json
+import shutil
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import pytest
+
+from tests.conftest import SHORT, call, document, make_case
+from tests.hostile import HOSTILE
+from walkers.archive.writing import write_archive
+from walkers.inputs import resolve_case
+from walkers.inputs.case import Case
+from walkers.inputs.text import rendered
+from walkers.postprocess import read_motion
+from walkers.postprocess.analysis import current_result
+from walkers.postprocess.drawing import new_figure, plain_text, save_figure
+from walkers.postprocess.paraview_script import _script
+from walkers.postprocess.report.run import result_html
+from walkers.runner.directory import CASE_NAME, case_of
+from walkers.runner.files import write_json
+from walkers.runner.manifest import record_tables
+from walkers.templates.deck import render_deck
+
+EACH = pytest.mark.parametrize("name", HOSTILE)
+
+
+class _Tags(HTMLParser):
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, tuple[str, ...]]] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, tuple(name for name, _ in attrs)))
+
+    def handle_comment(self, data: str) -> None:
+        self.found.append(("comment", ()))
+
+
+def _tags(page: str) -> list[tuple[str, tuple[str, ...]]]:
+    """Tags of a page with the names of their attributes: no text of anybody's may add one."""
+    return _Tags(page).found
+
+
+def _with_texts(case: Case, text: str) -> Case:
+    """The case as somebody could hand it over: each text of it another."""
+    return replace(
+        case,
+        name=text,
+        title=text,
+        material=text,
+        liquid=replace(case.liquid, name=text),
+        boundary=replace(case.boundary, material=text),
+    )
+
+
+@pytest.fixture
+def stranger(run_directory: Callable[..., Path], tmp_path: Path) -> Callable[[str], Path]:
+    """A run directory whose case has a text everywhere, and a manifest that says so."""
+    given = run_directory(run=SHORT)
+
+    def made(text: str) -> Path:
+        place = tmp_path / given.name
+        shutil.rmtree(place, ignore_errors=True)
+        shutil.copytree(given, place)
+        write_json(place / CASE_NAME, _with_texts(case_of(given), text).as_dict())
+        record_tables(place, [CASE_NAME])
+        return place
+
+    return made
+
+
+@EACH
+def test_a_title_is_no_line_of_a_deck(name: str) -> None:
+    tables = document(run=SHORT, beads={"density": "4 g/cm^3"})
+    plain, text = resolve_case(tables, name="plain"), HOSTILE[name]
+    odd = _with_texts(resolve_case({**tables, "title": text}, name=text), text)
+    decks = [render_deck(case) for case in (plain, odd)]
+    assert (decks[1].text, decks[1].files) == (decks[0].text, decks[0].files)
+
+
+@EACH
+def test_a_title_is_no_line_of_a_script_for_paraview(name: str, run_directory: Callable[..., Path]) -> None:
+    motion, folder = read_motion(run_directory(run=SHORT)).driven, Path(f"/{HOSTILE[name]}")
+    plain, odd = (
+        _script(replace(motion, case=replace(motion.case, title=title)), "walker", folder)
+        for title in ("plain", HOSTILE[name])
+    )
+    assert ast.dump(ast.parse(odd)) == ast.dump(ast.parse(plain))
+    (folder_line,) = [line for line in odd.splitlines() if line.startswith("folder = ")]
+    assert ast.literal_eval(folder_line.partition(" else ")[2]) == str(folder)
+
+
+def test_a_script_for_paraview_runs_nothing_of_a_title(in_folder: Path, stranger: Callable[[str], Path]) -> None:
+    call("paraview", str(stranger(HOSTILE["three double quotes"])), "--to", "shown", check=True)
+    script = (in_folder / "shown" / "show.py").read_text("utf-8")
+    exec(compile(script.partition("import os")[0], "head", "exec"), {})
+    assert not (in_folder / "pwned").exists()
+
+
+@EACH
+def test_a_result_in_a_notebook_has_the_tags_of_any_other(name: str, stranger: Callable[[str], Path]) -> None:
+    pages = [result_html(place, current_result(place)) for place in map(stranger, ("plain", HOSTILE[name]))]
+    assert _tags(pages[1]) == _tags(pages[0])
+
+
+@pytest.mark.parametrize("name", ["script", "newline", "shell", "quotes", "no ASCII", "variable of a shell"])
+def test_an_archive_of_a_stranger_is_a_page_and_json_and_holds_what_it_lists(
+    name: str, stranger: Callable[[str], Path], tmp_path: Path
+) -> None:
+    pages = []
+    for text in ("plain", HOSTILE[name]):
+        place = stranger(text)
+        manifest = json.loads((place / "manifest.json").read_text())
+        manifest |= {"platform": text, "engine": {**manifest["engine"], "sha256": text}}
+        write_json(place / "manifest.json", manifest)
+        path = write_archive(place, tmp_path / "archive.zip")
+        with zipfile.ZipFile(path) as archive:
+            pages.append(archive.read("ro-crate-preview.html").decode())
+            json.loads(archive.read("ro-crate-metadata.json"))
+            listed = archive.read("sha256sums.txt").decode().split("\n")[:-1]
+            assert {line.partition("  ")[2] for line in listed} <= set(archive.namelist())
+        call("verify", str(path), check=True)
+    assert _tags(pages[1]) == _tags(pages[0])
+
+
+@EACH
+def test_a_figure_is_xml_and_shows_a_text_as_it_is(name: str, tmp_path: Path) -> None:
+    figure, _ = new_figure(3.0, 2.0)
+    figure.suptitle(plain_text(HOSTILE[name][:2000]))
+    (path,) = save_figure(figure, tmp_path / "figure", [], ["svg"], HOSTILE[name])
+    ElementTree.parse(path)
+
+
+@EACH
+def test_a_calibrations_title_is_no_line_of_its_report(name: str) -> None:
+    def told(text: str) -> str:
+        file = SimpleNamespace(title=text)
+        row = SimpleNamespace(
+            title=text, value=1.0, deviation=0.1, unit="", engine=1.0, low=None, emulator=1.0, error=0.1, agrees=True,
+            held_out={text: (1.0, 0.1)},
+        )  # fmt: skip
+        one = SimpleNamespace(label=text, best=1.0, interval=(0.0, 1.0, 2.0), low=0.0, high=1.0, words="")
+        return rendered(
+            "walkers.calibration",
+            "report.md.j2",
+            calibration=SimpleNamespace(file=file, name=text),
+            rows=[row], parameters=[one], trials=[text], discrepancies={text: (0.0, 1.0, 2.0)}, chains={},
+            agree=1, sets=1, narrow=0.5, samples=1, inside=1.0, checked=1, made=1.0, expected=1.0, limits=(1.0, 1.0),
+        )  # fmt: skip
+
+    plain, odd = told("plain").split("\n"), told(HOSTILE[name])
+    assert "\r" not in odd
+    assert len(odd.split("\n")) == len(plain)
+    for one, other in zip(odd.split("\n"), plain, strict=True):
+        assert one.replace("\\|", "").count("|") == other.count("|")
+        assert "<" not in one.replace("\\<", "")
+
+
+@EACH
+def test_a_summary_of_a_case_has_no_line_of_its_title(name: str) -> None:
+    from walkers.runner.summary import describe, summarise
+
+    case = make_case(run=SHORT)
+    plain, odd = (describe(summarise(replace(case, title=title))) for title in ("plain", HOSTILE[name]))
+    assert len(odd.splitlines()) == len(plain.splitlines())
+    assert all(line.isprintable() for line in odd.split("\n"))
