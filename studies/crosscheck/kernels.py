@@ -117,8 +117,9 @@ class Pairs(NamedTuple):
 class Meeting(NamedTuple):
     """How two surfaces meet: number of the bridge, gap, reduced radius and mass, friction, normal, and velocities.
 
-    ``order`` is -1 where the first is the larger bead, for which a law's coupling has the other sign; ``apart`` is that of the centres along the normal, ``slide`` that of the surfaces along each other (m/s), ``turn``
-    the difference of the spins (rad/s).
+    ``order`` is -1 where the first is the larger bead, for which a law's coupling has the other sign; ``apart`` is the
+    velocity of the centres along the normal, ``slide`` that of the surfaces along each other (m/s), ``turn`` the
+    difference of the spins (rad/s).
     """
 
     bridge: int
