@@ -182,7 +182,7 @@ def restart_lines(bench: Bench) -> Iterator[Line]:
     case = full_case()
     beads = [over(FLOOR, -_DEEP, R, (0.002, 0.001, 0.0), _STILL), *pair(-_DEEP, 0.001, (0.001, -0.002, 0.001))]
     gone = replace(over(FLOOR, -_DEEP, S, _WAY), centre=(3e-3, 0.0, S - _DEEP))
-    scene = bench_scene([*beads, gone, *(_moved(bead, 3e-3) for bead in pair(-_DEEP, 0.04, _STILL))])
+    scene = bench_scene([*beads, gone, *(_moved(bead, 0.0, 3e-3) for bead in pair(-_DEEP, 0.04, _STILL))])
     whole = bench.run(prescribed(case, scene, 1000))
     first = prescribed(case, scene, 500, checkpoint=Checkpoint(write="half.restart"))
     carry = bench.run(first).directory / "half.restart"
@@ -195,9 +195,12 @@ def restart_lines(bench: Bench) -> Iterator[Line]:
             yield Line(f"{what} after a restart beside one without", 0.0, error, EQUAL)
 
 
-def _moved(bead: Bead, along: float) -> Bead:
-    x, y, z = bead.centre
-    return replace(bead, centre=(x, y + along, z))
+def _moved(bead: Bead, x: float, y: float, speed: float = 0.0) -> Bead:
+    """A bead elsewhere (m), so much faster along x (m/s)."""
+    place, velocity = bead.centre, bead.velocity
+    return replace(
+        bead, centre=(place[0] + x, place[1] + y, place[2]), velocity=(velocity[0] + speed, velocity[1], velocity[2])
+    )
 
 
 def rank_lines(bench: Bench) -> Iterator[Line]:
@@ -205,7 +208,12 @@ def rank_lines(bench: Bench) -> Iterator[Line]:
     if shutil.which("mpirun") is None:
         yield Line("two MPI ranks: no mpirun on this machine", nan, nan, 0.0, unmeasured=Verdict.SKIPPED)
         return
-    case, scene = full_case(), bench_scene([*_CLIMBING, *(_moved(bead, -3e-3) for bead in pair(-_DEEP, 0.04, _WAY))])
+    # The engine takes a pair the other way round where it has crossed from one rank to the other.
+    first, last = pair(-_DEEP, 0.01, _STILL)
+    crossing = [
+        _moved(bead, 2.6e-3, y, 0.9) for y, beads in ((0.0, (first, last)), (2e-3, (last, first))) for bead in beads
+    ]
+    case, scene = full_case(), bench_scene([*_CLIMBING, *crossing])
     one, two = (bench.run(prescribed(case, scene, 1000, ranks=ranks)) for ranks in (1, 2))
     yield Line("forces on two MPI ranks beside one", 0.0, farthest(two.force, one.force), 1e-9)
     yield Line("torques on two MPI ranks beside one", 0.0, farthest(two.torque, one.torque), 1e-9)

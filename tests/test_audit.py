@@ -91,6 +91,7 @@ WRONG = {
     "a spring stiffer by 1e-4": ("8. * shear_modulus_", "8.001 * shear_modulus_"),
     "a limit that leaves out the damping": ("if (damped > limit) hold = limit / damped * hold;", ""),
     "a rupture later by 1 %": ("if (gap < table->rupture) return", "if (gap < 1.01 * table->rupture) return"),
+    "the coupling's order": ("if (history[TABLE] < 0.) f[bridge::COUPLING] = -f[bridge::COUPLING];", ""),
     "walls at rest": ("vec(atom->v[i]) - vec(velocity);", "vec(atom->v[i]) - 0. * vec(velocity);"),
     "the damping": ("0.91287092917527685576", "0.913"),
 }
