@@ -100,10 +100,6 @@ bench-starts: setup ## Start 5,000 engines, eight at a time, and count those tha
 bench-sweeps: setup ## Measure what docs/explanation/performance.md states of sweeps
 	.venv/bin/python tests/benchmark_sweeps.py
 
-.PHONY: bench-piles
-bench-piles: setup ## Measure what docs/explanation/performance.md states of piles
-	.venv/bin/python tests/benchmark_piles.py
-
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/api docs/reference/generated

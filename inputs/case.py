@@ -20,8 +20,20 @@ from walkers.inputs.drive import AXES, Drive, Vector
 from walkers.inputs.origins import Origin, origins_of
 from walkers.physics.matter import Contact, Liquid
 
+_SILENCE = 600.0
+"""s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds."""
+_SLOWEST_STEP = 4e-5
+"""s a bead: thirty times what a step takes of two beads alone, a hundred times what it takes of a bead in a pile."""
+_LOG_BYTES = 64e6
+"""Walkers write some 50 kB, a segment of a pile as much."""
+_LOG_BYTES_PER_CYCLE = 1e4
+"""A cycle has some 500."""
 FIRST_ATTEMPTS = (12, 24)
 """Cycles after which it is asked whether walkers are steady. After 36 hardly any are that were not after 24."""
+
+
+BOUNDS = ("silence", "log_limit")
+"""Of `Run`: upon these depends whether a run ends, not what it gives."""
 
 
 def settling_of(cycles: int) -> int:
@@ -56,6 +68,9 @@ class Run:
         of walkers, which stand from the first, 0 s.
     ranks
         MPI processes.
+    silence, log_limit
+        An engine is ended that writes nothing for so long (s), or a log of so many bytes; None: as `longest_silence`
+        and `most_log` say.
     """
 
     time_step: float
@@ -70,6 +85,8 @@ class Run:
     settled_below: float
     longest_settling: float
     ranks: int
+    silence: float | None = None
+    log_limit: float | None = None
 
     @property
     def period(self) -> float:
@@ -104,6 +121,18 @@ class Run:
         settling = settling_of(cycles)
         return replace(self, cycles=cycles, settling_cycles=settling, until_steady=False, cycles_per_segment=cycles)
 
+    def longest_silence(self, beads: int) -> float:
+        """How long an engine with so many beads may write nothing, neither into its log nor into its dump, s."""
+        if self.silence is not None:
+            return self.silence
+        # It writes once a sample, and several times a cycle.
+        return max(_SILENCE, min(self.steps_per_sample, self.steps_per_cycle) * beads * _SLOWEST_STEP)
+
+    @property
+    def most_log(self) -> float:
+        """How large the engine's log may become, bytes."""
+        return self.log_limit or max(_LOG_BYTES, self.cycles * _LOG_BYTES_PER_CYCLE)
+
     @property
     def rests(self) -> bool:
         """Whether the beads rest before the drive."""
@@ -122,7 +151,7 @@ class Case:
     Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²). ``seed`` is that of all that is drawn at
     the start. ``name``, ``title``, ``document`` (the tables that it was read from), ``recorded`` (the `origins` that
     were written down with a run) and ``fingerprint`` (of what these two tell of) do not determine the run: they stay
-    out of `determinants`, the last three out of comparisons too.
+    out of `determinants`, the last three out of comparisons too; so do the `BOUNDS` of the run.
 
     Raises
     ------
@@ -281,8 +310,8 @@ class Case:
 
     def determinants(self) -> dict[str, Any]:
         """Everything that the run's outcome depends on, as plain JSON types."""
-        left_out = {"name", "title", "document", "recorded", "fingerprint"}
-        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=left_out)
+        left_out = dict.fromkeys(("name", "title", "document", "recorded", "fingerprint"), True)
+        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude={**left_out, "run": set(BOUNDS)})
         return values
 
     def as_dict(self) -> dict[str, Any]:

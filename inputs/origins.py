@@ -208,7 +208,7 @@ def _default_text(table: BaseModel, name: str) -> str | None:
 
 def _derived(case: Case, file: CaseFile) -> Iterator[Origin]:
     """What a case's own words leave to follow from others."""
-    from walkers.inputs.units import ACCELERATION, ANGLE, DURATION, LENGTH, TIME, quantity_text
+    from walkers.inputs.units import ACCELERATION, ANGLE, DURATION, FILE_SIZE, LENGTH, TIME, quantity_text
 
     def derived(key: str, text: str, source: str) -> Origin:
         return Origin(key, text, "derived", source)
@@ -234,6 +234,11 @@ def _derived(case: Case, file: CaseFile) -> Iterator[Origin]:
     most = f"until steady, at most {run.cycles}" if run.until_steady else str(run.cycles)
     yield derived(
         "run.cycles", most, "from the duration" if file.run.duration else "walkers are looked at after 12 and 24"
+    )
+    silence = quantity_text(run.longest_silence(case.count), DURATION)
+    yield derived("run.silence", silence, "an engine that writes nothing for so long is ended")
+    yield derived(
+        "run.log_limit", quantity_text(run.most_log, FILE_SIZE), "an engine that writes a longer log is ended"
     )
     yield derived("run.settling_cycles", str(run.settling_cycles), "a third of the cycles, at most 20")
     often = str(run.samples_per_cycle) if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"

@@ -8,6 +8,7 @@ from math import isclose, pi
 from typing import Any
 
 from walkers.inputs import units
+from walkers.inputs.case import BOUNDS
 from walkers.inputs.units import Kind
 
 READABLE_UNITS: Mapping[str, tuple[str, float]] = {
@@ -63,7 +64,9 @@ _GIVEN_BY: Mapping[str, tuple[str, ...]] = {
 _RATIOS = {"liquid.bridge_viscosity": "liquid.viscosity_ratio", "liquid.film_viscosity": "liquid.film_drag_ratio"}
 """What the laws take is the liquid's viscosity times these."""
 _NOT_COMPARED = ("name", "title", "document", "recorded")
-"""What does not determine a run."""
+"""What does not determine a run, and …"""
+_BOUNDS = tuple(f"run.{bound}" for bound in BOUNDS)
+"""… what only says when it is ended."""
 
 
 class FlatCase(dict[str, Any]):
@@ -94,7 +97,8 @@ def flattened(case: Mapping[str, Any]) -> FlatCase:
         ``liquid.bridge_viscosity`` and ``liquid.film_viscosity`` stand for the liquid's viscosity and its ratios where
         these were not recorded.
     """
-    flat = dict(dotted({key: value for key, value in case.items() if key not in _NOT_COMPARED}))
+    compared = {key: value for key, value in case.items() if key not in _NOT_COMPARED}
+    flat = {key: value for key, value in dotted(compared) if key not in _BOUNDS}
     for listed, alone in _SOLE.items():
         if not any(key.startswith(listed.replace("0", "1")) for key in flat):
             flat = {alone + key.removeprefix(listed) if key.startswith(listed) else key: flat[key] for key in flat}

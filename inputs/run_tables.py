@@ -133,6 +133,8 @@ def resolve_run(table: RunTable, case: Case) -> Run:
         settled_below=table.settled_below,
         longest_settling=rest,
         ranks=table.ranks,
+        silence=table.silence,
+        log_limit=table.log_limit,
     )
 
 

@@ -36,7 +36,7 @@ from walkers.inputs.axes import (
     written,
     zipped,
 )
-from walkers.inputs.case import Case
+from walkers.inputs.case import BOUNDS, Case
 from walkers.inputs.changes import changed, check_key
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.kinds import check_kind
@@ -47,6 +47,8 @@ from walkers.inputs.units import Speed
 
 _SHIPPED = Path(__file__).parent / "sweeps"
 _LONGEST_NAME = 120
+_SAME_RUN = ("title", *(f"run.{bound}" for bound in BOUNDS))
+"""Keys that do not determine a run."""
 
 
 class _Table(BaseModel):
@@ -230,8 +232,9 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         settings = flatten(file.set, lambda _: False)
         given = read_toml(base)
         for key in (*settings, *keys):
-            if key == "title" and key in keys:
-                raise UnusableAxisError(key, None, "does not vary: points with other titles alone are the same run")
+            if key in _SAME_RUN and key in keys:
+                told = f"does not vary: points with another {key} alone are the same run"
+                raise UnusableAxisError(key, None, told)
             check_key(key)
         tables = changed(given, settings)
         changed(tables, dict(zip(keys, rows[0], strict=True)))

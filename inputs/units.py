@@ -40,6 +40,7 @@ _USUAL: Mapping[str, tuple[str, float]] = {
     **{"N/m": ("N/m", 1.0), "mN/m": ("N/m", 1e-3)},
     **{"m^2/s": ("m^2/s", 1.0), "m²/s": ("m^2/s", 1.0), "mm^2/s": ("m^2/s", 1e-6), "mm²/s": ("m^2/s", 1e-6)},
     **{"Pa*s": ("Pa*s", 1.0), "mPa*s": ("Pa*s", 1e-3)},
+    **{"kB": ("byte", 1e3), "MB": ("byte", 1e6), "GB": ("byte", 1e9)},
     **{"Pa": ("Pa", 1.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9)},
 }
 """What the usual units are in SI units, as pint has them too: a case that has no others need not wait for pint."""
@@ -137,6 +138,8 @@ def si_units_by_pint(symbol: str, kind: Kind) -> float:
         raise ValueError(kind.expectation) from error
     if kind is ANGLE and str(unit) not in _ANGLE_UNITS:
         raise ValueError(kind.expectation)
+    if kind is FILE_SIZE and str(units.Quantity(1.0, unit).to_root_units().units) != "bit":
+        raise ValueError(kind.expectation)  # pint takes both bits and radians for pure numbers
     if kind is FREQUENCY and "radian" in str(units.Quantity(1.0, unit).to_root_units().units):
         raise ValueError(kind.expectation + " (cycles a second, not an angular frequency)")
     return factor
@@ -198,6 +201,7 @@ SURFACE_TENSION = Kind("surface tension", "N/m", "19.2 mN/m", 10.0, 1e-9)
 KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0)
 DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4)
 MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3)
+FILE_SIZE = Kind("size of a file", "byte", "64 MB", 1e15, 1.0)
 
 Length = Annotated[float, LENGTH, _validator(LENGTH, positive=True, zero=False)]
 Radius = Annotated[float, RADIUS, _validator(RADIUS, positive=True, zero=False)]
@@ -215,3 +219,4 @@ SurfaceTension = Annotated[float, SURFACE_TENSION, _validator(SURFACE_TENSION, p
 KinematicViscosity = Annotated[float, KINEMATIC_VISCOSITY, _validator(KINEMATIC_VISCOSITY, positive=True, zero=True)]
 DynamicViscosity = Annotated[float, DYNAMIC_VISCOSITY, _validator(DYNAMIC_VISCOSITY, positive=True, zero=True)]
 Modulus = Annotated[float, MODULUS, _validator(MODULUS, positive=True, zero=False)]
+FileSize = Annotated[float, FILE_SIZE, _validator(FILE_SIZE, positive=True, zero=False)]

@@ -6,9 +6,11 @@ user's own is named by where it is, ``package.module:function`` or ``path/to/fil
 
 from __future__ import annotations
 
+import hashlib
 import sys
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
+from inspect import getsourcefile
 from pathlib import Path
 from types import ModuleType
 
@@ -47,6 +49,20 @@ def by_name(name: str) -> BridgeLaw:
     if not callable(law):
         raise ValueError(f"bridge law {name!r}: {place} has no function {function}")
     return law  # type: ignore[no-any-return]
+
+
+def source_sha256(name: str) -> str | None:
+    """SHA-256 of the file that a user's own law is in; None of a law that comes with the program.
+
+    Raises
+    ------
+    ValueError
+        As for `by_name`.
+    """
+    if name in LAWS:
+        return None
+    file = getsourcefile(by_name(name))
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else None
 
 
 def law_of(liquid: Liquid) -> BridgeLaw:

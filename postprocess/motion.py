@@ -339,6 +339,8 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
     # In the laboratory frame the walls move, in the container's they rest.
     shift, speed = prescribed_motion(case.drive, time)
     lab = case.drive.frame == "lab"
+    if start:  # the frame at which the drive begins is the last one of the rest before it
+        speed[time == 0.0] = 0.0
     substrate, substrate_velocity = (shift, speed) if lab else boundary_motion(case.drive, time)
     return Motion(
         case=case,

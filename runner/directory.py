@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from walkers.inputs.case import Case
+from walkers.physics.laws import source_sha256
 from walkers.runner.binary import Engine
 from walkers.runner.failures import DiskFull, OutputGone
 from walkers.runner.files import fsync_path, read_json, settle, write_json
@@ -41,9 +42,12 @@ _LONGEST_NAME = 80
 def run_name(case: Case, engine: Engine) -> str:
     """Name of a run's directory: the case's name and 12 hex digits over resolved case, engine and the decks' version.
 
-    The wording of a deck is not among it: a comment in a template leaves the runs that are there.
+    The wording of a deck is not among it: a comment in a template leaves the runs that are there. The file of a law of
+    the user's own is.
     """
     determinants = {"case": case.determinants(), "deck": CONTENT_VERSION, "engine": engine.sha256, "format": FORMAT}
+    if own := source_sha256(case.liquid.law):
+        determinants["law"] = own
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
     return f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
 

@@ -104,6 +104,26 @@ class EngineKilled(EngineFailure):
         super().__init__(f"the engine was ended by {name}", directory)
 
 
+class EngineSilent(EngineFailure):
+    """The engine wrote nothing for too long, neither into its log nor into its dump, and was ended."""
+
+    def __init__(self, silence: float, step: int, steps: int, directory: Path) -> None:
+        super().__init__(
+            f"the engine wrote nothing for {silence:g} s (run.silence) after step {step} of {steps}, and was ended",
+            directory,
+        )
+
+
+class LogTooLong(EngineFailure):
+    """The engine's log grew beyond all that a deck has it write, and the engine was ended. The log is cut there."""
+
+    def __init__(self, limit: float, step: int, directory: Path) -> None:
+        super().__init__(
+            f"the engine's log grew beyond {limit / 1e6:g} MB (run.log_limit) after step {step}, and it was ended",
+            directory,
+        )
+
+
 class MissingFrames(EngineFailure):
     """The engine ended without complaint but its dump is short."""
 

@@ -114,7 +114,7 @@ def beside(path: Path) -> Iterator[Path]:
         yield new
         new.replace(path)
     except BaseException as error:
-        if isinstance(error, OSError) and error.filename is None:  # a disk that is full does not say which
+        if isinstance(error, OSError) and error.filename in (None, str(new)):  # a disk that is full does not say which
             error.filename = str(path)
         with suppress(OSError):
             new.unlink(missing_ok=True)

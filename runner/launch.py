@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from walkers.runner.binary import Engine, version_in
@@ -23,6 +24,8 @@ from walkers.runner.failures import (
     EngineError,
     EngineKilled,
     EngineNeverStarted,
+    EngineSilent,
+    LogTooLong,
     MissingFrames,
     OtherEngine,
     TimeLimitExceeded,
@@ -36,11 +39,20 @@ _POLL_SECONDS = 0.05
 _MORTAL = ("setpriv", "--pdeathsig", "KILL")
 # Whoever died before that was asked of the kernel is not noticed by it: then the parent is another one by now.
 _UNLESS_ORPHAN = ("sh", "-c", '[ "$PPID" = "$0" ] && exec "$@"')
+# Where there is but a loopback nobody reaches mpirun, which listens on every address that it sees, whatever it is told.
+_LOOPBACK_ALONE = ("sh", "-c", 'PATH="$PATH:/usr/sbin:/sbin" ip link set lo up && exec "$@"', "sh")
+_UNSHARED = (("unshare", "--net"), ("unshare", "--net", "--map-current-user", "--keep-caps"))
+"""For root, and for others."""
 _PAUSE_SECONDS = 0.2
 _GRACE_SECONDS = 2.0
+_LONGEST_LOOK = 1.0
+"""Between two looks no more than this counts as silence, in s: whoever was stopped meanwhile, as SLURM does with whole
+jobs, has heard nothing of an engine that was stopped too."""
 _CHUNK_BYTES = 1 << 20
 """Read of the engine's output at once; a line is shorter."""
 _SPARE_BYTES = 64 * 1024
+_TEMPORARY_BYTES = 16_000_000
+"""In TMPDIR, of mpirun and its processes: with 6 MB they wait for each other without end."""
 _STATUS_LINE = re.compile(rb"^ *(\d+) +(\d+) +(\S+)((?: +[-+.\w]+){6}) *$", re.MULTILINE)
 _ERROR_LINE = re.compile(rb"^.*\bERROR\b.*$", re.MULTILINE)
 _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
@@ -115,6 +127,9 @@ def launch(
         One of the failures of `walkers.runner.failures`; the engine and its children have ended by then.
     """
     check_room(directory, deck.layout.bead_dump_bytes)
+    temporary = Path(os.environ.get("TMPDIR", "/tmp"))
+    if deck.layout.ranks > 1 and temporary.is_dir():
+        check_room(temporary, _TEMPORARY_BYTES)
     plugin = plugin_of(engine)
     (directory / RUN_NAME).write_text(run_script(plugin, deck.layout.ranks), encoding="utf-8")
     for left in reversed(range(starts)):
@@ -153,6 +168,7 @@ def _launch_once(
     finally:
         if process is not None:
             _end(process)
+            watch.cut_log()
     wall_seconds = time.perf_counter() - begin
     watch.end()
     watch.check(None)
@@ -172,15 +188,13 @@ def _start(
     # Unless told otherwise mpirun refuses root, more ranks than cores, and binds all decks to the same cores.
     mortal = _MORTAL if shutil.which(_MORTAL[0]) else ()
     unless_orphan = (*_UNLESS_ORPHAN, str(os.getpid())) if mortal else ()
-    parallel = (
-        ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), *mortal]
-        if ranks > 1
-        else []
-    )
+    together = ("mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), *mortal)
+    parallel, apart = (together, _off_the_network()) if ranks > 1 else ((), ())
     loading = ("env", f"LD_PRELOAD={plugin}")
+    command = [*apart, *mortal, *unless_orphan, *parallel, *loading, str(engine.path), "-log", "none", "-in", DECK_NAME]
     with (directory / OUTPUT_NAME).open("wb") as output:
         return subprocess.Popen(
-            [*mortal, *unless_orphan, *parallel, *loading, str(engine.path), "-log", "none", "-in", DECK_NAME],
+            command,
             cwd=directory,
             env=_environment(ranks),
             stdin=subprocess.DEVNULL,
@@ -191,8 +205,26 @@ def _start(
         )
 
 
+@cache
+def _off_the_network() -> tuple[str, ...]:
+    """What starts a program where there is no network but the loopback; nothing where the system lets nobody do so."""
+    for unshared in _UNSHARED:
+        with suppress(OSError):
+            prefix = (*unshared, *_LOOPBACK_ALONE)
+            if not subprocess.run(
+                [*prefix, "true"], stdin=subprocess.DEVNULL, capture_output=True, check=False
+            ).returncode:
+                return prefix
+    return ()
+
+
 def _environment(ranks: int) -> dict[str, str]:
-    inherited = {name: value for name, value in os.environ.items() if name not in STEP_VARIABLES}
+    # What a user has Open MPI do on a cluster, such as by which network to meet, may leave no way on one machine.
+    inherited = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in STEP_VARIABLES and not name.startswith("OMPI_MCA_")
+    }
     return {**inherited, **(RANKS if ranks > 1 else ALONE)}
 
 
@@ -274,6 +306,9 @@ class _Watch:
         self.last_line = b""
         self._read = 0
         self._rest = b""
+        self._looked = begin
+        self._silent = 0.0
+        self._grown = 0
 
     @property
     def step(self) -> int:
@@ -286,15 +321,28 @@ class _Watch:
         return Progress(self.step, layout.steps, self.step * layout.time_step, elapsed, self.step)
 
     def look(self) -> None:
-        """Take in what the engine has written since the last look."""
-        with (self.directory / OUTPUT_NAME).open("rb") as output:
+        """Take in what the engine has written since the last look, as far as its log may go."""
+        with self._log.open("rb") as output:
             output.seek(self._read)
-            while chunk := output.read(_CHUNK_BYTES):
+            while self._read <= self.deck.log_limit and (chunk := output.read(_CHUNK_BYTES)):
                 self._read += len(chunk)
                 whole, newline, self._rest = (self._rest + chunk).rpartition(b"\n")
                 self._take_in(whole + newline)
                 if len(self._rest) > _CHUNK_BYTES:  # a line without end
                     self._rest = b""
+        self._listen()
+
+    def _listen(self) -> None:
+        """How long the engine has written nothing."""
+        now, grown = time.perf_counter(), self._read + self.written
+        self._silent = 0.0 if grown != self._grown else self._silent + min(now - self._looked, _LONGEST_LOOK)
+        self._looked, self._grown = now, grown
+
+    def cut_log(self) -> None:
+        """Cut a log that became too long before its engine had ended."""
+        with suppress(OSError):  # a folder that is gone
+            if self._log.stat().st_size > self.deck.log_limit:
+                os.truncate(self._log, int(self.deck.log_limit))
 
     def end(self) -> None:
         """Take in the last line, which may lack its end."""
@@ -338,12 +386,20 @@ class _Watch:
             raise OtherEngine(self.engine, self.version)
         if self.failure is not None:
             raise self.failure
+        if self._read > self.deck.log_limit:
+            raise LogTooLong(self.deck.log_limit, self.step, self.directory)
+        if self._silent > self.deck.silence:
+            raise EngineSilent(self.deck.silence, self.step, self.deck.layout.steps, self.directory)
         if time_limit is not None and time.perf_counter() - self.begin > time_limit:
             raise TimeLimitExceeded(time_limit, self.step, self.deck.layout.steps, self.directory)
         missing = self.deck.layout.bead_dump_bytes - self.written
         free = shutil.disk_usage(self.directory).free
         if missing > 0 and free < _SPARE_BYTES:
             raise DiskFull(missing, free, self.directory)
+
+    @property
+    def _log(self) -> Path:
+        return self.directory / OUTPUT_NAME
 
     @property
     def written(self) -> int:

@@ -110,15 +110,9 @@ class SweepProgress:
 
 
 _WORST_FIRST = (
-    *(
-        "EngineMissing",
-        "EngineDiffers",
-        "ProgramDiffers",
-        "DiskFull",
-        "OutputGone",
-        "EngineNeverStarted",
-    ),  # threaten all points
-    *("EngineError", "MissingFrames", "EngineKilled"),
+    # Threaten all points.
+    *("EngineMissing", "EngineDiffers", "ProgramDiffers", "DiskFull", "OutputGone", "EngineNeverStarted"),
+    *("EngineError", "MissingFrames", "EngineKilled", "EngineSilent", "LogTooLong"),
     "",  # what is not in this list
     *("BlowUp", "BeadsLost", "WalkersMet", "TimeLimitExceeded", "RunBusy"),
 )

@@ -58,7 +58,11 @@ _SCHEDULERS = {
 """Names of our own; the class names of Parsl's other providers are taken as they are."""
 
 
-_ODD = re.compile(r"[^\w./+@%=,:-]")
+_SHELL_TEXTS = ("scheduler_options", "worker_init", "launch_cmd", "interchange_launch_cmd", "regex_job_id")
+"""Settings of Parsl's that are lines or commands by what they are, and one that no shell sees."""
+# SLURM fills in what stands behind a per cent sign, and its jobs end at once where their output cannot go.
+_ODD = re.compile(r"[^\w./+@=,:-]")
+_TAKEN = "expected letters, digits and . _ / + @ = , : -"
 MOST = 10_000
 """Of anything that a site file counts."""
 
@@ -152,9 +156,27 @@ def _problems(file: SiteFile, document: Mapping[str, Any]) -> list[Problem]:
             if key not in known:
                 expected = f"unknown key; Parsl takes {', '.join(sorted(known))}{suggestion(key, known)}"
                 found.append(Problem(f"{table}.{key}", quoted(document, [table, key]), expected))
+    found += _odd_texts(document)
     if file.launcher is not None and file.launcher not in _launchers():
         expected = f"expected one of {', '.join(sorted(_launchers()))}"
         found.append(Problem("launcher", quoted(document, ["launcher"]), expected))
+    return found
+
+
+def _odd_texts(document: Mapping[str, Any]) -> list[Problem]:
+    """What a shell, or the scheduler's script, would take for more than a name: Parsl writes it there as it is."""
+    places = [["partition"], ["account"]]
+    places += [[table, key] for table in ("provider", "executor") for key in document.get(table, {})]
+    found = []
+    for place in places:
+        value: Any = document
+        for part in place:
+            value = value.get(part)
+        texts = [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, str)]
+        odd = next((odd for odd in map(_ODD.search, texts) if odd), None)
+        if odd and place[-1] not in _SHELL_TEXTS:
+            expected = f"{_TAKEN}, found {odd[0]!r}; [provider] scheduler_options takes whole lines of a script"
+            found.append(Problem(".".join(place), quoted(document, place), expected))
     return found
 
 
@@ -191,7 +213,7 @@ def check_path(folder: Path) -> None:
     """
     whole = str(folder.resolve())
     if odd := _ODD.search(whole):
-        told = f"with a site file expected letters, digits and . _ / + @ % = , : - in the path, found {odd[0]!r}"
+        told = f"with a site file {_TAKEN} in the path, found {odd[0]!r}"
         raise InputError("--out", [Problem("", None, f"{whole!r}: {told}")])
 
 
@@ -243,6 +265,8 @@ def pilots(site: Site, run_dir: Path) -> Config:
     provider = getattr(parsl.providers, name)(**(settings | _as_tuples(file.provider)))
     options: dict[str, Any] = {
         **({"launch_cmd": f"{file.container} {DEFAULT_LAUNCH_CMD}"} if file.container else {}),
+        # Whose pilots are on this machine has nobody to listen to elsewhere; Parsl listens to all who come.
+        **({"address": "127.0.0.1"} if name == "LocalProvider" else {}),
         "max_workers_per_node": site.workers_per_node,
         "heartbeat_period": 10,
         "heartbeat_threshold": 60,

@@ -95,7 +95,8 @@ def work(task: Task) -> Report:
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             return Report(failure=DiskFull.__name__, message=f"disk full: {error.filename or task.out}")
-        return Report(failure=type(error).__name__, message=str(error))
+        told = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+        return Report(failure=type(error).__name__, message=told)
     except WalkersError as error:
         return Report(failure=type(error).__name__, message=str(error))
 

@@ -67,6 +67,8 @@ class Deck:
         Lower and upper corner of the simulation box, m.
     fastest
         A speed that no bead can reach by the drive, gravity and the capillary forces alone, m/s.
+    silence, log_limit
+        How long the engine may write nothing, s, and how large its log may become, bytes.
     beyond_limits
         Whether the time step is beyond a limit, as a case may insist.
     """
@@ -76,6 +78,8 @@ class Deck:
     layout: Layout
     box: tuple[Vector, Vector]
     fastest: float
+    silence: float
+    log_limit: float
     beyond_limits: bool = False
 
 
@@ -318,7 +322,8 @@ def compose(plan: Plan) -> Deck:
         raise InputError(case.name, [Problem("liquid.law", case.liquid.law, str(error))]) from error
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
-    return Deck(text, files, layout, (scene.lower, scene.upper), fastest, beyond)
+    bounds = (case.run.longest_silence(len(scene.beads)), case.run.most_log)
+    return Deck(text, files, layout, (scene.lower, scene.upper), fastest, *bounds, beyond)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ ALONE = {
 RANKS = {"OMPI_MCA_btl": "self,vader", "OMPI_MCA_pml": "ob1", "OMPI_MCA_mpi_yield_when_idle": "1"}
 """Variables of the environment of an engine of several processes on one machine: they meet in its memory.
 
-`mpirun` itself still listens on the network; started so, two ranks take 0.7 of the time to start. Ranks that wait leave
+`mpirun` itself listens on the network that it sees (`walkers.runner.launch` leaves it the loopback); started so, two
+ranks take 0.7 of the time to start. Ranks that wait leave
 their core to others: beside four busy processes a pile took a quarter of the time.
 """

@@ -1,43 +1,94 @@
 """Measure what docs/explanation/performance.md states: ``make bench`` prints its tables.
 
-Seconds depend on the machine; the shares and ratios of one run are what counts.
+Seconds depend on the machine; the shares and ratios of one run are what counts. The decks of five cases as they were
+written for the stock engine's capillary model (tests/benchmark_decks.tar.xz) run in turn with today's, and each time
+the ratios are written beside those of the time before.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
+import tarfile
 import tempfile
 import time
-from collections.abc import Sequence
-from dataclasses import replace
-from math import sqrt
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
-from walkers import run as run_case
 from walkers.inputs import load_case
 from walkers.inputs.case import Case
 from walkers.runner import FinishedRun, find_engine
 from walkers.runner.directory import write_deck
 from walkers.runner.ensemble import finished_place
+from walkers.runner.plugin import plugin_of
 from walkers.sweeps.record import read_record
-from walkers.templates.deck import DECK_NAME, render_deck
+from walkers.templates.deck import DECK_NAME, Segment, render_deck
+from walkers.templates.engine import ALONE
 from walkers.theory.friction import Friction
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import friction_of
 
 _REPEATS = 3
+_STOCK_DECKS = Path(__file__).with_name("benchmark_decks.tar.xz")
+RATIOS = Path(__file__).with_name("benchmark_ratios.json")
+"""How many times faster today's decks are than those for the stock engine, as last measured."""
+Decks = Mapping[str, Callable[[], tuple[Case, Segment | None]]]
+DECKS: Decks = {
+    "walkers-6": lambda: (load_case("fig1b", {"run.cycles": 20}), None),
+    "walkers-96": lambda: (load_case("fig1b", {"dimers.replicates": 96, "run.cycles": 20}), None),
+    "climber": lambda: (load_case("climber", {"run.cycles": 60, "run.settling_cycles": 10}), None),
+    "pile-200": lambda: (load_case("pile-small"), Segment(0, 10_000, 0)),
+    "pile-1630": lambda: (load_case("pile-fig1a", {"run.ranks": 1}), Segment(0, 1_500, 0)),
+}
+"""Of the same cases and steps as the stock engine's decks; piles are shaken from where they were poured."""
 
 
 def _seconds(command: Sequence[str], folder: Path) -> float:
     begin = time.perf_counter()
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     return time.perf_counter() - begin
+
+
+def measure_decks(folder: Path) -> None:
+    """Time of a step in decks for the stock engine and in today's, in turn; minima of several."""
+    with tarfile.open(_STOCK_DECKS) as stored:
+        stored.extractall(folder / "stock", filter="data")
+    plugin, before = plugin_of(find_engine()), json.loads(RATIOS.read_text()) if RATIOS.exists() else {}
+    ratios: dict[str, float] = {}
+    print(
+        "| deck | stock engine, µs a step | today | bead-steps/s | times faster | before |\n|---|---|---|---|---|---|"
+    )
+    for name, made in DECKS.items():
+        case, segment = made()
+        deck = render_deck(case, segment)
+        (folder / name).mkdir()
+        write_deck(deck, folder / name)
+        pairs = [
+            (_loop(folder / "stock" / name, {}), _loop(folder / name, {"LD_PRELOAD": str(plugin)}))
+            for _ in range(_REPEATS)
+        ]
+        stock, today = (min(column) / deck.layout.steps for column in zip(*pairs, strict=True))
+        ratios[name] = round(stock / today, 2)
+        speed = deck.layout.atoms / today / 1e6
+        print(
+            f"| {name} | {stock * 1e6:.1f} | {today * 1e6:.1f} | {speed:.1f} M | {ratios[name]} | {before.get(name, '')} |"
+        )
+    RATIOS.write_text(json.dumps(ratios, indent=2) + "\n", encoding="utf-8")
+
+
+def _loop(folder: Path, environment: Mapping[str, str]) -> float:
+    """Time in the engine's loop of a deck, s."""
+    command = [str(find_engine().path), "-log", "none", "-in", DECK_NAME]
+    done = subprocess.run(
+        command, cwd=folder, env={**os.environ, **ALONE, **environment}, check=True, capture_output=True, text=True
+    )
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("Loop time of")]
+    return float(line.split()[3])
 
 
 def measure_program(folder: Path) -> None:
@@ -57,95 +108,6 @@ def measure_program(folder: Path) -> None:
     print(f"| `walkers run fig1b`, everything else | {min(overheads):.2f} |")
     for command in ("plot", "vtk", "render"):
         print(f"| `walkers {command} fig1b` | {_seconds([program, command, 'fig1b'], folder):.2f} |")
-
-
-def measure_steps(folder: Path) -> None:
-    """Cost of a step against the number of walkers in a deck, in both frames."""
-    print("\n| walkers in a deck | frame | µs a step | µs a step and walker |\n|---|---|---|---|")
-    for count in (1, 6, 24, 96):
-        frames: tuple[Literal["lab", "container"], ...] = ("lab", "container")
-        for frame in frames:
-            microseconds = _step_microseconds(_ensemble(count, frame), folder / "steps")
-            print(f"| {count} | {frame} | {microseconds:.2f} | {microseconds / count:.2f} |")
-
-
-def _ensemble(count: int, frame: Literal["lab", "container"] = "container") -> Case:
-    case = load_case("fig1b")
-    return replace(
-        case,
-        drive=replace(case.drive, frame=frame),
-        walkers=(replace(case.walkers[0], replicates=count),),
-        run=replace(case.run, cycles=20, settling_cycles=5, until_steady=False, cycles_per_segment=20),
-    )
-
-
-def _step_microseconds(case: Case, out: Path) -> float:
-    loops = [_engine_loop(run_case(case, out, force=True).directory) for _ in range(_REPEATS)]
-    return min(loops) / case.run.steps * 1e6
-
-
-_YADE = """
-import time
-from yade import *
-beads = O.materials.append(FrictMat(young={modulus}, poisson=0.23, density={density}, frictionAngle=0.3))
-O.bodies.append(utils.wall(0.0, axis=2, material=beads))
-for number in range({count}):
-    for x, radius in ((0.0, {large}), ({apart}, {small})):
-        O.bodies.append(utils.sphere((x, 0.03 * number, radius), radius, material=beads))
-O.engines = [
-    ForceResetter(),
-    InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], verletDist={small} / 2),
-    InteractionLoop(
-        [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
-        [Ip2_FrictMat_FrictMat_MindlinPhys(en=0.3)],
-        [Law2_ScGeom_MindlinPhys_Mindlin()],
-    ),
-    NewtonIntegrator(gravity=(0, 0, -9.81), damping=0),
-]
-O.dt = {time_step}
-O.run(1000, True)
-begin = time.perf_counter()
-O.run({steps}, True)
-print("MICROSECONDS", (time.perf_counter() - begin) / {steps} * 1e6)
-"""
-"""Dimers at rest without liquid, by another engine: what its contacts alone cost a step."""
-
-
-def measure_alternatives(folder: Path) -> None:
-    """Wall time of the engine a step and walker: one walker in a deck or many, by hand, and YADE if it is there."""
-    rows = []
-    for count in (1, 96):
-        case = _ensemble(count)
-        directory = run_case(case, folder / "alternatives", force=True).directory
-        wall = float(FinishedRun(directory).manifest["seconds"]["engine"])
-        rows.append((f"`walkers run`, {count} in a deck", wall / case.run.steps * 1e6 / count))
-        rows.append((f"the same deck by hand, {count}", _bare(case, folder / f"bare-{count}") / count))
-        if shutil.which("yade"):
-            rows.append((f"YADE, {count} dry dimers at rest", _yade(case, folder / f"yade-{count}.py", count) / count))
-    print("\n| engine | µs a step and walker |\n|---|---|")
-    for name, microseconds in rows:
-        print(f"| {name} | {microseconds:.2f} |")
-
-
-def _bare(case: Case, folder: Path) -> float:
-    """Wall time of a deck run by hand, start-up and all, µs a step."""
-    folder.mkdir()
-    write_deck(render_deck(case), folder)
-    with (folder / "out").open("wb") as out:
-        begin = time.perf_counter()
-        subprocess.run([str(find_engine().path), "-in", DECK_NAME], cwd=folder, stdout=out, check=True)
-        return (time.perf_counter() - begin) / case.run.steps * 1e6
-
-
-def _yade(case: Case, script: Path, count: int) -> float:
-    large, small = case.walkers[0].radii
-    values = {"modulus": case.contact.youngs_modulus, "density": case.density, "time_step": case.run.time_step}
-    apart = 2.0 * sqrt(large * small)
-    script.write_text(
-        _YADE.format(**values, large=large, small=small, apart=apart, count=count, steps=60_000 // count + 1000)
-    )
-    done = subprocess.run(["yade", "-n", "-x", "-j1", str(script)], capture_output=True, text=True, check=True)
-    return float(done.stdout.partition("MICROSECONDS")[2].split()[0])
 
 
 def measure_figures(folder: Path) -> None:
@@ -190,8 +152,7 @@ def main() -> None:
     """Print the tables."""
     with tempfile.TemporaryDirectory() as folder:
         measure_program(Path(folder))
-        measure_steps(Path(folder))
-        measure_alternatives(Path(folder))
+        measure_decks(Path(folder))
         measure_figures(Path(folder))
     measure_theory()
 

@@ -32,8 +32,12 @@ from tests.conftest import (
     wait_for_engines,
 )
 from walkers import run as run_case
+from walkers.inputs import load_case, resolve_case
 from walkers.inputs.case import Case
+from walkers.inputs.readable import differing, flattened
+from walkers.inputs.reading import read_toml, shipped_cases
 from walkers.runner import Engine, find_engine, open_run
+from walkers.runner.directory import run_name
 from walkers.runner.failures import (
     BeadsLost,
     BlowUp,
@@ -43,6 +47,8 @@ from walkers.runner.failures import (
     EngineFailure,
     EngineKilled,
     EngineMissing,
+    EngineSilent,
+    LogTooLong,
     MissingFrames,
     OtherEngine,
     TimeLimitExceeded,
@@ -254,6 +260,74 @@ def test_time_limit(tmp_path: Path) -> None:
     assert _remains(tmp_path)["reason"] == "TimeLimitExceeded"
 
 
+STRANGE_ENGINES = {
+    "says nothing": ("exec sleep 4711", EngineSilent, r"nothing for 0\.5 s \(run\.silence\) after step 0 of \d+"),
+    "and does not care for SIGTERM": ("trap '' TERM; while :; do sleep 0.1; done", EngineSilent, "nothing for"),
+    "stops saying anything": ("liggghts -log none -in walker.lig; exec sleep 4711", EngineSilent, r"step (\d+) of \1,"),
+    "writes a line without end": ("exec tr '\\0' x < /dev/zero", LogTooLong, r"beyond 2 MB \(run\.log_limit\)"),
+    "writes lines without end": ("exec yes", LogTooLong, "beyond 2 MB"),
+    "and does not mind SIGTERM": ("trap '' TERM; yes | tee -i /dev/null", LogTooLong, "beyond 2 MB"),
+    "ends after too long a log": ('yes | head -c 2100000; exec liggghts "$@"', LogTooLong, "beyond 2 MB"),
+}
+
+
+@pytest.mark.parametrize("name", STRANGE_ENGINES)
+def test_engines_that_say_nothing_or_too_much_are_ended(tmp_path: Path, name: str) -> None:
+    script, kind, told = STRANGE_ENGINES[name]
+    front = tmp_path / "front"
+    front.write_text(f"#!/bin/sh\n{script}\n")
+    front.chmod(0o755)
+    case = make_case(run={**SHORT, "silence": "0.5 s", "log_limit": "2 MB"})
+    with pytest.raises(kind, match=told):
+        run_case(case, tmp_path / "runs", engine=str(front), time_limit=PATIENCE)
+    assert not processes_in(tmp_path)
+    assert _remains(tmp_path / "runs")["reason"] == kind.__name__
+    (log,) = tmp_path.glob("runs/*/segments/*/engine.log")
+    assert log.stat().st_size <= 2_000_000
+
+
+def test_an_engine_that_writes_now_and_then_is_not_silent(tmp_path: Path) -> None:
+    """Five times a quarter of what would be silence."""
+    front = tmp_path / "front"
+    front.write_text('#!/bin/sh\nfor i in 1 2 3 4 5; do sleep 1; echo; done\nexec liggghts "$@"\n')
+    front.chmod(0o755)
+    run_case(make_case(run={**SHORT, "silence": "4 s"}), tmp_path / "runs", engine=str(front))
+
+
+def test_a_launcher_that_was_stopped_does_not_take_that_for_silence(tmp_path: Path) -> None:
+    """As a job is that SLURM suspends: launcher and engine stop, and go on together."""
+    (tmp_path / "long.toml").write_text(to_toml(document(run={**LONG, "silence": "3 s"})))
+    command = [PROGRAM, "run", "long.toml"]
+    program = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    try:
+        everybody = [program.pid, *wait_for_engines(tmp_path, program)]
+        for number in (signal.SIGSTOP, signal.SIGCONT):
+            for process in everybody:
+                os.kill(process, number)
+            time.sleep(4.0 if number == signal.SIGSTOP else 1.0)
+        assert program.poll() is None
+    finally:
+        program.terminate()
+        program.communicate(timeout=PATIENCE)
+
+
+def test_bounds_of_the_engine_are_no_matter_of_a_runs_name(tmp_path: Path) -> None:
+    """Nor a difference between runs; `walkers show` says them, and with slow decks they are larger."""
+    (tmp_path / "a.toml").write_text(to_toml(document(run=SHORT)))
+    (tmp_path / "b.toml").write_text(to_toml(document(run={**SHORT, "silence": "20 s", "log_limit": "5 MB"})))
+    usual, bounded = (load_case(tmp_path / f"{name}.toml").renamed("same") for name in "ab")
+    assert run_name(usual, find_engine()) == run_name(bounded, find_engine())
+    assert not differing([flattened(usual.as_dict()), flattened(bounded.as_dict())])
+    assert Case.from_dict(bounded.as_dict()).run == bounded.run
+    for name, told in (("a", ("600 s", "64 MB")), ("b", ("20 s", "5 MB"))):
+        shown = call("show", f"{name}.toml", folder=tmp_path, check=True).stdout
+        assert re.findall(r"^    (?:silence|log_limit) +(\S+ \S+)", shown, re.MULTILINE) == list(told)
+    slow = make_case(drive={"frequency": "0.01 Hz"}, run={**SHORT, "time_step": "1 us", "samples_per_cycle": 1})
+    assert slow.run.longest_silence(slow.count) > 20.0 * 2.7e-6 * slow.run.steps_per_cycle
+    long = make_case(run={"cycles": 600_000, "samples_per_cycle": 1})
+    assert long.run.most_log > 10.0 * 600_000 * 500.0
+
+
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
     """A file system of two megabytes."""
@@ -284,6 +358,112 @@ def test_a_disk_that_fills_up_during_the_run(small_disk: Path) -> None:
     filler.join()
     assert not list(small_disk.glob("runs/*/manifest.json"))
     assert not engines_in(small_disk)
+
+
+def _brief_pile(**run: object) -> Case:
+    """Settled and shaken for some hundredths of a second."""
+    tables = read_toml(shipped_cases()["pile-ci"])
+    tables["run"] = {
+        "duration": "0.03 s",
+        "time_step": "3 us",
+        "longest_settling": "0.02 s",
+        "segment": "0.01 s",
+        **run,
+    }
+    return resolve_case(tables, name="brief")
+
+
+def test_variables_of_open_mpi_that_a_user_has_set_do_not_matter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    variables = {
+        "btl": "tcp",
+        "pml": "cm",
+        "mtl": "nonsense",
+        "rmaps": "nonsense",
+        "oob": "nonsense",
+        "ess": "singleton",
+    }
+    for name, value in {**variables, "orte_default_hostfile": "/nonexistent"}.items():
+        monkeypatch.setenv(f"OMPI_MCA_{name}", value)
+    for case in (_brief_pile(ranks=2), make_case(run=SHORT)):
+        assert not run_case(case, tmp_path, time_limit=PATIENCE).cached
+
+
+def test_a_full_folder_of_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One process needs nothing there; mpirun would have its processes wait for each other without end."""
+    with mounted(tmp_path / "tmp", "2m") as place:
+        monkeypatch.setenv("TMPDIR", str(place))
+        assert not run_case(make_case(run=SHORT), tmp_path / "runs").cached
+        with pytest.raises(DiskFull, match=rf"disk full: 16 MB .* are free \(see {place}\)"):
+            run_case(_brief_pile(ranks=2), tmp_path / "runs", time_limit=PATIENCE)
+    monkeypatch.undo()
+    assert not run_case(_brief_pile(ranks=2), tmp_path / "runs", time_limit=PATIENCE).cached
+
+
+def _fill(place: Path) -> Path:
+    """Leave no byte on a file system; the file that takes them."""
+    with suppress(OSError), (place / "ballast").open("ab", buffering=0) as file:
+        while file.write(b"\0" * 4096):
+            pass
+    return place / "ballast"
+
+
+def test_a_pile_that_was_killed_goes_on_when_a_full_disk_has_room_again(tmp_path: Path) -> None:
+    """Nothing is lost, and the numbers are those of a pile that nobody stopped."""
+    case = _brief_pile(duration="0.1 s")
+    with mounted(tmp_path / "disk", "6m") as place:
+        child = os.fork()
+        if not child:
+            with suppress(BaseException):
+                run_case(case, place)
+            os._exit(0)
+        (whole,) = wait_for(lambda: list(place.glob("*.incomplete/segments/0001")))
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        wait_for(lambda: not engines_in(place))
+        node = (whole / "beads.bin").stat().st_ino
+        ballast = _fill(place)
+        with pytest.raises(DiskFull, match="disk full"):
+            run_case(case, place)
+        ballast.unlink()
+        done = run_case(case, place)
+        assert (done.directory / "segments" / "0001" / "beads.bin").stat().st_ino == node
+        assert done.result == run_case(case, tmp_path / "runs").result
+
+
+def test_a_sweep_on_a_disk_that_is_full_goes_on_when_there_is_room(tmp_path: Path) -> None:
+    """One that is full from the start, and one that an engine leaves full, for the tables; then none."""
+    (tmp_path / "base.toml").write_text(to_toml(document(run=SHORT)))
+    (tmp_path / "test.toml").write_text('case = "base.toml"\n[axes]\nrun.seed = [1, 2]\n')
+    front = tmp_path / "front"
+    with mounted(tmp_path / "disk", "2m") as place:
+        front.write_text(
+            f'#!/bin/sh\nliggghts "$@" || exit 1\n[ -e {place}/room ] || cat /dev/zero > {place}/ballast\n'
+        )
+        front.write_text(front.read_text() + "exit 0\n")
+        front.chmod(0o755)
+        sweep = ["sweep", "test.toml", "--out", str(place / "runs"), "--engine", str(front), "-j", "1"]
+        ballast = _fill(place)
+        told = [call(*sweep, folder=tmp_path)]
+        ballast.unlink()
+        told.append(call(*sweep, folder=tmp_path))
+        lines = [[line for line in done.stderr.splitlines() if "warning" not in line] for done in told]
+        assert [done.returncode for done in told] == [2, 1]
+        assert [len(one) for one in lines] == [1, 2]
+        assert "No space left on device" in lines[0][0]
+        assert all("disk full" in line and str(place) in line for line in lines[1]), lines
+        ballast.unlink()
+        (place / "room").touch()
+        assert "2 finished" in call(*sweep, folder=tmp_path, check=True).stdout
+        _fill(place)
+        done = call("table", str(place / "runs" / "test"), "--to", str(place / "table.csv"))
+        assert (done.returncode, done.stderr) == (2, f"walkers: {place}/table.csv: No space left on device\n")
+        subprocess.run(["mount", "-o", "remount,ro", str(place)], check=True)
+        for command in (["table", "runs/test", "--to", "table.csv"], ["plot", "runs/test"]):
+            done = call(*command, folder=place)
+            assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+            assert re.fullmatch(r"walkers: [\w/]+\.(csv|png): Read-only file system\n", done.stderr)
 
 
 def test_an_interrupt_while_the_engine_is_being_started_comes_after() -> None:

@@ -1,18 +1,32 @@
 """Site files: what is handed to Parsl, and what is said of one that makes no sense."""
 
+import json
 import os
 import signal
 import subprocess
 from contextlib import suppress
+from ipaddress import ip_address
 from pathlib import Path
 
 import psutil
 import pytest
 
-from tests.conftest import PATIENCE, PROGRAM, call, document, engines_in, to_toml, wait_for, wait_for_engines
+from tests.conftest import (
+    PATIENCE,
+    PROGRAM,
+    call,
+    document,
+    engines_in,
+    processes_in,
+    to_toml,
+    wait_for,
+    wait_for_engines,
+)
+from tests.hostile import HOSTILE
 from tests.test_sweeps import SLOW, TINY, contents_of
 from walkers.inputs import InputError
-from walkers.sweeps.site import load_site, pilots
+from walkers.runner.launch import _off_the_network
+from walkers.sweeps.site import check_path, load_site, pilots
 from walkers.sweeps.table import load
 
 SLURM = 'scheduler = "slurm"\ncores = 16\n'
@@ -84,6 +98,29 @@ def test_what_parsl_is_told(tmp_path: Path) -> None:
     assert not provider.exclusive
 
 
+# Of the last one SLURM makes something else: jobs end at once whose output goes to a folder that is not there.
+SHELL = {**HOSTILE, "variable of SLURM": "100%N"}
+
+
+@pytest.mark.parametrize("text", SHELL.values(), ids=SHELL)
+def test_texts_that_a_shell_would_take_for_more_are_refused_or_quoted(in_folder: Path, text: str) -> None:
+    """Settings and folder stand in scripts and commands of schedulers; names of modules are quoted there."""
+    for key in ("partition", "account", "provider.qos", "provider.clusters", "provider.gres", "executor.address"):
+        with pytest.raises(InputError, match=rf"site\.toml: {key} = .*: expected letters"):
+            _load(in_folder, SLURM + f"{key} = {json.dumps(text, ensure_ascii=False)}\n")
+    with pytest.raises(InputError, match=r"partition = .*: expected letters"):
+        _load(in_folder, f'scheduler = "grid-engine"\ncores = 2\npartition = {json.dumps(text, ensure_ascii=False)}\n')
+    with pytest.raises(InputError, match=r"--out: .* expected letters"):
+        check_path(in_folder / text)
+    (in_folder / "site.toml").write_text(SLURM + f"modules = [{json.dumps(text, ensure_ascii=False)}]\n")
+    script = pilots(load_site(in_folder / "site.toml"), in_folder / "parsl").executors[0].provider.worker_init
+    told = subprocess.run(
+        ["bash"], input=f"module() {{ printf '%s' \"$2\"; }}\n{script}", capture_output=True, text=True, check=True
+    )
+    assert told.stdout == text.replace("\r", "\n")  # as text is read
+    assert sorted(path.name for path in in_folder.iterdir()) == ["site.toml"]
+
+
 def test_workers_of_another_process_give_the_same(in_folder: Path) -> None:
     """Parsl's local provider: pilots without a scheduler."""
     (in_folder / "base.toml").write_text(to_toml(document(run=TINY)))
@@ -140,6 +177,56 @@ def _helpers(folder: Path) -> list[psutil.Process]:
             ):
                 found.append(process)
     return found
+
+
+def _reachable(processes: list[psutil.Process]) -> set[str]:
+    """What processes listen on, or take datagrams at, that others than this machine may reach."""
+    found = set()
+    for process in processes:
+        with suppress(psutil.Error, OSError):
+            devices = Path(f"/proc/{process.pid}/net/dev").read_text().splitlines()[2:]
+            if [line.split(":")[0].strip() for line in devices] == ["lo"]:
+                continue
+            for one in process.net_connections("inet"):
+                here = ip_address(one.laddr.ip.partition("%")[0].removeprefix("::ffff:")) if one.laddr else None
+                if here is not None and not here.is_loopback and not one.raddr:
+                    found.add(f"{process.name()} {one.type.name} {one.laddr}")
+    return found
+
+
+@pytest.mark.parametrize("site", ["", 'scheduler = "local"\ncores = 2\n'])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_nothing_listens_beyond_this_machine(in_folder: Path, site: str, ranks: int) -> None:
+    """Not the program, Parsl's interchange, pilots and workers, mpirun and the engines."""
+    if ranks > 1 and not _off_the_network():
+        pytest.skip("mpirun listens on every address where nobody may have a network of his own")
+    settings = {"run.ranks": ranks, "run.duration": "100 s"}
+    sweep = {"case": "pile-ci", "set": settings, "axes": {"run.seed": [1, 2]}}
+    (in_folder / "test.toml").write_text(to_toml(sweep))
+    (in_folder / "site.toml").write_text(site)
+    command = [PROGRAM, "sweep", "test.toml", *(["--site", "site.toml"] if site else ["-j", "2"])]
+    program = subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL)
+    found: set[str] = set()
+    seen: set[int] = set()
+
+    def looked() -> bool:
+        """Until beads have moved in two processes."""
+        assert program.poll() is None
+        there = [program.pid, *processes_in(in_folder), *(one.pid for one in _helpers(in_folder))]
+        there += [one.pid for one in psutil.Process(program.pid).children(recursive=True)]
+        seen.update(there)
+        with suppress(psutil.NoSuchProcess):
+            found.update(_reachable([psutil.Process(pid) for pid in set(there) if psutil.pid_exists(pid)]))
+        dumps = [dump for dump in in_folder.glob("runs/**/beads.bin") if dump.stat().st_size > 1000]
+        return len(dumps) * ranks >= 2
+
+    try:
+        wait_for(looked)
+    finally:
+        program.terminate()
+        program.wait(timeout=PATIENCE)
+    assert len(seen) > ranks
+    assert not found
 
 
 def test_sweeps_of_pilots_leave_nobody_behind(in_folder: Path) -> None:

@@ -185,7 +185,7 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
         motions = [read_motion(one.directory) for one in (together.runs[name], run)]
         ways = [one.position - one.position[0] for one in motions]
         assert ways[0].shape == ways[1].shape
-        assert np.abs(ways[0] - ways[1]).max() < 1e-6 * np.abs(ways[1]).max(), case.name
+        assert np.abs(ways[0] - ways[1]).max() < 2e-5 * np.abs(ways[1]).max(), case.name
         assert tables[0]["velocity"][0] == pytest.approx(tables[1]["velocity"][0], rel=1e-6, abs=1e-12), case.name
         cycles[case.name] = motions[0].case.run.cycles
     assert cycles["turning"] == 24

@@ -270,8 +270,8 @@ def test_a_failing_point_does_not_stop_the_others(
 def test_lost_beads_in_a_shared_deck_cost_only_their_own_point(sweep_file: Callable[..., str], in_folder: Path) -> None:
     """An engine that loses a bead of whoever has a restitution of 0.61, and takes all down that are in the deck."""
     front = in_folder / "front"
-    loses = "s/^run /group gone id 3\\ndelete_atoms group gone compress no\\nrun /"
-    front.write_text(f'#!/bin/sh\ngrep -qF " 0.61 " walker.lig && sed -i "{loses}" walker.lig\nexec liggghts "$@"\n')
+    loses = "s/^run /group gone id 2\\ndelete_atoms group gone compress no\\nrun /"
+    front.write_text(f'#!/bin/sh\ngrep -qF " 0.61" walker.lig && sed -i "{loses}" walker.lig\nexec liggghts "$@"\n')
     front.chmod(0o755)
     name = sweep_file(text="[axes]\ncontact.restitution = [0.3, 0.5, 0.61, 0.7]")
     assert _sweep(name, "-j", "1", "--engine", str(front)).returncode == 1
