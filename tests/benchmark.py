@@ -74,10 +74,8 @@ def measure_decks(folder: Path) -> None:
         ]
         stock, today = (min(column) / deck.layout.steps for column in zip(*pairs, strict=True))
         ratios[name] = round(stock / today, 2)
-        speed = deck.layout.atoms / today / 1e6
-        print(
-            f"| {name} | {stock * 1e6:.1f} | {today * 1e6:.1f} | {speed:.1f} M | {ratios[name]} | {before.get(name, '')} |"
-        )
+        cells = (name, f"{stock * 1e6:.1f}", f"{today * 1e6:.1f}", f"{deck.layout.atoms / today / 1e6:.1f} M")
+        print("|", " | ".join([*cells, str(ratios[name]), str(before.get(name, ""))]), "|")
     RATIOS.write_text(json.dumps(ratios, indent=2) + "\n", encoding="utf-8")
 
 
