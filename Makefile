@@ -64,7 +64,7 @@ test-slow: setup ## Run what `make test` leaves out: what only a release needs
 	.venv/bin/pytest -q -n 2 -m slow
 
 .PHONY: audit
-audit: setup ## Prove what the installed engine does, against published formulas
+audit: setup ## Prove what the installed engine does, beside a second engine and closed forms
 	@$(WALKERS) audit
 
 .PHONY: validate

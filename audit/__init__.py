@@ -1,6 +1,7 @@
-"""Proof of what the engine does: small decks, made of the blocks of the real ones, against published formulas.
+"""Proof of what the engine does with the contact model: small decks, beside the second engine and closed forms.
 
-Stands on all packages before it. A check is an entry in one of the modules of ``audit/checks``.
+Stands on all packages before it, and on the second engine of `walkers.studies.crosscheck`. A check is an entry in
+``CHECKS`` of `scenes` or `forms`.
 """
 
 from walkers.audit.check import Check, Line, Verdict

@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from walkers.audit.bench import FIRST_BEAD, FLOOR, Bench, Measured, bench_case, bench_recording, free_run
+from walkers.audit.bench import DRY, Bench, Measured, bench_case, bench_recording, bench_scene, dry, free_run
 from walkers.inputs.case import Case
+from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import reduced_modulus, reduced_shear_modulus
 from walkers.physics.impact import Impact
 from walkers.postprocess.dump import FloatArray
-from walkers.templates.deck import Plan
-from walkers.templates.engine import Workarounds
-from walkers.templates.scene import Bead, Scene
+from walkers.templates.bridge_tables import tabulated
+from walkers.templates.deck import BRIDGES_NAME, Plan, compose
+from walkers.templates.scene import Bead
 
 _STEPS = 1000
 """Time steps of the shortest contact."""
@@ -38,11 +39,11 @@ class Sphere:
         """Of the sphere, kg."""
         return self.density * 4.0 / 3.0 * pi * self.radius**3
 
-    def impact_on_plane(self, restitution: float = 1.0, friction: float = 0.0, copies: int = 1) -> Impact:
+    def impact_on_plane(self, restitution: float = 1.0, friction: float = 0.0) -> Impact:
         """Its impact on a rigid plane, E* = E/(1-ν²) and G* = G/(2-ν), twice that of two bodies of its modulus."""
         modulus = reduced_modulus(2.0 * self.youngs_modulus, self.poissons_ratio)
         shear = reduced_shear_modulus(2.0 * self.youngs_modulus, self.poissons_ratio)
-        return Impact(self.mass, self.radius, modulus, shear, restitution, friction, copies)
+        return Impact(self.mass, self.radius, modulus, shear, restitution, friction)
 
     def impact_on_equal(self, restitution: float = 1.0, friction: float = 0.0) -> Impact:
         """Its impact on another one like it."""
@@ -104,20 +105,9 @@ class Course:
 
 def stiff_case(youngs_modulus: float, poissons_ratio: float, density: float, time_step: float) -> Case:
     """A dry case with real moduli, which no case file may have."""
-    case = bench_case(liquid={"volume_fraction": 1e-9, "surface_tension": "1e-9 N/m"})
+    case = bench_case(liquid=DRY)
     contact = replace(case.contact, youngs_modulus=youngs_modulus, poissons_ratio=poissons_ratio)
     return replace(case, density=density, contact=contact, run=free_run(case.run, time_step))
-
-
-def _roomy_scene(beads: Sequence[Bead], radius: float) -> Scene:
-    """Beads over a floor with a carrier beside them, all far apart for spheres of a radius (m)."""
-    numbered = tuple(replace(bead, id=FIRST_BEAD + number) for number, bead in enumerate(beads))
-    half = max(abs(coordinate) for bead in beads for coordinate in bead.centre[:2]) + 4.0 * radius
-    top = max(bead.centre[2] for bead in beads) + 4.0 * radius
-    edge = half + 4.0 * radius
-    return Scene(
-        numbered, (FLOOR,), ((edge - radius,) * 2 + (top,),), (-edge, -edge, -radius), (edge, edge, top + 4.0 * radius)
-    )
 
 
 def _grid(number: int, spacing: float) -> list[tuple[float, float]]:
@@ -126,11 +116,15 @@ def _grid(number: int, spacing: float) -> list[tuple[float, float]]:
     return [((place % side - middle) * spacing, (place // side - middle) * spacing) for place in range(number)]
 
 
-def _run(bench: Bench, case: Case, beads: Sequence[Bead], steps: int, **options: Any) -> Measured:
-    sample = options.pop("sample_every", steps)
-    radius = max(bead.radius for bead in beads)
-    options.setdefault("workarounds", bench.workarounds)
-    return bench.run(Plan(case, _roomy_scene(beads, radius), bench_recording(steps, sample), **options))
+def _run(bench: Bench, case: Case, beads: Sequence[Bead], steps: int, sample_every: int, **options: Any) -> Measured:
+    room = max(max(map(abs, bead.centre)) + 6.0 * bead.radius for bead in beads)
+    deck = compose(Plan(case, bench_scene(beads, edge=room), bench_recording(steps, sample_every), **options))
+    tables = deck.files[BRIDGES_NAME]
+    if "surfaces" in options:  # decks have no tables of unlike surfaces, which never meet there
+        for one, other in {(beads[0].radius, bead.radius) for bead in beads}:
+            meeting = Surfaces.of(one, other, case.liquid, case.contact.minimum_separation_ratio)
+            tables += f"bridge 1 2 {one!r} {other!r}\n{tabulated(dry, meeting).text()}"
+    return bench.run(replace(deck, files={**deck.files, BRIDGES_NAME: tables}))
 
 
 def _steps(impact: Impact, launches: Sequence[Launch]) -> tuple[float, int]:
@@ -140,18 +134,13 @@ def _steps(impact: Impact, launches: Sequence[Launch]) -> tuple[float, int]:
     return step, ceil(_LONGEST * impact.duration(min(speeds)) / step)
 
 
-def walls_of(bench: Bench) -> dict[str, Workarounds]:
-    """Decks with walls that stand once and twice (the bench's own)."""
-    return {"single wall": Workarounds(wall_copies=1), "doubled wall": bench.workarounds}
-
-
-def onto_floor(bench: Bench, sphere: Sphere, launches: Sequence[Launch], workarounds: Workarounds) -> Rebound:
+def onto_floor(bench: Bench, sphere: Sphere, launches: Sequence[Launch]) -> Rebound:
     """Send spheres of one kind onto the floor, each by itself."""
     time_step, steps = _steps(sphere.impact_on_plane(), launches)
     case = stiff_case(2.0 * sphere.youngs_modulus, sphere.poissons_ratio, sphere.density, time_step)
     # The engine takes the harmonic mean of two moduli: twice the sphere's on both sides is the sphere on a rigid plane.
     kinds = list(dict.fromkeys((launch.restitution, launch.friction) for launch in launches))
-    surfaces = tuple(replace(case.contact, restitution=e, friction_bead_wall=mu) for e, mu in kinds)
+    surfaces = tuple((replace(case.contact, restitution=e, friction_bead_wall=mu), case.liquid) for e, mu in kinds)
     beads = [
         Bead(
             0, (x, y, sphere.radius), sphere.radius,
@@ -160,22 +149,19 @@ def onto_floor(bench: Bench, sphere: Sphere, launches: Sequence[Launch], workaro
         )
         for (x, y), launch in zip(_grid(len(launches), 4.0 * sphere.radius), launches, strict=True)
     ]  # fmt: skip
-    series = _run(bench, case, beads, steps, surfaces=surfaces, workarounds=workarounds)
-    rows = slice(series.row(FIRST_BEAD), None)
-    velocity, spin = series.velocity[-1, rows], series.spin[-1, rows]
+    series = _run(bench, case, beads, steps, steps, surfaces=surfaces)
+    velocity, spin = series.velocity[-1], series.spin[-1]
     return Rebound(velocity[:, 2], velocity[:, 0], spin[:, 1], sphere.radius)
 
 
-def course_on_floor(bench: Bench, sphere: Sphere, speed: float, workarounds: Workarounds) -> Course:
+def course_on_floor(bench: Bench, sphere: Sphere, speed: float) -> Course:
     """Let a sphere fall on the floor at a speed (m/s) and record each step of its elastic contact."""
     time_step, steps = _steps(sphere.impact_on_plane(), [Launch(speed)])
     case = stiff_case(2.0 * sphere.youngs_modulus, sphere.poissons_ratio, sphere.density, time_step)
     bead = Bead(0, (0.0, 0.0, sphere.radius), sphere.radius, (0.0, 0.0, -speed))
-    series = _run(bench, case, [bead], steps, sample_every=1, workarounds=workarounds)
-    row = series.row(FIRST_BEAD)
-    overlap = sphere.radius - series.position[:, row, 2]
-    rebound = float(series.velocity[-1, row, 2])
-    return Course(series.steps.astype(np.float64) * time_step, overlap, series.force[:, row, 2], rebound)
+    series = _run(bench, case, [bead], steps, 1)
+    overlap = sphere.radius - series.position[:, 0, 2]
+    return Course(series.time, overlap, series.force[:, 0, 2], float(series.velocity[-1, 0, 2]))
 
 
 def course_of_pair(bench: Bench, sphere: Sphere, speed: float) -> Course:
@@ -187,11 +173,9 @@ def course_of_pair(bench: Bench, sphere: Sphere, speed: float) -> Course:
         Bead(0, (0.0, 0.0, height), sphere.radius, (0.0, 0.0, speed)),
         Bead(0, (0.0, 0.0, height + 2.0 * sphere.radius), sphere.radius, (0.0, 0.0, -speed)),
     ]
-    series = _run(bench, case, beads, steps, sample_every=1)
-    row = series.row(FIRST_BEAD)
-    overlap = 2.0 * sphere.radius - (series.position[:, row + 1, 2] - series.position[:, row, 2])
-    rebound = float(series.velocity[-1, row + 1, 2])
-    return Course(series.steps.astype(np.float64) * time_step, overlap, series.force[:, row + 1, 2], rebound)
+    series = _run(bench, case, beads, steps, 1)
+    overlap = 2.0 * sphere.radius - (series.position[:, 1, 2] - series.position[:, 0, 2])
+    return Course(series.time, overlap, series.force[:, 1, 2], float(series.velocity[-1, 1, 2]))
 
 
 def between_spheres(
@@ -221,7 +205,7 @@ def between_spheres(
     case = stiff_case(upper.youngs_modulus, upper.poissons_ratio, upper.density, time_step)
     first = launches[0]
     touch = replace(case.contact, restitution=first.restitution, friction_bead_bead=first.friction)
-    surfaces = (touch, replace(touch, youngs_modulus=lower.youngs_modulus))
+    surfaces = ((touch, case.liquid), (replace(touch, youngs_modulus=lower.youngs_modulus), case.liquid))
     height = lower.radius + 2.0 * upper.radius
     beads = []
     for (x, y), launch in zip(_grid(len(launches), 4.0 * max(upper.radius, lower.radius)), launches, strict=True):
@@ -231,7 +215,6 @@ def between_spheres(
             Bead(0, (x, y, height + lower.radius + upper.radius), upper.radius, velocity, spin),
             Bead(0, (x, y, height), lower.radius, (0.0, 0.0, rise), back, surface=2, density=lower.density),
         ]
-    series = _run(bench, case, beads, steps, surfaces=surfaces)
-    rows = slice(series.row(FIRST_BEAD), None, 2)
-    velocities, spins = series.velocity[-1, rows], series.spin[-1, rows]
+    series = _run(bench, case, beads, steps, steps, surfaces=surfaces)
+    velocities, spins = series.velocity[-1, ::2], series.spin[-1, ::2]
     return Rebound(velocities[:, 2], velocities[:, 0], spins[:, 1], upper.radius)

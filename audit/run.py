@@ -9,40 +9,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
-from typing import Any
 
+from walkers.audit import forms, scenes
 from walkers.audit.bench import Bench
 from walkers.audit.check import Check, Line, Verdict
-from walkers.audit.checks import (
-    benchmarks,
-    capillary,
-    closed_forms,
-    contact,
-    cylinder,
-    drive,
-    energy,
-    repeatability,
-    timestep,
-    viscous,
-)
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.runner.audits import AuditRecord, write_audit
 from walkers.runner.binary import Engine, find_engine
-from walkers.templates.engine import ALL_WORKAROUNDS, Workarounds
 
-CHECKS: tuple[Check, ...] = (
-    *capillary.CHECKS,
-    *viscous.CHECKS,
-    *cylinder.CHECKS,
-    *contact.CHECKS,
-    *drive.CHECKS,
-    *repeatability.CHECKS,
-    *timestep.CHECKS,
-    *energy.CHECKS,
-    *benchmarks.CHECKS,
-    *closed_forms.CHECKS,
-)
+CHECKS: tuple[Check, ...] = (*scenes.CHECKS, *forms.CHECKS)
 
 
 @dataclass(frozen=True)
@@ -99,9 +75,7 @@ def run_audit(
     checks: Sequence[Check] = CHECKS,
     *,
     engine: Engine | None = None,
-    workarounds: Workarounds = ALL_WORKAROUNDS,
     on_done: Callable[[CheckedLines], None] | None = None,
-    **bench_options: Any,
 ) -> AuditReport:
     """Run checks on an engine.
 
@@ -111,16 +85,12 @@ def run_audit(
         Which ones.
     engine
         The binary; the installed one if None.
-    workarounds
-        Those of the decks on trial.
     on_done
         Called with each check as it is done.
-    bench_options
-        Further attributes of the `Bench`.
     """
     binary = engine or find_engine()
     with tempfile.TemporaryDirectory(prefix="walkers-audit-") as folder:
-        bench = Bench(binary, Path(folder), workarounds, **bench_options)
+        bench = Bench(binary, Path(folder))
 
         def measure(check: Check) -> CheckedLines:
             begin = time.perf_counter()
@@ -128,7 +98,7 @@ def run_audit(
                 lines = tuple(check.measure(bench))
             except Exception as failure:  # whatever another build of the engine does, the table must come
                 reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
-                lines = (Line(f"{check.title}: {reason}", "", nan, nan, unmeasured=Verdict.ERROR),)
+                lines = (Line(f"{check.title}: {reason}", nan, nan, 0.0, unmeasured=Verdict.ERROR),)
             checked = CheckedLines(check, lines, time.perf_counter() - begin)
             if on_done:
                 on_done(checked)

@@ -9,7 +9,7 @@ as well, which makes the mass that resists sliding 2/7 m*.
 - Damped by 2 √(5/6) β √(S_n m*) δ', S_n = 2 E* √(R*δ), it rebounds with e = exp(-πβ/√(1-β²)) at any speed.
 - Sliding all the way, the friction's impulse is μ (1+e) m* v_n: the centre of a sphere on a plane is slowed by
   μ (1+e) v_n, its surface by 7/2 of that, if the surface was faster.
-- Mindlin's tangential spring 8 G* √(R*δ), cut at μ times the normal force, is integrated in time.
+- Mindlin's tangential spring 8 G* √(R*δ), cut at μ times the elastic repulsion, is integrated in time.
 
 References
 ----------
@@ -22,14 +22,13 @@ spring leaves out: the micro-slip within the contact).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
 import numpy.typing as npt
 
-from walkers.physics.contact import damping_ratio, restitution_of_copies
+from walkers.physics.contact import damping_ratio
 
 FloatArray = npt.NDArray[np.float64]
 _DURATION = 2.9432750
@@ -40,10 +39,7 @@ SURFACE_OVER_CENTRE = 3.5
 
 @dataclass(frozen=True)
 class Impact:
-    """What meets: reduced mass (kg), radius (m) and moduli (Pa), restitution and friction of one contact.
-
-    ``copies`` contacts act side by side: a wall that stands twice in a deck.
-    """
+    """What meets: reduced mass (kg), radius (m) and moduli (Pa), restitution and friction."""
 
     mass: float
     radius: float
@@ -51,25 +47,18 @@ class Impact:
     shear_modulus: float
     restitution: float = 1.0
     friction: float = 0.0
-    copies: int = 1
 
     def depth(self, speed: float) -> float:
         """Largest overlap of the elastic impact at a normal speed (m/s), m."""
-        modulus = self.copies * self.modulus
-        return float((15.0 * self.mass * speed**2 / (16.0 * modulus * sqrt(self.radius))) ** 0.4)
+        return float((15.0 * self.mass * speed**2 / (16.0 * self.modulus * sqrt(self.radius))) ** 0.4)
 
     def peak_force(self, speed: float) -> float:
         """Largest force of the elastic impact, N."""
-        return float(4.0 / 3.0 * self.copies * self.modulus * sqrt(self.radius) * self.depth(speed) ** 1.5)
+        return float(4.0 / 3.0 * self.modulus * sqrt(self.radius) * self.depth(speed) ** 1.5)
 
     def duration(self, speed: float) -> float:
         """How long the elastic impact lasts, s."""
         return _DURATION * self.depth(speed) / speed
-
-    @property
-    def rebound(self) -> float:
-        """Restitution of all copies together."""
-        return restitution_of_copies(self.restitution, self.copies)
 
 
 def sliding_loss(friction: float, restitution: float, normal_speed: FloatArray) -> FloatArray:
@@ -99,8 +88,7 @@ def after_impact(impact: Impact, before: Motion, steps: int = 4000) -> Motion:
     """Integrate a sphere's damped Hertz impact on a plane with Mindlin's spring, cut at Coulomb's limit.
 
     The spring is damped in like manner while it holds, its arm ends half way into the overlap, and the limit is μ times
-    the magnitude of the normal force with its damping, also where that pulls, at the end of the contact: the engine's
-    model, integrated apart from it.
+    the elastic repulsion, for the spring and its damping together: the engine's model, integrated apart from it.
 
     Parameters
     ----------
@@ -117,36 +105,18 @@ def after_impact(impact: Impact, before: Motion, steps: int = 4000) -> Motion:
         overlap = overlap + approach * step
         touching &= overlap > 0.0
         root = np.sqrt(impact.radius * np.where(touching, overlap, 0.0))
-        push = 4.0 / 3.0 * impact.modulus * root * overlap
-        push = push + damping * np.sqrt(2.0 * impact.modulus * root * impact.mass) * approach
+        elastic = 4.0 / 3.0 * impact.modulus * root * overlap
+        push = elastic + damping * np.sqrt(2.0 * impact.modulus * root * impact.mass) * approach
         arm = 1.0 - overlap / (2.0 * impact.radius)
         slide = along - arm * rolling
         spring = spring + slide * step
         stiffness = 8.0 * impact.shear_modulus * root
-        limit = impact.friction * np.abs(push)
+        limit = impact.friction * np.maximum(elastic, 0.0)
         slips = np.abs(stiffness * spring) > limit
         spring = np.where(slips, np.sign(spring) * limit / np.where(stiffness > 0.0, stiffness, 1.0), spring)
         pull = stiffness * spring + np.where(slips, 0.0, damping * np.sqrt(stiffness * impact.mass) * slide)
-        gained = impact.copies * step / impact.mass * touching
+        pull = np.clip(pull, -limit, limit)
+        gained = step / impact.mass * touching
         approach, along = approach - gained * push, along - gained * pull
         rolling = rolling + 2.5 * gained * arm * pull
     return Motion(-approach, along, rolling)
-
-
-@cache
-def friction_excess(impact: Impact, steps: int = 20000) -> float:
-    """What a sphere loses of its tangential velocity in the engine's model when it slides all the way, over μ(1+e)v_n.
-
-    It is above one in damped impacts: friction counts the damping's pull at the end as a load, and the damping of the
-    spring comes on top of the limit while the spring alone is below it.
-
-    Parameters
-    ----------
-    steps
-        Of the elastic contact; with some thousand the number is uncertain by 2 %: stiffness vanishes at the end.
-    """
-    slippery = replace(impact, friction=1e-3)
-    fast = Motion(np.ones(1), np.ones(1), np.zeros(1))
-    after = after_impact(slippery, fast, steps)
-    expected = sliding_loss(slippery.friction, float(after.normal[0]), fast.normal)
-    return float(((1.0 - after.tangential) / expected)[0])

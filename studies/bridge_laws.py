@@ -2,7 +2,7 @@
 
 Each law gives the pull over the surface tension, F/γ, of a bridge of constant volume at gaps. Laws made for equal
 spheres of radius R take unequal ones and planes in Derjaguin's way, R = 2 R1 R2 / (R1 + R2), twice the sphere's radius
-at a plane; the engine's own takes √(R1 R2), and a wall for an equal sphere, twice (`walkers.physics.wall`). What
+at a plane; the engine's own takes √(R1 R2), and a wall for an equal sphere, twice. What
 they approximate is in `walkers.physics.laplace`.
 
 Coefficients and numbers of equations are those in the source of YADE (its ViscElCapPhys) and, for Bagheri, Roy and

@@ -21,7 +21,6 @@ from walkers.physics.laplace import POINTS, FloatArray, ForceCurve, bridge, forc
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, styled
 from walkers.studies.bridge_laws import ENGINE, LAWS, Law
 from walkers.studies.chapter import Chapter
-from walkers.studies.crosscheck.laws import ForceTable
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import friction_of
 
@@ -157,19 +156,6 @@ def capillary_errors(case: Case) -> tuple[ContactError, ...]:
             ContactError(name, condition, engine, float(forces[0]), exact.gaps, forces, deviation(ENGINE, condition))
         )
     return tuple(found)
-
-
-def force_tables(case: Case) -> tuple[ForceTable, ...]:
-    """Young–Laplace's pulls of the bridges of a case's dimer, for the second engine."""
-    tension = case.liquid.surface_tension
-    return tuple(
-        ForceTable(
-            (one.condition.radius_1, None if one.condition.radius_2 == inf else one.condition.radius_2),
-            tuple(map(float, one.gaps)),
-            tuple(float(force) / tension for force in one.forces),
-        )
-        for one in capillary_errors(case)
-    )
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from walkers.postprocess.drawing import save_figure
 from walkers.runner.files import write_text
 from walkers.studies.chapter import Chapter
 
-CHAPTERS = ("benchmarks", "closed-forms", "bridges", "crosscheck", "static-friction")
+CHAPTERS = ("benchmarks", "bridges", "crosscheck")
 """In the order of the page; each the function ``chapter`` of a module of `walkers.studies`."""
 PAGE = "validation.md"
 

@@ -6,17 +6,17 @@ import pytest
 
 from tests.conftest import call
 from walkers.runner.failures import EngineFailure
-from walkers.studies import static_friction
+from walkers.studies import bridges
 from walkers.studies.chapter import Chapter
 from walkers.studies.validate import CHAPTERS, PAGE, validate
 
 
 def test_a_quick_chapter_has_a_page_of_its_own(in_folder: Path) -> None:
-    done = call("validate", "closed-forms", "--quick", "-j", "1", check=True)
-    page = Path("runs/validation/validation-quick-closed-forms.md")
+    done = call("validate", "benchmarks", "--quick", "-j", "1", check=True)
+    page = Path("runs/validation/validation-quick-benchmarks.md")
     assert str(page) in done.stdout
-    assert "## One bead: closed forms" in page.read_text()
-    assert (page.parent / "figures" / "validation-closed-forms.png").exists()
+    assert "## Published benchmarks of impacts" in page.read_text()
+    assert (page.parent / "figures" / "validation-benchmarks-spin.png").exists()
     assert not (page.parent / PAGE).exists()
 
 
@@ -24,12 +24,12 @@ def test_a_chapter_that_cannot_be_made_leaves_the_others(tmp_path: Path, monkeyp
     def fail(out: Path, *, quick: bool = False) -> Chapter:
         raise EngineFailure("no engine here")
 
-    monkeypatch.setattr(static_friction, "chapter", fail)
-    made = validate(tmp_path, tmp_path, only=("static-friction", "closed-forms"), quick=True)
-    assert made.failed == ["static-friction: could not be made: no engine here"]
+    monkeypatch.setattr(bridges, "chapter", fail)
+    made = validate(tmp_path, tmp_path, only=("bridges", "benchmarks"), quick=True)
+    assert made.failed == ["bridges: could not be made: no engine here"]
     page = made.files[0].read_text()
     assert "no engine here" in page
-    assert "## One bead: closed forms" in page
+    assert "## Published benchmarks of impacts" in page
 
 
 def test_docs_have_all_chapters() -> None:

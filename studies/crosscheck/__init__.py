@@ -1,9 +1,9 @@
 """A second engine, written from the published formulas alone, that the decks' results are checked against.
 
 It is a referee and no replacement: `laws` says which terms act, `kernels` has their formulas and the integration,
-`engine` drives them, `setup` takes beads, walls and drive from a case: these import neither the laws of
-`walkers.physics` nor the decks of `walkers.templates`. `comparison` compares a run with it, `report` tells what came
-out. `yade` compares a walker with YADE, where that is installed, which runs `yade_script`.
+`engine` drives them, `setup` takes beads, walls and drive from a case. Of the bridges it takes the law
+(`walkers.physics.laws`), which it interpolates in its own way, and nothing of the decks. `comparison` compares a run
+with it, `report` tells what came out.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ class Tolerances:
         return f"velocity {self.speed:.2%}, {gait}, orientation at the end {self.orientation:g}°"
 
 
-TOLERANCES = Tolerances(speed=5e-4, gait=5e-3, orientation=0.5)
+TOLERANCES = Tolerances(speed=1e-4, gait=1e-3, orientation=0.1)
 """Of the second engine."""
 
 

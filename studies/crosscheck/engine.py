@@ -1,56 +1,33 @@
-"""The second engine: beads between walls that move on from where they are put."""
+"""The second engine: beads between walls that move on from where they are put, or are put anew step by step."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import log, pi, sqrt
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import inf, log, pi, sqrt
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
+from walkers.physics.bridge import BridgeLaw, Surfaces
+from walkers.physics.laws import law_of
+from walkers.physics.matter import Contact, Liquid
 from walkers.studies.crosscheck import kernels
-from walkers.studies.crosscheck.kernels import Constants, FloatArray, IntArray, Pairs, State
-from walkers.studies.crosscheck.laws import ForceTable, Laws
+from walkers.studies.crosscheck.kernels import CELLS, Bridges, Constants, FloatArray, Pairs, State
+from walkers.studies.crosscheck.laws import Laws
 
-_STATIC = {"none": kernels.NONE, "velocity": kernels.BY_VELOCITY, "stick-slip": kernels.STICK_SLIP}
-_WALLS = {"halves": kernels.HALVES, "plane-normal": kernels.PLANE_NORMAL, "plane": kernels.PLANE}
 _SKIN = 0.4
 """Of the smallest radius: neighbours are listed anew when a bead has gone nearly half as far."""
 
 
 @dataclass(frozen=True)
 class Matter:
-    """What beads, walls and liquid are made of, SI units.
-
-    Attributes
-    ----------
-    density
-        Of the beads, kg/m³.
-    youngs_modulus, poissons_ratio, restitution
-        Of beads and walls; Pa and pure numbers.
-    friction_beads, friction_walls, rolling_friction
-        Coefficients between beads, at walls, at both.
-    surface_tension, viscosity, film_viscosity
-        N/m; Pa s of the bridges and of the film on the walls.
-    volume_fraction, contact_angle
-        Liquid on a bead over its volume; effective angle, rad.
-    separation_ratio
-        Gap over reduced radius below which viscous forces stop growing.
-    """
+    """Density of the beads (kg/m³), how they touch each other and the walls, and the liquid of the bridges."""
 
     density: float
-    youngs_modulus: float
-    poissons_ratio: float = 0.3
-    restitution: float = 1.0
-    friction_beads: float = 0.0
-    friction_walls: float = 0.0
-    rolling_friction: float = 0.0
-    surface_tension: float = 0.0
-    viscosity: float = 0.0
-    film_viscosity: float = 0.0
-    volume_fraction: float = 0.01
-    contact_angle: float = 0.0
-    separation_ratio: float = 0.01
+    contact: Contact
+    liquid: Liquid
 
 
 @dataclass(frozen=True)
@@ -109,15 +86,12 @@ class SecondEngine:
     ) -> None:
         self.clock = clock
         self.radius = np.ascontiguousarray(beads.radius, dtype=np.float64)
-        self._tables = _Tables(laws.capillary_tables, self.radius)
-        self.constants = _constants(self.radius, matter, surroundings, laws, time_step, self._tables)
-        self.state = _state(beads, matter, len(self.constants.point), self._tables)
+        self.constants = _constants(self.radius, matter, surroundings, laws, time_step)
+        self.state = _state(beads, len(self.constants.point))
         self._skin = _SKIN * float(self.radius.min())
-        # However much liquid a bead takes over, it is hardly ever more than it has.
-        film = 2.0 * 4.0 / 3.0 * pi * self.radius**3 * matter.volume_fraction
-        bridge = (1.0 + 0.5 * matter.contact_angle) * np.cbrt(film / 2.0)
-        self._reach = self.radius + np.maximum(bridge, self._tables.longest / 2.0) + self._skin / 2.0
-        self._pairs = _no_pairs()
+        self._reach = self.radius + (self.constants.bridges.spans[:, kernels.RUPTURE].max() + self._skin) / 2.0
+        none = np.zeros(0, dtype=np.int64)
+        self.pairs = Pairs(none, none, np.zeros((0, 3)), np.zeros(0, dtype=np.bool_))
         self._list()
         self.evaluate()
 
@@ -147,145 +121,107 @@ class SecondEngine:
             self._list()
         return frames
 
+    def follow(self, position: FloatArray, velocity: FloatArray, spin: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Put the beads where another engine had them in the next step: the forces (N) and torques (N m) on them there.
+
+        Parameters
+        ----------
+        position, velocity, spin
+            Of shape (N, 3); velocities are those that the forces are to be evaluated with.
+        """
+        self.state.position[:], self.state.velocity[:], self.state.spin[:] = position, velocity, spin
+        self.clock += 1
+        self._list()
+        kernels.forces(self.constants, self.state, self.pairs, self.clock, True)
+        return self.state.force.copy(), self.state.torque.copy()
+
     def _advance(self, end: int, records: tuple[int, int], frames: FloatArray) -> int:
         """Move on to a step, or until neighbours are to be listed anew: the step that it is then."""
         clock = (self.clock, records[0], end, records[1])
-        return kernels.advance(self.constants, self.state, self._pairs, self._listed, self._skin, clock, frames)
-
-    @property
-    def energy(self) -> float:
-        """Kinetic energy, J."""
-        c, state = self.constants, self.state
-        moving = 0.5 * c.mass @ np.sum(state.velocity**2, axis=1)
-        return float(moving + 0.2 * (c.mass * c.radius**2) @ np.sum(state.spin**2, axis=1))
+        return kernels.advance(self.constants, self.state, self.pairs, self._listed, self._skin, clock, frames)
 
     def bridges(self) -> list[tuple[int, int]]:
         """Pairs of beads that a bridge holds together."""
-        held = self._pairs.bridged
-        return list(zip(self._pairs.first[held].tolist(), self._pairs.second[held].tolist(), strict=True))
+        held = self.pairs.bridged
+        return list(zip(self.pairs.first[held].tolist(), self.pairs.second[held].tolist(), strict=True))
 
     def _list(self) -> None:
         """List the neighbours; contacts and bridges go on."""
-        before, self._listed = self._pairs, self.state.position.copy()
+        before, self._listed = self.pairs, self.state.position.copy()
         near = cKDTree(self._listed).query_pairs(2.0 * float(self._reach.max()), output_type="ndarray").astype(np.int64)
         apart = np.linalg.norm(self._listed[near[:, 0]] - self._listed[near[:, 1]], axis=1)
         near = near[apart < self._reach[near].sum(axis=1)]
         count = len(self.radius)
         keys = np.sort(near.min(axis=1) * count + near.max(axis=1))
-        first, second = keys // count, keys % count
-        none = np.zeros(len(keys), dtype=np.bool_)
-        pairs = Pairs(first, second, np.empty((len(keys), 6)), np.zeros((len(keys), 3)), none, none.copy())
+        pairs = Pairs(keys // count, keys % count, np.zeros((len(keys), 3)), np.zeros(len(keys), dtype=np.bool_))
         known = before.first * count + before.second
-        common, new, old = np.intersect1d(keys, known, assume_unique=True, return_indices=True)
-        del common
-        for now, then in zip(pairs[3:], before[3:], strict=True):
-            now[new] = then[old]
-        self._tables.assign(pairs.bridge, first, second)
-        kernels.set_bridges(self.constants, self.state, pairs)
-        self._pairs = pairs
+        _, new, old = np.intersect1d(keys, known, assume_unique=True, return_indices=True)
+        pairs.spring[new], pairs.bridged[new] = before.spring[old], before.bridged[old]
+        self.pairs = pairs
 
 
-class _Tables:
-    """Tables of forces and which bridges they are of."""
-
-    def __init__(self, tables: tuple[ForceTable, ...], radius: FloatArray) -> None:
-        self.tables = tables
-        sizes, self.size_of = np.unique(radius, return_inverse=True)
-        self.between = np.full((len(sizes), len(sizes)), -1)
-        self.at_wall = np.full(len(sizes), -1)
-        for number, table in enumerate(tables):
-            for one, size in enumerate(sizes):
-                if table.fits(size, None):
-                    self.at_wall[one] = number
-                for other, second in enumerate(sizes):
-                    if table.fits(size, second):
-                        self.between[one, other] = number
-        self.rupture = np.array([*(table.gap[-1] for table in tables), 0.0])
-        self.longest = float(self.rupture.max())
-
-    def forces(self, tension: float) -> FloatArray:
-        """Pull at evenly spaced gaps, N, shape (T, TABLE_POINTS)."""
-        values = np.zeros((max(len(self.tables), 1), kernels.TABLE_POINTS))
-        for row, table in zip(values, self.tables, strict=False):
-            gaps = np.linspace(0.0, table.gap[-1], kernels.TABLE_POINTS)
-            row[:] = tension * np.interp(gaps, table.gap, table.force_over_tension)
-        return values
-
-    def assign(self, bridge: FloatArray, first: IntArray, second: IntArray) -> None:
-        """Say of bridges between beads which table they follow, and where it ends."""
-        self._put(bridge, self.between[self.size_of[first], self.size_of[second]])
-
-    def assign_walls(self, bridge: FloatArray) -> None:
-        """The same of bridges to walls."""
-        self._put(bridge, self.at_wall[self.size_of])
-
-    def _put(self, bridge: FloatArray, table: IntArray) -> None:
-        bridge[:, kernels.TABLE] = table
-        bridge[:, kernels.RUPTURE] = self.rupture[table]
+@lru_cache(maxsize=4096)
+def _splined(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
+    """A bridge's row of `Bridges.spans` and its splines; a kink may be at the scale."""
+    curve = law(surfaces)
+    end, scale = curve.rupture, curve.scale or surfaces.closest
+    scale = scale if scale < end else 0.4 * end
+    middle = max(0.5 * end, 0.5 * (scale + end))
+    t = np.linspace(0.0, 1.0, CELLS + 1)
+    pieces = (scale * t, scale * (middle / scale) ** t, end - (end - middle) * (1.0 - t) ** 2)
+    splines = [CubicSpline(CELLS * t, curve.forces(gaps).columns()).c.transpose(1, 0, 2) for gaps in pieces]
+    return np.array([curve.formation, scale, middle, end]), np.stack(splines)
 
 
-def _constants(
-    radius: FloatArray, matter: Matter, around: Surroundings, laws: Laws, time_step: float, tables: _Tables
-) -> Constants:
-    modulus, ratio = matter.youngs_modulus, matter.poissons_ratio
-    damping = -log(matter.restitution) / sqrt(log(matter.restitution) ** 2 + pi**2)
-    liquid = 4.0 / 3.0 * pi * radius**3 * matter.volume_fraction
+def _bridges(radius: FloatArray, matter: Matter, laws: Laws) -> Bridges:
+    liquid = matter.liquid if laws.film else replace(matter.liquid, film_viscosity=0.0)
+    sizes, kind = np.unique(radius, return_inverse=True)
+    others = [*sizes.tolist(), inf]
+    between = np.empty((len(sizes), len(others)), dtype=np.int64)
+    made: list[tuple[FloatArray, FloatArray]] = []
+    for row, one in enumerate(sizes.tolist()):
+        for column, other in enumerate(others):
+            if column < row:
+                between[row, column] = between[column, row]
+                continue
+            between[row, column] = len(made)
+            surfaces = Surfaces.of(one, other, liquid, matter.contact.minimum_separation_ratio)
+            made.append(_splined(law_of(liquid), surfaces))
+    acts = np.array([laws.capillary, *[laws.lubrication] * 4], dtype=np.float64)
+    spans, splines = np.stack([one for one, _ in made]), np.stack([one for _, one in made]) * acts
+    return Bridges(spans, splines, kind.astype(np.int64), between)
+
+
+def _constants(radius: FloatArray, matter: Matter, around: Surroundings, laws: Laws, time_step: float) -> Constants:
+    contact = matter.contact
+    modulus, ratio, loss = contact.youngs_modulus, contact.poissons_ratio, log(contact.restitution)
     harmonics = around.harmonics if around.harmonics is not None and laws.drive else np.zeros((0, 6))
     return Constants(
         step=time_step,
         radius=radius,
         mass=4.0 / 3.0 * pi * radius**3 * matter.density,
-        film=6.0 * pi * matter.film_viscosity * radius * laws.film,
-        reach=(1.0 + 0.5 * matter.contact_angle) * np.cbrt(liquid / 2.0),
-        point=np.ascontiguousarray(around.point, dtype=np.float64),
-        normal=np.ascontiguousarray(around.normal, dtype=np.float64),
+        point=np.array(around.point, dtype=np.float64, order="C"),
+        normal=np.array(around.normal, dtype=np.float64, order="C"),
         gravity=np.array(around.gravity) * laws.gravity,
         harmonics=np.ascontiguousarray(harmonics, dtype=np.float64),
         modulus=modulus / (2.0 * (1.0 - ratio**2)),
         shear_modulus=modulus / (4.0 * (1.0 + ratio) * (2.0 - ratio)),
-        normal_damping=damping * laws.normal_damping,
-        tangential_damping=damping * laws.tangential_damping,
-        friction_beads=matter.friction_beads,
-        friction_walls=matter.friction_walls,
-        rolling=matter.rolling_friction * laws.rolling_friction,
-        tension=matter.surface_tension,
-        contact_angle=matter.contact_angle,
-        capillary=laws.capillary,
-        normal_viscosity=matter.viscosity * laws.normal_lubrication,
-        tangential_viscosity=matter.viscosity * laws.tangential_lubrication,
-        separation=matter.separation_ratio,
-        tables=tables.forces(matter.surface_tension),
-        friction=laws.friction,
-        spring=laws.tangential_spring,
-        limit_with_damping=laws.coulomb_limit == "elastic-and-damping",
-        static=_STATIC[laws.static_friction],
-        static_ratio=laws.static_ratio,
-        static_velocity=laws.static_velocity,
-        wall_lubrication=_WALLS[laws.wall_lubrication],
-        transfer=laws.liquid_transfer,
-        copies=float(laws.wall_copies),
+        damping=-loss / sqrt(loss**2 + pi**2) * laws.damping,
+        friction_beads=contact.friction_bead_bead * laws.friction,
+        friction_walls=contact.friction_bead_wall * laws.friction,
+        rolling=contact.rolling_friction * laws.rolling_friction,
+        bridges=_bridges(radius, matter, laws),
     )
 
 
-def _state(beads: Beads, matter: Matter, walls: int, tables: _Tables) -> State:
+def _state(beads: Beads, walls: int) -> State:
     count = len(beads.radius)
-    wall_bridge = np.zeros((count, 6))
-    tables.assign_walls(wall_bridge)
     return State(
         position=np.array(beads.position, dtype=np.float64, order="C"),
         velocity=np.array(beads.velocity, dtype=np.float64, order="C"),
         spin=np.array(beads.spin, dtype=np.float64, order="C"),
         force=np.zeros((count, 3)),
         torque=np.zeros((count, 3)),
-        liquid=np.full(count, matter.volume_fraction),
-        wall_bridge=wall_bridge,
         wall_spring=np.zeros((count, walls, 3)),
         wall_bridged=np.zeros((count, walls), dtype=np.bool_),
-        wall_slips=np.zeros((count, walls), dtype=np.bool_),
     )
-
-
-def _no_pairs() -> Pairs:
-    none = np.zeros(0, dtype=np.int64)
-    flags = np.zeros(0, dtype=np.bool_)
-    return Pairs(none, none, np.zeros((0, 6)), np.zeros((0, 3)), flags, flags.copy())

@@ -1,25 +1,23 @@
 """The second engine's formulas and its integration, compiled by numba.
 
-Normals point from the second body (or the wall) to the first; h is the gap, δ = −h the overlap, η the viscosity, ε the
-minimum separation ratio. Forces are those at the new places, of the velocities half a step before (velocity Verlet with
-the forces evaluated once a step: L. Verlet, Phys. Rev. 159 (1967) 98; in granular codes as in Plimpton, J. Comput.
-Phys. 117 (1995) 1, doi 10.1006/jcph.1995.1039).
+Normals point from the second body (or the wall) to the first; h is the gap, δ = -h the overlap. Two surfaces meet by
+`meet`, whose terms are Hertz's repulsion with Tsuji's damping, Mindlin's spring with damping, both together no larger
+than μ times the elastic repulsion, rolling friction, and a bridge, whose pull and resistances are splines (`Bridges`).
+Forces are those at the new places, of the velocities half a step before (velocity Verlet with the forces evaluated once
+a step: L. Verlet, Phys. Rev. 159 (1967) 98; in granular codes as in Plimpton, J. Comput. Phys. 117 (1995) 1, doi
+10.1006/jcph.1995.1039).
 
 References
 ----------
-Contacts: H. Hertz, J. reine angew. Math. 92 (1881) 156; R. D. Mindlin, J. Appl. Mech. 16 (1949) 259; Y. Tsuji,
-T. Tanaka, T. Ishida, Powder Technology 71 (1992) 239, doi 10.1016/0032-5910(92)88030-L (damping).
-Bridges: F. Soulié et al., Int. J. Numer. Anal. Meth. Geomech. 30 (2006) 213, Eqs. 13, 14, doi 10.1002/nag.476;
-D. Shi, J. J. McCarthy, Powder Technology 184 (2008) 65, doi 10.1016/j.powtec.2007.08.011 (volumes, Eqs. 40, 41 for the
-viscous forces); G. Lian, C. Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138, doi
-10.1006/jcis.1993.1452 (rupture).
-Rolling friction: J. Ai, J.-F. Chen, J. M. Rotter, J. Y. Ooi, Powder Technology 206 (2011) 269, doi
-10.1016/j.powtec.2010.09.030, model A.
+H. Hertz, J. reine angew. Math. 92 (1881) 156; R. D. Mindlin, J. Appl. Mech. 16 (1949) 259; Y. Tsuji, T. Tanaka,
+T. Ishida, Powder Technology 71 (1992) 239, doi 10.1016/0032-5910(92)88030-L (damping).
+J. Ai, J.-F. Chen, J. M. Rotter, J. Y. Ooi, Powder Technology 206 (2011) 269, doi 10.1016/j.powtec.2010.09.030, model A
+(rolling friction).
 """
 
 from __future__ import annotations
 
-from math import exp, log, pi, sin, sqrt
+from math import log, sin, sqrt
 from typing import NamedTuple
 
 import numba
@@ -30,71 +28,67 @@ compiled = numba.njit(cache=True, error_model="numpy")
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 FlagArray = npt.NDArray[np.bool_]
-
-NONE, BY_VELOCITY, STICK_SLIP = 0, 1, 2
-HALVES, PLANE_NORMAL, PLANE = 0, 1, 2
-PEAK, SLOPE, SHIFT, OFFSET, RUPTURE, TABLE = range(6)
-"""Columns of a bridge's constants: πγ√(R1R2) (N), A/R2 (1/m), B, C, rupture distance (m), number of its table or −1."""
 Vector = tuple[float, float, float]
-TABLE_POINTS = 1024
-"""Of a table of forces, evenly from a gap of 0 to rupture."""
+
+CELLS = 512
+"""Of each of the three pieces of a bridge's splines."""
+FORMATION, SCALE, MIDDLE, RUPTURE = range(4)
+PULL, NORMAL, SLIDING, COUPLING, ROLLING = range(5)
+
+
+class Bridges(NamedTuple):
+    """Laws of T bridges as splines in three pieces: even in h up to the scale, in ln h up to the middle, and from there
+    to the rupture in √(rupture - h).
+
+    Attributes
+    ----------
+    spans : ndarray, shape (T, 4)
+        Gaps at which a bridge forms, where pieces end, and at which it breaks, m.
+    splines : ndarray, shape (T, 3, CELLS, 4, 5)
+        Coefficients of each cell, the highest power first, of the pull (N) and the resistances.
+    kind : ndarray, shape (N,)
+        Of each bead, by its radius.
+    between : ndarray, shape (K, K + 1)
+        Number of the bridge of two kinds of beads; the last column is that to walls.
+    """
+
+    spans: FloatArray
+    splines: FloatArray
+    kind: IntArray
+    between: IntArray
 
 
 class Constants(NamedTuple):
-    """What does not change: N beads, W walls, H harmonics, T tables; SI units.
+    """What does not change: N beads, W walls, H harmonics; SI units.
 
     Attributes
     ----------
     step : float
-    radius, mass, film : ndarray, shape (N,)
-        ``film`` is 6πη_f R, N s/m.
-    reach : ndarray, shape (N,)
-        Gap up to which the film acts, and what two spheres lack of a plane's lubrication, m: that at which a bridge of
-        the liquid that a bead has at first would break.
+    radius, mass : ndarray, shape (N,)
     point, normal : ndarray, shape (W, 3)
     gravity : ndarray, shape (3,)
     harmonics : ndarray, shape (H, 6)
         Direction, ω, peak acceleration, phase.
     modulus, shear_modulus, damping : float
         E*, G*, β.
-    friction, rolling : float
-        The former between beads and at walls.
-    tables : ndarray, shape (T, TABLE_POINTS)
-        Pull, N.
+    friction_beads, friction_walls, rolling : float
+        Coefficients of friction between beads and at walls, of rolling friction at both.
     """
 
     step: float
     radius: FloatArray
     mass: FloatArray
-    film: FloatArray
-    reach: FloatArray
     point: FloatArray
     normal: FloatArray
     gravity: FloatArray
     harmonics: FloatArray
     modulus: float
     shear_modulus: float
-    normal_damping: float
-    tangential_damping: float
+    damping: float
     friction_beads: float
     friction_walls: float
     rolling: float
-    tension: float
-    contact_angle: float
-    capillary: bool
-    normal_viscosity: float
-    tangential_viscosity: float
-    separation: float
-    tables: FloatArray
-    friction: bool
-    spring: bool
-    limit_with_damping: bool
-    static: int
-    static_ratio: float
-    static_velocity: float
-    wall_lubrication: int
-    transfer: bool
-    copies: float
+    bridges: Bridges
 
 
 class State(NamedTuple):
@@ -105,14 +99,9 @@ class State(NamedTuple):
     spin: FloatArray
     force: FloatArray
     torque: FloatArray
-    liquid: FloatArray
-    """Liquid on a bead over its volume, shape (N,)."""
-    wall_bridge: FloatArray
-    """Constants of the bridges to the walls, shape (N, 6)."""
     wall_spring: FloatArray
     """Tangential displacements, m, shape (N, W, 3)."""
     wall_bridged: FlagArray
-    wall_slips: FlagArray
 
 
 class Pairs(NamedTuple):
@@ -120,387 +109,208 @@ class Pairs(NamedTuple):
 
     first: IntArray
     second: IntArray
-    bridge: FloatArray
-    """Shape (P, 6)."""
     spring: FloatArray
     """Shape (P, 3)."""
     bridged: FlagArray
-    slips: FlagArray
+
+
+class Meeting(NamedTuple):
+    """How two surfaces meet: number of the bridge, gap, reduced radius and mass, friction, normal, and velocities.
+
+    ``order`` is -1 where the first is the larger bead, for which a law's coupling has the other sign; ``apart`` is the
+    velocity of the centres along the normal, ``slide`` that of the surfaces along each other (m/s), ``turn`` the
+    difference of the spins (rad/s).
+    """
+
+    bridge: int
+    order: float
+    gap: float
+    radius: float
+    mass: float
+    friction: float
+    n: Vector
+    apart: float
+    slide: Vector
+    turn: Vector
 
 
 @compiled
-def caps(own: float, other: float, content: float) -> float:
-    """Liquid that a bead gives to a bridge, m³: half of its film in the cap that the other covers."""
-    film = 4.0 / 3.0 * pi * own**3 * content
-    return 0.5 * film * (1.0 - sqrt(1.0 - (other / (own + other)) ** 2))
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @compiled
-def set_bridge(tension: float, angle: float, radii: tuple[float, float], volume: float, bridge: FloatArray) -> None:
-    """Constants of a bridge of a volume (m³) after Soulié et al., and its rupture distance after Lian et al."""
-    larger = max(radii[0], radii[1])
-    scaled = volume / larger**3
-    bridge[PEAK] = pi * tension * sqrt(radii[0] * radii[1])
-    bridge[SLOPE] = -1.1 * scaled**-0.53 / larger
-    bridge[SHIFT] = (-0.148 * log(scaled) - 0.96) * angle**2 - 0.0082 * log(scaled) + 0.48
-    bridge[OFFSET] = 0.0018 * log(scaled) + 0.078
-    bridge[RUPTURE] = (1.0 + 0.5 * angle) * volume ** (1.0 / 3.0)
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
-def set_pair_bridge(c: Constants, state: State, first: int, second: int, bridge: FloatArray) -> None:
-    """Constants of the bridge between two beads with the liquid that they have now; those of a table stay."""
-    if bridge[TABLE] >= 0.0:
-        return
-    one, other = c.radius[first], c.radius[second]
-    volume = caps(one, other, state.liquid[first]) + caps(other, one, state.liquid[second])
-    set_bridge(c.tension, c.contact_angle, (one, other), volume, bridge)
+def plus(a: Vector, scale: float, b: Vector) -> Vector:
+    """The first, and the second times a number."""
+    return (a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2])
 
 
 @compiled
-def set_wall_bridge(c: Constants, state: State, bead: int) -> None:
-    """Constants of a bead's bridges to the walls, half of its liquid; those of a table stay."""
-    bridge = state.wall_bridge[bead]
-    if bridge[TABLE] < 0.0:
-        radius = c.radius[bead]
-        volume = 0.5 * 4.0 / 3.0 * pi * radius**3 * state.liquid[bead]
-        set_bridge(c.tension, c.contact_angle, (radius, radius), volume, bridge)
-
-
-@compiled
-def set_bridges(c: Constants, state: State, pairs: Pairs) -> None:
-    """Constants of all bridges with the liquid that beads have now."""
-    for at in range(pairs.first.shape[0]):
-        set_pair_bridge(c, state, pairs.first[at], pairs.second[at], pairs.bridge[at])
-    for bead in range(c.radius.shape[0]):
-        set_wall_bridge(c, state, bead)
-
-
-@compiled
-def pull(c: Constants, bridge: FloatArray, gap: float) -> float:
-    """Capillary attraction, N: πγ√(R1R2) (exp(A h/R2 + B) + C), or as the table has it."""
-    if not c.capillary:
-        return 0.0
+def bridge_forces(b: Bridges, bridge: int, gap: float) -> tuple[float, float, float, float, float]:
+    """Pull (N) and resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s)."""
+    scale, middle, rupture = b.spans[bridge, SCALE], b.spans[bridge, MIDDLE], b.spans[bridge, RUPTURE]
     gap = max(gap, 0.0)
-    if bridge[TABLE] < 0.0:
-        return bridge[PEAK] * (exp(bridge[SLOPE] * gap + bridge[SHIFT]) + bridge[OFFSET])
-    values = c.tables[int(bridge[TABLE])]
-    place = gap / bridge[RUPTURE] * (TABLE_POINTS - 1)
-    low = min(int(place), TABLE_POINTS - 2)
-    return values[low] + (place - low) * (values[low + 1] - values[low])
+    if gap < scale:
+        piece, place = 0, gap / scale
+    elif gap < middle:
+        piece, place = 1, log(gap / scale) / log(middle / scale)
+    else:
+        piece, place = 2, 1.0 - sqrt((rupture - gap) / (rupture - middle))
+    cell = min(int(place * CELLS), CELLS - 1)
+    t = place * CELLS - cell
+    f = b.splines[bridge, piece, cell]
+    power = ((f[0] * t + f[1]) * t + f[2]) * t + f[3]
+    return power[PULL], power[NORMAL], power[SLIDING], power[COUPLING], power[ROLLING]
 
 
 @compiled
-def drags(c: Constants, reduced_radius: float, gap: float) -> tuple[float, float]:
-    """Normal and tangential viscous force over velocity, N s/m (Shi and McCarthy, Eqs. 40 and 41)."""
-    near = max(c.separation, gap / reduced_radius)
-    stokes = 6.0 * pi * reduced_radius
-    tangential = 0.0
-    if c.tangential_viscosity > 0.0:
-        tangential = stokes * c.tangential_viscosity * (8.0 / 15.0 * log(1.0 / near) + 0.9588)
-    return stokes * c.normal_viscosity / near, tangential
-
-
-@compiled
-def wall_drags(c: Constants, radius: float, gap: float) -> tuple[float, float]:
-    """The same at a wall, all of its copies."""
-    if c.wall_lubrication == PLANE:
-        return drags(c, radius, gap)
-    normal, tangential = drags(c, radius / 2.0, gap)
-    return c.copies * normal, c.copies * tangential
-
-
-@compiled
-def missing_wall_drag(c: Constants, radius: float, gap: float) -> float:
-    """What two equal spheres lack of a plane's normal lubrication, N s/m."""
-    halves = 1.0 / max(c.separation, 2.0 * gap / radius)
-    return 6.0 * pi * c.normal_viscosity * radius * (1.0 / max(c.separation, gap / radius) - halves)
-
-
-@compiled
-def limit_of_friction(c: Constants, friction: float, load: float, speed: float, slips: bool) -> float:
-    """Largest tangential force, N."""
-    if c.static == BY_VELOCITY:
-        return friction * load * (1.0 + (c.static_ratio - 1.0) / (1.0 + speed / c.static_velocity))
-    if c.static == STICK_SLIP and not slips:
-        return friction * load * c.static_ratio
-    return friction * load
-
-
-@compiled
-def touching(
-    c: Constants,
-    of: tuple[float, float, float, float],
-    n: Vector,
-    motion: tuple[float, Vector],
-    spring: FloatArray,
-    slips: bool,
-    moves: bool,
-) -> tuple[float, float, float, float, float, bool]:
-    """A dry contact: elastic and whole normal force (N), tangential force (N), whether it slips.
+def touch(c: Constants, m: Meeting, spring: FloatArray, moves: bool) -> tuple[float, Vector, Vector]:
+    """Normal force (N), tangential force (N) and couple (N m) on the first of two surfaces that overlap.
 
     Parameters
     ----------
-    c
-        Constants.
-    of
-        Overlap δ and reduced radius (m), reduced mass (kg), coefficient of friction.
-    n
-        Normal.
-    motion
-        Velocity of the first surface relative to the second, along the normal and along the surfaces, m/s.
+    c, m
+        Constants, and how they meet.
     spring
         Tangential displacement, m; changed.
-    slips
-        Whether the contact slipped the step before.
     moves
         Whether time goes on; else forces are those of the state as it is.
     """
-    overlap, reduced_radius, reduced_mass, friction = of
-    normal_speed, slide = motion
-    root = sqrt(reduced_radius * overlap)
-    elastic = 4.0 / 3.0 * c.modulus * root * overlap
-    damping = 2.0 * sqrt(5.0 / 6.0)
-    force = elastic - damping * c.normal_damping * sqrt(2.0 * c.modulus * root * reduced_mass) * normal_speed
-    if not c.friction:
-        return elastic, force, 0.0, 0.0, 0.0, slips
-    stiffness = 8.0 * c.shear_modulus * root
-    drag = damping * c.tangential_damping * sqrt(stiffness * reduced_mass)
-    load = abs(force) if c.limit_with_damping else elastic
-    speed = sqrt(slide[0] ** 2 + slide[1] ** 2 + slide[2] ** 2)
-    limit = limit_of_friction(c, friction, load, speed, slips)
-    if not c.spring:
-        scale = -drag if drag * speed <= limit else -limit / speed
-        return elastic, force, scale * slide[0], scale * slide[1], scale * slide[2], False
+    root = sqrt(-m.radius * m.gap)
+    elastic = -4.0 / 3.0 * c.modulus * root * m.gap
+    damping = 2.0 * sqrt(5.0 / 6.0) * c.damping * sqrt(m.mass)
+    normal = elastic - damping * sqrt(2.0 * c.modulus * root) * m.apart
+    stretch = (spring[0], spring[1], spring[2])
+    if moves:
+        stretch = plus(stretch, c.step, m.slide)
+        stretch = plus(stretch, -dot(stretch, m.n), m.n)
+    stiffness, limit = 8.0 * c.shear_modulus * root, m.friction * elastic
+    held = stiffness * sqrt(dot(stretch, stretch))
+    scale, along = 1.0, (0.0, 0.0, 0.0)
+    if held > limit:
+        scale = limit / held
+    else:
+        along = plus(along, -damping * sqrt(stiffness), m.slide)
+    tangential = plus(along, -scale * stiffness, stretch)
+    size = sqrt(dot(tangential, tangential))
+    if size > limit:
+        tangential = plus((0.0, 0.0, 0.0), limit / size, tangential)
     if moves:
         for axis in range(3):
-            spring[axis] += slide[axis] * c.step
-        along = spring[0] * n[0] + spring[1] * n[1] + spring[2] * n[2]
-        for axis in range(3):
-            spring[axis] -= along * n[axis]
-    stretch = stiffness * sqrt(spring[0] ** 2 + spring[1] ** 2 + spring[2] ** 2)
-    if c.static == STICK_SLIP:
-        if stretch > limit and not slips:
-            slips = True
-            limit = friction * load
-        elif slips and stretch < limit:
-            slips = spring[0] * slide[0] + spring[1] * slide[1] + spring[2] * slide[2] > 0.0
-    if stretch > limit:
-        if moves:
-            for axis in range(3):
-                spring[axis] *= limit / stretch
-            return elastic, force, -stiffness * spring[0], -stiffness * spring[1], -stiffness * spring[2], slips
-        scale = -stiffness * limit / stretch
-        return elastic, force, scale * spring[0], scale * spring[1], scale * spring[2], slips
-    return (
-        elastic,
-        force,
-        -stiffness * spring[0] - drag * slide[0],
-        -stiffness * spring[1] - drag * slide[1],
-        -stiffness * spring[2] - drag * slide[2],
-        slips,
-    )
+            spring[axis] = scale * stretch[axis]
+    turning, couple = sqrt(dot(m.turn, m.turn)), (0.0, 0.0, 0.0)
+    if turning > 0.0:
+        rolls = plus(m.turn, -dot(m.turn, m.n), m.n)
+        couple = plus(couple, -c.rolling * elastic * m.radius / turning, rolls)
+    return normal, tangential, couple
 
 
 @compiled
-def sliding(n: Vector, between: Vector, turning: Vector) -> tuple[float, Vector]:
-    """Velocity of one surface relative to another, m/s: along the normal, and along the surfaces.
-
-    Parameters
-    ----------
-    n
-        Normal.
-    between
-        Velocity of the first centre relative to the second, m/s.
-    turning
-        Sum of the angular velocities, each times its arm from the centre to the contact, m/s.
-    """
-    along = between[0] * n[0] + between[1] * n[1] + between[2] * n[2]
-    return along, (
-        between[0] - along * n[0] + n[1] * turning[2] - n[2] * turning[1],
-        between[1] - along * n[1] + n[2] * turning[0] - n[0] * turning[2],
-        between[2] - along * n[2] + n[0] * turning[1] - n[1] * turning[0],
-    )
+def meet(c: Constants, m: Meeting, spring: FloatArray, bridged: bool, moves: bool) -> tuple[Vector, Vector]:
+    """Force (N) and couple (N m) on the first of two surfaces that touch or have a bridge."""
+    normal, tangential, couple = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if m.gap < 0.0:
+        normal, tangential, couple = touch(c, m, spring, moves)
+    if bridged:
+        pull, resists, slides, couples, rolls = bridge_forces(c.bridges, m.bridge, m.gap)
+        q, couples = cross(m.n, m.turn), m.order * couples
+        normal -= pull + resists * m.apart
+        tangential = plus(plus(tangential, -slides, m.slide), -couples, q)
+        couple = plus(plus(couple, couples, cross(m.n, m.slide)), rolls, cross(m.n, q))
+    return plus(tangential, normal, m.n), couple
 
 
 @compiled
-def push(state: State, bead: int, sign: float, arm: float, n: Vector, force: Vector) -> None:
-    """A force (N), or its reaction (``sign`` −1), on a bead whose surface it meets at ``arm`` (m) from the centre."""
+def still_bridged(c: Constants, bridge: int, gap: float, was: bool) -> bool:
+    """Whether there is a bridge now."""
+    formation = c.bridges.spans[bridge, FORMATION]
+    return gap < c.bridges.spans[bridge, RUPTURE] and (was or gap <= formation)
+
+
+@compiled
+def push(state: State, bead: int, sign: float, arm: float, n: Vector, acting: tuple[Vector, Vector]) -> None:
+    """A force (N) and a couple (N m), or their reaction (``sign`` -1), on a bead, ``arm`` (m) from the contact."""
+    force, couple = acting
+    turn = cross(n, force)
     for axis in range(3):
         state.force[bead, axis] += sign * force[axis]
-    state.torque[bead, 0] -= arm * (n[1] * force[2] - n[2] * force[1])
-    state.torque[bead, 1] -= arm * (n[2] * force[0] - n[0] * force[2])
-    state.torque[bead, 2] -= arm * (n[0] * force[1] - n[1] * force[0])
+        state.torque[bead, axis] += sign * couple[axis] - arm * turn[axis]
 
 
 @compiled
-def rolling_torque(n: Vector, turning: Vector, size: float) -> Vector:
-    """Torque of a size (N m) against a relative rotation, without its part about the normal."""
-    length = sqrt(turning[0] ** 2 + turning[1] ** 2 + turning[2] ** 2)
-    if length == 0.0:
-        return (0.0, 0.0, 0.0)
-    along = turning[0] * n[0] + turning[1] * n[1] + turning[2] * n[2]
-    scale = -size / length
-    return (
-        scale * (turning[0] - along * n[0]),
-        scale * (turning[1] - along * n[1]),
-        scale * (turning[2] - along * n[2]),
-    )
-
-
-@compiled
-def along_normal(n: Vector, normal: float, tangential: Vector) -> Vector:
-    """A force from its normal part and its tangential one."""
-    return (normal * n[0] + tangential[0], normal * n[1] + tangential[1], normal * n[2] + tangential[2])
+def vector(values: FloatArray) -> Vector:
+    """A row as a tuple."""
+    return (values[0], values[1], values[2])
 
 
 @compiled
 def body_forces(c: Constants, state: State, clock: int) -> None:
     """Weight and inertial force."""
-    ax, ay, az = c.gravity[0], c.gravity[1], c.gravity[2]
+    total = vector(c.gravity)
     if clock >= 0:
         for one in range(c.harmonics.shape[0]):
             wave = c.harmonics[one]
-            now = wave[4] * sin(wave[3] * clock * c.step + wave[5])
-            ax, ay, az = ax + now * wave[0], ay + now * wave[1], az + now * wave[2]
+            total = plus(total, wave[4] * sin(wave[3] * clock * c.step + wave[5]), (wave[0], wave[1], wave[2]))
     for bead in range(c.radius.shape[0]):
-        state.force[bead, 0] = c.mass[bead] * ax
-        state.force[bead, 1] = c.mass[bead] * ay
-        state.force[bead, 2] = c.mass[bead] * az
-        state.torque[bead, :] = 0.0
+        for axis in range(3):
+            state.force[bead, axis] = c.mass[bead] * total[axis]
+            state.torque[bead, axis] = 0.0
 
 
 @compiled
 def wall_forces(c: Constants, state: State, moves: bool) -> None:
-    """Contacts, bridges and films of all beads at all walls."""
-    x, v, w = state.position, state.velocity, state.spin
+    """Contacts and bridges of all beads at all walls."""
     for bead in range(c.radius.shape[0]):
-        radius, bridge = c.radius[bead], state.wall_bridge[bead]
+        radius, bridge = c.radius[bead], c.bridges.between[c.bridges.kind[bead], -1]
+        velocity, spin = vector(state.velocity[bead]), vector(state.spin[bead])
         for wall in range(c.point.shape[0]):
-            n = (c.normal[wall, 0], c.normal[wall, 1], c.normal[wall, 2])
-            p = c.point[wall]
-            height = (x[bead, 0] - p[0]) * n[0] + (x[bead, 1] - p[1]) * n[1] + (x[bead, 2] - p[2]) * n[2]
-            gap = height - radius
-            if gap >= max(bridge[RUPTURE], c.reach[bead]):
-                leave(state.wall_spring[bead, wall], state.wall_bridged[bead], state.wall_slips[bead], wall)
-                continue
-            arm = radius + min(gap, 0.0) / 2.0
-            between = (v[bead, 0], v[bead, 1], v[bead, 2])
-            turning = (arm * w[bead, 0], arm * w[bead, 1], arm * w[bead, 2])
-            speed, slide = sliding(n, between, turning)
-            normal, tangential = 0.0, 0.0
-            if gap < 0.0:
-                state.wall_bridged[bead, wall] = True
-                of = (-gap, radius, c.mass[bead], c.friction_walls)
-                spring, slips = state.wall_spring[bead, wall], state.wall_slips[bead, wall]
-                elastic, force, tx, ty, tz, slips = touching(c, of, n, (speed, slide), spring, slips, moves)
-                state.wall_slips[bead, wall] = slips
-                push(
-                    state,
-                    bead,
-                    1.0,
-                    arm,
-                    n,
-                    along_normal(n, c.copies * force, (c.copies * tx, c.copies * ty, c.copies * tz)),
-                )
-                torque = rolling_torque(
-                    n, (w[bead, 0], w[bead, 1], w[bead, 2]), c.copies * c.rolling * elastic * radius
-                )
-                for axis in range(3):
-                    state.torque[bead, axis] += torque[axis]
-            elif gap >= bridge[RUPTURE]:
-                leave(state.wall_spring[bead, wall], state.wall_bridged[bead], state.wall_slips[bead], wall)
-            else:
+            n = vector(c.normal[wall])
+            gap = dot(plus(vector(state.position[bead]), -1.0, vector(c.point[wall])), n) - radius
+            bridged = still_bridged(c, bridge, gap, state.wall_bridged[bead, wall])
+            state.wall_bridged[bead, wall] = bridged
+            if gap >= 0.0:
                 state.wall_spring[bead, wall, :] = 0.0
-                state.wall_slips[bead, wall] = False
-            if state.wall_bridged[bead, wall]:
-                normal, tangential = wall_drags(c, radius, gap)
-                normal *= -speed
-                normal -= pull(c, bridge, gap) * (c.copies if bridge[TABLE] < 0.0 else 1.0)
-            if c.wall_lubrication == PLANE_NORMAL and 0.0 < gap < c.reach[bead]:
-                normal -= missing_wall_drag(c, radius, gap) * speed
-            viscous = (-tangential * slide[0], -tangential * slide[1], -tangential * slide[2])
-            push(state, bead, 1.0, arm, n, along_normal(n, normal, viscous))
-            if gap < c.reach[bead]:
-                for axis in range(3):
-                    state.force[bead, axis] -= c.film[bead] * (between[axis] - speed * n[axis])
+                if not bridged:
+                    continue
+            arm, apart = radius + 0.5 * gap, dot(velocity, n)
+            slide = plus(plus(velocity, -apart, n), arm, cross(n, spin))
+            m = Meeting(bridge, 1.0, gap, radius, c.mass[bead], c.friction_walls, n, apart, slide, spin)
+            push(state, bead, 1.0, arm, n, meet(c, m, state.wall_spring[bead, wall], bridged, moves))
 
 
 @compiled
-def leave(spring: FloatArray, bridged: FlagArray, slips: FlagArray, at: int) -> None:
-    """Neither contact nor bridge any more."""
-    spring[:] = 0.0
-    bridged[at] = False
-    slips[at] = False
-
-
-@compiled
-def pair_forces(c: Constants, state: State, pairs: Pairs, moves: bool) -> bool:
-    """Contacts and bridges between beads; whether a bridge broke and its liquid was shared out."""
-    x, v, w = state.position, state.velocity, state.spin
-    shared = False
+def pair_forces(c: Constants, state: State, pairs: Pairs, moves: bool) -> None:
+    """Contacts and bridges between beads."""
     for at in range(pairs.first.shape[0]):
         i, j = pairs.first[at], pairs.second[at]
-        dx, dy, dz = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], x[i, 2] - x[j, 2]
-        together = c.radius[i] + c.radius[j]
-        square = dx * dx + dy * dy + dz * dz
-        if square >= together**2 and not pairs.bridged[at]:
+        d = plus(vector(state.position[i]), -1.0, vector(state.position[j]))
+        distance, together = sqrt(dot(d, d)), c.radius[i] + c.radius[j]
+        gap, n = distance - together, (d[0] / distance, d[1] / distance, d[2] / distance)
+        bridge = c.bridges.between[c.bridges.kind[i], c.bridges.kind[j]]
+        pairs.bridged[at] = still_bridged(c, bridge, gap, pairs.bridged[at])
+        if gap >= 0.0:
             pairs.spring[at, :] = 0.0
-            pairs.slips[at] = False
-            continue
-        distance = sqrt(square)
-        gap, n = distance - together, (dx / distance, dy / distance, dz / distance)
-        if gap >= pairs.bridge[at, RUPTURE]:
-            leave(pairs.spring[at], pairs.bridged, pairs.slips, at)
-            shared = share_liquid(c, state, i, j) or shared
-            continue
-        arm_i, arm_j = c.radius[i] + min(gap, 0.0) / 2.0, c.radius[j] + min(gap, 0.0) / 2.0
-        between = (v[i, 0] - v[j, 0], v[i, 1] - v[j, 1], v[i, 2] - v[j, 2])
-        turning = (
-            arm_i * w[i, 0] + arm_j * w[j, 0],
-            arm_i * w[i, 1] + arm_j * w[j, 1],
-            arm_i * w[i, 2] + arm_j * w[j, 2],
-        )
-        speed, slide = sliding(n, between, turning)
-        reduced_radius = c.radius[i] * c.radius[j] / together
-        normal, tangential = drags(c, reduced_radius, gap)
-        normal = -normal * speed - pull(c, pairs.bridge[at], gap)
-        viscous = (-tangential * slide[0], -tangential * slide[1], -tangential * slide[2])
-        if gap < 0.0:
-            pairs.bridged[at] = True
-            of = (-gap, reduced_radius, c.mass[i] * c.mass[j] / (c.mass[i] + c.mass[j]), c.friction_beads)
-            elastic, force, tx, ty, tz, slips = touching(
-                c, of, n, (speed, slide), pairs.spring[at], pairs.slips[at], moves
-            )
-            pairs.slips[at] = slips
-            normal += force
-            viscous = (viscous[0] + tx, viscous[1] + ty, viscous[2] + tz)
-            roll = (w[i, 0] - w[j, 0], w[i, 1] - w[j, 1], w[i, 2] - w[j, 2])
-            torque = rolling_torque(n, roll, c.rolling * elastic * reduced_radius)
-            for axis in range(3):
-                state.torque[i, axis] += torque[axis]
-                state.torque[j, axis] -= torque[axis]
-        else:
-            pairs.spring[at, :] = 0.0
-            pairs.slips[at] = False
-        both = along_normal(n, normal, viscous)
-        push(state, i, 1.0, arm_i, n, both)
-        push(state, j, -1.0, arm_j, n, both)
-    return shared
-
-
-@compiled
-def share_liquid(c: Constants, state: State, i: int, j: int) -> bool:
-    """The liquid of a bridge that breaks goes to its beads in proportion to their volumes."""
-    if not c.transfer:
-        return False
-    one, other = c.radius[i], c.radius[j]
-    from_i, from_j = caps(one, other, state.liquid[i]), caps(other, one, state.liquid[j])
-    to_i = (from_i + from_j) / (1.0 + (other / one) ** 3)
-    moved = to_i - from_i
-    state.liquid[i] += moved / (4.0 / 3.0 * pi * one**3)
-    state.liquid[j] -= moved / (4.0 / 3.0 * pi * other**3)
-    return True
+            if not pairs.bridged[at]:
+                continue
+        arm_i, arm_j = c.radius[i] + 0.5 * gap, c.radius[j] + 0.5 * gap
+        between = plus(vector(state.velocity[i]), -1.0, vector(state.velocity[j]))
+        spin_i, spin_j = vector(state.spin[i]), vector(state.spin[j])
+        apart = dot(between, n)
+        turning = plus(plus((0.0, 0.0, 0.0), arm_i, spin_i), arm_j, spin_j)
+        slide = plus(plus(between, -apart, n), 1.0, cross(n, turning))
+        mass, radius = c.mass[i] * c.mass[j] / (c.mass[i] + c.mass[j]), c.radius[i] * c.radius[j] / together
+        order, turn = (-1.0 if c.radius[i] > c.radius[j] else 1.0), plus(spin_i, -1.0, spin_j)
+        m = Meeting(bridge, order, gap, radius, mass, c.friction_beads, n, apart, slide, turn)
+        acting = meet(c, m, pairs.spring[at], pairs.bridged[at], moves)
+        push(state, i, 1.0, arm_i, n, acting)
+        push(state, j, -1.0, arm_j, n, acting)
 
 
 @compiled
@@ -508,8 +318,7 @@ def forces(c: Constants, state: State, pairs: Pairs, clock: int, moves: bool) ->
     """All forces and torques at the places and velocities of the state."""
     body_forces(c, state, clock)
     wall_forces(c, state, moves)
-    if pair_forces(c, state, pairs, moves):
-        set_bridges(c, state, pairs)
+    pair_forces(c, state, pairs, moves)
 
 
 @compiled

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from walkers.inputs.boundary import Face
 from walkers.inputs.case import Case
 from walkers.postprocess.motion import Motion
 from walkers.studies.crosscheck.engine import Beads, Matter, SecondEngine, Surroundings
@@ -12,35 +15,21 @@ from walkers.studies.crosscheck.laws import Laws
 
 def matter_of(case: Case) -> Matter:
     """What a case's beads, walls and liquid are made of."""
-    contact, liquid = case.contact, case.liquid
-    return Matter(
-        density=case.density,
-        youngs_modulus=contact.youngs_modulus,
-        poissons_ratio=contact.poissons_ratio,
-        restitution=contact.restitution,
-        friction_beads=contact.friction_bead_bead,
-        friction_walls=contact.friction_bead_wall,
-        rolling_friction=contact.rolling_friction,
-        surface_tension=liquid.surface_tension,
-        viscosity=liquid.dynamic_viscosity,
-        film_viscosity=liquid.film_viscosity,
-        volume_fraction=liquid.volume_fraction,
-        contact_angle=liquid.contact_angle,
-        separation_ratio=contact.minimum_separation_ratio,
-    )
+    return Matter(case.density, case.contact, case.liquid)
 
 
-def surroundings_of(case: Case) -> Surroundings:
-    """A case's walls, weight and drive.
+def surroundings_of(case: Case, faces: Sequence[Face] = ()) -> Surroundings:
+    """A case's walls (or some faces), weight and drive.
 
     Raises
     ------
     ValueError
         If a wall is round.
     """
-    faces = case.boundary.faces()
-    if any(face.of for face in faces):
-        raise ValueError("boundary.shape: the second engine has flat walls only, no cylinder")
+    if not faces:
+        faces = case.boundary.faces()
+        if any(face.of for face in faces):
+            raise ValueError("boundary.shape: the second engine has flat walls only, no cylinder")
     return Surroundings(
         point=np.array([face.centroid for face in faces]),
         normal=np.array([face.normal for face in faces]),
@@ -63,12 +52,12 @@ def engine_of(motion: Motion, laws: Laws) -> SecondEngine:
     return engine_at(motion.case, beads, laws, round(float(motion.time[0]) / motion.case.run.time_step))
 
 
-def engine_at(case: Case, beads: Beads, laws: Laws, clock: int = 0) -> SecondEngine:
-    """The second engine with a case's matter, walls and drive, and some beads, at a step.
+def engine_at(case: Case, beads: Beads, laws: Laws, clock: int = 0, faces: Sequence[Face] = ()) -> SecondEngine:
+    """The second engine with a case's matter, walls (or some faces) and drive, and some beads, at a step.
 
     Raises
     ------
     ValueError
         If a wall is round.
     """
-    return SecondEngine(beads, matter_of(case), surroundings_of(case), laws, case.run.time_step, clock)
+    return SecondEngine(beads, matter_of(case), surroundings_of(case, faces), laws, case.run.time_step, clock)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 import warnings
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -15,32 +13,25 @@ from walkers.commands.arguments import EngineName, Json
 
 Only = Annotated[list[str] | None, typer.Option("--only", help="Name of a check; may be repeated.")]
 Quick = Annotated[bool, typer.Option("--quick", help="Leave out the checks that take longest.")]
-Markdown = Annotated[Path | None, typer.Option("--markdown", help="Write a page of the defects and the table.")]
 
 
 def command(
     only: Only = None,
     quick: Quick = False,
     as_json: Json = False,
-    markdown: Markdown = None,
     engine: EngineName = None,
 ) -> int:
-    """Measure the engine's forces and our workarounds against published formulas; exit status 1 if a line fails."""
+    """Measure forces of engine and contact model beside a second engine and closed forms; exit 1 if a line fails."""
     from walkers.audit.run import CheckedLines, record, run_audit, selected
-    from walkers.audit.table import as_dict, as_markdown, as_text
+    from walkers.audit.table import as_dict, as_text
     from walkers.inputs.errors import InputError, Problem
     from walkers.runner.binary import find_engine
     from walkers.runner.failures import EngineMissing
-    from walkers.runner.files import write_text
 
     def tell(checked: CheckedLines) -> None:
         print(f"walkers: {checked.check.name} ({checked.seconds:.1f} s)", file=sys.stderr, flush=True)
 
     checks = selected(only or (), quick=quick)
-    if markdown is not None and not (markdown.parent.is_dir() and os.access(markdown.parent, os.W_OK)):
-        raise InputError(
-            "--markdown", [Problem("", None, f"expected a file in a folder that can be written, not {markdown}")]
-        )
     try:
         binary = find_engine(engine)
     except EngineMissing as missing:
@@ -49,8 +40,6 @@ def command(
         raise InputError("--engine", [Problem("", None, str(missing))]) from missing
     report = run_audit(checks, engine=binary, on_done=tell)
     print(json.dumps(as_dict(report), indent=2, ensure_ascii=False) if as_json else as_text(report))
-    if markdown is not None:
-        write_text(markdown, as_markdown(report))
     if not only:
         try:
             record(report, quick=quick)

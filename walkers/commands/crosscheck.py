@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,20 +15,9 @@ from walkers.pipeline import DEFAULT_OUT, Run, run
 if TYPE_CHECKING:
     from walkers.inputs.case import Case as Resolved
     from walkers.studies.crosscheck.comparison import Comparison, PileComparison
-    from walkers.studies.crosscheck.yade import YadeComparison
 
 Cycles = Annotated[int | None, typer.Option("--cycles", help="Of the drive, in place of the case's own.")]
 Without = Annotated[list[str] | None, typer.Option("--without", metavar="TERM", help="Leave a term out, such as film.")]
-Laws = Annotated[
-    list[str] | None,
-    typer.Option("--law", metavar="NAME=VALUE", help="Replace a law, such as wall-lubrication=plane."),
-]
-With = Annotated[
-    Literal["second-engine", "yade"],
-    typer.Option(
-        "--with", help="Engine beside LIGGGHTS: our own; or YADE, if installed, for contacts and integration."
-    ),
-]
 Seeds = Annotated[int, typer.Option("--seeds", min=1, help="Of a pile: so many starts, for the statistics.")]
 
 
@@ -37,10 +26,8 @@ def command(
     out: Out = DEFAULT_OUT,
     cycles: Cycles = None,
     without: Without = None,
-    laws: Laws = None,
     settings: Set = None,
     seeds: Seeds = 1,
-    other: With = "second-engine",
     as_json: Json = False,
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
@@ -52,13 +39,12 @@ def command(
     from walkers.studies.crosscheck.comparison import shortened
     from walkers.studies.crosscheck.laws import laws_from
     from walkers.studies.crosscheck.setup import surroundings_of
-    from walkers.studies.crosscheck.yade import compare_with_yade
 
     loaded = load(case, settings)
     check_out(out)
     refuse("--seeds", seeds > 1 and loaded.mixture is None, "is for piles: walkers and placed beads start but one way")
     try:
-        supposed = laws_from(without or (), laws or ())
+        supposed = laws_from(without or ())
     except ValueError as error:
         option, _, told = str(error).partition(": ")
         raise InputError(f"--{option}", [Problem("", None, told)]) from error
@@ -71,17 +57,11 @@ def command(
     except ValueError as error:
         raise InputError("--cycles", [Problem("", None, str(error))]) from error
 
-    program = "" if other == "second-engine" else _yade(loaded, bool(without or laws))
-
     def make(one: Resolved, folder: Path) -> Run:
         with progress_of(one.name) as advance:
             return run(one, folder, engine=engine, progress=advance, allow_failed_audit=allow_failed_audit)
 
-    found: Comparison | PileComparison | YadeComparison
-    if program:
-        found = compare_with_yade(make(loaded, out).motion, program)
-    else:
-        found = crosscheck(loaded, out, supposed, seeds=seeds, make=make)
+    found = crosscheck(loaded, out, supposed, seeds=seeds, make=make)
     if as_json:
         print(json.dumps(found.as_dict(), ensure_ascii=False))
     else:
@@ -91,29 +71,7 @@ def command(
     return 1 if found.disagreements else 0
 
 
-def _yade(case: Resolved, other_laws: bool) -> str:
-    """YADE's program, if it can be asked for this case.
+def _described(found: Comparison | PileComparison) -> str:
+    from walkers.studies.crosscheck.comparison import PileComparison, describe, describe_piles
 
-    Raises
-    ------
-    walkers.inputs.errors.InputError
-        If not.
-    """
-    from walkers.studies.crosscheck.yade import INSTALL_COMMAND, check_case, find_program
-
-    refuse("--with yade", other_laws, "it has the decks' laws alone: leave --without and --law away")
-    try:
-        check_case(case)
-    except ValueError as error:
-        refuse("--with yade", True, str(error))
-    program = find_program()
-    refuse("--with yade", program is None, f"YADE is not installed on this machine; install it with: {INSTALL_COMMAND}")
-    return program or ""
-
-
-def _described(found: Comparison | PileComparison | YadeComparison) -> str:
-    from walkers.studies.crosscheck.comparison import Comparison, PileComparison, describe, describe_piles
-
-    if isinstance(found, PileComparison):
-        return describe_piles(found)
-    return describe(found) if isinstance(found, Comparison) else found.described()
+    return describe_piles(found) if isinstance(found, PileComparison) else describe(found)

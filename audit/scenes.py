@@ -1,0 +1,304 @@
+"""Beads on prescribed ways, by the engine and, put where it had them, by the second engine, whose laws are the same.
+
+Forces and torques of each step are compared, over the largest of the scene. Most scenes have `law`, whose pull and
+resistances are all there, and have nothing to do with each other.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import product
+from math import cos, degrees, nan, pi, sin, sqrt
+
+import numpy as np
+
+from walkers.audit.bench import FLOOR, Bench, Measured, bench_case, bench_recording, bench_scene, farthest
+from walkers.audit.check import Check, Line, Verdict
+from walkers.inputs.boundary import SIDES, Cylinder, Face, Span
+from walkers.inputs.case import Case
+from walkers.inputs.drive import Vector
+from walkers.inputs.text import rendered
+from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
+from walkers.physics.laws import law_of
+from walkers.postprocess.motion import prescribed_motion
+from walkers.studies.crosscheck.engine import Beads, SecondEngine
+from walkers.studies.crosscheck.laws import Laws
+from walkers.studies.crosscheck.setup import engine_at
+from walkers.templates.bridge_tables import tabulated
+from walkers.templates.deck import BRIDGES_NAME, Checkpoint, Plan, compose
+from walkers.templates.scene import Bead, Scene
+
+EQUAL = 1e-6
+"""Of the largest force or torque: how far two engines may differ, each with its own interpolation of the law."""
+R, S = 3e-4, 2e-4
+_DEEP = 1.7123e-6
+"""m; overlap of what touches."""
+_WAY, _SPIN = (0.031, -0.023, 0.053), (61.0, -83.0, 47.0)
+_STEPS = 2000
+
+
+def law(surfaces: Surfaces) -> Curve:
+    """A bridge that forms before surfaces touch, with a kink near contact, and resistances of all kinds."""
+    size, scale = surfaces.reduced_radius, surfaces.closest
+    uneven = 1.0 - surfaces.radius / surfaces.other_radius  # none of equal beads, which have no order
+    drag = 6.0 * pi * 0.03 * size
+
+    def forces(gaps: FloatArray) -> Forces:
+        near = 1.0 / np.maximum(gaps / scale, 1.0)
+        return Forces(
+            pull=0.05 * size * np.exp(-12.0 * gaps / size),
+            normal=drag * near / surfaces.minimum_separation_ratio,
+            sliding=drag * (4.0 + np.log(near)),
+            coupling=-0.7 * uneven * drag * size * (1.0 + near),
+            rolling=drag * size**2 * (4.0 + 2.0 * near),
+        )
+
+    return Curve(forces, rupture=0.25 * size, formation=0.03 * size)
+
+
+def full_case(**changes: dict[str, object]) -> Case:
+    """Friction, rolling friction, damping and the law of this module, but for some changes."""
+    contact: dict[str, object] = {
+        "friction": {"bead_bead": 0.23, "bead_wall": 0.31}, "rolling_friction": 0.04, "restitution": 0.4,
+    }  # fmt: skip
+    liquid: dict[str, object] = {"dynamic_viscosity": "4.6 mPa*s", "law": f"{__name__}:law"}
+    case = bench_case(**{**changes, "contact": contact, "liquid": {**liquid, **changes.get("liquid", {})}})
+    return replace(case, liquid=replace(case.liquid, film_viscosity=0.02))
+
+
+def second_engine(case: Case, scene: Scene) -> SecondEngine:
+    """The second engine with the beads of a scene."""
+    start = [[getattr(bead, name) for bead in scene.beads] for name in ("radius", "centre", "velocity", "spin")]
+    laws = Laws(drive=case.drive.frame == "container")
+    return engine_at(case, Beads(*map(np.array, start)), laws, faces=scene.faces)
+
+
+def deviation(case: Case, scene: Scene, series: Measured) -> tuple[float, float]:
+    """How far forces and torques of a series are from the second engine's, over the largest ones."""
+    _, speed = prescribed_motion(case.drive, series.time)
+    # The engine adds up the steps of its walls, each with the velocity at its end; in the first frame they do not move.
+    shift = np.cumsum(speed * (series.time[:, None] > 0.0), axis=0) * case.run.time_step
+    engine = second_engine(case, scene)
+    ways = (series.position - shift[:, None], series.velocity - speed[:, None], series.spin)
+    found = [engine.follow(*(way[step] for way in ways)) for step in range(1, len(series.time))]
+    force, torque = (np.array([one[which] for one in found]) for which in (0, 1))
+    return farthest(series.force[1:], force), farthest(series.torque[1:], torque)
+
+
+def prescribed(case: Case, scene: Scene, steps: int = _STEPS, **options: object) -> Plan:
+    """Move the beads of a scene with their velocities, recording each step."""
+    return Plan(case, scene, bench_recording(steps), prescribed=True, **options)  # type: ignore[arg-type]
+
+
+def follows(case: Callable[[], Case], scene: Scene, name: str, bench: Bench) -> Iterator[Line]:
+    """Lines of a scene."""
+    made = case()
+    for what, error in zip(
+        ("force", "torque"), deviation(made, scene, bench.run(prescribed(made, scene))), strict=True
+    ):
+        yield Line(f"{name}: {what} beside the second engine's", 0.0, error, EQUAL)
+
+
+def over(
+    face: Face, gap: float, radius: float, velocity: Vector = (0.0, 0.0, 0.0), spin: Vector = _SPIN, x: float = 0.0
+) -> Bead:
+    """A bead at a gap (m) from a face, its velocity in the face's own axes, and so far along x (m) from its middle."""
+    centre = [at + (radius + gap) * n for at, n in zip(face.centroid, face.normal, strict=True)]
+    return Bead(0, (centre[0] + x, centre[1], centre[2]), radius, face.turned(velocity), spin)
+
+
+def pair(
+    gap: float, apart: float, slide: Vector, spins: tuple[Vector, Vector] = (_SPIN, (-29.0, 53.0, 19.0))
+) -> list[Bead]:
+    """Two beads of unlike size in mid-air, at a gap (m), with a velocity apart (m/s) and another one besides."""
+    n = np.array([0.48, 0.6, 0.64])
+    first, second = np.array([-3e-3, 1e-3, 4e-3]), apart * n + np.array(slide)
+    place = first + (R + S + gap) * n
+    return [
+        Bead(0, (first[0], first[1], first[2]), R, spin=spins[0]),
+        Bead(0, (place[0], place[1], place[2]), S, (second[0], second[1], second[2]), spins[1]),
+    ]
+
+
+_LEANING = Face("z", 1, (0.0, 0.0, 0.0), lean=0.37)
+_SIDE = Face("y", -1, (0.0, 6.0e-4, 1e-3), wall="+y")
+_IN_CORNER = Bead(0, (1e-4, 6.0e-4 - R + _DEEP, R - _DEEP), R, (0.031, -0.043, 0.037), _SPIN)
+_CLIMBING = [
+    Bead(0, (0.0, 0.0, R - _DEEP), R, (0.01, 0.02, 0.0), (5.0, 9.0, 40.0)),
+    Bead(0, (R + S - _DEEP, 0.0, S + 1e-4), S, (0.01, 0.03, -0.04), _SPIN),
+    Bead(0, (0.0, R + R - _DEEP, R - _DEEP), R, (0.0113, 0.0447, 0.0511), (3.0, -80.0, 5.0)),
+]
+_ROLL: Vector = (0.0, 0.03 / R, 0.0)
+_STILL: Vector = (0.0, 0.0, 0.0)
+_OWN = partial(full_case)
+_LAB = partial(full_case, drive={"frame": "lab", "frequency": "300 Hz", "peak_acceleration": "8 g"})
+_UPRIGHT = partial(full_case, drive={"frame": "lab", "frequency": "300 Hz", "peak_acceleration": "25 g", "axis": "z"})
+_DRIVEN = partial(
+    full_case,
+    drive={"frequency": "300 Hz", "peak_acceleration": "8 g", "axis": "z"},
+    environment={"gravity": "9.81 m/s^2"},
+)
+_SOULIE = partial(full_case, liquid={"law": "soulie"})
+
+SCENES: dict[str, tuple[Callable[[], Case], Scene]] = {
+    "a bead leaves the floor": (_OWN, bench_scene([over(FLOOR, -_DEEP, R, _WAY), over(FLOOR, 2e-5, S, _WAY, x=2e-3)])),
+    "a bead comes to the floor": (_OWN, bench_scene([over(FLOOR, 9e-5, R, (0.031, 0.023, -0.053))])),
+    "a bead slides": (_OWN, bench_scene([over(FLOOR, -_DEEP, R, (0.02, 0.013, 0.0), _STILL)])),
+    "a bead rolls": (_OWN, bench_scene([over(FLOOR, -_DEEP, R, (0.03, 0.0, 0.0), _ROLL)])),
+    "a bead spins where it is": (_OWN, bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, 2e-6, S, x=2e-3)])),
+    "a bead leaves a leaning wall": (_OWN, bench_scene([over(_LEANING, -_DEEP, R, _WAY)], [_LEANING])),
+    "a bead in a corner": (_OWN, bench_scene([_IN_CORNER], [FLOOR, _SIDE])),
+    "two beads part": (_OWN, bench_scene(pair(-_DEEP, 0.043, (0.02, -0.011, 0.005)))),
+    "two beads part, the smaller first": (_OWN, bench_scene(pair(-_DEEP, 0.043, (0.02, -0.011, 0.005))[::-1])),
+    "two beads meet": (_OWN, bench_scene(pair(4.1e-5, -0.023, (0.004, -0.003, 0.002)))),
+    "two beads roll on each other": (_OWN, bench_scene(pair(-_DEEP, 0.0, _STILL))),
+    "three beads on the floor": (_OWN, bench_scene(_CLIMBING)),
+    "the floor moves to and fro": (
+        _LAB,
+        bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, -5e-7, S, spin=_STILL, x=2e-3)]),
+    ),
+    "the floor moves up and down": (
+        _UPRIGHT,
+        bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, 3e-6, S, spin=_ROLL, x=2e-3)]),
+    ),
+    "weight and drive": (_DRIVEN, bench_scene([over(FLOOR, -_DEEP, R), Bead(0, (2e-3, 0.0, 5e-3), S)])),
+    "a bead leaves the floor (soulie)": (_SOULIE, bench_scene([over(FLOOR, -_DEEP, R, _WAY)])),
+    "two beads part (soulie)": (_SOULIE, bench_scene(pair(-_DEEP, 0.043, (0.02, -0.011, 0.005)))),
+}
+"""Each with its case."""
+
+
+def scene_lines(bench: Bench) -> Iterator[Line]:
+    """All scenes."""
+    for name, (case, scene) in SCENES.items():
+        yield from follows(case, scene, name, bench)
+
+
+def restart_lines(bench: Bench) -> Iterator[Line]:
+    """Springs and open bridges, of pairs and at walls, go on from a restart file as without one."""
+    case = full_case()
+    beads = [over(FLOOR, -_DEEP, R, (0.002, 0.001, 0.0), _STILL), *pair(-_DEEP, 0.001, (0.001, -0.002, 0.001))]
+    gone = replace(over(FLOOR, -_DEEP, S, _WAY), centre=(3e-3, 0.0, S - _DEEP))
+    scene = bench_scene([*beads, gone, *(_moved(bead, 0.0, 3e-3) for bead in pair(-_DEEP, 0.04, _STILL))])
+    whole = bench.run(prescribed(case, scene, 1000))
+    first = prescribed(case, scene, 500, checkpoint=Checkpoint(write="half.restart"))
+    carry = bench.run(first).directory / "half.restart"
+    recording = replace(bench_recording(1000), begin=500)
+    second = bench.run(replace(first, recording=recording, checkpoint=Checkpoint(read="half.restart")), carry)
+    for number, what in enumerate(("a spring at a wall", "a spring of a pair", None, "an open bridge to a wall", None,
+                                   "an open bridge of a pair")):  # fmt: skip
+        if what:
+            error = farthest(second.force[1:, number], whole.force[501:, number])
+            yield Line(f"{what} after a restart beside one without", 0.0, error, EQUAL)
+
+
+def _moved(bead: Bead, x: float, y: float, speed: float = 0.0) -> Bead:
+    """A bead elsewhere (m), so much faster along x (m/s)."""
+    place, velocity = bead.centre, bead.velocity
+    return replace(
+        bead, centre=(place[0] + x, place[1] + y, place[2]), velocity=(velocity[0] + speed, velocity[1], velocity[2])
+    )
+
+
+def rank_lines(bench: Bench) -> Iterator[Line]:
+    """A deck on two MPI ranks against the same on one."""
+    if shutil.which("mpirun") is None:
+        yield Line("two MPI ranks: no mpirun on this machine", nan, nan, 0.0, unmeasured=Verdict.SKIPPED)
+        return
+    # The engine takes a pair the other way round where it has crossed from one rank to the other.
+    first, last = pair(-_DEEP, 0.01, _STILL)
+    crossing = [
+        _moved(bead, 2.6e-3, y, 0.9) for y, beads in ((0.0, (first, last)), (2e-3, (last, first))) for bead in beads
+    ]
+    case, scene = full_case(), bench_scene([*_CLIMBING, *crossing])
+    one, two = (bench.run(prescribed(case, scene, 1000, ranks=ranks)) for ranks in (1, 2))
+    yield Line("forces on two MPI ranks beside one", 0.0, farthest(two.force, one.force), 1e-9)
+    yield Line("torques on two MPI ranks beside one", 0.0, farthest(two.torque, one.torque), 1e-9)
+
+
+_ROUND = Cylinder(material="glass", width=5e-3, height=20e-3)
+_HALF = 0.5 * _ROUND.width
+_SIZES = (2e-4, 3.5e-4, 5.5e-4)
+
+
+def _at(turn: float, out: float, aside: float, z: float) -> Vector:
+    """A place so far from the axis toward an azimuth and so far to its left, m."""
+    return out * cos(turn) - aside * sin(turn), out * sin(turn) + aside * cos(turn), z
+
+
+def _round_scene(beads: Sequence[Bead]) -> Scene:
+    room = _ROUND.room(Span(0.0, 0.0, 0.0, 0.0, max(_SIZES)))
+    numbered = tuple(replace(bead, id=number) for number, bead in enumerate(beads, 1))
+    return Scene(numbered, _ROUND.faces(), room.lower, room.upper)
+
+
+def cylinder_lines(bench: Bench) -> Iterator[Line]:
+    """A round wall: beads that leave one of its faces, as from a plane, and beads on their way past several."""
+    leaving = []
+    for number, (radius, share) in enumerate(product(_SIZES, (-0.3, 0.0, 0.3))):
+        turn, inner = 2.0 * pi * (11 * number % SIDES + 0.5) / SIDES, _HALF - radius
+        x, y, _ = _at(turn, -0.05, 0.0, 0.0)
+        place = _at(turn, inner + _DEEP, share * inner * pi / SIDES, 1.5e-3 * (number + 1))
+        leaving.append(Bead(0, place, radius, (x, y, 0.03), _SPIN))
+    case, scene = full_case(liquid={"law": "soulie"}), _round_scene(leaving)
+    errors = deviation(case, scene, bench.run(prescribed(case, scene, skin=2e-4)))
+    for what, error in zip(("force", "torque"), errors, strict=True):
+        yield Line(f"beads leave a face of a round wall: {what} beside the second engine's", 0.0, error, EQUAL)
+    case = bench_case()
+    for radius, way in product(_SIZES, (1.0, -1.0)):
+        yield Line(
+            f"a bead of {radius * 1e3:g} mm on its way around a round wall {'one way' if way > 0.0 else 'the other'}: "
+            "mean force over a plane's", 1.0, _around(bench, case, radius, way), 0.02,
+        )  # fmt: skip
+
+
+def _around(bench: Bench, case: Case, radius: float, way: float) -> float:
+    """Mean force over that of the nearest face, of a bead that moves on a chord: touching, open, touching."""
+    inner, turn = _HALF - radius, 2.0 * pi * 12.5 / SIDES
+    reach = sqrt(2.0 * inner * 0.08 * radius)
+    x, y, _ = _at(turn, 0.0, way, 0.0)
+    place = _at(turn, sqrt(inner**2 - reach**2) + _DEEP, -way * reach, 5e-3)
+    scene = _round_scene([Bead(0, place, radius, (x, y, 0.0))])
+    series = bench.run(prescribed(case, scene, int(2.0 * reach / case.run.time_step), skin=2e-4))
+    faces = _ROUND.faces()[1:]
+    points, normals = (np.array([getattr(face, name) for face in faces]) for name in ("centroid", "normal"))
+    engine = second_engine(case, replace(scene, faces=faces[:1]))
+    pulls = []
+    for step in range(1, len(series.time)):
+        nearest = int(np.einsum("wx,wx->w", series.position[step, 0] - points, normals).argmin())
+        engine.constants.point[0], engine.constants.normal[0] = points[nearest], normals[nearest]
+        force, _ = engine.follow(series.position[step], series.velocity[step], series.spin[step])
+        pulls.append(force[0])
+    expected = np.linalg.norm(pulls, axis=1)
+    return 1.0 + float(np.linalg.norm(series.force[1:, 0] - pulls, axis=1).mean() / expected.mean())
+
+
+def stock_lines(bench: Bench) -> Iterator[Line]:
+    """Two beads that part by Debian's own ``cohesion easo/capillary/viscous``, against the contact model's Soulié."""
+    bare = bench_case(
+        liquid={"dynamic_viscosity": "4.6 mPa*s", "contact_angle": "20 deg"}, contact={"restitution": 0.5}
+    )
+    scene = bench_scene(pair(-_DEEP, 0.05, _STILL, (_STILL, _STILL)))
+    deck = compose(prescribed(bare, scene))
+    meeting = Surfaces.of(S, R, bare.liquid, bare.contact.minimum_separation_ratio)
+    fine = tabulated(law_of(bare.liquid), meeting, tolerance=1e-10).text()
+    tables = deck.files[BRIDGES_NAME].split("bridge ")
+    tables = [f"1 1 {S!r} {R!r}\n{fine}" if one.startswith(f"1 1 {S!r} {R!r}") else one for one in tables]
+    ours = bench.run(replace(deck, files={**deck.files, BRIDGES_NAME: "bridge ".join(tables)}))
+    angle = degrees(sqrt(2.0 * bare.liquid.contact_angle))
+    text = rendered("walkers.audit", "stock.lig.j2", case=bare, scene=scene, layout=deck.layout, angle=angle)
+    theirs = bench.run(replace(deck, text=text))
+    error = farthest(ours.force, theirs.force)
+    yield Line("two beads part: force beside that of Debian's model of bridges", 0.0, error, 1e-9)
+
+
+CHECKS = (
+    Check("scenes", "beads on prescribed ways beside the second engine", scene_lines),
+    Check("restart", "springs and open bridges after a restart", restart_lines),
+    Check("ranks", "two MPI ranks beside one", rank_lines),
+    Check("stock", "a bridge of two beads beside Debian's own model", stock_lines),
+    Check("cylinder", "forces at a round wall", cylinder_lines, quick=False),
+)
