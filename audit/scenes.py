@@ -1,7 +1,7 @@
 """Beads on prescribed ways, by the engine and, put where it had them, by the second engine, whose laws are the same.
 
 Forces and torques of each step are compared, over the largest of the scene. Most scenes have `law`, whose pull and
-resistances are all there, and have nothing to do with each other.
+resistances are all there, and have nothing to do with each other; each law that comes with the program has two more.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.text import rendered
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
-from walkers.physics.laws import law_of
+from walkers.physics.laws import LAWS, law_of
 from walkers.postprocess.motion import prescribed_motion
 from walkers.studies.crosscheck.engine import Beads, SecondEngine
 from walkers.studies.crosscheck.laws import Laws
@@ -141,7 +141,6 @@ _DRIVEN = partial(
     drive={"frequency": "300 Hz", "peak_acceleration": "8 g", "axis": "z"},
     environment={"gravity": "9.81 m/s^2"},
 )
-_SOULIE = partial(full_case, liquid={"law": "soulie"})
 
 SCENES: dict[str, tuple[Callable[[], Case], Scene]] = {
     "a bead leaves the floor": (_OWN, bench_scene([over(FLOOR, -_DEEP, R, _WAY), over(FLOOR, 2e-5, S, _WAY, x=2e-3)])),
@@ -165,10 +164,12 @@ SCENES: dict[str, tuple[Callable[[], Case], Scene]] = {
         bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, 3e-6, S, spin=_ROLL, x=2e-3)]),
     ),
     "weight and drive": (_DRIVEN, bench_scene([over(FLOOR, -_DEEP, R), Bead(0, (2e-3, 0.0, 5e-3), S)])),
-    "a bead leaves the floor (soulie)": (_SOULIE, bench_scene([over(FLOOR, -_DEEP, R, _WAY)])),
-    "two beads part (soulie)": (_SOULIE, bench_scene(pair(-_DEEP, 0.043, (0.02, -0.011, 0.005)))),
 }
 """Each with its case."""
+for _name in LAWS:
+    _case = partial(full_case, liquid={"law": _name, "contact_angle": "10 deg"})
+    SCENES[f"a bead leaves the floor ({_name})"] = _case, bench_scene([over(FLOOR, -_DEEP, R, _WAY)])
+    SCENES[f"two beads part ({_name})"] = _case, bench_scene(pair(-_DEEP, 0.043, (0.02, -0.011, 0.005)))
 
 
 def scene_lines(bench: Bench) -> Iterator[Line]:
