@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import pi
+from math import inf, pi
 from typing import TYPE_CHECKING
 
-from walkers.physics import capillary
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.dimer import Dimer
+from walkers.physics.laws import law_of
 
 if TYPE_CHECKING:
     from walkers.inputs.bodies import Walkers
@@ -43,27 +43,47 @@ class ContactLoads:
     overlaps: tuple[float, ...]
 
 
+@dataclass(frozen=True)
+class BridgeAtRest:
+    """Liquid (m³), pull (N) and rupture distance (m) of a bridge between surfaces that touch."""
+
+    volume: float
+    pull: float
+    rupture: float
+
+
+@lru_cache(maxsize=256)
+def bridge_at_rest(case: Case, radius: float, other_radius: float) -> BridgeAtRest:
+    """The bridge of a bead to another, or to a plane (a radius of infinity), by the case's law; radii in m."""
+    import numpy as np
+
+    from walkers.physics.bridge import Surfaces
+
+    surfaces = Surfaces.of(radius, other_radius, case.liquid, case.contact.minimum_separation_ratio)
+    curve = law_of(case.liquid)(surfaces)
+    return BridgeAtRest(surfaces.volume, float(curve.forces(np.zeros(1)).pull[0]), curve.rupture)
+
+
 @lru_cache(maxsize=16)  # asked for at every stage of a deck
 def contact_loads(case: Case, walkers: Walkers | None = None) -> ContactLoads:
     """Capillary load of each contact of a case's first (or other) walkers, and the overlap at which it is carried."""
     walkers = walkers or case.walkers[0]
-    liquid, radii = case.liquid, walkers.radii
-    modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
-    volumes, forces, overlaps = [], [], []
+    radii, modulus = walkers.radii, reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
+    bridges, overlaps = [], []
     for radius in radii:
-        volumes.append(capillary.bridge_volume_at_wall(radius, liquid.volume_fraction))
-        forces.append(
-            capillary.capillary_force_at_wall(liquid.surface_tension, radius, volumes[-1], liquid.contact_angle)
-        )
+        bridges.append(bridge_at_rest(case, radius, inf))
         weight = 4.0 / 3.0 * pi * radius**3 * case.density * case.pressing_gravity
-        overlaps.append(hertz_overlap(forces[-1] + weight, radius, modulus))
+        overlaps.append(hertz_overlap(bridges[-1].pull + weight, radius, modulus))
     for one, other in walkers.pairs:
         pair = (radii[one], radii[other])
-        volumes.append(capillary.bridge_volume_between_beads(*pair, liquid.volume_fraction))
-        forces.append(capillary.capillary_force(liquid.surface_tension, *pair, volumes[-1], liquid.contact_angle))
-        overlaps.append(hertz_overlap(forces[-1], pair[0] * pair[1] / sum(pair), modulus))
-    rupture = tuple(capillary.rupture_distance(volume, liquid.contact_angle) for volume in volumes)
-    return ContactLoads(tuple(volumes), tuple(forces), rupture, tuple(overlaps))
+        bridges.append(bridge_at_rest(case, *pair))
+        overlaps.append(hertz_overlap(bridges[-1].pull, pair[0] * pair[1] / sum(pair), modulus))
+    return ContactLoads(
+        tuple(one.volume for one in bridges),
+        tuple(one.pull for one in bridges),
+        tuple(one.rupture for one in bridges),
+        tuple(overlaps),
+    )
 
 
 def reach(case: Case) -> float:

@@ -10,7 +10,7 @@ from walkers.inputs.library import Known, suggestion
 from walkers.inputs.origins import Choices
 from walkers.inputs.schema import CaseFile, ContactTable, LiquidTable
 from walkers.inputs.units import DYNAMIC_VISCOSITY, quantity_text
-from walkers.physics.laws import by_name
+from walkers.physics.laws import LAWS, by_name
 from walkers.physics.matter import Contact, Liquid
 
 _OF_SURFACES = ("rolling_friction", "restitution", "minimum_separation_ratio")
@@ -91,10 +91,11 @@ def _liquid(table: LiquidTable, pair: Mapping[str, Known], choices: Choices) -> 
     def chosen(key: str) -> float:
         return choices.choose(f"liquid.{key}", getattr(table, key), pair.get(key)) or 0.0
 
-    try:
-        by_name(table.law)
-    except ValueError as error:
-        raise UnusableKeyError("liquid.law", str(error)) from error
+    if table.law not in LAWS:
+        try:
+            by_name(table.law)
+        except ValueError as error:
+            raise UnusableKeyError("liquid.law", str(error)) from error
     film, bridges = (float(f"{viscosity * chosen(f'{of}_ratio'):.15g}") for of in ("film_drag", "viscosity"))
     fraction, angle = chosen("volume_fraction"), chosen("contact_angle")
     return Liquid(tension, bridges, density, fraction, angle, table.name, film, table.law)

@@ -13,9 +13,12 @@ from importlib.util import module_from_spec, spec_from_file_location
 from inspect import getsourcefile
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
-from walkers.physics.bridge import BridgeLaw
 from walkers.physics.matter import Liquid
+
+if TYPE_CHECKING:  # numpy is not needed to know a law by its name
+    from walkers.physics.bridge import BridgeLaw
 
 LAWS = {
     "soulie": "walkers.physics.soulie",

@@ -6,17 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, inf, pi, sqrt
 
-import numpy as np
-
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.errors import InputError, Problem
-from walkers.inputs.loads import hop_height, reach
+from walkers.inputs.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import rendered
-from walkers.physics.bridge import Surfaces
-from walkers.physics.laws import law_of
-from walkers.templates.bridge_tables import UnusableLawError, bridge_tables
 from walkers.templates.layout import (
     BEAD_COLUMNS,
     MEAN_SPIN_COLUMNS,
@@ -270,6 +265,8 @@ def compose(plan: Plan) -> Deck:
     InputError
         If the law of the bridges cannot be tabulated.
     """
+    from walkers.templates.bridge_tables import UnusableLawError, bridge_tables
+
     case, scene, walkers = plan.case, plan.scene, plan.walkers
     first = case.drive.harmonics[0]
     layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
@@ -412,8 +409,8 @@ def fastest_of(case: Case, scene: Scene) -> float:
     """Ten times the boundary's peak velocity (20 in a pile), the deepest fall, and what a bridge can give, m/s."""
     sizes = sorted(bead.radius for bead in scene.beads)
     mass = 4.0 / 3.0 * pi * sizes[0] ** 3 * case.density
-    curve = law_of(case.liquid)(Surfaces.of(sizes[-1], inf, case.liquid, case.contact.minimum_separation_ratio))
-    work = float(curve.forces(np.zeros(1)).pull[0]) * curve.rupture
+    bridge = bridge_at_rest(case, sizes[-1], inf)
+    work = bridge.pull * bridge.rupture
     deep = hop_height(case) if case.boundary.tilt == 0.0 else reach(case)
     fall = sqrt(2.0 * case.gravity * (max(scene.upper[2], deep) if case.loose else deep))
     return (20.0 if case.loose else 10.0) * case.drive.peak_velocity + fall + sqrt(2.0 * work / mass)

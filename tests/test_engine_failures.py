@@ -412,7 +412,7 @@ def _fill(place: Path) -> Path:
 def test_a_pile_that_was_killed_goes_on_when_a_full_disk_has_room_again(tmp_path: Path) -> None:
     """Nothing is lost, and the numbers are those of a pile that nobody stopped."""
     case = _brief_pile(duration="0.1 s")
-    with mounted(tmp_path / "disk", "6m") as place:
+    with mounted(tmp_path / "disk", "16m") as place:
         child = os.fork()
         if not child:
             with suppress(BaseException):

@@ -1,6 +1,7 @@
 """Reports: what is in the file, that it says what the result says, and what a user's words cannot do in it."""
 
 import base64
+import hashlib
 import html
 import json
 import re
@@ -104,8 +105,11 @@ def walked_run(run_directory: Callable[..., Path], once: Once) -> Path:
     def make(folder: Path) -> None:
         settings = {"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 20}
         shutil.copytree(run_directory(dimers={"replicates": 2}, run=settings), folder / "run")
-        case = folder / "run" / "case.json"
+        case, manifest = folder / "run" / "case.json", folder / "run" / "manifest.json"
         case.write_text(json.dumps({**json.loads(case.read_text()), "title": HOSTILE}))
+        listed = json.loads(manifest.read_text())
+        listed["sha256"]["case.json"] = hashlib.sha256(case.read_bytes()).hexdigest()
+        manifest.write_text(json.dumps(listed))
 
     return once("hostile", make) / "run"
 
