@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import shutil
 from collections.abc import Iterator
@@ -196,10 +197,22 @@ def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
         raise DiskFull(needed, shutil.disk_usage(incomplete.parent).free, incomplete) from error
 
 
-def write_deck(deck: Deck, directory: Path) -> None:
-    """Write a deck, its files and its layout into a directory."""
+def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
+    """Write a deck, its files and its layout into a directory.
+
+    Parameters
+    ----------
+    before
+        Directory of the segment before: a file that is the same there is linked to, for the tables of a pile's bridges
+        are larger than what a segment of it computes.
+    """
     for name, text in {DECK_NAME: deck.text, **deck.files}.items():
-        (directory / name).write_text(text, encoding="utf-8", errors="surrogateescape")
+        contents = text.encode("utf-8", "surrogateescape")
+        if before is not None and (before / name).is_file() and (before / name).read_bytes() == contents:
+            with suppress(OSError):  # a file system without links
+                os.link(before / name, directory / name)
+                continue
+        (directory / name).write_bytes(contents)
     write_json(directory / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
 
 

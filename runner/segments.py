@@ -159,7 +159,7 @@ class OpenRun:
         shutil.rmtree(new, ignore_errors=True)
         with room_on_disk(new, deck.layout.bead_dump_bytes):
             new.mkdir()
-            write_deck(deck, new)
+            write_deck(deck, new, new.with_name(f"{number - 1:04d}") if number else None)
             if segment.begin:
                 shutil.copyfile(new.with_name(f"{number - 1:04d}") / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
             report = launch(deck, new, self.engine, on_progress=tell, time_limit=time_limit, keep_open=self.locks)

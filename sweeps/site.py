@@ -213,8 +213,8 @@ def check_path(folder: Path) -> None:
     """
     whole = str(folder.resolve())
     if odd := _ODD.search(whole):
-        told = f"with a site file {_TAKEN} in the path, found {odd[0]!r}"
-        raise InputError("--out", [Problem("", None, f"{whole!r}: {told}")])
+        told = f"with a site file {_TAKEN} in the path, found {odd[0]!r} in {whole!r}"
+        raise InputError("--out", [Problem("", None, told)])
 
 
 def threads(workers: int, run_dir: Path) -> Config:

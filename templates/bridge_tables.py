@@ -56,10 +56,10 @@ class Table:
         return _gaps(self.curve.rupture, self.scale, self.octaves, self.cells, (0.0, 1.0 / 3.0, 2.0 / 3.0), end=True)
 
     def text(self) -> str:
-        """The table's part of the engine's file after its first line."""
+        """The table's part of the engine's file after its first line; twelve digits, far beyond `TOLERANCE`."""
         head = f"range {self.curve.formation!r} {self.curve.rupture!r} {self.scale!r} {self.octaves} {self.cells}"
         numbers = np.column_stack([self.gaps, self.rows]).tolist()
-        return "\n".join([head, *(" ".join(map(repr, row)) for row in numbers)]) + "\n"
+        return "\n".join([head, *(" ".join(f"{number:.12g}" for number in row) for row in numbers)]) + "\n"
 
 
 @lru_cache(maxsize=4096)

@@ -169,6 +169,7 @@ CONTENT = {
     3: "e993195041abe10b",
     4: "9700ab33da1ab01e",
     5: "e7fab73da94479b5",
+    6: "3cb4429f05c982e1",
 }
 """Digest of all that the engine reads of some cases, by the version of the decks' content."""
 
