@@ -14,6 +14,7 @@
 #ifndef BRIDGE_TABLE_H
 #define BRIDGE_TABLE_H
 
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -27,6 +28,44 @@
 namespace bridge {
 
 enum { PULL, NORMAL, SLIDING, COUPLING, ROLLING, COLUMNS };
+
+/* The words of a text, without comments. */
+class Words {
+public:
+  explicit Words(const char *const text) : at_(text) {}
+
+  std::string next()
+  {
+    skip();
+    const char *const begin = at_;
+    while (*at_ && !std::isspace(static_cast<unsigned char>(*at_))) at_++;
+    return std::string(begin, at_);
+  }
+
+  double number()
+  {
+    skip();
+    char *end;
+    const double value = std::strtod(at_, &end);  // takes "inf"
+    if (end == at_ || (*end && !std::isspace(static_cast<unsigned char>(*end))))
+      throw std::runtime_error("expected a number, not \"" + next() + "\"");
+    if (std::isnan(value)) throw std::runtime_error("a number of a table is nan");
+    at_ = end;
+    return value;
+  }
+
+private:
+  const char *at_;
+
+  void skip()
+  {
+    while (std::isspace(static_cast<unsigned char>(*at_)) || *at_ == '#') {
+      if (*at_ == '#')
+        while (*at_ && *at_ != '\n') at_++;
+      else at_++;
+    }
+  }
+};
 
 struct Cell {
   double begin, inverse_width;
@@ -72,17 +111,17 @@ public:
 
   bool begins_with(const double radius_1) const { return same(radius_1, radius[0]); }
 
-  void read(std::istream &in)
+  void read(Words &words)
   {
-    type[0] = static_cast<int>(number(in));
-    type[1] = static_cast<int>(number(in));
-    radius[0] = number(in);
-    radius[1] = number(in);
-    if (word(in) != "range") throw std::runtime_error("a table lacks its range");
-    formation = number(in);
-    rupture = number(in);
-    const double scale = number(in);
-    const int octaves = static_cast<int>(number(in)), cells = static_cast<int>(number(in));
+    type[0] = static_cast<int>(words.number());
+    type[1] = static_cast<int>(words.number());
+    radius[0] = words.number();
+    radius[1] = words.number();
+    if (words.next() != "range") throw std::runtime_error("a table lacks its range");
+    formation = words.number();
+    rupture = words.number();
+    const double scale = words.number();
+    const int octaves = static_cast<int>(words.number()), cells = static_cast<int>(words.number());
     int power = 0;
     while ((1 << power) < cells) power++;
     if (!(scale > 0. && rupture > 0. && formation >= 0. && formation <= rupture) || octaves < 0 || octaves > 60
@@ -97,10 +136,10 @@ public:
     std::vector<double> rows(COLUMNS * static_cast<size_t>(3 * cells * (octaves + 2) + 1));
     double before = -1.;
     for (size_t row = 0; row < rows.size(); row += COLUMNS) {
-      const double gap = number(in);
+      const double gap = words.number();
       if (!(gap > before)) throw std::runtime_error("the gaps of a table do not grow");
       before = gap;
-      for (int c = 0; c < COLUMNS; c++) rows[row + c] = number(in);
+      for (int c = 0; c < COLUMNS; c++) rows[row + c] = words.number();
     }
     std::memcpy(contact, rows.data(), sizeof(contact));
     near_.clear();
@@ -114,28 +153,11 @@ public:
       far_.push_back(cell(&rows[3 * COLUMNS * (near_.size() + far_.size())], number, 1.));
   }
 
-  static std::string word(std::istream &in)
-  {
-    std::string text;
-    while (in >> text && text[0] == '#') in.ignore(1 << 20, '\n');
-    return in ? text : "";
-  }
-
 private:
   double middle, inverse_scale, inverse_rest;
   int shift;
   uint64_t first;
   std::vector<Cell> near_, far_;
-
-  static double number(std::istream &in)
-  {
-    const std::string text = word(in);
-    char *end;
-    const double value = std::strtod(text.c_str(), &end);  // takes "inf", which >> does not
-    if (text.empty() || *end) throw std::runtime_error("expected a number, not \"" + text + "\"");
-    if (std::isnan(value)) throw std::runtime_error("a number of a table is nan");
-    return value;
-  }
 
   static bool same(const double a, const double b) { return a == b || std::fabs(a - b) <= 1e-9 * std::fabs(a); }
 
@@ -159,11 +181,15 @@ inline std::vector<Table> read_tables(const std::string &file)
 {
   std::ifstream in(file.c_str());
   if (!in) throw std::runtime_error("cannot be read");
+  std::ostringstream contents;
+  contents << in.rdbuf();
+  const std::string text = contents.str();
+  Words words(text.c_str());
   std::vector<Table> tables;
-  for (std::string text = Table::word(in); !text.empty(); text = Table::word(in)) {
-    if (text != "bridge") throw std::runtime_error("expected \"bridge\", not \"" + text + "\"");
+  for (std::string word = words.next(); !word.empty(); word = words.next()) {
+    if (word != "bridge") throw std::runtime_error("expected \"bridge\", not \"" + word + "\"");
     tables.push_back(Table());
-    tables.back().read(in);
+    tables.back().read(words);
   }
   if (tables.empty()) throw std::runtime_error("holds no table");
   return tables;
