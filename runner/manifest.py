@@ -17,6 +17,7 @@ from walkers.runner.audits import read_audit
 from walkers.runner.binary import Engine
 from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import EngineReport
+from walkers.runner.plugin import plugin_of
 from walkers.runner.provenance import software
 
 MANIFEST_NAME = "manifest.json"
@@ -50,7 +51,7 @@ def manifest(
         Names of folders in it that have manifests of their own: checksums of their files are there.
     """
     finished = time.time()
-    audit = read_audit(engine.sha256)
+    audit, plugin = read_audit(engine.sha256), plugin_of(engine)
     files = {
         path.relative_to(directory).as_posix(): path.stat().st_size
         for path in sorted(directory.rglob("*"))
@@ -67,6 +68,7 @@ def manifest(
             "sha256": engine.sha256,
             "audit": audit.summary() if audit else None,
         },
+        "contact_model": {"path": str(plugin), "sha256": checksums(plugin.parent, [plugin.name])[plugin.name]},
         **_made_by(),
         "host": platform.node(),
         "platform": platform.platform(),
