@@ -27,7 +27,17 @@ PACKAGES = ("g++", "libliggghts-dev", "libopenmpi-dev")
 HEADERS = Path("/usr/include/liggghts")
 _VERSION = re.compile(rb"LIGGGHTS[\w-]* [\d.]+(?=, compiled)")
 # Plain -O2 keeps the numbers the same on all machines of an architecture: no fused operations, no reordering.
-OPTIONS = ("-shared", "-fPIC", "-std=gnu++11", "-O2", "-DNDEBUG", "-DOMPI_SKIP_MPICXX", "-Wall", "-Wextra")
+OPTIONS = (
+    "-shared",
+    "-fPIC",
+    "-std=gnu++11",
+    "-O2",
+    "-fno-math-errno",
+    "-DNDEBUG",
+    "-DOMPI_SKIP_MPICXX",
+    "-Wall",
+    "-Wextra",
+)
 
 
 def plugin_of(engine: Engine) -> Path:

@@ -42,8 +42,8 @@ DECKS: Decks = {
     "walkers-6": lambda: (load_case("fig1b", {"run.cycles": 20}), None),
     "walkers-96": lambda: (load_case("fig1b", {"dimers.replicates": 96, "run.cycles": 20}), None),
     "climber": lambda: (load_case("climber", {"run.cycles": 60, "run.settling_cycles": 10}), None),
-    "pile-200": lambda: (load_case("pile-small"), Segment(0, 10_000, 0)),
-    "pile-1630": lambda: (load_case("pile-fig1a", {"run.ranks": 1}), Segment(0, 1_500, 0)),
+    "pile-200": lambda: (load_case("pile-small"), Segment(0, 40_000, 0)),
+    "pile-1630": lambda: (load_case("pile-fig1a", {"run.ranks": 1}), Segment(0, 12_000, 0)),
 }
 """Of the same cases and steps as the stock engine's decks; piles are shaken from where they were poured."""
 
