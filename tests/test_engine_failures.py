@@ -280,7 +280,7 @@ def test_engines_that_say_nothing_or_too_much_are_ended(tmp_path: Path, name: st
     case = make_case(run={**SHORT, "silence": "0.5 s", "log_limit": "2 MB"})
     with pytest.raises(kind, match=told):
         run_case(case, tmp_path / "runs", engine=str(front), time_limit=PATIENCE)
-    assert not processes_in(tmp_path)
+    wait_for(lambda: not processes_in(tmp_path))
     assert _remains(tmp_path / "runs")["reason"] == kind.__name__
     (log,) = tmp_path.glob("runs/*/segments/*/engine.log")
     assert log.stat().st_size <= 2_000_000
