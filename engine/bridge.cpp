@@ -105,13 +105,22 @@ public:
     registry.registerProperty("coeffFrict", &MODEL_PARAMS::createCoeffFrict);
     registry.connect("Yeff", modulus_, NAME);
     registry.connect("Geff", shear_modulus_, NAME);
-    registry.connect("betaeff", damping_, NAME);
+    double **ratio;  // minus the damping ratio
+    registry.connect("betaeff", ratio, NAME);
     registry.connect("coeffFrict", friction_, NAME);
     if (rolls_) {
       registry.registerProperty("coeffRollFrict", &MODEL_PARAMS::createCoeffRollFrict);
       registry.connect("coeffRollFrict", rolling_friction_, NAME);
     }
     if (force->cg_active()) error->cg(FLERR, NAME);
+    const int types = atom->ntypes + 1;
+    dampings_.assign(types * types, Damping());
+    for (int i = 1; i < types; i++)
+      for (int j = 1; j < types; j++) {
+        const double damping = -2. * std::sqrt(5. / 6.) * ratio[i][j];
+        dampings_[i * types + j] = {damping * std::sqrt(2. * modulus_[i][j]),
+                                    damping * std::sqrt(8. * shear_modulus_[i][j])};
+      }
     // The engine looks for neighbours up to a multiple of the sum of the radii, at a wall of the radius.
     double reach = 0.;
     for (const bridge::Table &one : tables_)
@@ -163,30 +172,31 @@ protected:
   {
     const int i = c.type_i, j = c.type_j;
     const double root = std::sqrt(-c.reduced_radius * c.gap);
-    const double stiffness = 4. / 3. * modulus_[i][j] * root, along = 8. * shear_modulus_[i][j] * root;
-    const double damping = -2. * 0.91287092917527685576 * damping_[i][j] * std::sqrt(c.reduced_mass);  // sqrt(5/6)
-    const double elastic = -stiffness * c.gap;
+    const double along = 8. * shear_modulus_[i][j] * root, elastic = -4. / 3. * modulus_[i][j] * root * c.gap;
+    // Both dampings are 2 sqrt(5/6) beta sqrt(k m) of their stiffness k, which is a modulus times the root.
+    const double damping = std::sqrt(root * c.reduced_mass);
+    const Damping &of = dampings_[i * (atom->ntypes + 1) + j];
     Vec stretch = vec(spring);
     if (update) {
       stretch = stretch + time_step * c.sliding;
       stretch = stretch - dot(stretch, c.n) * c.n;
     }
     Vec hold = along * stretch;
-    const double limit = friction_[i][j] * elastic, held = length(hold);
-    if (held > limit) {
-      stretch = limit / held * stretch;
-      hold = limit / held * hold;
+    const double limit = friction_[i][j] * elastic;
+    if (dot(hold, hold) > limit * limit) {
+      const double share = limit / length(hold);
+      stretch = share * stretch;
+      hold = share * hold;
     } else {
-      hold = hold + damping * std::sqrt(along) * c.sliding;
-      const double damped = length(hold);
-      if (damped > limit) hold = limit / damped * hold;
+      hold = hold + of.along * damping * c.sliding;
+      if (dot(hold, hold) > limit * limit) hold = limit / length(hold) * hold;
     }
     if (update) {
       spring[0] = stretch.x;
       spring[1] = stretch.y;
       spring[2] = stretch.z;
     }
-    c.force = c.force + (elastic - damping * std::sqrt(1.5 * stiffness) * c.apart) * c.n - hold;
+    c.force = c.force + (elastic - of.normal * damping * c.apart) * c.n - hold;
     if (rolls_) {
       const double speed = length(c.spin);
       if (speed > 0.) {
@@ -198,9 +208,13 @@ protected:
 
   const bool rolls_;
   double formed_;  // the largest gap at which any bridge forms
-  double **modulus_, **shear_modulus_, **damping_, **friction_, **rolling_friction_;
+  double **modulus_, **shear_modulus_, **friction_, **rolling_friction_;
 
 private:
+  struct Damping {
+    double normal, along;
+  };
+  std::vector<Damping> dampings_;  // by both types
   std::string file_;
   std::vector<bridge::Table> tables_;
 
