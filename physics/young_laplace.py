@@ -32,19 +32,24 @@ def law(surfaces: Surfaces) -> Curve:
     NoBridgeError
         If no bridge was found (a contact angle so large that the liquid is not held between them).
     """
-    pair = (surfaces.radius, surfaces.other_radius)
-    rupture, smooth = _solved(*pair, surfaces.volume, surfaces.liquid.contact_angle)
+    radius = surfaces.radius
+    shape = (surfaces.other_radius / radius, surfaces.volume / radius**3, surfaces.liquid.contact_angle)
+    farthest, smooth = _solved(*(float(f"{one:.14g}") for one in shape))
+    rupture = radius * farthest
 
     def pull(gaps: FloatArray) -> FloatArray:
-        return np.asarray(smooth(np.sqrt(np.clip(1.0 - gaps / rupture, 0.0, 1.0))))
+        return radius * np.asarray(smooth(np.sqrt(np.clip(1.0 - gaps / rupture, 0.0, 1.0))))
 
     return reynolds.curve(surfaces, pull, rupture)
 
 
-@lru_cache(maxsize=256)
-def _solved(radius_1: float, radius_2: float, volume: float, contact_angle: float) -> tuple[float, Chebyshev]:
-    """Rupture distance, m, and F/γ, m, as a polynomial in √(1 - h/rupture)."""
-    bridge = (radius_1, radius_2, volume, contact_angle)
+@lru_cache(maxsize=1024)
+def _solved(other_radius: float, volume: float, contact_angle: float) -> tuple[float, Chebyshev]:
+    """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's radius.
+
+    Bridges of one shape are solved once: beads of all sizes have the same at a wall.
+    """
+    bridge = (1.0, other_radius, volume, contact_angle)
     rupture = laplace.rupture_distance(*bridge)
     return rupture, Chebyshev.interpolate(
         lambda part: laplace.force_curve(*bridge, rupture * (1.0 - part**2)).forces, NODES - 1, domain=[0.0, 1.0]
