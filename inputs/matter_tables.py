@@ -11,7 +11,7 @@ from walkers.inputs.origins import Choices
 from walkers.inputs.schema import CaseFile, ContactTable, LiquidTable
 from walkers.inputs.units import DYNAMIC_VISCOSITY, quantity_text
 from walkers.physics.laws import LAWS, by_name
-from walkers.physics.matter import Contact, Liquid
+from walkers.physics.matter import DEFAULT_LAW, Contact, Liquid
 
 _OF_SURFACES = ("rolling_friction", "restitution", "minimum_separation_ratio")
 
@@ -38,7 +38,9 @@ def resolve_matter(file: CaseFile) -> tuple[float, Liquid, Contact, Choices]:
     UnusableKeyError
         If something is missing that the library does not know, or is said twice.
     """
-    choices, bead, wall = Choices(file.liquid.name), file.beads.material, file.boundary.material
+    # What was calibrated was so with one law of the bridges: with another it is a guess.
+    choices = Choices(file.liquid.name if file.liquid.law == DEFAULT_LAW else None)
+    bead, wall = file.beads.material, file.boundary.material
     pair = library.surface_pair(bead, wall) or {}
     density = _density(file, choices)
     return density, _liquid(file.liquid, pair, choices), _contact(file.contact, bead, wall, choices), choices

@@ -297,3 +297,9 @@ def test_spread_on_the_command_line(in_folder: Path) -> None:
     assert "(5 to 95 %)" in told
     assert read_toml(in_folder / "glass.toml") == GLASS
     assert call("run", "fig1b", "--points", "2").returncode == 2
+
+
+def test_what_was_calibrated_with_another_law_is_a_guess() -> None:
+    of = origins(load_case("fig1b", {"liquid.law": "young-laplace"}))
+    assert (of["liquid.law"].origin, of["liquid.viscosity_ratio"].origin) == ("given", "default")
+    assert of["liquid.viscosity_ratio"].guessed
