@@ -113,7 +113,10 @@ class Killed:
 HALTING = """#!/bin/sh
 segment=$(basename "$PWD" .new)
 halt=../../../halt-$segment
-[ -e $halt ] && (while ! [ -e beads.bin ]; do sleep 0.02; done; kill -STOP $$; mv $halt ../../../halted-$segment) &
+if [ -e $halt ]; then
+    sed -i 's/^\\(run *\\)[0-9]*/\\1999999999/' walker.lig  # else it may be over before it is stopped
+    (while ! [ -e beads.bin ]; do sleep 0.02; done; kill -STOP $$; mv $halt ../../../halted-$segment) &
+fi
 exec liggghts "$@"
 """
 

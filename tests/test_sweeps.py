@@ -339,6 +339,7 @@ def test_an_engine_that_outlives_a_killed_sweep_is_waited_for(
     front.write_text(
         f"""#!/bin/sh
         [ -e {stopped} ] && exec liggghts "$@"
+        sed -i 's/^run .*/run 999999999/' walker.lig
         liggghts "$@" &
         while ! [ -e beads.bin ]; do sleep 0.02; done
         kill -STOP $! && echo $! > {stopped}.new && mv {stopped}.new {stopped}
