@@ -20,19 +20,6 @@ def reduced_shear_modulus(youngs_modulus: float, poissons_ratio: float) -> float
     return youngs_modulus / (4.0 * (1.0 + poissons_ratio) * (2.0 - poissons_ratio))
 
 
-def hertz_repulsion(overlap: float, reduced_radius: float, reduced_modulus: float) -> float:
-    """Repulsion of two beads, N.
-
-    Parameters
-    ----------
-    overlap
-        δ, m; none for a gap (negative).
-    reduced_radius, reduced_modulus
-        R* in m, E* in Pa.
-    """
-    return float(4.0 / 3.0 * reduced_modulus * sqrt(reduced_radius) * max(overlap, 0.0) ** 1.5)
-
-
 def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -> float:
     """Overlap at which the repulsion of two beads carries a load, m.
 
@@ -44,25 +31,6 @@ def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -
         R* in m, E* in Pa.
     """
     return float((3.0 * force / (4.0 * reduced_modulus * sqrt(reduced_radius))) ** (2.0 / 3.0))
-
-
-def normal_damping(overlap: float, reduced_radius: float, reduced_modulus: float, mass: float, ratio: float) -> float:
-    """Coefficient of the damping of two beads along their normal, 2 √(5/6) β √(2 E* √(R*δ) m*), N s/m.
-
-    Y. Tsuji, T. Tanaka, T. Ishida, Powder Technology 71 (1992) 239–250, doi 10.1016/0032-5910(92)88030-L, for the
-    damping ratio of D. Antypov, J. A. Elliott, EPL 94 (2011) 50004, doi 10.1209/0295-5075/94/50004.
-
-    Parameters
-    ----------
-    overlap
-        δ, m; none for a gap (negative).
-    reduced_radius, reduced_modulus, mass
-        R* in m, E* in Pa, m* in kg.
-    ratio
-        β (`damping_ratio`).
-    """
-    stiffness = 2.0 * reduced_modulus * sqrt(reduced_radius * max(overlap, 0.0))
-    return 2.0 * sqrt(5.0 / 6.0) * ratio * sqrt(stiffness * mass)
 
 
 def damping_ratio(restitution: float) -> float:

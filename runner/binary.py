@@ -16,7 +16,8 @@ from walkers.runner.failures import EngineMissing
 
 ENGINE_VARIABLE = "WALKERS_ENGINE"
 SOURCES = Path(str(files("walkers.engine")))
-"""Of the contact model that decks need (`walkers.runner.plugin`)."""
+MODEL = ("bridge.cpp", "table.h")
+"""Folder and files of the contact model that decks need (`walkers.runner.plugin`)."""
 _BANNER = re.compile(rb"\(Version ([^,\n]+),")
 _LIBRARY = re.compile(r"libliggghts\S* => (\S+)")
 
@@ -62,7 +63,7 @@ def find_engine(wanted: str | None = None) -> Engine:
 @lru_cache(maxsize=8)
 def _identity(path: Path, _modified: int) -> str:
     digest = hashlib.sha256()
-    for part in [*parts_of(path), *(SOURCES / name for name in ("bridge.cpp", "table.h"))]:
+    for part in [*parts_of(path), *(SOURCES / name for name in MODEL)]:
         with part.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())
     return digest.hexdigest()

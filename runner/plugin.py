@@ -18,7 +18,7 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from walkers.runner.binary import SOURCES, Engine, parts_of
+from walkers.runner.binary import MODEL, SOURCES, Engine, parts_of
 from walkers.runner.failures import ContactModelMissing, EngineFailure, OtherEngine
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME
 from walkers.templates.engine import AUDITED_VERSION
@@ -62,7 +62,7 @@ def plugin_of(engine: Engine) -> Path:
 def _fingerprint() -> str:
     """Of sources, options, and the library that is linked to, which is another file after an upgrade."""
     digest = hashlib.sha256("\0".join(OPTIONS).encode())
-    for name in ("bridge.cpp", "table.h"):
+    for name in MODEL:
         digest.update((SOURCES / name).read_bytes())
     for library in sorted(Path("/usr/lib").glob("*/libliggghts.so.3")):
         digest.update(f"{library.resolve()} {library.stat().st_mtime_ns} {library.stat().st_size}".encode())
@@ -119,7 +119,3 @@ def main() -> None:
         plugin_of(find_engine())
     except EngineFailure as failure:
         raise SystemExit(f"walkers: {failure}") from failure
-
-
-if __name__ == "__main__":
-    main()

@@ -88,12 +88,15 @@ WRONG = {
         "const double arm = radius + 0.5 * c.gap;", "const double arm = radius + 0.5 * std::min(c.gap, 0.);"
     ),
     "a spring that does not turn with the contact": ("stretch = stretch - dot(stretch, c.n) * c.n;", ""),
-    "a spring stiffer by 1e-4": ("8. * shear_modulus_", "8.001 * shear_modulus_"),
-    "a limit that leaves out the damping": ("if (damped > limit) hold = limit / damped * hold;", ""),
+    "a spring stiffer by 1e-4": ("8. * shear_modulus_[i][j] * root", "8.001 * shear_modulus_[i][j] * root"),
+    "a limit that leaves out the damping": (
+        "if (dot(hold, hold) > limit * limit) hold = limit / length(hold) * hold;",
+        "",
+    ),
     "a rupture later by 1 %": ("if (gap < table->rupture) return", "if (gap < 1.01 * table->rupture) return"),
     "the coupling's order": ("if (history[TABLE] < 0.) f[bridge::COUPLING] = -f[bridge::COUPLING];", ""),
     "walls at rest": ("vec(atom->v[i]) - vec(velocity);", "vec(atom->v[i]) - 0. * vec(velocity);"),
-    "the damping": ("0.91287092917527685576", "0.913"),
+    "the damping": ("std::sqrt(5. / 6.)", "0.913"),
 }
 # fmt: on
 
