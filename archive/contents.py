@@ -22,7 +22,9 @@ _MEANINGS = {
     RECORD_NAME: ("record", "the points of the sweep: what varied, what follows from it, the names of the runs"),
     "result.json": ("result", "what the run gave, SI units"),
     "walker.lig": ("deck", "the deck: what the engine was told"),
-    "walls.stl": ("deck", "mesh of the walls"),
+    "bridges.txt": ("deck", "forces of each bridge against its gap, which the engine reads"),
+    "loads.txt": ("deck", "gravity and drive of each bead, where beads have their own"),
+    "run.sh": ("deck", "runs the deck by hand"),
     "layout.json": ("deck", "columns of the dumps; which bead belongs to which walker"),
     "engine.log": ("output", "what the engine said"),
     "segment.json": ("output", "from which step to which the segment went, and what it took"),
@@ -38,13 +40,12 @@ _MEANINGS = {
 }
 _GIVEN = ("case", "the case as it was given, with the values that were put beside it")
 _SWEEP = ("record", "the sweep as it was given")
-_NUMBERS = ("deck", "numbers of each bead, from which the deck adds forces of the walls")
+_REST = ("output", "what else the engine wrote")
 _MEDIA = {
     ".json": "application/json",
     ".toml": "application/toml",
     ".parquet": "application/vnd.apache.parquet",
     ".csv": "text/csv",
-    ".stl": "model/stl",
     ".html": "text/html",
 }
 _TEXT = (".lig", ".txt", ".log")
@@ -104,7 +105,7 @@ def _told(name: str) -> tuple[str, str]:
         return _MEANINGS[name]
     if suffix == "parquet":
         return "table", f"table {stem}; units and meanings of its columns are in the field metadata"
-    return _NUMBERS
+    return _REST
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from walkers.inputs import resolve_case
-from walkers.inputs.boundary import Face
+from walkers.inputs.boundary import BOTTOM, Wall
 from walkers.inputs.case import Case, Run
 from walkers.inputs.errors import Stopped
 from walkers.physics.bridge import Curve, Forces, Surfaces
@@ -28,7 +28,7 @@ from walkers.templates.scene import Bead, Scene
 
 DRY = {"law": f"{__name__}:dry"}
 """Of a case's liquid, where there are to be no bridges."""
-FLOOR = Face("z", 1, (0.0, 0.0, 0.0))
+FLOOR = BOTTOM
 
 
 def dry(surfaces: Surfaces) -> Curve:
@@ -142,10 +142,10 @@ def bench_recording(steps: int, sample_every: int = 1) -> Recording:
     return Recording(steps, sample_every, steps, steps, bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS))
 
 
-def bench_scene(beads: Sequence[Bead], faces: Sequence[Face] = (FLOOR,), edge: float = 0.01) -> Scene:
-    """Beads, which are numbered here, between faces in a box about the origin, ``edge`` (m) half its width."""
+def bench_scene(beads: Sequence[Bead], walls: Sequence[Wall] = (FLOOR,), edge: float = 0.01) -> Scene:
+    """Beads, which are numbered here, between walls in a box about the origin, ``edge`` (m) half its width."""
     numbered = tuple(replace(bead, id=number) for number, bead in enumerate(beads, 1))
-    return Scene(numbered, tuple(faces), (-edge,) * 3, (edge,) * 3)
+    return Scene(numbered, tuple(walls), (-edge,) * 3, (edge,) * 3)
 
 
 def farthest(measured: FloatArray, expected: FloatArray) -> float:

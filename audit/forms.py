@@ -5,6 +5,7 @@ A bead of radius R and mass m, I = 2/5 m R²:
 - two surfaces that meet at v_n have Hertz's largest force and duration, and part with the restitution;
 - while it slides the floor takes μ (1 + e) m v_n of its momentum, however it is damped;
 - sent off sliding at u on a floor of friction μ it has v = u - μ g t and Rω = 5/2 μ g t, until it rolls with 5/7 u;
+- rolling to and fro in a cylinder of radius C that lies on its side it has ω² = 5/7 g/(C - R);
 - rolling against a torque μ_r R m g it slows at 5/7 μ_r g, for friction turns it while it brakes it;
 - in the air it falls at g, and the frame of the shaken walls adds a0 sin ωt.
 
@@ -15,13 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import pi
+from math import cos, pi, sin, sqrt
 
 import numpy as np
 
 from walkers.audit.bench import DRY, Bench, Measured, bench_case, bench_recording, bench_scene, farthest, free_run
 from walkers.audit.check import Check, Line
 from walkers.audit.impacts import Course, Launch, Sphere, course_of_pair, course_on_floor, onto_floor
+from walkers.inputs.boundary import Round
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.physics.contact import hertz_overlap, reduced_modulus
@@ -66,12 +68,16 @@ def _heavy_case(**contact: object) -> Case:
     )
 
 
-def _way(bench: Bench, case: Case, velocity: float, spin: float, duration: float) -> Measured:
-    """A bead in balance on the floor that is sent off along x, turning about y."""
+def _height(case: Case) -> float:
+    """Of a bead in balance on a floor, m."""
     mass = 4.0 / 3.0 * pi * RADIUS**3 * case.density
     modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
-    height = RADIUS - hertz_overlap(mass * GRAVITY, RADIUS, modulus)
-    bead = Bead(0, (0.0, 0.0, height), RADIUS, (velocity, 0.0, 0.0), (0.0, spin, 0.0))
+    return RADIUS - hertz_overlap(mass * GRAVITY, RADIUS, modulus)
+
+
+def _way(bench: Bench, case: Case, velocity: float, spin: float, duration: float) -> Measured:
+    """A bead in balance on the floor that is sent off along x, turning about y."""
+    bead = Bead(0, (0.0, 0.0, _height(case)), RADIUS, (velocity, 0.0, 0.0), (0.0, spin, 0.0))
     every = max(1, round(duration / case.run.time_step / 200.0))
     return bench.run(Plan(case, bench_scene([bead]), bench_recording(200 * every, every)))
 
@@ -90,11 +96,34 @@ def rolling_lines(bench: Bench) -> Iterator[Line]:
     yield Line(
         "its velocity at the end over that at the start", 5.0 / 7.0, float(series.velocity[-1, 0, 0]) / speed, _STEP
     )
+    yield _trough_line(bench)
     rolling, speed = 0.01, 5e-3
     slowing = 5.0 / 7.0 * rolling * GRAVITY
     series = _way(bench, _heavy_case(rolling_friction=rolling), speed, speed / RADIUS, 1.3 * speed / slowing)
     error = farthest(series.velocity[:, 0, 0, None], np.maximum(speed - slowing * series.time, 0.0)[:, None])
     yield Line("a bead rolls to rest: u - 5/7 μ_r g t, at most off by", 0.0, error, _STEP)
+
+
+def _trough_line(bench: Bench) -> Line:
+    """A bead that is let go a little beside the lowest line of a cylinder on its side."""
+    case = bench_case(
+        liquid=DRY,
+        contact={"friction": {"bead_bead": 0.0, "bead_wall": 0.9}, "restitution": 0.3},
+        environment={"gravity": f"{GRAVITY} m/s^2"},
+        boundary={"tilt": "90 deg", "uphill": "0 deg"},
+        run={"time_step": "1 us"},
+    )
+    wall, turn = Round(3e-3), 0.05
+    depth = RADIUS - _height(case)
+    out = wall.radius - RADIUS + depth
+    bead = Bead(0, (-out * cos(turn), out * sin(turn), 0.0), RADIUS)
+    frequency = sqrt(5.0 / 7.0 * GRAVITY / out) * (1.0 - turn**2 / 16.0)
+    series = bench.run(Plan(case, bench_scene([bead], [wall]), bench_recording(200 * 500, 500)))
+    swings = out * np.sin(turn * np.cos(frequency * series.time))
+    return Line(
+        "a bead rolls to and fro in a cylinder: ω² = 5/7 g/(C - R), at most off by",
+        0.0, farthest(series.position[:, 0, 1, None], swings[:, None]), _STEP,
+    )  # fmt: skip
 
 
 def flight_lines(bench: Bench) -> Iterator[Line]:

@@ -35,6 +35,8 @@ _PARTS = 16
 """In which these are thought of, for the memory's sake."""
 MISSING_MISFIT = float(np.log1p(30.0**2))
 """ln(1 + r²) of an observation that cannot be made: as of one that is 30 deviations off."""
+_END = 0.005
+"""Of a range: a set that is so near an end of it is not taken for the best, for what is better may lie beyond."""
 _QUANTILES = norm.ppf((np.arange(5) + 0.5) / 5.0)
 FINAL = frozenset(failure.__name__ for failure in (BeadsLost, BlowUp))
 """Failures of a set's own making: calling again would bring the same."""
@@ -192,8 +194,9 @@ def calibrate(
     follows = f"{seen.hexdigest()} {calibration.design.predictive}"
     drawn = _kept(folder / "predictive.json", _determinants(calibration, 0), draw, follows)
     predictive = runner.run("predictive", drawn)
-    first_of_all = ranking(calibration, np.concatenate([outcome, predictive.outcome]))[:1]
-    best = np.concatenate([unit, drawn])[first_of_all]
+    ranked = np.concatenate([unit, drawn])[ranking(calibration, np.concatenate([outcome, predictive.outcome]))]
+    within = ((ranked > _END) & (ranked < 1.0 - _END)).all(axis=1)
+    best = ranked[within][:1] if within.any() else ranked[:1]
     checks = {
         name: runner.run(name, best, extra)
         for name, extra in _finer_and_longer(calibration, space.values(best)).items()

@@ -5,7 +5,9 @@
    Loaded with LD_PRELOAD into Debian's liggghts, it makes the engine know
 
        pair_style gran model hertz tangential history cohesion bridge [rolling_friction cdt] table FILE
-       fix ID all wall/gran model hertz tangential history cohesion bridge [rolling_friction cdt] mesh ... table FILE
+       fix ID GROUP wall/bridge type TYPE [plane X Y Z NX NY NZ]... [cylinder X Y RADIUS]...
+                                [shaken AX AY AZ FREQUENCY PHASE]... [begin STEP] [frame lab | walls]
+                                [loads FILE]
 
    Spheres repel each other by Hertz's law, damped, and hold each other by Mindlin's spring, damped, up to Coulomb's
    limit: mu times the elastic repulsion, damping included. Rolling friction is cdt's. A bridge (table.h) forms when the
@@ -16,15 +18,22 @@
 
    with the torques that conserve momentum and angular momentum. Overlapping surfaces have the bridge of gap 0.
 
+   Walls have the contacts of the pair style, with a surface of infinite radius: planes through a point, beads on the
+   side of the normal; cylinders along z, beads within. They are shaken as one, from a step on, by the sum of
+   A sin(2 pi f t + phase); in their own frame they rest, and beads have the inertial force instead. Gravity
+   and more inertial forces may differ from bead to bead: a file has them, for each. The engine's own
+   walls are meshes of triangles, whose bookkeeping takes longer than all forces, or primitives, of whose contacts it
+   tells nothing; its forces by a formula read the formula's text in every step.
+
    The engine's loops are written out for spheres: no heat, energies, rigid bodies, stored contact forces, virial of
    walls. A contact's history is the number of its table, 0 without a bridge, and the spring; the number is negative
    where i is the second bead of the table, for which the coupling has the other sign (n and s turn round, q does not). */
 #include "granular_pair_style.h"
-#include "granular_wall.h"
 #include "contact_models.h"
 #include "fix_insert_stream.h"  // which pair_gran_base.h forgets
 #include "pair_gran_base.h"
-#include "fix_wall_gran_base.h"
+#include "modify.h"
+#include "output.h"
 #include "comm.h"
 #include "universe.h"
 #include "table.h"
@@ -75,12 +84,17 @@ struct Contact {
 
 class Law : protected Pointers {
 public:
-  Law(LAMMPS *lmp, IContactHistorySetup *const history, const bool rolls) : Pointers(lmp), rolls_(rolls), formed_(0.)
+  Law(LAMMPS *lmp, const bool rolls) : Pointers(lmp), rolls_(rolls), formed_(0.) { known()[lmp] = this; }
+  ~Law()
   {
-    history->add_history_value("bridge", "1");  // "1": the sign changes where the engine swaps i and j
-    history->add_history_value("shearx", "1");
-    history->add_history_value("sheary", "1");
-    history->add_history_value("shearz", "1");
+    if (known()[lmp] == this) known().erase(lmp);
+  }
+
+  /* The law of an engine, for its walls; none before its pair style. */
+  static const Law *of(LAMMPS *const lmp)
+  {
+    const std::map<LAMMPS *, const Law *>::const_iterator found = known().find(lmp);
+    return found == known().end() ? 0 : found->second;
   }
 
   void settings(const int n, char **const args)
@@ -121,11 +135,9 @@ public:
         dampings_[i * types + j] = {damping * std::sqrt(2. * modulus_[i][j]),
                                     damping * std::sqrt(8. * shear_modulus_[i][j])};
       }
-    // The engine looks for neighbours up to a multiple of the sum of the radii, at a wall of the radius.
+    // The engine looks for neighbours up to a multiple of the sum of the radii; a wall has none.
     double reach = 0.;
-    for (const bridge::Table &one : tables_)
-      reach =
-        std::max(reach, one.rupture / (std::isinf(one.radius[1]) ? one.radius[0] : one.radius[0] + one.radius[1]));
+    for (const bridge::Table &one : tables_) reach = std::max(reach, one.rupture / (one.radius[0] + one.radius[1]));
     neighbor->register_contact_dist_factor(1. + 1.01 * reach);
   }
 
@@ -140,10 +152,12 @@ public:
     return false;
   }
 
-protected:
+  /* The largest gap at which any bridge forms, m. */
+  double formed() const { return formed_; }
+
   /* The bridge of a contact whose surfaces touch or had one: its table, or none; the history is kept up. */
   inline const bridge::Table *bridge_of(double *const history, const double gap, const int type_i, const int type_j,
-                                        const double radius_i, const double radius_j)
+                                        const double radius_i, const double radius_j) const
   {
     if (history[TABLE] == 0.) {
       if (gap > formed_) return 0;
@@ -206,19 +220,25 @@ protected:
     }
   }
 
-  const bool rolls_;
-  double formed_;  // the largest gap at which any bridge forms
-  double **modulus_, **shear_modulus_, **friction_, **rolling_friction_;
-
 private:
   struct Damping {
     double normal, along;
   };
+  const bool rolls_;
+  double formed_;
+  double **modulus_, **shear_modulus_, **friction_, **rolling_friction_;
   std::vector<Damping> dampings_;  // by both types
   std::string file_;
   std::vector<bridge::Table> tables_;
 
-  __attribute__((noinline)) int find(const int type_i, const int type_j, const double radius_i, const double radius_j)
+  static std::map<LAMMPS *, const Law *> &known()
+  {
+    static std::map<LAMMPS *, const Law *> laws;
+    return laws;
+  }
+
+  __attribute__((noinline)) int find(const int type_i, const int type_j, const double radius_i,
+                                     const double radius_j) const
   {
     for (size_t number = 0; number < tables_.size(); number++)
       if (tables_[number].joins(type_i, type_j, radius_i, radius_j)) return number;
@@ -232,7 +252,13 @@ private:
 
 class Pair : public PairStyles::IGranularPairStyle, private Law {
 public:
-  Pair(LAMMPS *lmp, PairGran *parent, const int64_t hash, const bool rolls) : Law(lmp, parent, rolls), hash_(hash) {}
+  Pair(LAMMPS *lmp, PairGran *parent, const int64_t hash, const bool rolls) : Law(lmp, rolls), hash_(hash)
+  {
+    parent->add_history_value("bridge", "1");  // "1": the sign changes where the engine swaps i and j
+    parent->add_history_value("shearx", "1");
+    parent->add_history_value("sheary", "1");
+    parent->add_history_value("shearz", "1");
+  }
   void settings(int n, char **args, IContactHistorySetup *) { Law::settings(n, args); }
   void init_granular() { connect(); }
   int get_history_offset(const std::string) { return -1; }
@@ -272,7 +298,7 @@ public:
       for (int jj = 0; jj < count; jj++) {
         const int j = neighbours[jj] & NEIGHMASK;
         const Vec d = xi - vec(x[j]);
-        const double squared = dot(d, d), sum = ri + radius[j], reach = sum + formed_;
+        const double squared = dot(d, d), sum = ri + radius[j], reach = sum + formed();
         if (squared > reach * reach && !flags[jj]) continue;
         double *const history = histories + width * jj;
         Contact c;
@@ -348,37 +374,291 @@ private:
   }
 };
 
-class Wall : public Walls::IGranularWall, private Law {
+/* Planes and the insides of upright cylinders, shaken as one. */
+class FixWallBridge : public Fix {
 public:
-  Wall(LAMMPS *lmp, FixWallGran *parent, const int64_t, const bool rolls) : Law(lmp, parent, rolls) {}
-  void settings(int n, char **args, IContactHistorySetup *) { Law::settings(n, args); }
-  void init_granular() { connect(); }
-  bool checkSurfaceIntersect(SurfacesIntersectData &) { return true; }
-  int get_history_offset(const std::string) { return -1; }
-  bool contact_match(const std::string kind, const std::string model) { return match(kind, model); }
-
-  void compute_force(FixWallGran *wall, SurfacesIntersectData &surfaces, bool touching, double *velocity,
-                     FixMeshSurface *fix_mesh, int mesh_number, TriMesh *mesh, int triangle)
+  FixWallBridge(LAMMPS *lmp, int count, char **args) : Fix(lmp, count, args), law_(0), type_(0), begin_(0), moves_(true)
   {
-    const int i = surfaces.i;
-    double *const history = surfaces.contact_history;
-    const bool tell = wall->compute_wall_gran_local() && wall->addflag();
-    const double radius = surfaces.radi;
+    Arguments words(*this, count, args);
+    std::string file;
+    while (words.more()) {
+      const std::string word = words.next();
+      if (word == "type") type_ = static_cast<int>(words.number());
+      else if (word == "plane") {
+        const Vec point = words.vector(), normal = words.vector();
+        if (!(length(normal) > 0.)) error->fix_error(FLERR, this, "a plane has a normal of no length");
+        walls_.push_back({1. / length(normal) * normal, point, 0.});
+      } else if (word == "cylinder") {
+        const double x = words.number(), y = words.number();
+        walls_.push_back({{0., 0., 0.}, {x, y, 0.}, words.number()});
+        if (!(walls_.back().radius > 0.)) error->fix_error(FLERR, this, "a cylinder has a radius that is not above 0");
+      } else if (word == "shaken") {
+        const Vec amplitude = words.vector();
+        const double frequency = 2. * M_PI * words.number();
+        waves_.push_back({amplitude, frequency, words.number(), 0.});
+      } else if (word == "begin") begin_ = static_cast<bigint>(words.number());
+      else if (word == "frame") moves_ = words.one_of("lab", "walls");
+      else if (word == "loads") file = words.next();
+      else error->fix_error(FLERR, this, ("unknown keyword " + word).c_str());
+    }
+    if (walls_.empty()) error->fix_error(FLERR, this, "expected a plane or a cylinder");
+    if (type_ < 1 || type_ > atom->ntypes) error->fix_error(FLERR, this, "expected a type, of those of the box");
+    load_width_ = 3 * (1 + waves_.size());
+    if (!file.empty()) read_loads(file);
+    width_ = HISTORY * walls_.size();
+    create_attribute = restart_peratom = local_flag = local_freq = nevery = 1;
+    size_local_rows = 0;
+    size_local_cols = COLUMNS;
+    grow_arrays(atom->nmax);
+    for (const int of : {0, 1}) atom->add_callback(of);
+  }
+
+  ~FixWallBridge()
+  {
+    for (const int of : {0, 1}) atom->delete_callback(id, of);
+  }
+
+  int setmask() { return FixConst::PRE_NEIGHBOR | FixConst::POST_FORCE | FixConst::END_OF_STEP; }
+  int min_type() { return type_; }  // the materials' tables reach as far as the types that are used
+  int max_type() { return type_; }
+  void init()
+  {
+    law_ = Law::of(lmp);
+    if (!law_) error->fix_error(FLERR, this, "the pair style has no cohesion bridge");
+  }
+
+  void setup_pre_neighbor() { pre_neighbor(); }
+
+  /* Lists who has a bridge to a wall, or is so near that it may form one before neighbours are listed anew: until then
+     beads go less than the skin, and walls twice their amplitudes. */
+  void pre_neighbor()
+  {
+    double reach = law_->formed() + neighbor->skin;
+    if (moves_)
+      for (const Wave &wave : waves_) reach += 2. * length(wave.amplitude);
+    near_.clear();
+    move(0.);
+    for (int wall = 0; wall < static_cast<int>(walls_.size()); wall++)
+      for (int i = 0; i < atom->nlocal; i++) {
+        Vec n;
+        if (!(atom->mask[i] & groupbit)) continue;
+        if (gap_at(wall, i, n) > reach && history_of(i, wall)[TABLE] == 0.) continue;
+        near_.push_back({i, wall});
+      }
+  }
+
+  void setup(int)
+  {
+    move(0.);
+    push();
+    evaluate(true, false, 0);
+    tell();
+  }
+
+  void post_force(int)
+  {
+    move(0.5 * update->dt);  // velocities are still those of half a step before
+    push();
+    evaluate(true, true, 0);
+  }
+
+  /* Rows are of the velocities at the end of the step, as those of pairs are and what a dump says of the beads. */
+  void end_of_step()
+  {
+    if (update->ntimestep != output->next_dump_any) return;
+    move(0.);
+    tell();
+  }
+
+  void grow_arrays(int most) { history_.resize(static_cast<size_t>(most) * width_); }
+  void copy_arrays(int from, int to, int) { std::copy_n(of(from), width_, of(to)); }
+  void set_arrays(int i) { std::fill_n(of(i), width_, 0.); }
+  int pack_exchange(int i, double *buffer) { return std::copy_n(of(i), width_, buffer) - buffer; }
+  int unpack_exchange(int i, double *buffer)
+  {
+    std::copy_n(buffer, width_, of(i));
+    return width_;
+  }
+  int size_restart(int) { return width_ + 1; }
+  int maxsize_restart() { return width_ + 1; }
+  int pack_restart(int i, double *buffer)
+  {
+    buffer[0] = width_ + 1;
+    return 1 + pack_exchange(i, buffer + 1);
+  }
+  void unpack_restart(int i, int number)
+  {
+    double *kept = atom->extra[i];
+    for (; number; number--) kept += static_cast<int>(kept[0]);
+    if (kept[0] != width_ + 1) error->fix_error(FLERR, this, "the restart file has another number of walls");
+    unpack_exchange(i, kept + 1);
+  }
+
+private:
+  enum { COLUMNS = 12 };  // foot, bead: x, y, z; wall, id; force: x, y, z; overlap
+
+  struct Surface {
+    Vec normal, point;
+    double radius;  // of a cylinder, 0 of a plane
+  };
+
+  struct Wave {
+    Vec amplitude;
+    double frequency, phase, now;  // rad/s, rad; sine
+  };
+
+  struct Near {
+    int bead, wall;
+  };
+
+  /* The words of a command after the style, read one by one. */
+  class Arguments {
+  public:
+    Arguments(FixWallBridge &fix, const int count, char **const args) : fix_(fix), at_(args + 3), end_(args + count) {}
+    bool more() const { return at_ < end_; }
+    std::string next()
+    {
+      if (!more()) fix_.error->fix_error(FLERR, &fix_, "the command ends early");
+      return *at_++;
+    }
+    double number()
+    {
+      const std::string word = next();
+      return fix_.force->numeric(FLERR, const_cast<char *>(word.c_str()));
+    }
+    Vec vector()
+    {
+      const double x = number(), y = number(), z = number();
+      return {x, y, z};
+    }
+    bool one_of(const std::string &yes, const std::string &no)
+    {
+      const std::string found = next();
+      if (found != yes && found != no)
+        fix_.error->fix_error(FLERR, &fix_, ("expected " + yes + " or " + no + ", not " + found).c_str());
+      return found == yes;
+    }
+
+  private:
+    FixWallBridge &fix_;
+    char **at_, **end_;
+  };
+
+  const Law *law_;
+  int type_, width_;
+  std::vector<Surface> walls_;
+  std::vector<double> history_;  // of each bead at each wall
+  std::vector<Wave> waves_;
+  std::vector<Near> near_;
+  std::vector<double> loads_;  // by the ids of beads: gravity, amplitude of the acceleration of each wave
+  size_t load_width_;
+  bigint begin_;
+  bool moves_;                   // in the frame of the laboratory
+  Vec shift_, velocity_, push_;  // of the walls now; force on a mass of 1
+  std::vector<double> cells_;
+  std::vector<double *> rows_;
+
+  double *of(const int i) { return &history_[static_cast<size_t>(i) * width_]; }
+
+  void read_loads(const std::string &file)
+  {
+    std::ifstream in(file.c_str());
+    const int most = atom->tag_max();
+    loads_.resize((most + 1) * load_width_);
+    bool whole = static_cast<bool>(in);
+    for (int bead; whole && in >> bead;) {
+      whole = bead > 0 && bead <= most;
+      for (size_t column = 0; whole && column < load_width_; column++)
+        whole = static_cast<bool>(in >> loads_[bead * load_width_ + column]);
+    }
+    if (!whole || !in.eof()) error->fix_error(FLERR, this, (file + " has no loads that can be read").c_str());
+  }
+
+  double *history_of(const int i, const int wall) { return of(i) + HISTORY * wall; }
+
+  /* Puts the walls where they are in this step, with the velocity of some time before. */
+  void move(const double before)
+  {
+    shift_ = velocity_ = push_ = {0., 0., 0.};
+    const double time = (update->ntimestep - begin_) * update->dt;
+    for (Wave &wave : waves_) {
+      const double w = wave.frequency;
+      wave.now = time < 0. ? 0. : std::sin(w * time + wave.phase);
+      if (time < 0.) continue;
+      if (moves_) {
+        shift_ = shift_ + wave.now * wave.amplitude;
+        velocity_ = velocity_ + w * std::cos(w * (time - before) + wave.phase) * wave.amplitude;
+      } else push_ = push_ + w * w * wave.now * wave.amplitude;
+    }
+  }
+
+  /* The inertial force where the frame is that of shaken walls, and the beads' own loads. */
+  void push()
+  {
+    if (loads_.empty() && (moves_ || waves_.empty())) return;
+    for (int i = 0; i < atom->nlocal; i++) {
+      if (!(atom->mask[i] & groupbit)) continue;
+      Vec acceleration = push_;
+      if (!loads_.empty()) {
+        const double *load = &loads_[atom->tag[i] * load_width_];
+        acceleration = acceleration + vec(load);
+        for (const Wave &wave : waves_) acceleration = acceleration + wave.now * vec(load += 3);
+      }
+      add_to(atom->f[i], atom->rmass[i] * acceleration);
+    }
+  }
+
+  double gap_at(const int number, const int i, Vec &n) const
+  {
+    const Surface &wall = walls_[number];
+    Vec d = vec(atom->x[i]) - wall.point - shift_;
+    n = wall.normal;
+    if (!(wall.radius > 0.)) return dot(n, d) - atom->radius[i];
+    d.z = 0.;
+    const double out = length(d);
+    n = -1. / out * d;
+    return wall.radius - out - atom->radius[i];
+  }
+
+  void tell()
+  {
+    cells_.clear();
+    evaluate(false, false, &cells_);
+    size_local_rows = cells_.size() / COLUMNS;
+    rows_.clear();
+    for (int row = 0; row < size_local_rows; row++) rows_.push_back(&cells_[row * COLUMNS]);
+    array_local = rows_.data();
+  }
+
+  void evaluate(const bool add, const bool stretch, std::vector<double> *const told)
+  {
+    const double formed = law_->formed();
+    for (const Near &one : near_) {
+      double *const history = history_of(one.bead, one.wall);
+      Vec n;
+      const double gap = gap_at(one.wall, one.bead, n);
+      if (gap > formed && history[TABLE] == 0.) continue;
+      touch(one.bead, one.wall, gap, n, history, add, stretch, told);
+    }
+  }
+
+  void touch(const int i, const int wall, const double gap, const Vec n, double *const history, const bool add,
+             const bool stretch, std::vector<double> *const told)
+  {
+    if (std::isnan(gap)) error->one(FLERR, "fix wall/bridge: a bead's position is no number");
+    const double radius = atom->radius[i];
+    const bool touching = gap < 0.;
     Contact c;
-    c.gap = -surfaces.deltan;
+    c.gap = gap;
+    c.n = n;
     c.type_i = atom->type[i];
-    c.type_j = wall->atom_type_wall();
+    c.type_j = type_;
     if (!touching) history[SPRING] = history[SPRING + 1] = history[SPRING + 2] = 0.;
     const bridge::Table *const table =
-      bridge_of(history, c.gap, c.type_i, c.type_j, radius, std::numeric_limits<double>::infinity());
-    if (!touching && !table && !tell) return;
-    surfaces.r = radius + c.gap;
-    surfaces.rsq = surfaces.r * surfaces.r;
-    surfaces.has_force_update = true;
-    c.n = 1. / surfaces.r * vec(surfaces.delta);
-    add_to(surfaces.en, c.n - vec(surfaces.en));
+      law_->bridge_of(history, c.gap, c.type_i, c.type_j, radius, std::numeric_limits<double>::infinity());
+    if (!touching && !table) return;
     const double arm = radius + 0.5 * c.gap;
-    const Vec v = vec(atom->v[i]) - vec(velocity);
+    const Vec v = vec(atom->v[i]) - velocity_;
     c.spin = vec(atom->omega[i]);
     c.apart = dot(v, c.n);
     c.rolling = cross(c.n, c.spin);
@@ -387,47 +667,39 @@ public:
     if (touching) {
       c.reduced_radius = radius;
       c.reduced_mass = atom->rmass[i];
-      touch(c, history + SPRING, wall->computeflag() && wall->shearupdate(), update->dt);
+      law_->touch(c, history + SPRING, stretch, update->dt);
     }
-    if (table) wet(c, *table, history);
-    const Vec torque = c.couple - arm * cross(c.n, c.force);
-    if (wall->computeflag()) {
+    if (table) law_->wet(c, *table, history);
+    if (add) {
       add_to(atom->f[i], c.force);
-      add_to(atom->torque[i], torque);
+      add_to(atom->torque[i], c.couple - arm * cross(c.n, c.force));
     }
-    if (tell) report(wall, surfaces, velocity, c, torque, mesh_number, mesh, triangle);
-    double acted[3] = {c.force.x, c.force.y, c.force.z};
-    if (wall->store_force())
-      vectorAdd3D(wall->fix_wallforce()->array_atom[i], acted, wall->fix_wallforce()->array_atom[i]);
-    if (fix_mesh && (touching || table)) {
-      double delta[3] = {-surfaces.delta[0], -surfaces.delta[1], -surfaces.delta[2]};
-      fix_mesh->add_particle_contribution(i, acted, delta, triangle, velocity);
+    if (told) {
+      const Vec x = vec(atom->x[i]), foot = x - (radius + c.gap) * c.n;
+      for (const double cell : {foot.x, foot.y, foot.z, x.x, x.y, x.z, 1. * wall, 1. * atom->tag[i], c.force.x,
+                                c.force.y, c.force.z, -c.gap})
+        told->push_back(cell);
     }
-  }
-
-private:
-  __attribute__((noinline)) void report(FixWallGran *wall, SurfacesIntersectData &surfaces, double *velocity,
-                                        const Contact &c, const Vec torque, const int mesh_number, TriMesh *mesh,
-                                        const int triangle)
-  {
-    const int i = surfaces.i;
-    double at[3], normal[3] = {-c.n.x, -c.n.y, -c.n.z};
-    vectorSubtract3D(atom->x[i], surfaces.delta, at);
-    ComputePairGranLocal *const rows = wall->compute_wall_gran_local();
-    rows->add_wall_1(mesh_number, mesh ? mesh->id(triangle) : 0, i, at, velocity);
-    rows->add_wall_2(i, c.force.x, c.force.y, c.force.z, torque.x, torque.y, torque.z, surfaces.contact_history,
-                     surfaces.rsq, normal);
   }
 };
 
+/* The engine's table of fixes is private, and has no other entry: a pointer to the member, by explicit instantiation. */
+typedef std::map<std::string, Fix *(*)(LAMMPS *, int, char **)> Fixes;
+struct Styles {
+  typedef Fixes *Modify::*Member;
+  friend Member member(Styles);
+};
+template<Styles::Member FOUND> struct Found {
+  friend Styles::Member member(Styles) { return FOUND; }
+};
+template struct Found<&Modify::fix_map>;
+
+Fix *make_walls(LAMMPS *lmp, int count, char **args) { return new FixWallBridge(lmp, count, args); }
+
 template<bool ROLLS> PairStyles::IGranularPairStyle *make_pair_style(LAMMPS *lmp, PairGran *parent, int64_t hash)
 {
+  (*(lmp->modify->*member(Styles())))["wall/bridge"] = &make_walls;
   return new Pair(lmp, parent, hash, ROLLS);
-}
-
-template<bool ROLLS> Walls::IGranularWall *make_wall(LAMMPS *lmp, FixWallGran *parent, int64_t hash)
-{
-  return new Wall(lmp, parent, hash, ROLLS);
 }
 
 template<bool ROLLS> void add_styles()
@@ -435,7 +707,6 @@ template<bool ROLLS> void add_styles()
   const int rolling = ROLLS ? ROLLING_CDT : ROLLING_OFF;
   const int64_t hash = Utils::generate_gran_hashcode(HERTZ, TANGENTIAL_HISTORY, BRIDGE_ID, rolling, SURFACE_DEFAULT);
   PairStyles::Factory::instance().addStyle("gran", hash, &make_pair_style<ROLLS>);
-  Walls::Factory::instance().addStyle("gran", hash, &make_wall<ROLLS>);
 }
 
 struct Registration {

@@ -9,72 +9,64 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, cos, hypot, inf, pi, sin, sqrt, tan
-from typing import ClassVar, Literal
+from math import ceil, cos, hypot, inf, pi, sin, sqrt
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from walkers.inputs.drive import Vector
 
-AxisName = Literal["x", "y", "z"]
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    FloatArray = npt.NDArray[np.floating[Any]]
+
 FLOOR = "floor"
 LOOSE = 1.03
 """Pitch of the places from which beads are poured, in diameters of the largest bead."""
-SIDES = 64
-"""Of the prism that stands for a cylinder in the engine; its edges lie 0.12 % of the radius beyond its faces."""
-_SLENDER = 1.2e-3
-"""The least ratio of a triangle's width to its height in a round wall; the engine takes none below 0.001."""
 _LEAST = 1e-13
 _RIM = 2e-4
 """m; the simulation box of a container reaches this far beyond its walls."""
 
 
 @dataclass(frozen=True)
-class Round:
-    """What the faces of a round wall have in common: its radius, its lower and upper end (m), its number of pieces."""
+class Flat:
+    """A plane: a point of it (m), its unit normal into the space where the beads are, its name."""
 
-    radius: float
-    bottom: float
-    top: float
-    pieces: int
+    point: Vector
+    normal: Vector
+    name: str = FLOOR
 
-    def half_width(self, depth: float) -> float:
-        """Half the width of faces whose ends meet at a depth within the wall, m."""
-        return (self.radius - depth) * tan(pi / SIDES)
+    def distances(self, places: FloatArray) -> FloatArray:
+        """Of places, shape (..., 3), m."""
+        found: FloatArray = (places - self.point) @ self.normal
+        return found
+
+    def normals(self, places: FloatArray) -> FloatArray:
+        """Unit vectors away from it, of the shape of the places."""
+        return 0.0 * places + self.normal
 
 
 @dataclass(frozen=True)
-class Face:
-    """A flat wall: the axis that it is normal to, the side to which its normal points, its centroid (m).
+class Round:
+    """The inside of an upright cylinder about the origin: its radius (m), its name."""
 
-    ``turn`` (rad) turns an upright one about the vertical, ``lean`` a level one about the x axis; ``wall`` is the wall
-    that the face belongs to, ``of`` the round one that it is a side of.
-    """
+    radius: float
+    name: str = "side"
 
-    axis: AxisName
-    side: Literal[1, -1]
-    centroid: Vector
-    turn: float = 0.0
-    wall: str = FLOOR
-    lean: float = 0.0
-    of: Round | None = None
+    def distances(self, places: FloatArray) -> FloatArray:
+        """Of places, shape (..., 3), m."""
+        found: FloatArray = self.radius - (places[..., 0] ** 2 + places[..., 1] ** 2) ** 0.5
+        return found
 
-    @property
-    def normal(self) -> Vector:
-        """Unit vector into the space where the beads are."""
-        return self.turned(tuple(float(self.side) * (axis == self.axis) for axis in ("x", "y", "z")))  # type: ignore[arg-type]
+    def normals(self, places: FloatArray) -> FloatArray:
+        """Unit vectors toward the axis, of the shape of the places."""
+        found: FloatArray = places * (-1.0, -1.0, 0.0) / (self.radius - self.distances(places))[..., None]
+        return found
 
-    @property
-    def triangles(self) -> int:
-        """How many triangles it is made of in the engine: one, or two for each piece of a round wall's side."""
-        return 2 * self.of.pieces if self.of else 1
 
-    def turned(self, vector: Vector) -> Vector:
-        """A vector of the face's own axes in those of the boundary."""
-        x, y, z = vector
-        if self.lean:
-            y, z = y * cos(self.lean) - z * sin(self.lean), y * sin(self.lean) + z * cos(self.lean)
-        if self.turn == 0.0:
-            return (x, y, z)
-        return (x * cos(self.turn) - y * sin(self.turn), x * sin(self.turn) + y * cos(self.turn), z)
+Wall = Flat | Round
+BOTTOM = Flat((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+"""The floor of every boundary that has one."""
 
 
 @dataclass(frozen=True)
@@ -137,19 +129,15 @@ class Boundary:
         down, press = gravity * _round(sin(self.tilt)), gravity * _round(cos(self.tilt))
         return (-down * _round(cos(self.uphill)), -down * _round(sin(self.uphill)), -press)
 
-    @abstractmethod
-    def faces(self) -> tuple[Face, ...]:
-        """The floor first, if there is one, then the side walls."""
-
     @property
-    def walls(self) -> tuple[str, ...]:
-        """Names of the walls: the floor first, if there is one, then the sides."""
-        return tuple(dict.fromkeys(face.wall for face in self.faces()))
+    @abstractmethod
+    def walls(self) -> tuple[Wall, ...]:
+        """The floor first, if there is one, then the side walls."""
 
     @property
     def bare(self) -> bool:
         """Whether it is a floor without any side walls."""
-        return self.walls == (FLOOR,)
+        return [wall.name for wall in self.walls] == [FLOOR]
 
     @abstractmethod
     def room(self, span: Span) -> Room:
@@ -195,9 +183,10 @@ class Plane(Boundary):
 
     shape: Literal["plane"] = "plane"
 
-    def faces(self) -> tuple[Face, ...]:
+    @property
+    def walls(self) -> tuple[Wall, ...]:
         """The plane."""
-        return (Face("z", 1, (0.0, 0.0, 0.0)),)
+        return (BOTTOM,)
 
     def room(self, span: Span) -> Room:
         """A box about the ways of all walkers."""
@@ -236,14 +225,11 @@ class Channel(_Row):
     width: float
     shape: Literal["channel"] = "channel"
 
-    def faces(self) -> tuple[Face, ...]:
+    @property
+    def walls(self) -> tuple[Wall, ...]:
         """The floor and two walls."""
-        half, level = self.width / 2.0, self.width / 4.0
-        return (
-            Face("z", 1, (0.0, 0.0, 0.0)),
-            Face("y", 1, (0.0, -half, level), wall="-y"),
-            Face("y", -1, (0.0, half, level), wall="+y"),
-        )
+        half = self.width / 2.0
+        return (BOTTOM, Flat((0.0, -half, 0.0), (0.0, 1.0, 0.0), "-y"), Flat((0.0, half, 0.0), (0.0, -1.0, 0.0), "+y"))
 
     def room(self, span: Span) -> Room:
         """A box about the walkers' ways."""
@@ -269,13 +255,11 @@ class Groove(_Row):
     opening: float
     shape: Literal["groove"] = "groove"
 
-    def faces(self) -> tuple[Face, ...]:
+    @property
+    def walls(self) -> tuple[Wall, ...]:
         """The wall to the right and that to the left."""
-        rise, far = (pi - self.opening) / 2.0, 1e-3
-        return tuple(
-            Face("z", 1, (0.0, side * far * cos(rise), far * sin(rise)), wall=name, lean=side * rise)
-            for side, name in ((-1.0, "-y"), (1.0, "+y"))
-        )
+        across, up = cos(self.opening / 2.0), sin(self.opening / 2.0)
+        return (Flat(BOTTOM.point, (0.0, across, up), "-y"), Flat(BOTTOM.point, (0.0, -across, up), "+y"))
 
     def rest_height(self, radius: float) -> float:
         """Height at which a bead touches both walls, m."""
@@ -338,15 +322,16 @@ class Box(Container):
 
     shape: Literal["box"] = "box"
 
-    def faces(self) -> tuple[Face, ...]:
-        """The floor and four walls; centroids off the middle, where MPI ranks may meet."""
-        half, aside, level = self.width / 2.0, 0.0137 * self.width, self.height / 4.0
+    @property
+    def walls(self) -> tuple[Wall, ...]:
+        """The floor and four walls."""
+        half = self.width / 2.0
         return (
-            Face("z", 1, (aside, 0.0, 0.0)),
-            Face("x", 1, (-half, 0.0, level), wall="-x"),
-            Face("x", -1, (half, 0.0, level), wall="+x"),
-            Face("y", 1, (aside, -half, level), wall="-y"),
-            Face("y", -1, (aside, half, level), wall="+y"),
+            BOTTOM,
+            Flat((-half, 0.0, 0.0), (1.0, 0.0, 0.0), "-x"),
+            Flat((half, 0.0, 0.0), (-1.0, 0.0, 0.0), "+x"),
+            Flat((0.0, -half, 0.0), (0.0, 1.0, 0.0), "-y"),
+            Flat((0.0, half, 0.0), (0.0, -1.0, 0.0), "+y"),
         )
 
     def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
@@ -362,34 +347,19 @@ class Box(Container):
 
 @dataclass(frozen=True, kw_only=True)
 class Cylinder(Container):
-    """A round container; in the engine a prism whose faces touch it: beads never meet an edge from outside."""
+    """A round container."""
 
     shape: Literal["cylinder"] = "cylinder"
 
-    def faces(self) -> tuple[Face, ...]:
-        """The floor and the prism's faces, which are one wall: every second face, then those between them.
-
-        In this order neither sense of rotation differs from the other: the engine treats a bead that comes to a face
-        from one of a higher number unlike one from a lower number (`walkers.templates.engine`).
-        """
-        half, level = self.width / 2.0, self.height / 4.0
-        turns = _turns()
-        sides = [((half * cos(turn), half * sin(turn), level), turn) for turn in turns[::2] + turns[1::2]]
-        floor = Face("z", 1, (0.0137 * self.width, 0.0, 0.0))
-        wall = self._wall
-        return (floor, *(Face("x", -1, place, turn, "side", of=wall) for place, turn in sides))
-
     @property
-    def _wall(self) -> Round:
-        """From below the floor to above the box, no triangle of it too slender for beads of a quarter of the width."""
-        bottom, top = -0.2 * self.height, 2.2 * self.height
-        narrowest = 2.0 * Round(self.width / 2.0, bottom, top, 1).half_width(self.width / 8.0)
-        return Round(self.width / 2.0, bottom, top, ceil(_SLENDER * (top - bottom) / narrowest))
+    def walls(self) -> tuple[Wall, ...]:
+        """The floor and the side."""
+        return (BOTTOM, Round(self.width / 2.0))
 
     def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
-        """Distance from the nearest of the prism's faces, m."""
+        """Distance from the side, m."""
         del z
-        return self.width / 2.0 - max(x * cos(turn) + y * sin(turn) for turn in _turns())
+        return self.width / 2.0 - hypot(x, y)
 
     def layer(self, largest: float) -> Layer:
         """The places of a box that lie within; the wall cuts the outer ones, whose beads stray less."""
@@ -405,11 +375,6 @@ class Cylinder(Container):
 
 Shape = Plane | Channel | Groove | Box | Cylinder
 """The boundaries that there are."""
-
-
-def _turns() -> list[float]:
-    """Directions in which the faces of a cylinder's prism lie, rad about the axis."""
-    return [2.0 * pi * (number + 0.5) / SIDES for number in range(SIDES)]
 
 
 def _room_above(half: tuple[float, float], top: float, largest: float) -> Room:

@@ -46,6 +46,12 @@ class Harmonic:
         return self.peak_acceleration / self.angular_frequency**2
 
     @property
+    def displacement(self) -> Vector:
+        """A along its direction, m."""
+        x, y, z = self.direction
+        return (self.amplitude * x, self.amplitude * y, self.amplitude * z)
+
+    @property
     def peak_velocity(self) -> float:
         """A 2πf, m/s."""
         return self.peak_acceleration / self.angular_frequency

@@ -115,7 +115,7 @@ def surface_pair(first: str | None, second: str | None) -> Mapping[str, Known] |
     """How two wet surfaces touch, or None where the library has no value for them.
 
     ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio``, ``viscosity_ratio``,
-    ``film_drag_ratio``, ``contact_angle`` (rad), ``volume_fraction`` and ``restitution``.
+    ``contact_angle`` (rad), ``volume_fraction`` and ``restitution``.
     """
     for entry in _contents()["surface_pairs"]:
         if sorted(entry["materials"]) == sorted([first or "", second or ""]):

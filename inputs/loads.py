@@ -14,6 +14,7 @@ from walkers.physics.laws import law_of
 if TYPE_CHECKING:
     from walkers.inputs.bodies import Walkers
     from walkers.inputs.case import Case
+    from walkers.physics.bridge import Curve, Surfaces
 
 
 def dimer_of(case: Case) -> Dimer:
@@ -57,11 +58,26 @@ def bridge_at_rest(case: Case, radius: float, other_radius: float) -> BridgeAtRe
     """The bridge of a bead to another, or to a plane (a radius of infinity), by the case's law; radii in m."""
     import numpy as np
 
+    surfaces, curve = _bridge(case, radius, other_radius)
+    touching = np.zeros(1)
+    pull = curve.pull(touching) if curve.pull else curve.forces(touching).pull
+    return BridgeAtRest(surfaces.volume, float(pull[0]), curve.rupture)
+
+
+def resistances_at_rest(case: Case, radius: float, other_radius: float) -> tuple[float, float, float]:
+    """S (N s/m), C (N s) and Q (N m s) of that bridge, the smaller bead as body 1 (`walkers.physics.bridge`)."""
+    import numpy as np
+
+    _, curve = _bridge(case, radius, other_radius)
+    _, _, sliding, coupling, rolling = map(float, curve.forces(np.zeros(1)).columns()[0])
+    return sliding, coupling, rolling
+
+
+def _bridge(case: Case, radius: float, other_radius: float) -> tuple[Surfaces, Curve]:
     from walkers.physics.bridge import Surfaces
 
     surfaces = Surfaces.of(radius, other_radius, case.liquid, case.contact.minimum_separation_ratio)
-    curve = law_of(case.liquid)(surfaces)
-    return BridgeAtRest(surfaces.volume, float(curve.forces(np.zeros(1)).pull[0]), curve.rupture)
+    return surfaces, law_of(case.liquid)(surfaces)
 
 
 @lru_cache(maxsize=16)  # asked for at every stage of a deck

@@ -98,9 +98,9 @@ def _liquid(table: LiquidTable, pair: Mapping[str, Known], choices: Choices) -> 
             by_name(table.law)
         except ValueError as error:
             raise UnusableKeyError("liquid.law", str(error)) from error
-    film, bridges = (float(f"{viscosity * chosen(f'{of}_ratio'):.15g}") for of in ("film_drag", "viscosity"))
+    bridges = float(f"{viscosity * chosen('viscosity_ratio'):.15g}")
     fraction, angle = chosen("volume_fraction"), chosen("contact_angle")
-    return Liquid(tension, bridges, density, fraction, angle, table.name, film, table.law)
+    return Liquid(tension, bridges, density, fraction, angle, table.name, table.law)
 
 
 def _contact(table: ContactTable, bead: str | None, wall: str, choices: Choices) -> Contact:

@@ -27,7 +27,7 @@ _KINDS: Mapping[str, Kind] = {
     **dict.fromkeys(("radii", "small", "large", "gap", "spacing", "width", "height", "places", "beads"), units.LENGTH),
     **dict.fromkeys(("angle", "angle_spread", "tilt", "uphill", "opening", "phase", "contact_angle"), units.ANGLE),
     **dict.fromkeys(("peak_acceleration", "gravity"), units.ACCELERATION),
-    **dict.fromkeys(("dynamic_viscosity", "bridge_viscosity", "film_viscosity"), units.DYNAMIC_VISCOSITY),
+    **dict.fromkeys(("dynamic_viscosity", "bridge_viscosity"), units.DYNAMIC_VISCOSITY),
     "frequency": units.FREQUENCY,
     "density": units.DENSITY,
     "surface_tension": units.SURFACE_TENSION,
@@ -61,8 +61,6 @@ _GIVEN_BY: Mapping[str, tuple[str, ...]] = {
     "liquid.dynamic_viscosity": ("liquid.dynamic_viscosity", "liquid.kinematic_viscosity", "liquid.density"),
 }
 """The keys by which a case file gives such a value, where they are others than its own."""
-_RATIOS = {"liquid.bridge_viscosity": "liquid.viscosity_ratio", "liquid.film_viscosity": "liquid.film_drag_ratio"}
-"""What the laws take is the liquid's viscosity times these."""
 _NOT_COMPARED = ("name", "title", "document", "recorded")
 """What does not determine a run, and …"""
 _BOUNDS = tuple(f"run.{bound}" for bound in BOUNDS)
@@ -94,8 +92,8 @@ def flattened(case: Mapping[str, Any]) -> FlatCase:
     FlatCase
         Keys are a case file's where it has the value, such as ``drive.frequency`` and ``contact.friction.bead_wall``;
         ``walkers.radii`` are those of ``[dimers]`` or ``[[clusters]]``, ``walkers[1].radii`` where there are several.
-        ``liquid.bridge_viscosity`` and ``liquid.film_viscosity`` stand for the liquid's viscosity and its ratios where
-        these were not recorded.
+        ``liquid.bridge_viscosity`` stands for the liquid's viscosity and the bridges' ratio to it where these were not
+        recorded.
     """
     compared = {key: value for key, value in case.items() if key not in _NOT_COMPARED}
     flat = {key: value for key, value in dotted(compared) if key not in _BOUNDS}
@@ -103,38 +101,28 @@ def flattened(case: Mapping[str, Any]) -> FlatCase:
         if not any(key.startswith(listed.replace("0", "1")) for key in flat):
             flat = {alone + key.removeprefix(listed) if key.startswith(listed) else key: flat[key] for key in flat}
     recorded = {one["key"]: one for one in case.get("recorded") or ()}
-    told = FlatCase(_with_ratios({_RENAMED.get(key, key): value for key, value in flat.items()}, recorded))
+    told = FlatCase(_with_ratio({_RENAMED.get(key, key): value for key, value in flat.items()}, recorded))
     if recorded:
         told.given = {key: one["text"] for key, one in recorded.items() if one["origin"] == "given"}
     return told
 
 
-def _with_ratios(flat: dict[str, Any], recorded: Mapping[str, Any]) -> dict[str, Any]:
-    """A resolved case has the products of viscosity and ratios; the factors are among what was recorded, as texts."""
-    viscosity, ratios = _own_viscosity(flat, recorded)
-    if viscosity is None:
-        return flat
-    told: dict[str, Any] = {}
-    for key, value in flat.items():
-        if key == "liquid.bridge_viscosity":
-            told["liquid.dynamic_viscosity"] = viscosity
-        told |= {_RATIOS[key]: ratios[key]} if key in ratios else {key: value}
-    return told
-
-
-def _own_viscosity(flat: Mapping[str, Any], recorded: Mapping[str, Any]) -> tuple[float | None, dict[str, float]]:
-    """Viscosity of the liquid, Pa s, and the ratios to it by the products' keys; None if they are not recorded."""
-    ratios = {}
+def _with_ratio(flat: dict[str, Any], recorded: Mapping[str, Any]) -> dict[str, Any]:
+    """A resolved case has the product of viscosity and ratio; the factors are among what was recorded, as texts."""
     try:
         viscosity = units.parse_quantity(recorded["liquid.dynamic_viscosity"]["text"], units.DYNAMIC_VISCOSITY)
-        for product, ratio in _RATIOS.items():
-            ratios[product] = float(recorded[ratio]["text"])
-            # Of a case that was changed since it was read, what is recorded is not what the laws take.
-            if not isclose(viscosity * ratios[product], flat[product], rel_tol=1e-4, abs_tol=1e-12):
-                return None, {}
+        ratio = float(recorded["liquid.viscosity_ratio"]["text"])
     except (KeyError, ValueError):
-        return None, {}
-    return viscosity, ratios
+        return flat
+    product = "liquid.bridge_viscosity"
+    # Of a case that was changed since it was read, what is recorded is not what the laws take.
+    if product not in flat or not isclose(viscosity * ratio, flat[product], rel_tol=1e-4, abs_tol=1e-12):
+        return flat
+    factors = {"liquid.dynamic_viscosity": viscosity, "liquid.viscosity_ratio": ratio}
+    told: dict[str, Any] = {}
+    for key, value in flat.items():
+        told |= factors if key == product else {key: value}
+    return told
 
 
 def dotted(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:

@@ -156,10 +156,9 @@ class PlacedTable(Table):
 class LiquidTable(Table):
     """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
 
-    ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag;
-    ``film_drag_ratio`` a drag on beads along near walls over that of Stokes in the liquid, 6π η R v. ``law`` is that of
-    the bridges, one of `walkers.physics.laws` or a function of yours, ``file.py:function``. The four before it, left
-    out, are the library's for the surfaces, else as in `walkers.inputs.matter_tables`.
+    ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag. ``law`` is that
+    of the bridges, one of `walkers.physics.laws` or a function of yours, ``file.py:function``. The three before it,
+    left out, are the library's for the surfaces, else as in `walkers.inputs.matter_tables`.
     """
 
     name: str | None = None
@@ -169,7 +168,6 @@ class LiquidTable(Table):
     dynamic_viscosity: DynamicViscosity | None = None
     volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] | None = None
     viscosity_ratio: Annotated[Number, Field(ge=1e-3, le=1e4)] | None = None
-    film_drag_ratio: Annotated[Number, Field(ge=0, le=1e4)] | None = None
     contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] | None = None
     law: str = DEFAULT_LAW
 

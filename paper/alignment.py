@@ -14,6 +14,7 @@ from walkers.paper import dimers, published
 from walkers.paper.sources import Sources
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 from walkers.theory.mathieu import Alignment, alignment, is_stable, turning
+from walkers.theory.prediction import pendulum_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,7 +84,7 @@ def _turns(axes: Axes, trajectory: Group, angle: float) -> None:
 
 def _beginning(axes: Axes, trajectory: Group, angle: float) -> None:
     """Each walker with the solution that begins as it does."""
-    drive, parameters = trajectory.case.drive, _of(trajectory)
+    drive, parameters = trajectory.case.drive, pendulum_of(trajectory.case)
     few = trajectory.time <= _SMALL
     for number, walker in enumerate(trajectory.walkers):
         psi = trajectory.orientation[few, number]
@@ -93,11 +94,6 @@ def _beginning(axes: Axes, trajectory: Group, angle: float) -> None:
         predicted = turning(parameters, float(psi[0]), pi * drive.frequency * trajectory.time[few], phase)
         axes.plot(trajectory.time[few] * 1e3, np.degrees(predicted), "--", color=_shade(angle), lw=0.9)
     axes.set(xlabel="time (ms)", ylabel=r"orientation $\psi$ (°)")
-
-
-def _of(trajectory: Group) -> Alignment:
-    case = trajectory.case
-    return alignment(dimer_of(case), case.drive.frequency, case.drive.peak_acceleration)
 
 
 def paper_drives() -> dict[str, Alignment]:

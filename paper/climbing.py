@@ -1,4 +1,4 @@
-"""What stands on a wall and climbs it: maps of postures over friction, film and tilt, and the clusters themselves."""
+"""What stands on a wall and climbs it: maps of postures over friction, tilt and drag, and the clusters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KINDS = ("climbs upright", "stays, upright", "slides down upright", "leans", "tu
 _MARKERS = ("^", "o", "v", "D", "X")
 _SHAPE = "clusters[0].arrangement"
 _SHAPES = {"chain": "dimer", "fan": "fan: large, two small", "diamond": "diamond: large, two small, small"}
-_FRICTION, _TILT, _FILM = "contact.friction.bead_wall", "boundary.tilt", "liquid.film_drag_ratio"
+_FRICTION, _TILT, _DRAG = "contact.friction.bead_wall", "boundary.tilt", "liquid.viscosity_ratio"
 STAYS = 5e-5
 """m/s; what is slower stays where it is: no more than a tenth of a radius in a second."""
 _SPEEDS = (-10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0)
@@ -45,19 +45,19 @@ def kinds(table: pd.DataFrame) -> npt.NDArray[np.int64]:
 
 @styled
 def fig_climbing(sources: Sources) -> Figure:
-    """Dimer, fan and diamond: the film against friction on a wall, and against tilt."""
+    """Dimer, fan and diamond: the bridges' viscosity against friction on a wall, and against tilt."""
     from matplotlib.lines import Line2D
 
     figure, rows = new_figure(TWO_COLUMNS, 4.8, nrows=2, ncols=3, sharey=True)
-    maps = (("climb-film", _FRICTION, "friction, on a wall"), ("climb-tilt", _TILT, "tilt (°), friction 0.5"))
+    maps = (("climb-friction", _FRICTION, "friction, on a wall"), ("climb-tilt", _TILT, "tilt (°), friction 0.5"))
     for axes, (sweep, key, label) in zip(rows, maps, strict=True):
         table = sources.finished(sweep)
         for one, (shape, name) in zip(axes, _SHAPES.items(), strict=True):
             drawn = _map(one, table[table[_SHAPE] == shape], key)
             one.set_xlabel(label)
-            if sweep == "climb-film":
+            if sweep == "climb-friction":
                 one.set_title(name)
-        axes[0].set_ylabel("drag of the film over Stokes's")
+        axes[0].set(ylabel="bridges' viscosity over the liquid's", yscale="log")
     letter_panels(rows.flat)
     figure.colorbar(drawn, ax=rows, label="up the slope (mm/s)", shrink=0.6, extend="both", ticks=_SPEEDS, format="%g")
     handles = [
@@ -77,7 +77,7 @@ def _map(axes: Axes, table: pd.DataFrame, key: str) -> PathCollection:
     for kind, marker in enumerate(_MARKERS):
         here = found == kind
         drawn = axes.scatter(
-            table[key].to_numpy()[here], table[_FILM].to_numpy()[here], c=speed[here], marker=marker,
+            table[key].to_numpy()[here], table[_DRAG].to_numpy()[here], c=speed[here], marker=marker,
             s=26, cmap="RdBu", norm=shades, ec="0.2", lw=0.4,
         )  # fmt: skip
     return drawn

@@ -60,7 +60,7 @@ class Row:
     key, what, unit, published, measured
         See `walkers.paper.published.Published`.
     engine, low, high, theory, left_out
-        See `Value`; theory is Coulomb friction with the drag of bridges and film, nothing fitted.
+        See `Value`; theory is Coulomb friction with the resistance of bridges, nothing fitted.
     ratio
         Engine (or theory, where the number is one of theory alone) to published; None where that is zero or in words,
         or there is nothing to compare.

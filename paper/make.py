@@ -52,7 +52,7 @@ FIGURES = {
     "alignment": Drawing(fig_alignment, ("alignment",), "Alignment with the shaking axis and across it"),
     "modes": Drawing(fig_modes, ("modes",), "Modes of motion"),
     "sensitivity": Drawing(fig_sensitivity, ("sensitivity",), "What the disagreements depend on"),
-    "climbing": Drawing(fig_climbing, ("climb-film", "climb-tilt"), "What stands on a wall and climbs it", True),
+    "climbing": Drawing(fig_climbing, ("climb-friction", "climb-tilt"), "What stands on a wall and climbs it", True),
     "zoo": Drawing(fig_zoo, ("zoo", "zoo-corner"), "Clusters on a wall and in a corner", True),
 }
 COMPARISON = "comparison"

@@ -1,7 +1,8 @@
 """Which physics is missing: published numbers from the theory, with one term after the other, each fitted anew.
 
-The engine knows Coulomb's friction, the bridges' drag and a film's. The theory integrates under any law of friction,
-thousands of walkers a second, so that for every term all parameters can be searched for what they give at best.
+The engine knows Coulomb's friction and the bridges' resistance to sliding and rolling. The theory integrates under any
+law of friction, thousands of walkers a second, so that for every term all parameters can be searched for what they give
+at best.
 It is a theory of walkers whose contacts stay closed, aligned with the drive: of hopping and turning it knows nothing.
 """
 
@@ -21,11 +22,9 @@ from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
 from walkers.paper import dimers, published
-from walkers.physics.film import film_drag
 from walkers.runner.files import write_json, write_text
 from walkers.theory.friction import Friction
 from walkers.theory.motion import Walker, walk
-from walkers.theory.prediction import bridge_drag
 from walkers.theory.quasistatic import translation
 
 FloatArray = npt.NDArray[np.float64]
@@ -53,7 +52,7 @@ class Term:
 
 
 ALWAYS = Term(
-    "Coulomb friction and the bridges' drag",
+    "Coulomb friction and the bridges' resistance",
     {
         "friction_wall": (0.02, 0.6),
         "friction_slide": (0.02, 0.6),
@@ -64,7 +63,6 @@ ALWAYS = Term(
 """What the engine has: three frictions, and the bridges' viscosity over the liquid's."""
 KAPPA = Term("drag in proportion to the load, the paper's κ (s/m)", {"log10_kappa": (-1.0, 2.0)})
 ADDED = (
-    Term("drag of a film on the beads' translation", {"log10_film_drag_ratio": (-2.0, 2.0)}),
     Term("weaker or stronger bridges to the substrate", {"wall_bridge_factor": (0.5, 1.3)}),
     Term("weaker or stronger bridges between the beads", {"bead_bridge_factor": (0.5, 1.3)}),
     KAPPA,
@@ -76,7 +74,6 @@ ADDED = (
 """Terms to be tried, one at a time and all together."""
 
 _NEUTRAL = {
-    "log10_film_drag_ratio": -2.0,
     "wall_bridge_factor": 1.0,
     "bead_bridge_factor": 1.0,
     "log10_kappa": -1.0,
@@ -160,14 +157,13 @@ def walkers_of_the_paper() -> dict[str, Case]:
 
 
 def _bare(case: Case) -> Case:
-    """With perfectly wetting bridges of 1 % liquid, of its own viscosity, and without a film."""
+    """With perfectly wetting bridges of 1 % liquid, of its own viscosity."""
     from walkers.inputs import library
 
     known = library.liquid(case.liquid.name or "")
     liquid = replace(
         case.liquid,
         dynamic_viscosity=known["kinematic_viscosity"].value * known["density"].value,
-        film_viscosity=0.0,
         volume_fraction=0.01,
         contact_angle=0.0,
     )
@@ -213,10 +209,9 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
         Of `ALWAYS` and of any of `ADDED`.
     """
     cases = walkers_of_the_paper()
-    walkers, drag, films = _fixed()
+    walkers = _walkers()
     known = {**dict.fromkeys(("wall_bridge_factor", "bead_bridge_factor", "static_ratio"), 1.0), **parameters}
     scale = np.array([[known["wall_bridge_factor"]]] * 2 + [[known["bead_bridge_factor"]]])
-    film = 10.0 ** known["log10_film_drag_ratio"] if "log10_film_drag_ratio" in known else 0.0
     on_slide = np.array([name.startswith("4") for name in cases])
     wall = np.where(on_slide, known["friction_slide"], known["friction_wall"])
     dry = Friction.coulomb(wall, np.full(len(cases), known["friction_bead"]))
@@ -226,10 +221,10 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
         static=kinetic * known["static_ratio"],
         stribeck_velocity=10.0 ** known.get("log10_stribeck_velocity", -3.0),
         linear=10.0 ** known["log10_kappa"] if "log10_kappa" in known else 0.0,
-        viscous=drag * 10.0 ** known["log10_viscosity_ratio"],
     )
+    resistances = walkers.resistances * 10.0 ** known["log10_viscosity_ratio"]
     motion = walk(
-        replace(walkers, at_rest=walkers.at_rest * scale, film=films * film),
+        replace(walkers, at_rest=walkers.at_rest * scale, resistances=resistances),
         friction,
         [case.drive.frequency for case in cases.values()],
         [case.drive.peak_acceleration for case in cases.values()],
@@ -243,15 +238,9 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
 
 
 @cache
-def _fixed() -> tuple[Walker, FloatArray, FloatArray]:
-    """The walkers, the drag of their bridges and of a film, both of the liquid's own viscosity."""
-    cases = list(walkers_of_the_paper().values())
-    walkers = Walker.joined([Walker.of_case(case) for case in cases])
-    drag = np.stack([bridge_drag(case) for case in cases], axis=-1)
-    films = [
-        [film_drag(case.liquid.dynamic_viscosity, case.walkers[0].radii[bead]) for case in cases] for bead in range(2)
-    ]
-    return walkers, drag, np.array(films)
+def _walkers() -> Walker:
+    """The walkers, their bridges of the liquid's own viscosity."""
+    return Walker.joined([Walker.of_case(case) for case in walkers_of_the_paper().values()])
 
 
 def values_of(parameters: Mapping[str, float], wanted: Sequence[Target]) -> dict[str, float]:

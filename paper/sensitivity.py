@@ -27,7 +27,6 @@ PARAMETERS = {
     "liquid volume fraction": "liquid.volume_fraction",
     "Young's modulus (MPa)": "contact.youngs_modulus",
     "viscosity ratio": "liquid.viscosity_ratio",
-    "film drag ratio": "liquid.film_drag_ratio",
     "contact angle (°)": "liquid.contact_angle",
     "restitution": "contact.restitution",
 }

@@ -54,7 +54,7 @@ def fig2(sources: Sources) -> Figure:
         panel.set(xlabel=r"peak acceleration $a_0$ (g, 9.8 m/s²)", ylabel="velocity (mm/s)", xlim=(0.0, top * 1.03))
     # The paper's fit goes on beyond what the paper measured: that is not to flatten the rest.
     engine.set_ylim(*_limits([*table["smallest"], *table["largest"], *published.FIT.values()]))
-    engine.set_title("engine, and theory with bridges and film")
+    engine.set_title("engine, and theory with bridges")
     dry.set_title("theory: Coulomb friction, dry")
     dry.locator_params(nbins=5)
     above = engine.secondary_xaxis(
@@ -62,7 +62,7 @@ def fig2(sources: Sources) -> Figure:
         functions=(lambda g: g * dimer.gamma0(published.GRAVITY), lambda x: x / dimer.gamma0(published.GRAVITY)),
     )
     above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
-    engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction, bridges and film")
+    engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction, bridges")
     engine.plot([], [], color="0.45", lw=2.0, marker="*", ms=8, label="paper's fit, κ = 0.033 s/mm")
     legend_below(engine, ncols=3, title="symbols: engine, mean and range of 6 walkers; in (c) of 2")
     legend_below(dry, ncols=4, columnspacing=1.0, handlelength=1.8, handletextpad=0.4)
@@ -126,7 +126,7 @@ def fig3(sources: Sources) -> Figure:
     fitted = [((r1 - r2) / (r1 + r2), v * 1e3) for (r1, r2), v in published.FIG3_FIT.items()]
     axes.plot(*zip(*fitted, strict=True), "*", color="0.45", ms=8)
     for viscous, style, label in (
-        (True, "--", "Coulomb friction, bridges and film, mean R 0.25 mm"),
+        (True, "--", "Coulomb friction, bridges, mean R 0.25 mm"),
         (False, ":", "Coulomb friction, dry, mean R 0.25 mm"),
     ):
         cases = [dimers.of_asymmetry(case, sine, gamma0) for sine in sines]
@@ -138,7 +138,7 @@ def fig3(sources: Sources) -> Figure:
         "x",
         color="0.1",
         ms=6,
-        label="Coulomb friction, bridges and film, these beads",
+        label="Coulomb friction, bridges, these beads",
     )
     mean, low, high = (table[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
     axes.errorbar(

@@ -118,12 +118,15 @@ class Curve:
         Gap below which it forms, m: 0 where the surfaces must touch.
     scale
         Over which forces vary near contact, m; a kink may be there. 0 is for `Surfaces.closest`.
+    pull
+        That of ``forces`` by itself, N, of a law whose resistances are more work than its pull.
     """
 
     forces: Callable[[FloatArray], Forces]
     rupture: float
     formation: float = 0.0
     scale: float = 0.0
+    pull: Callable[[FloatArray], FloatArray] | None = None
 
 
 BridgeLaw = Callable[[Surfaces], Curve]

@@ -83,11 +83,6 @@ def capillary_force_limit_at_wall(surface_tension: float, radius: float) -> floa
     return 4.0 * pi * surface_tension * radius
 
 
-def rupture_distance_at_wall(radius: float, volume_fraction: float, contact_angle: float) -> float:
-    """Gap at which the bridge between a bead and a wall breaks, m; angle in rad (`rupture_distance`)."""
-    return rupture_distance(bridge_volume_at_wall(radius, volume_fraction), contact_angle)
-
-
 def rupture_distance(volume: float, contact_angle: float) -> float:
     """Gap at which a bridge breaks, (1 + θ/2) V^(1/3), m (Lian et al. 1993)."""
     return (1.0 + 0.5 * contact_angle) * cbrt(volume)

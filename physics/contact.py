@@ -26,11 +26,11 @@ def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -
     Parameters
     ----------
     force
-        Load, N.
+        Load, N; one that pulls apart presses nothing.
     reduced_radius, reduced_modulus
         R* in m, E* in Pa.
     """
-    return float((3.0 * force / (4.0 * reduced_modulus * sqrt(reduced_radius))) ** (2.0 / 3.0))
+    return float((3.0 * max(force, 0.0) / (4.0 * reduced_modulus * sqrt(reduced_radius))) ** (2.0 / 3.0))
 
 
 def damping_ratio(restitution: float) -> float:

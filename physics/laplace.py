@@ -477,18 +477,6 @@ def rupture_distance(
     return cbrt(volume) * float(_branch(family).bridges[-1, 4])
 
 
-def force_table(
-    radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float]
-) -> tuple[FloatArray, FloatArray]:
-    """Gaps from 0 to rupture and F/γ there, each of shape (`POINTS`,), for a law that interpolates.
-
-    Parameters and errors as for `force_curve`. The gaps are closer at both ends; between them straight lines are within
-    a part in a thousand of the force at contact for the volumes of the paper's bridges (in the tests).
-    """
-    curve = force_curve(radius_1, radius_2, volume, contact_angle)
-    return curve.gaps, curve.forces
-
-
 _MESH = 41
 _ROUGH, _FINE = 1e-4, 1e-10
 _FEWEST_STEPS, _SMALLEST_STEP = 8, 1e-3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-DEFAULT_LAW = "soulie"
+DEFAULT_LAW = "young-laplace"
 
 
 @dataclass(frozen=True)
@@ -12,9 +12,7 @@ class Liquid:
     """Surface tension (N/m), dynamic viscosity (Pa s), density (kg/m³), effective contact angle (rad).
 
     The viscosity is that of the bridges: the liquid's, times the case's ``viscosity_ratio``. ``volume_fraction`` is the
-    liquid on a bead over the bead's volume. ``film_viscosity`` (Pa s) is that of the film on the walls along
-    which beads plough: 6π R times it drags a bead's centre in proportion to its velocity there.
-    ``law`` names the law of the bridges (`walkers.physics.laws`).
+    liquid on a bead over the bead's volume. ``law`` names the law of the bridges (`walkers.physics.laws`).
     """
 
     surface_tension: float
@@ -23,7 +21,6 @@ class Liquid:
     volume_fraction: float
     contact_angle: float
     name: str | None
-    film_viscosity: float = 0.0
     law: str = DEFAULT_LAW
 
 

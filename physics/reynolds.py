@@ -50,7 +50,6 @@ from collections.abc import Callable
 from math import pi, sqrt
 
 import numpy as np
-from scipy.special import hyp2f1
 
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 
@@ -71,10 +70,13 @@ def curve(surfaces: Surfaces, pull: Callable[[FloatArray], FloatArray], rupture:
         m.
     """
 
-    def forces(gaps: FloatArray) -> Forces:
-        return Forces(surfaces.liquid.surface_tension * pull(gaps), *resistances(surfaces, gaps))
+    def pulled(gaps: FloatArray) -> FloatArray:
+        return surfaces.liquid.surface_tension * pull(gaps)
 
-    return Curve(forces, rupture)
+    def forces(gaps: FloatArray) -> Forces:
+        return Forces(pulled(gaps), *resistances(surfaces, gaps))
+
+    return Curve(forces, rupture, pull=pulled)
 
 
 def resistances(surfaces: Surfaces, gaps: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -104,6 +106,8 @@ def _tilted(deep: FloatArray) -> FloatArray:
 
     the second term by Green's identity; y³/96 where y is small and the terms cancel.
     """
+    from scipy.special import hyp2f1  # half a second, which a case that is only shown is spared
+
     lifted = hyp2f1(_A, _B, 2.0, -deep)
     slope = 1.0 - _A * _B * deep * hyp2f1(_A + 1.0, _B + 1.0, 3.0, -deep) / lifted
     wide = 1.0 + deep

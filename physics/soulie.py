@@ -1,12 +1,9 @@
-"""The law of decks for the stock engine: Soulié's pull, lubrication between spheres at all gaps, and the film.
+"""The law of the stock engine, mended at walls: Soulié's pull, and lubrication between immersed spheres at all gaps.
 
 The pull is that of `walkers.physics.capillary`, the bridge breaks at (1 + θ/2) V^(1/3), and the resistances are those
 of `walkers.physics.lubrication`, which take the solids for immersed: no torque but by the sliding force. At a wall the
 pull is twice that of two equal spheres; the resistances are a plane's, of R* = R. Such a deck's doubled wall has less
 of the tangential one at gaps above εR/2, by about a fifth: there this law differs from it.
-
-The film on the walls (`walkers.physics.film`) adds a drag c = 6πη_f R on the centre's velocity, v = s - (R + h/2) q, up
-to the gap at which the bridge breaks.
 """
 
 from __future__ import annotations
@@ -17,7 +14,6 @@ import numpy as np
 
 from walkers.physics import capillary
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
-from walkers.physics.film import film_drag
 from walkers.physics.lubrication import normal_drag, tangential_drag
 
 
@@ -49,16 +45,15 @@ def law(surfaces: Surfaces) -> Curve:
     """Pull and resistances as decks for the stock engine have them."""
     liquid, radius = surfaces.liquid, surfaces.radius
     lubricated = (liquid.dynamic_viscosity, surfaces.reduced_radius, surfaces.minimum_separation_ratio)
-    film = film_drag(liquid.film_viscosity, radius) if surfaces.at_wall else 0.0
 
     def forces(gaps: FloatArray) -> Forces:
-        pair, arm = (radius, surfaces.other_radius), radius + 0.5 * gaps
+        pair, none = (radius, surfaces.other_radius), np.zeros_like(gaps)
         return Forces(
             pull=liquid.surface_tension * pull(*pair, surfaces.volume, liquid.contact_angle, gaps),
             normal=np.array([normal_drag(*lubricated, float(gap)) for gap in gaps]),
-            sliding=np.array([tangential_drag(*lubricated, float(gap)) for gap in gaps]) + film,
-            coupling=-film * arm,
-            rolling=film * arm**2,
+            sliding=np.array([tangential_drag(*lubricated, float(gap)) for gap in gaps]),
+            coupling=none,
+            rolling=none,
         )
 
     return Curve(forces, capillary.rupture_distance(surfaces.volume, liquid.contact_angle))

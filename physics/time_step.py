@@ -6,7 +6,7 @@ passing it gives wrong speeds without a word (a glycerol climber: 10.9 mm/s at 1
     Rayleigh    π R √(ρ/G)/(0.1631 ν + 0.8766) of the smallest bead
     Hertz       2.87 (m*²/(R* E*² v))^(1/5) for an impact at the substrate's peak velocity v
     viscous     2/Σ(c/m) over the bridges of a bead, c = 6πηR*/ε the largest normal drag and m the mass that it slows
-                (the bead's own at a wall, the reduced mass between beads), or of the film's drag, if that is larger
+                (the bead's own at a wall, the reduced mass between beads)
 
 Speeds of the AK5 walker agree within 0.5 % from 1 to 10 µs, the latter being its Rayleigh time.
 """
@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from math import ceil, inf, pi, sqrt
 
 from walkers.physics.contact import reduced_modulus
-from walkers.physics.film import film_drag
 from walkers.physics.lubrication import normal_drag
 from walkers.physics.matter import Contact, Liquid
 
@@ -110,7 +109,6 @@ def _viscous_limit(bridged: Bridged, density: float, contact: Contact, liquid: L
             for other in neighbours
         )
         rates.append(normal_drag(viscosity, radius, nearest) / mass + between)
-        rates.append(film_drag(liquid.film_viscosity, radius) / mass)
     return 2.0 / max(rates) if max(rates) > 0.0 else inf
 
 

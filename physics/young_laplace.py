@@ -3,25 +3,31 @@
 The pull is that of `walkers.physics.laplace`, its closed form, for the volume and the contact angle given, between
 beads and at a plane; the bridge breaks at the largest gap at which the equation has a solution. There the pull falls as
 the root of what is left of the gap, with a slope without bound; in t = √(1 - h/rupture) it is smooth, and a polynomial
-in t through `NODES` solutions is as good as the equation.
+in t through a few dozen solutions is as good as the equation. Polynomials are kept in the user's cache, by the bridge's
+shape: half a second is saved each time.
 
-The resistances are those of `walkers.physics.reynolds`, of the liquid's viscosity alone. The film's viscosity
-(`Liquid.film_viscosity`) is not used: it stands for the drag on a rolling bead that a law without coupling and rolling
-resistance leaves out, and here that drag is in C and Q.
+The resistances are those of `walkers.physics.reynolds`.
 """
 
 from __future__ import annotations
 
+import tempfile
 from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
 
 import numpy as np
 from numpy.polynomial import Chebyshev
+from platformdirs import user_cache_path
 
-from walkers.physics import laplace, reynolds
+from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 
-NODES = 96
-"""Gaps at which the equation is solved: errors below 1e-7 of the pull at contact for volumes above 1e-6 R³."""
+NODES = (24, 48, 96)
+"""Gaps at which the equation is solved: as many as the last coefficients tell, of which the largest suffices for
+errors below 1e-7 of the pull at contact at volumes above 1e-6 R³."""
+_SMALL = 1e-9
+"""Of the pull at contact: the last coefficients of a polynomial that is fine enough."""
 
 
 def law(surfaces: Surfaces) -> Curve:
@@ -43,14 +49,49 @@ def law(surfaces: Surfaces) -> Curve:
     return reynolds.curve(surfaces, pull, rupture)
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=4096)
 def _solved(other_radius: float, volume: float, contact_angle: float) -> tuple[float, Chebyshev]:
     """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's radius.
 
     Bridges of one shape are solved once: beads of all sizes have the same at a wall.
     """
-    bridge = (1.0, other_radius, volume, contact_angle)
+    shape = (other_radius, volume, contact_angle)
+    place = user_cache_path("granular-walkers") / "young-laplace" / f"{_fingerprint(shape)}.npy"
+    try:
+        numbers = np.load(place)
+    except (OSError, ValueError, EOFError):
+        numbers = _solve(shape)
+        _keep(place, numbers)
+    return float(numbers[0]), Chebyshev(numbers[1:], domain=[0.0, 1.0])
+
+
+def _fingerprint(shape: tuple[float, float, float]) -> str:
+    """Of a bridge's shape and of what solves the equation."""
+    source = Path(__file__).with_name("laplace.py").read_bytes()
+    return sha256(source + repr((NODES, _SMALL, shape)).encode()).hexdigest()[:24]
+
+
+def _solve(shape: tuple[float, float, float]) -> FloatArray:
+    """The rupture distance, then the coefficients of the polynomial."""
+    from walkers.physics import laplace
+
+    bridge = (1.0, *shape)
     rupture = laplace.rupture_distance(*bridge)
-    return rupture, Chebyshev.interpolate(
-        lambda part: laplace.force_curve(*bridge, rupture * (1.0 - part**2)).forces, NODES - 1, domain=[0.0, 1.0]
-    )
+    for nodes in NODES:
+        smooth = Chebyshev.interpolate(
+            lambda part: laplace.force_curve(*bridge, rupture * (1.0 - part**2)).forces, nodes - 1, domain=[0.0, 1.0]
+        )
+        if np.abs(smooth.coef[-4:]).max() < _SMALL * abs(smooth(1.0)):
+            break
+    return np.array([rupture, *smooth.coef])
+
+
+def _keep(place: Path, numbers: FloatArray) -> None:
+    """Write to the cache, if it can be written to, beside and renamed: others may be at it."""
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=place.parent, suffix=".part", delete=False) as file:
+            np.save(file, numbers)
+        Path(file.name).replace(place)
+    except OSError:
+        return

@@ -129,14 +129,14 @@ def _gaps(group: Group, at_walls: FloatArray) -> FloatArray:
 
 def _nearest_wall(group: Group) -> tuple[FloatArray, FloatArray | None]:
     """Gap of each bead to the wall that is nearest to it, and that wall's normal; None where there is but a floor."""
-    faces = group.case.boundary.faces()
-    if len(faces) == 1:
-        return group.position[..., 2] - group.radii, None
-    normals = np.array([face.normal for face in faces])
-    away = np.einsum("kx,kx->k", normals, np.array([face.centroid for face in faces]))
-    heights = group.position @ normals.T - away
-    nearest = np.argmin(heights, axis=-1)
-    return np.take_along_axis(heights, nearest[..., None], axis=-1)[..., 0] - group.radii, normals[nearest]
+    boundary, position = group.case.boundary, group.position
+    if boundary.bare:
+        return position[..., 2] - group.radii, None
+    heights = np.stack([wall.distances(position) for wall in boundary.walls])
+    normals = np.stack([wall.normals(position) for wall in boundary.walls])
+    nearest = np.argmin(heights, axis=0)[None]
+    at_walls = np.take_along_axis(heights, nearest, axis=0)[0] - group.radii
+    return at_walls, np.take_along_axis(normals, nearest[..., None], axis=0)[0]
 
 
 @dataclass(frozen=True)

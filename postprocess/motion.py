@@ -276,9 +276,9 @@ def read_motion(directory: str | Path) -> Motion:
     --------
     >>> motion = read_motion(walkers.run("fig1b", tmp).directory)
     >>> motion.position.shape  # 24 cycles of 20 samples, six walkers of two beads
-    (481, 12, 3)
+    (241, 12, 3)
     >>> motion.groups[0].heading.shape
-    (481, 6, 3)
+    (241, 6, 3)
     """
     directory = Path(directory)
     case = case_of(directory)
@@ -411,9 +411,9 @@ class Bridges:
         Net normal force (capillary, viscous and elastic), positive where it pulls the two together, N; and the gap, m,
         negative where they touch.
     wall_beads, walls : ndarray of int, shape (M,)
-        Bead and wall, 0 being the floor; a cylinder's side is one wall.
+        Bead and wall, 0 being the floor.
     wall_force, wall_gap : ndarray, shape (M,)
-        The same of bridges to walls; of a wall that stands twice in the deck the sum.
+        The same of bridges to walls.
     """
 
     frame: int
@@ -435,9 +435,6 @@ def read_bridges(motion: Motion) -> Iterator[Bridges]:
         If a dump cannot be read, or ends early.
     """
     stride = motion.case.run.samples_per_bridge_sample
-    names = motion.case.boundary.walls
-    faces = [face for face in motion.case.boundary.faces() for _ in range(face.triangles)]
-    normals, walls_of = np.array([one.normal for one in faces]), np.array([names.index(one.wall) for one in faces])
     wanted = {place: frame for frame, place in enumerate(motion.frames)}
     for segment in dict.fromkeys(segment for segment, _ in motion.frames):
         layout = layout_of(segment)
@@ -447,21 +444,13 @@ def read_bridges(motion: Motion) -> Iterator[Bridges]:
         for number, ((_, between), (_, against)) in enumerate(zip(pairs, walls, strict=False)):
             frame = wanted.get((segment, stride * number))
             if frame is not None:
-                yield _bridges(motion, frame, between, against, layout, normals, walls_of)
+                yield _bridges(motion, frame, between, against, layout)
         if number + 1 != layout.bridge_frames:
             raise DumpError(f"{segment}: its bridges hold {number + 1} of {layout.bridge_frames} frames")
 
 
-def _bridges(
-    motion: Motion,
-    frame: int,
-    between: FloatArray,
-    against: FloatArray,
-    layout: Layout,
-    normals: FloatArray,
-    walls_of: IntArray,
-) -> Bridges:
-    """The bridges of a frame, given the rows of its dumps, and the normal and the wall of each triangle."""
+def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: Layout) -> Bridges:
+    """The bridges of a frame, given the rows of its dumps."""
     place = motion.position[frame]
     pair, wall = layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
     # Neighbours without a bridge are reported too, with no force.
@@ -471,19 +460,16 @@ def _bridges(
     arm = place[ids[:, 1]] - place[ids[:, 0]]
     force = between[:, pair("fx") : pair("fx") + 3]
     beads = against[:, wall("id")].astype(np.int64) - motion.first_id
-    triangle = against[:, wall("triangle")].astype(np.int64)
-    pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals[triangle])
-    count = int(walls_of.max()) + 1  # bead and wall as one number: rows are compared ten times more slowly
-    held, which = np.unique(beads * count + walls_of[triangle], return_inverse=True)
-    gap = np.full(len(held), np.inf)
-    np.minimum.at(gap, which, -against[:, wall("overlap")])
+    walls = against[:, wall("wall")].astype(np.int64)
+    normals = np.stack([one.normals(place[beads]) for one in motion.case.boundary.walls])
+    pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals[walls, np.arange(len(walls))])
     return Bridges(
         frame=frame,
         beads=ids,
         force=np.einsum("kx,kx->k", force, arm) / np.linalg.norm(arm, axis=1),
         gap=-between[:, pair("overlap")],
-        wall_beads=held // count,
-        walls=held % count,
-        wall_force=np.bincount(which, weights=pull, minlength=len(held)).astype(np.float64),
-        wall_gap=gap,
+        wall_beads=beads,
+        walls=walls,
+        wall_force=pull,
+        wall_gap=-against[:, wall("overlap")],
     )

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
+from walkers.inputs.boundary import Flat, Wall
 from walkers.inputs.errors import InputError, Problem
 from walkers.postprocess.analysis import analyses_of
 from walkers.postprocess.dump import FloatArray
@@ -27,6 +28,8 @@ FOLDER_NAME = "vtk"
 COLLECTION_NAME = "walkers.pvd"
 SCRIPT_NAME = "show.py"
 _END_OF_VTK = b"</VTKFile>\n"
+_SIDES = 64
+"""Of the prism that a round wall is drawn as."""
 
 
 def write_vtk(
@@ -209,22 +212,30 @@ def boundary_of(motion: Motion) -> pv.PolyData:
     low, high = motion.position.min(axis=(0, 1)) - margin, motion.position.max(axis=(0, 1)) + margin
     half, top = boundary.inner_width / 2.0, boundary.top
     if boundary.closed:
-        wide = 1.01 * half  # the edges of a cylinder's prism lie beyond its faces
+        wide = 1.01 * half  # a cylinder is drawn by flat sides, whose edges lie beyond it
         low, high = np.array([-wide, -wide, min(low[2], 0.0)]), np.array([wide, wide, top])
-    faces = boundary.faces()
-    planes = [(np.array(face.centroid), np.array(face.normal)) for face in faces]
+    planes = [plane for wall in boundary.walls for plane in _planes(wall)]
     edges = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]
     points: list[FloatArray] = []
     cells: list[int] = []
-    for number, (centroid, normal) in enumerate(planes):
+    for number, (point, normal) in enumerate(planes):
         others = planes[:number] + planes[number + 1 :]
         middle = (low + high) / 2.0
-        nearest = middle - (middle - centroid) @ normal * normal
+        nearest = middle - (middle - point) @ normal * normal
         corners = _clipped(_square(nearest, normal, 2.0 * float(np.linalg.norm(high - low))), [*others, *edges])
         if len(corners) > 2:
             cells += [len(corners), *range(len(points), len(points) + len(corners))]
             points += list(corners)
     return pv.PolyData(np.array(points), faces=cells)
+
+
+def _planes(wall: Wall) -> list[tuple[FloatArray, FloatArray]]:
+    """A point and the normal of a wall, or of each of the flat sides that a round one is drawn by."""
+    if isinstance(wall, Flat):
+        return [(np.array(wall.point), np.array(wall.normal))]
+    turns = 2.0 * np.pi * (np.arange(_SIDES) + 0.5) / _SIDES
+    outward = np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=-1)
+    return [(wall.radius * one, -one) for one in outward]
 
 
 def _square(centre: FloatArray, normal: FloatArray, size: float) -> FloatArray:
@@ -259,16 +270,9 @@ def bridges_at(motion: Motion, bridges: Bridges) -> pv.PolyData:
     A line joins two centres, or a centre and the nearest point of the wall.
     """
     centres = motion.position[bridges.frame]
-    boundary = motion.case.boundary
-    faces, names = boundary.faces(), boundary.walls
-    normals = np.array([face.normal for face in faces])
-    away = centres[bridges.wall_beads] @ normals.T - np.einsum("kx,kx->k", normals, [face.centroid for face in faces])
-    # Of the faces of the wall that a bridge is with, the nearest one.
-    other = np.array([names.index(face.wall) for face in faces]) != bridges.walls[:, None]
-    nearest = np.where(other, np.inf, away).argmin(axis=1)
     held = centres[bridges.wall_beads]
-    feet = held - np.take_along_axis(away, nearest[:, None], axis=1) * normals[nearest]
-    walls = np.stack([held, feet], axis=1)
+    feet = np.stack([held - wall.distances(held)[:, None] * wall.normals(held) for wall in motion.case.boundary.walls])
+    walls = np.stack([held, feet[bridges.walls, np.arange(len(held))]], axis=1)
     mesh = lines_between(np.concatenate([centres[bridges.beads], walls]) + motion.substrate[bridges.frame])
     gap = np.concatenate([bridges.gap, bridges.wall_gap])
     mesh.cell_data["gap"] = gap

@@ -356,7 +356,7 @@ def _result(found: PileAnalysis) -> dict[str, Any]:
 
 def names_of_walls(walls: tuple[int, ...], boundary: Boundary) -> str:
     """Names of some walls, such as ``-x +y`` for a corner of a box."""
-    return " ".join(boundary.walls[wall] for wall in sorted(walls))
+    return " ".join(boundary.walls[wall].name for wall in sorted(walls))
 
 
 def _lines(result: Mapping[str, Any]) -> list[str]:

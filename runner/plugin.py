@@ -26,12 +26,12 @@ from walkers.templates.engine import AUDITED_VERSION
 PACKAGES = ("g++", "libliggghts-dev", "libopenmpi-dev")
 HEADERS = Path("/usr/include/liggghts")
 _VERSION = re.compile(rb"LIGGGHTS[\w-]* [\d.]+(?=, compiled)")
-# Plain -O2 keeps the numbers the same on all machines of an architecture: no fused operations, no reordering.
+# Without -march the numbers are the same on all machines of an architecture: no fused operations. -O3 does not reorder.
 OPTIONS = (
     "-shared",
     "-fPIC",
     "-std=gnu++11",
-    "-O2",
+    "-O3",
     "-fno-math-errno",
     "-DNDEBUG",
     "-DOMPI_SKIP_MPICXX",

@@ -1,20 +1,16 @@
-"""Published laws of capillary bridges, the engine's among them.
+"""Published laws of capillary bridges: fits and closed forms for what `walkers.physics.laplace` solves.
 
-Each law gives the pull over the surface tension, F/γ, of a bridge of constant volume at gaps. Laws made for equal
-spheres of radius R take unequal ones and planes in Derjaguin's way, R = 2 R1 R2 / (R1 + R2), twice the sphere's radius
-at a plane; the engine's own takes √(R1 R2), and a wall for an equal sphere, twice. What
-they approximate is in `walkers.physics.laplace`.
+Each gives the pull over the surface tension, F/γ, of a bridge of constant volume at gaps. Laws made for equal spheres
+of radius R take unequal ones and planes in Derjaguin's way, R = 2 R1 R2 / (R1 + R2), twice the sphere's radius at a
+plane; the stock engine's takes √(R1 R2), and a wall for an equal sphere, twice.
 
 Coefficients and numbers of equations are those in the source of YADE (its ViscElCapPhys) and, for Bagheri, Roy and
 Pöschel's by these authors themselves, of MercuryDPM.
 
 References
 ----------
-F. Soulié, F. Cherblanc, M. S. El Youssoufi, C. Saix, Int. J. Numer. Anal. Meth. Geomech. 30 (2006) 213–228,
-doi 10.1002/nag.476.
-C. D. Willett, M. J. Adams, S. A. Johnson, J. P. K. Seville, Langmuir 16 (2000) 9396–9405, doi 10.1021/la000657y.
-Y. I. Rabinovich, M. S. Esayanur, B. M. Moudgil, Langmuir 21 (2005) 10992–10997, doi 10.1021/la0517639.
-P. Lambert, A. Chau, A. Delchambre, S. Régnier, Langmuir 24 (2008) 3157–3163, doi 10.1021/la7036444.
+Soulié et al. (2006), Willett et al. (2000), Rabinovich et al. (2005), Lambert et al. (2008): in
+`walkers.physics.capillary`, `walkers.physics.willett` and `walkers.physics.rabinovich`.
 T. Weigert, S. Ripperger, Part. Part. Syst. Charact. 16 (1999) 238–242,
 doi 10.1002/(SICI)1521-4117(199910)16:5<238::AID-PPSC238>3.0.CO;2-E.
 M. Bagheri, S. Roy, T. Pöschel, Comput. Part. Mech. 11 (2024) 2179–2190, doi 10.1007/s40571-024-00772-5.
@@ -71,24 +67,24 @@ def bagheri(radius_1: float, radius_2: float, volume: float, contact_angle: floa
 
 
 def rupture_of_lian(radius_1: float, radius_2: float, volume: float, contact_angle: float) -> float:  # noqa: ARG001
-    """Lian, Thornton and Adams (1993), the engine's: (1 + θ/2) V^(1/3), whatever the radii."""
+    """Lian, Thornton and Adams (1993): (1 + θ/2) V^(1/3), whatever the radii."""
     return capillary.rupture_distance(volume, contact_angle)
 
 
 @dataclass(frozen=True)
 class Law:
-    """A published law: its ``force`` (radii, volume, contact angle, gaps → F/γ) and its ``rupture`` distance.
+    """A published law: its ``pull`` (radii, volume, contact angle, gaps → F/γ) and its ``rupture`` distance.
 
-    Those that give no rupture distance are taken as far as the engine's law.
+    Those that give no rupture distance have Lian et al.'s.
     """
 
     name: str
-    force: Callable[[float, float, float, float, FloatArray], FloatArray]
+    pull: Callable[[float, float, float, float, FloatArray], FloatArray]
     rupture: Callable[[float, float, float, float], float]
 
 
 LAWS = (
-    Law("Soulié 2006 (engine)", soulie.pull, rupture_of_lian),
+    Law("Soulié 2006 (stock engine)", soulie.pull, rupture_of_lian),
     Law("Willett 2000", willett.pull, willett.rupture),
     Law("Willett 2000, Eq. 12", willett_simple, willett.rupture),
     Law("Rabinovich 2005", rabinovich.pull, rupture_of_lian),
@@ -96,4 +92,4 @@ LAWS = (
     Law("Weigert 1999", weigert, rupture_of_lian),
     Law("Bagheri 2024", bagheri, willett.rupture),
 )
-ENGINE = LAWS[0]
+"""The stock engine's first."""

@@ -1,10 +1,10 @@
-"""Render a case to a LIGGGHTS deck with its STL files and its layout."""
+"""Render a case to a LIGGGHTS deck with its files and its layout."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, inf, pi, sqrt
+from math import ceil, inf, pi, prod, sqrt
 
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
@@ -25,15 +25,15 @@ from walkers.templates.layout import (
 from walkers.templates.placement import place
 from walkers.templates.scene import Scene
 from walkers.templates.sharing import Loading, Surface, check_sharing, loadings_of, surface_of, surfaces_of
-from walkers.templates.walls import wall_meshes
 
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
 BRIDGES_NAME = "bridges.txt"
+LOADS_NAME = "loads.txt"
 RUN_NAME = "run.sh"
 STATUS_LINES_PER_CYCLE = 4
-CONTENT_VERSION = 6
+CONTENT_VERSION = 7
 """Of what decks compute: to be raised where the same case gives another deck, comments aside. Runs are named by it."""
 
 RESTART_NAME = "state.restart"
@@ -273,8 +273,6 @@ def compose(plan: Plan) -> Deck:
     surfaces = plan.surfaces or (surface_of(case),)
     contacts = [contact for contact, _ in surfaces]
     moduli = [*(contact.youngs_modulus for contact in contacts), case.contact.youngs_modulus]
-    forces = _forces(plan, scene)
-    meshes = wall_meshes(scene.beads, scene.faces, max(scene.upper))
     text = rendered(
         "walkers.templates",
         "walker.lig.j2",
@@ -287,7 +285,6 @@ def compose(plan: Plan) -> Deck:
         layout_name=LAYOUT_NAME,
         bridges_name=BRIDGES_NAME,
         run_name=RUN_NAME,
-        meshes=meshes,
         contact_model=_contact_model(case),
         types=len(surfaces) + 1,
         moduli=moduli,
@@ -299,20 +296,17 @@ def compose(plan: Plan) -> Deck:
         down=[component / case.gravity for component in case.gravity_vector] if case.gravity else [],
         plan=plan,
         # Of a drive that moves the walls; it has one harmonic.
-        amplitude=[first.amplitude * component for component in first.direction],
         peak_velocity=[first.peak_velocity * component for component in first.direction],
-        forces=forces,
-        loaded=[axis for axis in "xyz" if any(one.axis == axis for one in forces)],
-        pair_bridge_terms=_terms("pair_bridges", layout.pair_bridge_columns, " ".join(PAIR_BRIDGES).split()),
-        wall_bridge_terms=_terms("wall_bridges", layout.wall_bridge_columns, " ".join(WALL_BRIDGES).split()),
+        loads_name=LOADS_NAME,
+        pair_bridge_terms=_terms("c_pair_bridges", layout.pair_bridge_columns, " ".join(PAIR_BRIDGES).split()),
+        wall_bridge_terms=_terms("f_walls", layout.wall_bridge_columns, WALL_BRIDGES),
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
-        wall_bridge_options=" ".join(WALL_BRIDGES.values()),
         skin=plan.skin or min(bead.radius for bead in scene.beads),
         most_neighbours=_most_neighbours(scene, plan.skin),
         bin_size=None if plan.skin else _bin_size(scene),
+        wide=not plan.skin and prod(_extent(scene)) / max(bead.radius for bead in scene.beads) ** 3 > _MOST_BINS,
     )  # fmt: skip
-    files = {f"{mesh.name}.stl": mesh.text for mesh in meshes}
-    files |= {one.file: _atom_file(one.shares) for one in forces}
+    files = {LOADS_NAME: _loads(plan)} if plan.several else {}
     try:
         files[BRIDGES_NAME] = bridge_tables(surfaces, scene.beads)
     except UnusableLawError as error:
@@ -323,48 +317,16 @@ def compose(plan: Plan) -> Deck:
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, *bounds, beyond)
 
 
-@dataclass(frozen=True)
-class _Force:
-    """A force of which each bead has its own share, along an axis, N: its weight, or the amplitude of a harmonic's."""
-
-    axis: str
-    shares: Mapping[int, float]
-    harmonic: int = 0
-
-    @property
-    def name(self) -> str:
-        """Of the engine's variable."""
-        return f"drive_{self.harmonic}_{self.axis}" if self.harmonic else f"weight_{self.axis}"
-
-    @property
-    def file(self) -> str:
-        """From which the engine reads the shares."""
-        return f"{self.name}.txt"
+def _loads(plan: Plan) -> str:
+    """Gravity and the amplitude of the inertial acceleration of each harmonic, bead by bead, as the engine reads it."""
+    rows = ((bead.id, plan.loadings[bead.loading]) for bead in plan.scene.beads)
+    vectors = ((number, (load.gravity, *load.harmonics)) for number, load in rows)
+    return "".join(f"{number} {' '.join(repr(x) for one in of for x in one)}\n" for number, of in vectors)
 
 
-def _forces(plan: Plan, scene: Scene) -> list[_Force]:
-    """The forces on beads that do not all have the same gravity and drive; without those that are zero for all."""
-    if not plan.several:
-        return []
-    loads = [(bead, 4.0 / 3.0 * pi * bead.radius**3 * plan.case.density) for bead in scene.beads]
-    forces = []
-    for component, axis in enumerate("xyz"):
-        weights = {bead.id: mass * plan.loadings[bead.loading].gravity[component] for bead, mass in loads}
-        forces.append(_Force(axis, weights))
-        for number in range(len(plan.case.drive.harmonics)):
-            shares = {bead.id: mass * plan.loadings[bead.loading].harmonics[number][component] for bead, mass in loads}
-            forces.append(_Force(axis, shares, number + 1))
-    return [one for one in forces if any(one.shares.values())]
-
-
-def _atom_file(shares: Mapping[int, float]) -> str:
-    """A number for each bead, by its id, as the engine reads it."""
-    return f"{len(shares)}\n" + "".join(f"{bead} {share!r}\n" for bead, share in shares.items())
-
-
-def _terms(compute: str, columns: Sequence[str], all_columns: Sequence[str]) -> list[str]:
-    """What a dump writes for some of the columns that a compute has."""
-    return [f"c_{compute}[{all_columns.index(column) + 1}]" for column in columns]
+def _terms(source: str, columns: Sequence[str], all_columns: Sequence[str]) -> list[str]:
+    """What a dump writes for some of the columns that a compute or a fix has."""
+    return [f"{source}[{all_columns.index(column) + 1}]" for column in columns]
 
 
 def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
@@ -388,10 +350,17 @@ def _contact_model(case: Case) -> str:
     return f"hertz tangential history cohesion bridge{rolling}"
 
 
+_MOST_BINS = 2.0e9
+"""Of the largest bead's radius each. The engine sorts atoms into at most 2^31 bins, which are somewhat larger."""
+
+
+def _extent(scene: Scene) -> tuple[float, ...]:
+    return tuple(high - low for low, high in zip(scene.lower, scene.upper, strict=True))
+
+
 def _bin_size(scene: Scene) -> float:
     """At most some ten thousand bins, none smaller than two beads (m)."""
-    width, depth, height = (high - low for low, high in zip(scene.lower, scene.upper, strict=True))
-    return float(max(4.0 * max(bead.radius for bead in scene.beads), (width * depth * height / 2e4) ** (1.0 / 3.0)))
+    return float(max(4.0 * max(bead.radius for bead in scene.beads), (prod(_extent(scene)) / 2e4) ** (1.0 / 3.0)))
 
 
 _LEAST_NEIGHBOURS = 100

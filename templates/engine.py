@@ -5,7 +5,7 @@ from __future__ import annotations
 AUDITED_VERSION = "LIGGGHTS-PUBLIC 3.8.0"
 """The version that all of this was measured on."""
 
-POSITION_IS_NO_NUMBER = "tri_mesh_I.h:109"
+POSITION_IS_NO_NUMBER = "a bead's position is no number"
 """In the ERROR line of an engine that has met a bead whose position is no number."""
 
 STEP_VARIABLES = ("SLURM_STEP_ID", "SLURM_STEPID", "SLURM_PROCID")

@@ -18,17 +18,13 @@ PAIR_BRIDGES = {
     "fx fy fz": "force",
     "overlap": "delta",
 }
-WALL_BRIDGES = {
-    "x y z bead_x bead_y bead_z": "pos",
-    "mesh triangle id": "id",
-    "fx fy fz": "force",
-    "overlap": "delta",
-}
-"""What the engine computes of bridges, in its order: names of the columns and the option that gives them."""
+"""What the engine computes of bridges between beads, in its order: columns and the option that gives them."""
+WALL_BRIDGES = ("x", "y", "z", "bead_x", "bead_y", "bead_z", "wall", "id", "fx", "fy", "fz", "overlap")
+"""What the fix of the walls has of bridges to walls, in its order: foot, bead, number of the wall, …"""
 PAIR_BRIDGE_COLUMNS = ("id1", "id2", "fx", "fy", "fz", "overlap")
 """Columns of the dump of bridges between beads; the force acts on bead ``id1``."""
-WALL_BRIDGE_COLUMNS = ("triangle", "id", "fx", "fy", "fz", "overlap")
-"""Columns of the dump of bridges to walls: number of the wall's face, force on bead ``id``."""
+WALL_BRIDGE_COLUMNS = ("wall", "id", "fx", "fy", "fz", "overlap")
+"""Columns of the dump of bridges to walls: number of the wall, force on bead ``id``."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
         if one.walks:
             ids = tuple(range(first, first + len(one.beads)))
             walkers.append(PlacedWalker(len(walkers), make, ids, one.facing, one.angle, origin))
-    return Scene(tuple(beads), boundary.faces(), room.lower, room.upper), tuple(walkers)
+    return Scene(tuple(beads), boundary.walls, room.lower, room.upper), tuple(walkers)
 
 
 def _span(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> Span:

@@ -1,10 +1,10 @@
-"""What stands in the simulation box: beads, and the faces of walls."""
+"""What stands in the simulation box: beads, and walls."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from walkers.inputs.boundary import Face
+from walkers.inputs.boundary import Wall
 from walkers.inputs.drive import Vector
 
 
@@ -36,9 +36,9 @@ class Bead:
 
 @dataclass(frozen=True)
 class Scene:
-    """Beads, faces and the box's corners, all in m."""
+    """Beads, walls and the box's corners, all in m."""
 
     beads: tuple[Bead, ...]
-    faces: tuple[Face, ...]
+    walls: tuple[Wall, ...]
     lower: Vector
     upper: Vector

@@ -16,6 +16,7 @@ import tarfile
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -133,13 +134,14 @@ def measure_theory() -> None:
     """How many walkers a second the theory integrates on one core, compiled."""
     print("\n| friction | walkers a second |\n|---|---|")
     case, count = load_case("fig1b"), 1000
-    walker, accelerations = Walker.of_case(case), np.linspace(5.0, 60.0, count)
+    wet, accelerations = Walker.of_case(case), np.linspace(5.0, 60.0, count)
+    dry, coulomb = replace(wet, resistances=np.zeros_like(wet.resistances)), friction_of(case)
     laws = {
-        "the paper's, κ v F": Friction(linear=33.0),
-        "Coulomb and bridges": friction_of(case, viscous=True),
-        "Coulomb, dry": friction_of(case, viscous=False),
+        "the paper's, κ v F": (dry, Friction(linear=33.0)),
+        "Coulomb and bridges": (wet, coulomb),
+        "Coulomb, dry": (dry, coulomb),
     }
-    for name, friction in laws.items():
+    for name, (walker, friction) in laws.items():
         walk(walker, friction, case.drive.frequency, 5.0)
         begin = time.perf_counter()
         walk(walker, friction, case.drive.frequency, accelerations)

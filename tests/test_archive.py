@@ -302,7 +302,7 @@ def test_what_an_archive_says_of_its_run(run: Path, tmp_path: Path) -> None:
     engine = crate.get(f"#{run.name}-engine")
     assert engine["instrument"]["sha256"] == manifest["engine"]["sha256"]
     names = {what: {Path(item.id).name for item in engine[what]} for what in ("object", "result")}
-    assert names["object"] >= {"walker.lig", "walls.stl", "bridges.txt"}
+    assert names["object"] >= {"walker.lig", "bridges.txt", "run.sh"}
     assert names["result"] == {"beads.bin", "bridges.pairs.txt", "bridges.walls.txt", "engine.log", "segment.json"}
     needed = crate.get(f"#{run.name}-tables")["instrument"]["softwareRequirements"]
     versions = {one["name"]: one["softwareVersion"] for one in needed}

@@ -95,7 +95,7 @@ WRONG = {
     ),
     "a rupture later by 1 %": ("if (gap < table->rupture) return", "if (gap < 1.01 * table->rupture) return"),
     "the coupling's order": ("if (history[TABLE] < 0.) f[bridge::COUPLING] = -f[bridge::COUPLING];", ""),
-    "walls at rest": ("vec(atom->v[i]) - vec(velocity);", "vec(atom->v[i]) - 0. * vec(velocity);"),
+    "walls at rest": ("vec(atom->v[i]) - velocity_;", "vec(atom->v[i]) - 0. * velocity_;"),
     "the damping": ("std::sqrt(5. / 6.)", "0.913"),
 }
 # fmt: on

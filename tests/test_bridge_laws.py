@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from functools import partial
 from math import cos, inf, log, pi, radians, sqrt
 from pathlib import Path
@@ -31,10 +32,9 @@ def surfaces(
     volume: float = 0.02,
     angle: float = 0.0,
     closest: float = 1e-3,
-    film: float = 0.0,
 ) -> Surfaces:
     """Of viscosity and surface tension 1."""
-    return Surfaces(radius, other, volume, Liquid(1.0, 1.0, None, 0.01, angle, None, film), closest)
+    return Surfaces(radius, other, volume, Liquid(1.0, 1.0, None, 0.01, angle, None), closest)
 
 
 def matrix(pair: Surfaces, gap: float) -> tuple[float, float, float]:
@@ -266,15 +266,32 @@ def test_roughness_ends_the_growth() -> None:
         assert one == pytest.approx(np.full(3, one[0]))
 
 
-def test_the_film_is_not_young_laplaces() -> None:
-    dry, wet = (young_laplace.law(surfaces(film=film)).forces(np.zeros(1)) for film in (0.0, 5.0))
-    assert np.array_equal(dry.columns(), wet.columns())
+def test_what_was_solved_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bridge of one shape is solved once, and again if what was kept is damaged or cannot be kept."""
+    monkeypatch.setattr(young_laplace, "user_cache_path", lambda _: tmp_path)
+    solve, solved = young_laplace._solve, []
+    monkeypatch.setattr(young_laplace, "_solve", lambda shape: solved.append(shape) or solve(shape))
+
+    def pull(volume: float) -> float:
+        young_laplace._solved.cache_clear()
+        return float(young_laplace.law(surfaces(2.0, volume=8.0 * volume)).forces(np.zeros(1)).pull[0])
+
+    first = pull(0.0123)
+    assert pull(0.0123) == first
+    assert len(solved) == 1
+    (kept,) = (tmp_path / "young-laplace").iterdir()
+    kept.write_bytes(kept.read_bytes()[:100])
+    assert pull(0.0123) == first
+    assert len(solved) == 2
+    shutil.rmtree(tmp_path / "young-laplace")
+    (tmp_path / "young-laplace").write_text("no folder")
+    assert pull(0.0123) == first
 
 
-# --- The law of decks for the stock engine --------------------------------------------------------------------------
+# --- The stock engine's law, mended at walls ------------------------------------------------------------------------
 
 
-def test_soulie_is_what_decks_have() -> None:
+def test_soulie_between_beads() -> None:
     closest, gaps = 0.01, np.array([0.0, 0.004, 0.03, 0.2])
     beads = soulie_law.law(surfaces(1.0, 0.5, 0.01, 0.3, closest))
     found = beads.forces(gaps)
@@ -288,15 +305,11 @@ def test_soulie_is_what_decks_have() -> None:
 
 def test_soulie_at_a_wall() -> None:
     closest, gaps = 0.01, np.array([0.0, 0.004, 0.03, 0.2])
-    found = soulie_law.law(surfaces(1.0, inf, 0.01, 0.3, closest, film=0.5)).forces(gaps)
-    film = 6.0 * pi * 0.5
+    found = soulie_law.law(surfaces(1.0, inf, 0.01, 0.3, closest)).forces(gaps)
     for place, gap in enumerate(gaps):
         assert found.pull[place] == capillary_force_at_wall(1.0, 1.0, 0.01, 0.3, gap)
-        assert found.sliding[place] - film == pytest.approx(tangential_drag(1.0, 1.0, closest, gap), rel=1e-12)
-    # The film alone drags the centre: nothing of it for a bead that turns in place.
-    arm = 1.0 + 0.5 * gaps
-    assert film * arm + found.coupling == pytest.approx(np.zeros(4), abs=1e-12)
-    assert found.coupling * arm + found.rolling == pytest.approx(np.zeros(4), abs=1e-12)
+        assert found.sliding[place] == tangential_drag(1.0, 1.0, closest, gap)
+    assert not np.any([found.coupling, found.rolling])
 
 
 # --- The others, and names ------------------------------------------------------------------------------------------

@@ -9,31 +9,12 @@ import pytest
 from tests.conftest import make_case
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 from walkers.physics.laws import LAWS, by_name
+from walkers.studies.bridges import interpolated
 from walkers.templates.bridge_tables import TOLERANCE, UnusableLawError, tabulated
 
-CASE = make_case(liquid={"film_drag_ratio": 0.5, "contact_angle": "20 deg"})
+CASE = make_case(liquid={"contact_angle": "20 deg"})
 AT_WALL = Surfaces.of(3e-4, inf, CASE.liquid, CASE.contact.minimum_separation_ratio)
 BETWEEN = Surfaces.of(3e-4, 2e-4, CASE.liquid, CASE.contact.minimum_separation_ratio)
-
-
-def interpolated(text: str, gaps: FloatArray) -> FloatArray:
-    """What engine/table.h makes of a table, written down once more from the format alone."""
-    head, *lines = text.splitlines()
-    rupture, scale = (float(word) for word in head.split()[2:4])
-    octaves, cells = (int(word) for word in head.split()[4:])
-    rows = np.array([[float(word) for word in line.split()] for line in lines])
-    middle = scale * (2.0**octaves - 1.0)
-    mantissa, exponent = np.frexp(1.0 + gaps / scale)
-    near = cells * ((exponent - 1) + 2.0 * mantissa - 1.0)
-    far = cells * (octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle))))
-    place = np.where(gaps < middle, near, far)
-    cell = np.minimum(place.astype(int), (len(rows) - 1) // 3 - 1)
-    found = []
-    for at, number in zip(place - cell, cell, strict=True):
-        cubic = np.polynomial.Polynomial.fit
-        four = rows[3 * number : 3 * number + 4, 1:]
-        found.append([cubic(np.arange(4) / 3.0, column, 3)(at) for column in four.T])
-    return np.array(found)
 
 
 @pytest.mark.parametrize("surfaces", [AT_WALL, BETWEEN], ids=["wall", "beads"])

@@ -541,7 +541,7 @@ def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
     document["set"] = {
         "dimers": {"replicates": 1},
         "run": {"cycles": 40, "settling_cycles": 20, "samples_per_cycle": 10},
-        "liquid": {"volume_fraction": 0.01},
+        "liquid": {"volume_fraction": 0.01, "law": "soulie"},
         "contact": {"rolling_friction": 0.003},
     }
     found = read_calibration(document, source="apart", name="apart", folder=tmp_path)

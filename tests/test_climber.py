@@ -23,7 +23,7 @@ from walkers.runner.ensemble import finished_places
 from walkers.sweeps.shared_deck import make_runs
 from walkers.theory.prediction import motion_of, predict
 
-FRICTIONS = {0.1: -2.2e-3, 0.2: 1.75e-3, 0.3: 5.85e-3}
+FRICTIONS = {0.1: -9.57e-3, 0.2: -3.33e-3, 0.3: 4.77e-3}
 """Climbing speeds in m/s, as measured; the theory has those that climb a tenth faster."""
 
 
@@ -106,7 +106,7 @@ def test_the_shipped_climber_comes_upright_and_climbs(upright: Path) -> None:
     assert np.degrees(walkers["start_angle"].abs().max()) > 9.0
     assert np.degrees(walkers["orientation_end"].abs().max()) < 0.3
     assert result["posture"]["upright"] == result["walkers"] == 6
-    assert result["velocity"]["mean"] == pytest.approx(1.41e-3, rel=0.03)
+    assert result["velocity"]["mean"] == pytest.approx(3.62e-3, rel=0.03)
     lines = describe_result(upright, result).splitlines()
     assert lines[0].startswith("climber: upright to the end, within 0.")
 
@@ -131,4 +131,4 @@ def test_the_shipped_climber_as_it_ships(tmp_path: Path) -> None:
     result = run_case(load_case("climber"), tmp_path).result
     assert result["posture"]["upright"] == 6
     assert result["posture"]["ends_within"] < np.radians(0.01)
-    assert result["velocity"]["mean"] == pytest.approx(1.412e-3, rel=0.005)
+    assert result["velocity"]["mean"] == pytest.approx(3.618e-3, rel=0.005)

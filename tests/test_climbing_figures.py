@@ -17,8 +17,8 @@ from walkers.postprocess.drawing import save_figure
 
 RADII = [["0.545 mm", "0.3075 mm"], ["0.545 mm", "0.3075 mm", "0.3075 mm"]]
 FEWER: dict[str, dict[str, Any]] = {
-    "climb-film": {"liquid.film_drag_ratio": [0, 1]},
-    "climb-tilt": {"boundary.tilt": ["20 deg", "90 deg"], "liquid.film_drag_ratio": [1]},
+    "climb-friction": {"liquid.viscosity_ratio": [1, 2]},
+    "climb-tilt": {"boundary.tilt": ["20 deg", "90 deg"], "liquid.viscosity_ratio": [1]},
     "zoo": {},
     "zoo-corner": {"clusters[0].radii": RADII},
 }
@@ -33,7 +33,7 @@ def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
 def _run_briefly(out: Path) -> None:
     for name, axes in FEWER.items():
         given = shipped_sweep(name, BRIEF, axes)
-        if name == "climb-film":
+        if name == "climb-friction":
             given["zip"][0] = {f"contact.friction.bead_{other}": [0.3, 0.5] for other in ("wall", "bead")}
         run_shipped(name, given, out)
 

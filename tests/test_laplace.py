@@ -13,7 +13,6 @@ from walkers.physics.laplace import (
     NoBridgeError,
     bridge,
     force_curve,
-    force_table,
     rupture_distance,
 )
 from walkers.physics.willett import rupture as rupture_of_willett
@@ -130,7 +129,7 @@ def test_published_fits_between_equal_spheres(volume: float, degrees: float) -> 
     bridge_of = (1.0, 1.0, volume, radians(degrees))
     end = min(rupture_distance(*bridge_of), rupture_of_willett(*bridge_of))
     curve = force_curve(*bridge_of, np.linspace(0.0, 0.9 * end, 40))
-    fits = {law.name: law.force(*bridge_of, curve.gaps) for law in LAWS}
+    fits = {law.name: law.pull(*bridge_of, curve.gaps) for law in LAWS}
     assert fits["Willett 2000"] == pytest.approx(curve.forces, abs=0.03 * curve.forces[0])
     assert fits["Bagheri 2024"] == pytest.approx(curve.forces, abs=0.02 * curve.forces[0])
     assert fits["Bagheri 2024"][0] == pytest.approx(curve.forces[0], rel=0.008)
@@ -207,7 +206,8 @@ def test_a_plane_is_a_large_sphere() -> None:
 
 @pytest.mark.parametrize("given", [BRIDGES[1], BRIDGES[3], BRIDGES[4]])
 def test_tables_may_be_interpolated(given: tuple[float, float, float, float]) -> None:
-    gaps, forces = force_table(*given)
+    curve = force_curve(*given)
+    gaps, forces = curve.gaps, curve.forces
     assert gaps.shape == forces.shape == (POINTS,)
     assert gaps[0] == 0.0
     assert gaps[-1] == rupture_distance(*given)

@@ -32,30 +32,28 @@ def test_targets_are_of_walkers_that_there_are() -> None:
 
 
 def test_speeds_are_those_of_the_theory_beside_the_engine() -> None:
-    """For a case with its bridges, friction and film the same velocity as `walkers theory` gives."""
+    """For a case with its bridges and friction the same velocity as `walkers theory` gives."""
     bare = walkers_of_the_paper()["4a"]
     liquid = replace(bare.liquid, dynamic_viscosity=7.0 * bare.liquid.dynamic_viscosity)
-    liquid = replace(liquid, film_viscosity=3.0 * bare.liquid.dynamic_viscosity)
     contact = replace(bare.contact, friction_bead_wall=0.3, friction_bead_bead=0.1)
     expected = float(motion_of(replace(bare, liquid=liquid, contact=contact)).velocity[0])
     parameters = {
         **{"friction_wall": 0.05, "friction_slide": 0.3, "friction_bead": 0.1},
-        **{"log10_viscosity_ratio": float(np.log10(7.0)), "log10_film_drag_ratio": float(np.log10(3.0))},
+        "log10_viscosity_ratio": float(np.log10(7.0)),
     }
     assert expected > 1e-3
     assert speeds(parameters)["velocity"]["4a"] == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_papers_law_alone_gives_its_figures_and_with_inertia_less_at_the_largest_asymmetry() -> None:
-    """Quasi-static 1.11, 1.47, 2.20, 3.42, 4.88 mm/s; of Fig. 4a's 2.3 and of the plateau it gives nothing."""
+    """Of Fig. 4a and of the plateau it gives nothing."""
     found = fit((KAPPA,), targets(), fixed=NOTHING_ELSE, generations=3)
-    values = {name: None if value is None else value * 1e3 for name, value in found.values.items()}
+    published = {target.name: target.value for target in targets()}
     assert found.parameters.keys() == {"log10_kappa"}
-    for name, expected in {"Fig. 2, 4 g": 1.24, "Fig. 2, 6 g": 3.07, "Fig. 3, 0.3/0.2 mm": 2.24}.items():
-        assert values[name] == pytest.approx(expected, rel=0.05)
-    assert values["Fig. 3, 0.4/0.2 mm"] == pytest.approx(3.95, rel=0.05)
-    assert values["Fig. 4a, velocity"] == pytest.approx(5.5, rel=0.1)
-    assert values["Fig. 2, plateau"] is None
+    assert not {"Fig. 2, 4 g", "Fig. 2, 6 g", "Fig. 3, 0.3/0.2 mm"} & set(found.missed)
+    assert {"Fig. 2, plateau", "Fig. 4a, velocity", "Fig. 3, 0.4/0.2 mm"} <= set(found.missed)
+    assert (found.values["Fig. 3, 0.4/0.2 mm"] or 0.0) < published["Fig. 3, 0.4/0.2 mm"]
+    assert (found.values["Fig. 4a, velocity"] or 0.0) > 2.0 * published["Fig. 4a, velocity"]
 
 
 @pytest.mark.slow
@@ -66,7 +64,7 @@ def test_what_the_theory_made_is_found_again_and_what_it_lacks_is_missed(tmp_pat
         [replace(one, value=value) for one, value in zip(wanted, values_of(known, wanted).values(), strict=True)]
         for known in (KNOWN, made)
     )
-    alone = fit((), dry, generations=14)
+    alone = fit((), dry, generations=30)
     assert (alone.met, alone.missed) == (len(wanted), [])
     assert alone.misfit < 0.2
     assert alone.parameters["friction_wall"] == pytest.approx(KNOWN["friction_wall"], rel=0.15)

@@ -85,7 +85,6 @@ def test_another_material_loses_what_was_calibrated_and_says_so() -> None:
     assert guessed == {
         "liquid.volume_fraction": "0.01",
         "liquid.viscosity_ratio": "1",
-        "liquid.film_drag_ratio": "0",
         "liquid.contact_angle": "0 deg",
         "contact.restitution": "0.3",
         "contact.minimum_separation_ratio": "0.01",
@@ -174,11 +173,11 @@ def test_what_is_called_uncertain_keeps_where_it_comes_from() -> None:
 
 def test_what_was_calibrated_with_other_liquids_is_a_guess() -> None:
     oil, glycerol = (origins(load_case("fig1b", {"liquid.name": name})) for name in ("Si AK10", "glycerol 87 %"))
-    assert oil["liquid.contact_angle"].origin == "calibrated"
-    angle = glycerol["liquid.contact_angle"]
-    assert (angle.origin, angle.text, angle.guessed) == ("default", "39.9 deg", True)
-    assert "Si AK5 and Si AK10" in angle.source
-    assert angle.range == library.unmeasured()["liquid.contact_angle"].range
+    assert oil["liquid.volume_fraction"].origin == "calibrated"
+    fraction = glycerol["liquid.volume_fraction"]
+    assert (fraction.origin, fraction.text, fraction.guessed) == ("default", "0.022", True)
+    assert "Si AK5 and Si AK10" in fraction.source
+    assert fraction.range == library.unmeasured()["liquid.volume_fraction"].range
 
 
 def test_settings_are_read_as_a_file_would() -> None:
@@ -238,7 +237,7 @@ def test_show_says_where_values_come_from() -> None:
     lines = call("show", "fig1b", check=True).stdout.splitlines()
     assert any(line.split() == ["frequency", "80", "Hz", "given"] for line in lines)
     told = "calibrated with Si AK5 and Si AK10, may be"
-    assert any(line.startswith("    contact_angle") and told in line for line in lines)
+    assert any(line.startswith("    volume_fraction") and told in line for line in lines)
     assert not any("None" in line for line in lines)
 
 
@@ -286,7 +285,7 @@ def test_what_a_spread_draws_is_told_apart() -> None:
     sweep = spread_sweep(case, 32)
     ranks = np.argsort(np.argsort(np.array([[plain(value) for value in row] for row in sweep.rows]), axis=0), axis=0)
     alike = np.abs(np.corrcoef(ranks.T) - np.eye(len(sweep.keys)))
-    assert len(sweep.keys) == 9
+    assert len(sweep.keys) == 6
     assert alike.max() < 0.4
 
 
@@ -300,6 +299,6 @@ def test_spread_on_the_command_line(in_folder: Path) -> None:
 
 
 def test_what_was_calibrated_with_another_law_is_a_guess() -> None:
-    of = origins(load_case("fig1b", {"liquid.law": "young-laplace"}))
+    of = origins(load_case("fig1b", {"liquid.law": "willett"}))
     assert (of["liquid.law"].origin, of["liquid.viscosity_ratio"].origin) == ("given", "default")
     assert of["liquid.viscosity_ratio"].guessed

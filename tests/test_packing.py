@@ -30,7 +30,7 @@ def test_what_may_differ_within_a_deck() -> None:
         make_case(run=STEP, drive={"axis": "y"}),
         make_case(run=STEP, boundary={"tilt": "20 deg"}),
         make_case(run=STEP, environment={"gravity": "0 m/s^2"}),
-        make_case(run=STEP, liquid={"film_drag_ratio": 0.5}),
+        make_case(run=STEP, liquid={"viscosity_ratio": 2.0}),
     ]
     assert len({sharing_key(case) for case in same}) == 1
     render_shared_deck(same)

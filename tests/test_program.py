@@ -58,7 +58,7 @@ def test_deck_is_printed_or_written(tmp_path: Path) -> None:
     printed = _walkers("deck", "fig1b")
     call("deck", "fig1b", "--to", str(tmp_path / "deck"), check=True)
     assert (tmp_path / "deck" / "walker.lig").read_text() == printed
-    assert (tmp_path / "deck" / "walls.stl").exists()
+    assert (tmp_path / "deck" / "bridges.txt").exists()
     again = call("deck", "fig1b", "--to", str(tmp_path / "deck"))
     assert again.returncode == 2
 

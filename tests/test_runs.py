@@ -153,7 +153,7 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     }
     assert {path.name for path in (run.directory / "segments").iterdir()} == {"0000"}
     assert {path.name for path in (run.directory / FIRST_SEGMENT).iterdir()} == {
-        *("layout.json", "walker.lig", "walls.stl", "engine.log", "segment.json", "run.sh"),
+        *("layout.json", "walker.lig", "bridges.txt", "engine.log", "segment.json", "run.sh"),
         *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
         "bridges.txt",
     }

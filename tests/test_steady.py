@@ -46,8 +46,9 @@ def _shipped(angle: float = 0.0, **drive: Any) -> Case:
 
 
 def _turning() -> Case:
-    """A walker that still turns to the axis after 12 cycles, and less and less after 24."""
-    return _shipped(4.0, peak_acceleration="8 g")
+    """A walker that still turns to the axis after 12 cycles, and less and less after 24: little drags it."""
+    case = _shipped(4.0, peak_acceleration="8 g")
+    return replace(case, liquid=replace(case.liquid, dynamic_viscosity=4.6e-3))
 
 
 def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(runs_folder: Path) -> None:
@@ -55,13 +56,13 @@ def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(runs_folder: Path
     case = load_case("fig1b")
     full = replace(case, run=replace(case.run, until_steady=False, cycles_per_segment=case.run.cycles))
     long = run_case(full, runs_folder)
-    assert (short.result["cycles"], short.result["settling_cycles"], short.result["ended_early"]) == (24, 8, True)
+    assert (short.result["cycles"], short.result["settling_cycles"], short.result["ended_early"]) == (12, 4, True)
     assert (long.result["cycles"], long.result["settling_cycles"], long.result["ended_early"]) == (60, 20, False)
-    assert "6 of 6 steady after 24 cycles" in short.describe()
+    assert "6 of 6 steady after 12 cycles" in short.describe()
     speeds = [one.result["velocity"]["mean"] for one in (short, long)]
     assert speeds[0] == pytest.approx(speeds[1], rel=0.005)
     # Until then the two are the same run.
-    ways = [one.motion.position[:481] for one in (short, long)]
+    ways = [one.motion.position[:241] for one in (short, long)]
     np.testing.assert_array_equal(ways[0], ways[1])
 
 
@@ -80,19 +81,23 @@ def test_walkers_whose_contacts_open_have_the_speeds_of_long_runs(tmp_path: Path
     """At the end of a cycle some bridges between their beads are open; they share decks and go on for longer."""
     engine = find_engine()
     cases = []
-    for gamma0 in (0.74, 0.94, 1.14):
+    for ratio, peak in ((3.0, "7 g"), (19.0, "7 g"), (19.0, "10 g")):
         tables: dict[str, Any] = {
-            "dimers": {"mean_radius": "0.25 mm", "sin_delta": 0.35, "replicates": 2, "spacing": "120 mm"},
+            "dimers": {"radii": ["0.6 mm", "0.3 mm"], "replicates": 2, "spacing": "120 mm"},
             "beads": {"material": "ruby"},
-            "liquid": {"name": "Si AK5"},
-            "boundary": {"material": "chromium-coated glass"},
-            "drive": {"frequency": "80 Hz", "gamma0": gamma0},
+            "liquid": {"name": "Si AK10", "viscosity_ratio": ratio},
+            "boundary": {"material": "glass"},
+            "drive": {"frequency": "80 Hz", "peak_acceleration": peak},
+            "run": {"time_step": "3 us"},
         }
         cases.append(resolve_case(tables, name="open"))
     assert len({sharing_key(case) for case in cases}) == 1
     made = make_runs(cases, tmp_path, engine)
     long = make_runs([replace(case, run=replace(case.run, until_steady=False)) for case in cases], tmp_path, engine)
-    results = [[current_result(run.directory) for run in one.runs.values()] for one in (made, long)]
+    results = [
+        sorted((current_result(run.directory) for run in one.runs.values()), key=lambda one: one["velocity"]["mean"])
+        for one in (made, long)
+    ]
     opened = 0
     for one, other in zip(*results, strict=True):
         assert one["velocity"]["smallest"] == pytest.approx(other["velocity"]["smallest"], rel=0.005)
@@ -103,13 +108,13 @@ def test_walkers_whose_contacts_open_have_the_speeds_of_long_runs(tmp_path: Path
 
 
 def test_a_walker_that_turns_ever_faster_is_not_steady_however_even_its_speed(tmp_path: Path) -> None:
-    """Sin δ = 0.25 at 14.25 g: after 12 cycles its speed is even to 0.2 %, but 1.6 % from where it ends."""
+    """On a slope of 60° with its large bead above it turns over; after 12 cycles its speed is even to 0.2 % yet."""
     tables: dict[str, Any] = {
-        "dimers": {"mean_radius": "0.25 mm", "sin_delta": 0.25, "replicates": 2},
+        "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1, "angle": "0.4 deg", "facing": "up"},
         "beads": {"material": "ruby"},
         "liquid": {"name": "Si AK5"},
-        "boundary": {"material": "chromium-coated glass"},
-        "drive": {"frequency": "80 Hz", "gamma0": 1.14},
+        "boundary": {"material": "chromium-coated glass", "tilt": "60 deg"},
+        "drive": {"frequency": "80 Hz", "peak_acceleration": "6 g"},
         "run": {"cycles": 12, "settling_cycles": 4},
     }
     directory = run_case(resolve_case(tables, name="turning"), tmp_path).directory
@@ -166,7 +171,7 @@ def _companions() -> list[Case]:
         replace(case, boundary=replace(case.boundary, tilt=0.3)).renamed("uphill"),
         replace(case, gravity=5.0).renamed("light"),
         replace(case, contact=replace(case.contact, friction_bead_wall=0.2)).renamed("rough"),
-        replace(case, liquid=replace(case.liquid, film_viscosity=2e-3)).renamed("film"),
+        replace(case, liquid=replace(case.liquid, dynamic_viscosity=2e-3)).renamed("thin"),
     ]
 
 
@@ -174,9 +179,7 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
     cases, engine = _companions(), find_engine()
     assert len({sharing_key(case) for case in cases}) == 1
     together = make_runs(cases, tmp_path / "together", engine)
-    assert (
-        len({run.directory.parent for run in together.runs.values()}) == 3
-    )  # the second and the third have those that went on
+    assert len({run.directory.parent for run in together.runs.values()}) == 2  # the second has the one that went on
     cycles = {}
     for case in cases:
         alone = make_runs([case], tmp_path / "alone", engine)
@@ -210,15 +213,13 @@ def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
 
 
 def test_several_drives_have_a_force_each_in_one_deck(tmp_path: Path) -> None:
-    """Of one gravity and drive a deck is as anybody would write it; of several it reads amplitudes bead by bead."""
+    """Of one gravity and drive a deck is as anybody would write it; of several it reads loads bead by bead."""
     first = make_case(dimers={"spacing": "80 mm"})
     second = replace(first, drive=first.drive.with_peak(20.0))
     engine = find_engine()
     single = next(iter(make_runs([first], tmp_path / "single", engine).runs.values())).directory / FIRST_SEGMENT
     assert "fix             gravity" in (single / "walker.lig").read_text()
     shared = next(iter(make_runs([first, second], tmp_path / "shared", engine).runs.values())).directory.parent
-    amplitudes = (shared / "drive_1_x.txt").read_text().split("\n")
-    mass = 4.0 / 3.0 * np.pi * 0.3e-3**3 * first.density
-    assert amplitudes[0] == "4"
-    assert float(amplitudes[1].split()[1]) == pytest.approx(mass * first.drive.peak_acceleration, rel=1e-12)
-    assert float(amplitudes[3].split()[1]) == pytest.approx(mass * 20.0, rel=1e-12)
+    loads = np.loadtxt(shared / "loads.txt")
+    drives = [first.drive.peak_acceleration] * 2 + [20.0] * 2
+    np.testing.assert_allclose(loads, [(number, 0, 0, -9.81, a, 0, 0) for number, a in enumerate(drives, 1)])

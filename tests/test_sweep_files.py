@@ -127,7 +127,7 @@ def test_shipped_sweeps_are_the_papers() -> None:
         "fig3",
         "fig4",
         "modes",
-        *("climb-film", "climb-liquids", "climb-rolling", "climb-start", "climb-tilt", "zoo", "zoo-corner"),
+        *("climb-friction", "climb-liquids", "climb-rolling", "climb-start", "climb-tilt", "zoo", "zoo-corner"),
         *("pile-liquids", "pile-paper", "pile-seeds", "pile-softness", "pile-step"),
         "sensitivity",
     }

@@ -14,7 +14,7 @@ from walkers.theory.prediction import check_applies, motion_of
 from walkers.theory.quasistatic import FRICTION_OF_THE_PAPER, mean_velocity
 
 MODEL, PAPER = "theory", f"paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
-"""Coulomb friction with the drag of bridges and film (`walkers.theory.prediction.motion_of`); the paper's own model, of
+"""Coulomb friction with the resistance of bridges (`walkers.theory.prediction.motion_of`); the paper's own model, of
 what its friction was fitted to (`walkers.theory.quasistatic.mean_velocity`)."""
 _BEADS, _BOUNDARIES, _LIQUIDS = "ruby", ("chromium-coated glass", "glass"), ("Si AK5", "Si AK10")
 """Of the paper's walkers on a level substrate (its Figs. 2 to 4)."""

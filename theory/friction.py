@@ -12,7 +12,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Friction:
-    """F∥ = F (μ(v) sign v + κ v) + c v at each of the three contacts; at v = 0 whatever up to F μs holds it.
+    """F∥ = F (μ(v) sign v + κ v) at each of the three contacts; at v = 0 whatever up to F μs holds it.
 
     μ(v) = μk + (μs - μk) exp(-(v/vs)²), after Stribeck. Each is a number, or an array that broadcasts to (3, N) for N
     parameter sets: contacts 1, 2 (beads on the substrate) and 3 (bead on bead). F is that of rigid beads; the engine's
@@ -28,15 +28,12 @@ class Friction:
         vs, m/s.
     linear
         κ, s/m: the paper's law.
-    viscous
-        c, N s/m: drag of the liquid, whatever the normal force.
     """
 
     kinetic: npt.ArrayLike = 0.0
     static: npt.ArrayLike | None = None
     stribeck_velocity: float = 1e-3
     linear: npt.ArrayLike = 0.0
-    viscous: npt.ArrayLike = 0.0
 
     @classmethod
     def coulomb(cls, bead_wall: npt.ArrayLike, bead_bead: npt.ArrayLike) -> Friction:

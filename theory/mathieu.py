@@ -6,7 +6,8 @@ Energy and the work of the inertial force give, with ϑ = πft,
     d²ψ/dϑ² + [U - 4V cos 2ϑ] ψ = 0,    4V = (5/7) a0/(π² f²) (R1 - R2)/L (Σ m R)/(Σ m R²)
 
 and U = 0 on a level substrate. A steady acceleration along the axis, such as a climber's weight, gives U as the drive
-gives V. A film that drags the beads' centres by 6πηR v adds 2β dψ/dϑ with 2πfβ = (5/7) 6πη (Σ R³)/(Σ m R²). Where the
+gives V. Bridges to the substrate whose resistance to rolling is Q take the power Σ Q Ω² of the energy (7/10) Σ m R² Ω²,
+which adds 2β dψ/dϑ with 2πfβ = (5/7) (Σ Q)/(Σ m R²); that between the beads takes nothing of a rigid cone. Where the
 drive is fast, U + 2V²/(1 + β²) takes the place of U - 4V cos 2ϑ (Kapitza's pendulum): a dimer on its head (U < 0)
 stands where that is positive.
 
@@ -23,7 +24,6 @@ import numpy.typing as npt
 from scipy.special import mathieu_a, mathieu_b
 
 from walkers.physics.dimer import Dimer
-from walkers.physics.film import film_drag
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def alignment(
     frequency: float,
     peak_acceleration: float,
     steady_acceleration: float = 0.0,
-    film_viscosity: float = 0.0,
+    rolling_resistance: float = 0.0,
 ) -> Alignment:
     """U, V and β of a dimer.
 
@@ -79,19 +79,18 @@ def alignment(
         Acceleration that pulls the beads along the axis, m/s², positive from the small bead to the large one: the
         weight of a climber with its large bead below, which hangs as from a pivot (U > 0). A climber that leads with
         its large bead stands on its head (U < 0), and only the drive keeps it upright.
-    film_viscosity
-        η of a film on the wall (`walkers.physics.film`), Pa s.
+    rolling_resistance
+        Σ Q of the bridges to the substrate (`walkers.physics.bridge`), N m s.
     """
     (first, second), masses = dimer.radii, dimer.masses
     lever = (first - second) / (2.0 * sqrt(first * second))
     moment = masses[0] * first**2 + masses[1] * second**2
     inverse_radius = (masses[0] * first + masses[1] * second) / moment
     per_acceleration = 5.0 / 7.0 * lever * inverse_radius / (pi * frequency) ** 2
-    rate = sum(film_drag(film_viscosity, radius) * radius**2 for radius in dimer.radii) / (7.0 / 5.0 * moment)
     return Alignment(
         steady_acceleration * per_acceleration,
         peak_acceleration * per_acceleration / 4.0,
-        rate / (2.0 * pi * frequency),
+        5.0 / 7.0 * rolling_resistance / moment / (2.0 * pi * frequency),
     )
 
 
@@ -151,12 +150,13 @@ def largest_stable_v() -> float:
 def turning(parameters: Alignment, start: float, angles: npt.ArrayLike, phase: float = 0.0) -> FloatArray:
     """Orientation of a dimer that begins at rest and rolls sideways without sliding, whatever its angle to the axis.
 
-    The Mathieu equation with sin ψ instead of ψ: a parametric pendulum, d²ψ/dϑ² = -[U - 4V cos(2ϑ + phase)] sin ψ.
+    The Mathieu equation with sin ψ instead of ψ, a damped parametric pendulum:
+    d²ψ/dϑ² = -2β dψ/dϑ - [U - 4V cos(2ϑ + phase)] sin ψ.
 
     Parameters
     ----------
     parameters
-        U and V.
+        U, V and β.
     start
         ψ at ϑ = 0, rad.
     angles : ndarray, shape (N,)
@@ -175,7 +175,7 @@ def turning(parameters: Alignment, start: float, angles: npt.ArrayLike, phase: f
 
     def slope(at: float, state: FloatArray) -> list[float]:
         pull = parameters.u - 4.0 * parameters.v * np.cos(2.0 * at + phase)
-        return [state[1], -pull * np.sin(state[0])]
+        return [state[1], -2.0 * parameters.damping * state[1] - pull * np.sin(state[0])]
 
     solution = solve_ivp(slope, (0.0, float(theta[-1])), [start, 0.0], t_eval=theta, rtol=1e-8, atol=1e-10)
     psi: FloatArray = solution.y[0]

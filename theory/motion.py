@@ -1,8 +1,12 @@
 """The equations of motion of a walker that stays in contact, integrated in time under any law of friction.
 
-    M dv/dt = -M a(t) (1, 1, 0) - G F∥,    F = F0 + D F∥,    F∥ = law(v, F)
+    M dv/dt = -M a(t) (1, 1, 0) - G (F∥ + f + Hᵀm),    F = F0 + D (F∥ + f),    F∥ = law(v, F)
 
-(symbols as in `walkers.theory.quasistatic`); a film on the wall may drag the centres besides. Coulomb's law
+(symbols as in `walkers.theory.quasistatic`). Liquid bridges resist sliding and rolling, q = H v, by forces and couples,
+
+    f = S v + C q,    m = C v + Q q
+
+(`walkers.physics.bridge`); the couples press no contact. Coulomb's law
 is set-valued: a contact that sticks is held by whatever force keeps it at rest. Each step is implicit
 (`walkers.theory.stepping`), its friction forces found by a semi-smooth Newton method: sticking needs no regularisation,
 and steps are short only where a contact begins to stick or to slip.
@@ -12,16 +16,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from math import inf
 
 import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.case import Case
-from walkers.inputs.loads import contact_loads, dimer_of
+from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
 from walkers.physics.dimer import Dimer
-from walkers.physics.film import film_drag
 from walkers.theory.friction import Friction
-from walkers.theory.quasistatic import forces_at_rest, inertia_matrix, normal_force_matrix, translation
+from walkers.theory.quasistatic import (
+    forces_at_rest,
+    inertia_matrix,
+    normal_force_matrix,
+    rolling_matrix,
+    translation,
+)
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -36,45 +46,56 @@ class Walker:
 
     Attributes
     ----------
-    sin_delta, asymmetry
-        sin δ and μ.
+    radii : ndarray, shape (2, N)
+        R1 and R2, m.
+    asymmetry
+        μ.
     scale
         4πγR̄/M, m/s²: the acceleration that a force of 1 in the theory's unit gives.
     force_unit
         4πγR̄, N.
     at_rest : ndarray, shape (3, N)
         Normal forces at rest, in that unit.
-    film : ndarray, shape (2, N)
-        How strongly a film on the wall drags the beads' centres, N s/m.
+    resistances : ndarray, shape (3, 3, N)
+        S (N s/m), C (N s) and Q (N m s) of the bridges at contacts 1, 2 and 3, the first bead as body 1 of the last.
     """
 
-    sin_delta: FloatArray
+    radii: FloatArray
     asymmetry: FloatArray
     scale: FloatArray
     force_unit: FloatArray
     at_rest: FloatArray
-    film: FloatArray
+    resistances: FloatArray
+
+    @property
+    def sin_delta(self) -> FloatArray:
+        """The asymmetry of the radii, shape (N,)."""
+        return (self.radii[0] - self.radii[1]) / self.radii.sum(axis=0)  # type: ignore[no-any-return]
 
     @classmethod
     def of_dimer(cls, dimer: Dimer, gravity: float = 0.0) -> Walker:
         """The paper's walker: perfect wetting; on a substrate that gravity (m/s²) presses it to."""
         weights = np.array([*dimer.masses, 0.0]) * gravity / dimer.capillary_scale
         return cls(
-            sin_delta=np.array([dimer.sin_delta]),
+            radii=np.array(dimer.radii)[:, None],
             asymmetry=np.array([dimer.mass_asymmetry]),
             scale=np.array([dimer.capillary_scale / dimer.total_mass]),
             force_unit=np.array([dimer.capillary_scale]),
             at_rest=(forces_at_rest(dimer.sin_delta) + weights)[:, None],
-            film=np.zeros((2, 1)),
+            resistances=np.zeros((3, 3, 1)),
         )
 
     @classmethod
     def of_case(cls, case: Case) -> Walker:
-        """A case's walker with the capillary forces that its bridges have in the engine, its weight and its film."""
+        """A case's walker with the pulls and resistances that its bridges have in the engine, and its weight."""
         dimer = dimer_of(case)
         forces = np.array(contact_loads(case).capillary) + np.array([*dimer.masses, 0.0]) * case.pressing_gravity
-        film = [[film_drag(case.liquid.film_viscosity, radius)] for radius in case.walkers[0].radii]
-        return replace(cls.of_dimer(dimer), at_rest=(forces / dimer.capillary_scale)[:, None], film=np.array(film))
+        first, second = dimer.radii
+        meeting = ((first, inf), (second, inf), (first, second))
+        resistances = np.array([resistances_at_rest(case, *pair) for pair in meeting]).T
+        resistances[1, 2] *= -1.0 if first > second else 1.0  # that of the smaller bead as body 1
+        at_rest = (forces / dimer.capillary_scale)[:, None]
+        return replace(cls.of_dimer(dimer), at_rest=at_rest, resistances=resistances[..., None])
 
     @classmethod
     def joined(cls, walkers: Sequence[Walker]) -> Walker:
@@ -153,7 +174,7 @@ def walk(
     given = (frequency, peak_acceleration, steady_acceleration, walker.scale)
     drive = np.stack(np.broadcast_arrays(*(np.asarray(one, np.float64).reshape(-1) for one in given))[:3], axis=-1)
     count = len(drive)
-    walkers, law = _rows_of(walker, count), _law_of(friction, walker, count)
+    walkers, law = _rows_of(walker, count), _law_of(friction, count)
     from walkers.theory.stepping import integrate
 
     mean, least, repeated, solved, series = integrate(walkers, law, drive, cycles, steps_per_cycle)
@@ -173,28 +194,26 @@ def walk(
 
 
 def _rows_of(walker: Walker, count: int) -> FloatArray:
-    """The table of `walkers.theory.stepping.integrate`, shape (N, 9, 3).
-
-    A force on a bead's centre acts on the normal forces as one at its contact with the substrate does.
-    """
+    """The table of `walkers.theory.stepping.integrate`, shape (N, 13, 3)."""
     asymmetry = np.broadcast_to(walker.asymmetry, (count,))
     gains = inertia_matrix(asymmetry) * np.broadcast_to(walker.scale, (count,))[:, None, None]
     matrix = normal_force_matrix(np.broadcast_to(walker.sin_delta, (count,)), asymmetry)
     rest = np.broadcast_to(walker.at_rest, (3, count)).T[:, None]
-    film = np.broadcast_to(walker.film / walker.force_unit, (2, count)).T
-    pressed = np.einsum("nij,nj->ni", matrix[:, :, :2], film)[:, None]
-    rate = film.sum(axis=1) * np.broadcast_to(walker.scale, (count,))
-    return np.concatenate([gains, matrix, rest, pressed, np.broadcast_to(rate[:, None, None], (count, 1, 3))], axis=1)
+    roll = rolling_matrix(*np.broadcast_to(walker.radii, (2, count)))
+    resist = np.moveaxis(np.broadcast_to(walker.resistances / walker.force_unit, (3, 3, count)), -1, 1)[..., None]
+    slide, couple, turn = resist * np.eye(3)
+    forces, couples = slide + couple @ roll, couple + turn @ roll
+    slowed = gains @ (forces + np.swapaxes(roll, 1, 2) @ couples)
+    return np.concatenate([gains, matrix, rest, slowed, matrix @ forces], axis=1)
 
 
-def _law_of(friction: Friction, walker: Walker, count: int) -> FloatArray:
-    """The table of `walkers.theory.stepping.integrate`, shape (N, 5, 3)."""
+def _law_of(friction: Friction, count: int) -> FloatArray:
+    """The table of `walkers.theory.stepping.integrate`, shape (N, 4, 3)."""
     values = (
         friction.kinetic,
         friction.kinetic if friction.static is None else friction.static,
         friction.stribeck_velocity,
         friction.linear,
-        np.asarray(friction.viscous, np.float64) / walker.force_unit,
     )
     rows = [np.broadcast_to(np.asarray(value, np.float64), (3, count)) for value in values]
     return np.ascontiguousarray(np.moveaxis(np.stack(rows), -1, 0))

@@ -10,10 +10,9 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
-from walkers.physics.lubrication import tangential_drag
 from walkers.theory.friction import Friction
-from walkers.theory.mathieu import alignment, largest_stable_v
-from walkers.theory.motion import FloatArray, Motion, Walker, walk
+from walkers.theory.mathieu import Alignment, alignment, largest_stable_v
+from walkers.theory.motion import Motion, Walker, walk
 from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, detachment, mean_velocity
 from walkers.theory.sideways import axial_motion_of, time_to_turn, turning_rate
 
@@ -25,32 +24,21 @@ _TRIALS = 33
 _ROUNDS = 3
 
 
-def bridge_drag(case: Case) -> FloatArray:
-    """Coefficient of the tangential viscous force at each contact as in the engine, N s/m, shape (3,).
-
-    Lubrication of touching bridges (`walkers.physics.lubrication`).
-    """
-    viscosity, nearest = case.liquid.dynamic_viscosity, case.contact.minimum_separation_ratio
-    on_walls = [tangential_drag(viscosity, radius, nearest) for radius in case.walkers[0].radii]
-    return np.array([*on_walls, tangential_drag(viscosity, dimer_of(case).reduced_radius, nearest)])
-
-
-def friction_of(*cases: Case, viscous: bool) -> Friction:
-    """Coulomb's law with each case's coefficients, with or without the drag of its bridges."""
+def friction_of(*cases: Case) -> Friction:
+    """Coulomb's law with each case's coefficients."""
     contacts = [case.contact for case in cases]
-    dry = Friction.coulomb([one.friction_bead_wall for one in contacts], [one.friction_bead_bead for one in contacts])
-    return replace(dry, viscous=np.stack([bridge_drag(case) for case in cases], axis=-1)) if viscous else dry
+    return Friction.coulomb([one.friction_bead_wall for one in contacts], [one.friction_bead_bead for one in contacts])
 
 
 def motion_of(*cases: Case, viscous: bool = True) -> Motion:
-    """The motions of cases' walkers, aligned with the drive, with the capillary forces that the engine gives them.
+    """The motions of cases' walkers, aligned with the drive, with the pulls that the engine gives their bridges.
 
     Parameters
     ----------
     cases
         N of them, driven along the substrate.
     viscous
-        Whether the drag of the bridges and of the film acts beside friction.
+        Whether the bridges' resistance to sliding and rolling acts beside friction.
 
     Raises
     ------
@@ -60,7 +48,7 @@ def motion_of(*cases: Case, viscous: bool = True) -> Motion:
     check_applies(*cases)
     return walk(
         Walker.joined([_walker_of(case, viscous=viscous) for case in cases]),
-        friction_of(*cases, viscous=viscous),
+        friction_of(*cases),
         [case.drive.frequency for case in cases],
         [case.drive.peak_acceleration for case in cases],
         steady_acceleration=[case.axial_gravity for case in cases],
@@ -69,7 +57,7 @@ def motion_of(*cases: Case, viscous: bool = True) -> Motion:
 
 def _walker_of(case: Case, *, viscous: bool) -> Walker:
     walker = Walker.of_case(case)
-    return walker if viscous else replace(walker, film=np.zeros_like(walker.film))
+    return walker if viscous else replace(walker, resistances=np.zeros_like(walker.resistances))
 
 
 def check_applies(*cases: Case) -> None:
@@ -108,7 +96,7 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
     check_applies(case)
     if dimer_of(case).sin_delta == 0.0:
         return float("nan")
-    dimer, walker, friction = dimer_of(case), _walker_of(case, viscous=viscous), friction_of(case, viscous=viscous)
+    dimer, walker, friction = dimer_of(case), _walker_of(case, viscous=viscous), friction_of(case)
     low, high = 0.0, float(detachment(dimer.sin_delta).gamma)
     for _ in range(_ROUNDS):
         trials = np.linspace(low, high, _TRIALS)
@@ -164,6 +152,13 @@ def predict(case: Case) -> dict[str, Any]:
     }
 
 
+def pendulum_of(case: Case) -> Alignment:
+    """The Mathieu equation of a case's dimer, damped by its bridges."""
+    rolling = float(Walker.of_case(case).resistances[2, :2].sum())
+    drive = (case.drive.frequency, case.drive.peak_acceleration)
+    return alignment(dimer_of(case), *drive, -case.axial_gravity, rolling)
+
+
 def alignment_of(case: Case) -> dict[str, Any]:
     """Whether a case's dimer keeps to the axis, and if not how soon it has turned over.
 
@@ -175,15 +170,14 @@ def alignment_of(case: Case) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``u``, ``v``, ``damping`` (β, by the film) of the Mathieu equation, whether small angles are ``stable`` by it
+        ``u``, ``v``, ``damping`` (β, by the bridges) of the Mathieu equation, whether small angles are ``stable`` by it
         and the ``largest_stable_v`` on a level substrate; ``rolling_rate``, at which they grow by it, 1/s; ``rate``, at
         which they grow or (negative) decay where contacts may slide and beads spin, 1/s (at 1° if there is rolling
         friction), None where the axial motion does not repeat itself; whether the dimer ``stands``;
         ``turns_over_after``, s from 1° to 90°.
     """
     drive = case.drive
-    film = case.liquid.film_viscosity
-    mathieu = alignment(dimer_of(case), drive.frequency, drive.peak_acceleration, -case.axial_gravity, film)
+    mathieu = pendulum_of(case)
     rate = _turning_rate(case) if drive.peak_acceleration > 0.0 else None
     return {
         "u": mathieu.u,
@@ -200,12 +194,11 @@ def alignment_of(case: Case) -> dict[str, Any]:
 
 def _turning_rate(case: Case) -> float | None:
     dimer, drive = dimer_of(case), (case.drive.frequency, case.drive.peak_acceleration)
-    walker, friction = _walker_of(case, viscous=True), friction_of(case, viscous=True)
+    walker, friction = Walker.of_case(case), friction_of(case)
     axial = axial_motion_of(dimer, walker, friction, (*drive, case.axial_gravity))
     if not axial.periodic:
         return None
-    film, rolling = walker.film[:, 0], case.contact.rolling_friction
-    return turning_rate(axial, dimer, friction, drive, film=film, rolling_friction=rolling)
+    return turning_rate(axial, dimer, friction, drive, rolling_friction=case.contact.rolling_friction)
 
 
 def _number(value: float) -> float | None:

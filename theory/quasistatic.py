@@ -69,6 +69,25 @@ def inertia_matrix(asymmetry: npt.ArrayLike) -> FloatArray:
     return _matrix(rows)
 
 
+def rolling_matrix(first: npt.ArrayLike, second: npt.ArrayLike) -> FloatArray:
+    """The matrix H of q = H v: rolling rates (`walkers.physics.bridge`) from sliding velocities, closed contacts.
+
+    Beads that go at v = (v1 + v2 - v3)/2 and slide at v1 and v2 on the substrate have q1 = (v1 - v)/R1 and
+    q2 = (v2 - v)/R2; on each other they have q3 = q1 - q2, the first bead as body 1.
+
+    Parameters
+    ----------
+    first, second
+        R1 and R2, m, of the same shape (…).
+
+    Returns
+    -------
+    ndarray, shape (…, 3, 3), 1/m
+    """
+    one, two = 0.5 / np.asarray(first, np.float64), 0.5 / np.asarray(second, np.float64)
+    return _matrix([[one, -one, one], [-two, two, two], [one + two, -one - two, one - two]])
+
+
 def forces_at_rest(sin_delta: npt.ArrayLike) -> FloatArray:
     """F0, shape (…, 3): the normal forces at rest that balance the capillary ones; perfect wetting, no weight."""
     s = np.asarray(sin_delta, np.float64)

@@ -19,7 +19,7 @@ from walkers.physics.dimer import Dimer
 from walkers.theory.friction import Friction
 from walkers.theory.mathieu import NEUTRAL, multipliers
 from walkers.theory.motion import Walker, walk
-from walkers.theory.quasistatic import inertia_matrix, normal_force_matrix, translation
+from walkers.theory.quasistatic import inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -48,6 +48,8 @@ class AxialMotion:
         Force along the axis by which the second bead pushes the first, N.
     torque : ndarray, shape (2, steps)
         On each bead from the other, N m, in the sense of `spin`.
+    resistances : ndarray, shape (3, 3)
+        S, C and Q of the bridges, as `walkers.theory.motion.Walker` has them.
     periodic
         Whether the motion repeats itself.
     """
@@ -57,6 +59,7 @@ class AxialMotion:
     normal: FloatArray
     push: FloatArray
     torque: FloatArray
+    resistances: FloatArray
     periodic: bool
 
 
@@ -81,21 +84,22 @@ def axial_motion_of(
     sliding, slope = (before + after) / 2.0, (after - before) * frequency * steps
     along, accelerated = translation(sliding), translation(slope)
     pull = peak * np.cos(2.0 * pi * (np.arange(steps) + 0.5) / steps) + steady
-    force, scale = dimer.capillary_scale, float(walker.scale[0])
-    gains, film = inertia_matrix(walker.asymmetry)[0] * scale, walker.film[:, 0]
-    matrix = normal_force_matrix(walker.sin_delta, walker.asymmetry)[0]
-    lost = np.array([1.0, 1.0, 0.0])[:, None] * (pull + film.sum() / force * scale * along)
-    friction_forces = np.linalg.solve(gains, -slope - lost)
-    normal = walker.at_rest[:, :1] + matrix @ friction_forces + (matrix[:, :2] @ film / force)[:, None] * along
+    gains = inertia_matrix(walker.asymmetry)[0] / dimer.total_mass
+    matrix, roll = normal_force_matrix(walker.sin_delta, walker.asymmetry)[0], rolling_matrix(*dimer.radii)
+    _, coupling, rolling = walker.resistances
+    couples = coupling * sliding + rolling * (roll @ sliding)
+    parallel = np.linalg.solve(gains, -slope - np.outer([1.0, 1.0, 0.0], pull)) - roll.T @ couples
     radii, masses = np.array(dimer.radii)[:, None], np.array(dimer.masses)[:, None]
     inertia = 2.0 / 5.0 * masses * radii**2
-    on_wall = -friction_forces[:2] * force
+    on_wall = -parallel[:2]
+    normal = walker.at_rest * dimer.capillary_scale + matrix @ parallel
     return AxialMotion(
         sliding=sliding,
         spin=(along - sliding[:2]) / radii,
-        normal=np.maximum(normal, 0.0) * force,  # a contact that would open bears nothing
-        push=masses[0] * (accelerated + pull) + film[0] * along - on_wall[0],
-        torque=inertia * (accelerated - slope[:2]) / radii + radii * on_wall,
+        normal=np.maximum(normal, 0.0),  # a contact that would open bears nothing
+        push=masses[0] * (accelerated + pull) - on_wall[0],
+        torque=inertia * (accelerated - slope[:2]) / radii + radii * on_wall - couples[:2],
+        resistances=walker.resistances[..., 0],
         periodic=bool(motion.periodic[0] and motion.solved[0]),
     )
 
@@ -106,14 +110,14 @@ def turning_rate(
     friction: Friction,
     drive: tuple[float, float],
     *,
-    film: FloatArray | None = None,
     rolling_friction: float = 0.0,
     angle: float = radians(1.0),
 ) -> float:
     """How fast small angles to the axis grow, 1/s; negative where they decay.
 
-    Each contact resists sideways sliding by c = μF/|v| + its viscous drag, for friction is against the direction of
-    sliding, which is the axis but for a small angle. Rolling friction resists sideways rolling by μ F R/|ω| likewise.
+    Each contact resists sideways sliding by c = μF/|v|, for friction is against the direction of sliding, which is the
+    axis but for a small angle, and its bridge as it does along the axis. Rolling friction resists sideways rolling by
+    μ F R/|ω| likewise.
 
     Parameters
     ----------
@@ -122,11 +126,9 @@ def turning_rate(
     dimer
         The beads, the large one first.
     friction
-        The contacts; Coulomb's with or without the bridges' drag.
+        The contacts; Coulomb's.
     drive
         Frequency (Hz) and peak acceleration (m/s²).
-    film : ndarray, shape (2,)
-        How strongly a film drags the beads' centres, N s/m; none if left out.
     rolling_friction
         Of the engine's model of constant torque; it is left out of the axial motion.
     angle
@@ -135,7 +137,7 @@ def turning_rate(
     """
     frequency, peak = drive
     steps = axial.push.shape[0]
-    slopes = _sideways(axial, dimer, _sideways_drags(axial, friction), np.zeros(2) if film is None else film)
+    slopes = _sideways(axial, dimer, _sideways_drags(axial, friction))
     if rolling_friction:
         speed = 5.0 / 7.0 * peak / (2.0 * pi * frequency) * angle / sqrt(2.0)
         slopes += _rolling(axial, dimer, rolling_friction, speed)
@@ -148,39 +150,42 @@ def turning_rate(
 
 
 def _sideways_drags(axial: AxialMotion, friction: Friction) -> FloatArray:
-    """Force over sideways sliding velocity at each contact, N s/m, shape (3, steps)."""
-    kinetic, viscous = (np.asarray(one, np.float64) for one in (friction.kinetic, friction.viscous))
-    columns = [np.broadcast_to(one.reshape(-1, 1) if one.ndim else one, (3, 1)) for one in (kinetic, viscous)]
-    drags: FloatArray = columns[0] * axial.normal / np.maximum(np.abs(axial.sliding), _SLOWEST) + columns[1]
+    """Friction over sideways sliding velocity at each contact, N s/m, shape (3, steps)."""
+    drags: FloatArray = np.asarray(friction.kinetic) * axial.normal / np.maximum(np.abs(axial.sliding), _SLOWEST)
     return drags
 
 
-def _sideways(axial: AxialMotion, dimer: Dimer, drags: FloatArray, film: FloatArray) -> FloatArray:
+def _sideways(axial: AxialMotion, dimer: Dimer, drags: FloatArray) -> FloatArray:
     """The linear equations of sideways motion, shape (steps, 7, 7).
 
     Of ψ, then of each bead the velocity across the drive, then of each the spin about the drive, then about the
     vertical. The push along the axis has a part across the drive, ψ times as large; so have the torque and the spin.
+    Contacts slide and roll across the dimer, v and q; forces -(c v + S v + C q) and couples -(C v + Q q) act as
+    `walkers.physics.bridge` has it.
     """
     (first, second), masses = dimer.radii, dimer.masses
     radii, sine = np.array(dimer.radii), dimer.sin_delta
     cosine, length = sqrt(1.0 - sine**2), 2.0 * sqrt(first * second)
     inertias = 2.0 / 5.0 * np.array(masses) * radii**2
     slopes = np.zeros((axial.push.shape[0], 7, 7))
-    sliding = np.zeros((3, *slopes.shape[::2]))  # sideways, at each contact
-    sliding[0, :, 1], sliding[0, :, 3] = 1.0, first
-    sliding[1, :, 2], sliding[1, :, 4] = 1.0, second
-    sliding[2, :, 0] = sine * (radii @ axial.spin)
+    sliding, rolling = np.zeros((2, 3, *slopes.shape[::2]))  # sideways, at each contact
+    for bead in range(2):
+        sliding[bead, :, 1 + bead], sliding[bead, :, 3 + bead], rolling[bead, :, 3 + bead] = 1.0, radii[bead], 1.0
+    sliding[2, :, 0], rolling[2, :, 0] = sine * (radii @ axial.spin), sine * (axial.spin[0] - axial.spin[1])
     sliding[2, :, 1:] = [1.0, -1.0, first * sine, second * sine, -first * cosine, -second * cosine]
-    forces = -drags[:, :, None] * sliding
+    rolling[2, :, 3:] = [sine, -sine, -cosine, cosine]
+    slide, couple, turned = axial.resistances[..., None, None]
+    forces = -(drags[:, :, None] + slide) * sliding - couple * rolling
+    couples = -couple * sliding - turned * rolling
     slopes[:, 0, 1], slopes[:, 0, 2] = 1.0 / length, -1.0 / length
     for bead, side in enumerate((1.0, -1.0)):
         velocity, roll, turn = 1 + bead, 3 + bead, 5 + bead
         slopes[:, velocity] = (side * forces[2] + forces[bead]) / masses[bead]
         slopes[:, velocity, 0] += side * axial.push / masses[bead]
-        slopes[:, velocity, velocity] -= film[bead] / masses[bead]
-        slopes[:, roll] = radii[bead] * (forces[bead] + sine * forces[2]) / inertias[bead]
+        between = radii[bead] * forces[2] + side * couples[2]
+        slopes[:, roll] = (radii[bead] * forces[bead] + couples[bead] + sine * between) / inertias[bead]
         slopes[:, roll, 0] -= axial.torque[bead] / inertias[bead]
-        slopes[:, turn] = -radii[bead] * cosine * forces[2] / inertias[bead]
+        slopes[:, turn] = -cosine * between / inertias[bead]
     return slopes
 
 

@@ -15,7 +15,7 @@ _SLIDING, _PARALLEL, _NORMAL, _MODE = range(4)
 """Rows of a walker's state: sliding velocities, friction forces, normal forces, and 0, ±1: sticking, sliding."""
 _RIGHT, _START, _FREE, _NOW = range(3, 7)
 """Rows of what is worked with, after a matrix: right side, velocities that a stage starts from and coasts to; from the
-last one on the walker's first seven rows as the film leaves them."""
+last one on the walker's first seven rows as the bridges' resistance leaves them."""
 _FIRST = 1.0 - np.sqrt(0.5)
 """Length of either stage of an L-stable step of second order (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006)."""
 _FINER = 8
@@ -34,11 +34,12 @@ def integrate(
 
     Parameters
     ----------
-    walkers : ndarray, shape (N, 9, 3)
-        Of each: three rows of G times 4πγR̄/M (m/s²), three rows of D, the normal forces at rest; of the film's drag
-        what it adds to the normal forces (s/m), and its rate (1/s).
-    law : ndarray, shape (N, 5, 3)
-        Of each, contact by contact: μk, μs, vs (m/s), κ (s/m), and the drag in units of 4πγR̄ (s/m).
+    walkers : ndarray, shape (N, 13, 3)
+        Of each: three rows of G times 4πγR̄/M (m/s²), three rows of D, the normal forces at rest; of the bridges'
+        resistance to the sliding velocities three rows of how it slows them (1/s), and three of what it adds to the
+        normal forces (s/m).
+    law : ndarray, shape (N, 4, 3)
+        Of each, contact by contact: μk, μs, vs (m/s), κ (s/m).
     drive : ndarray, shape (N, 3)
         Frequency (Hz), peak acceleration and steady acceleration (m/s²).
     cycles, steps
@@ -151,7 +152,7 @@ def _stage(
     free, now = work[_FREE], work[_NOW:]
     for at in range(3):
         free[at] = work[_START, at] - (push if at < 2 else 0.0)
-    _drag(walker, seconds, work)
+    _resist(walker, seconds, work)
     solved = _settle(now, seconds, law, state, work)
     for at in range(3):
         slips = state[_MODE, at] != 0.0
@@ -161,22 +162,23 @@ def _stage(
 
 
 @njit(cache=True)
-def _drag(walker: FloatArray, seconds: float, work: FloatArray) -> None:
-    """What the film's drag on v_x = (v1 + v2 - v3)/2 leaves of a stage, implicitly, in place.
+def _resist(walker: FloatArray, seconds: float, work: FloatArray) -> None:
+    """What the bridges' resistance leaves of a stage, implicitly, in place.
 
-    With (1 + k) v_x' = v_x for a step in which it would take away k v_x; the same for what the friction forces give.
+    The velocities at its end are (1 + h A) v' = v - h G F∥, and the normal forces F0 + D F∥ + B v'.
     """
-    free, start, now = work[_FREE], work[_START], work[_NOW:]
-    lost = seconds * walker[8, 0] / (1.0 + seconds * walker[8, 0]) / 2.0
-    along = (start[0] + start[1] - start[2]) / 2.0
-    taken = lost * (free[0] + free[1] - free[2])
-    free[0] -= taken
-    free[1] -= taken
+    rows, free, now = work[:3], work[_FREE], work[_NOW:]
+    for at in range(3):
+        for by in range(3):
+            rows[at, by] = seconds * walker[7 + at, by]
+        rows[at, at] += 1.0
+    free[0], free[1], free[2] = _solved(rows, free)
     for by in range(3):
-        taken = lost * (walker[0, by] + walker[1, by] - walker[2, by])
-        for at in range(6):
-            now[at, by] = walker[at, by] - (taken if at < 2 else 0.0)
-        now[6, by] = walker[6, by] + walker[7, by] * along
+        now[0, by], now[1, by], now[2, by] = _solved(rows, walker[:3, by])
+    for at in range(3):
+        for by in range(3):
+            now[3 + at, by] = walker[3 + at, by] - seconds * _row(walker, 10 + at, now[:3, by])
+        now[6, at] = walker[6, at] + _row(walker, 10 + at, free)
 
 
 @njit(cache=True)
@@ -207,9 +209,9 @@ def _settle(walker: FloatArray, seconds: float, law: FloatArray, state: FloatArr
                 if fade != 0.0:
                     fade *= np.exp(-((speed / law[2, at]) ** 2))
                 kinetic = law[0, at] + fade
-                drag = normal * law[3, at] + law[4, at]
+                drag = normal * law[3, at]
                 slope = side * kinetic + law[3, at] * speed
-                # How the force at a normal force falls with the speed, after Stribeck, and grows with it by the drag.
+                # How the force at a normal force falls with the speed, after Stribeck, and grows with it by κ.
                 steep = drag - 2.0 * side * normal * fade * speed / law[2, at] ** 2
                 for by in range(3):
                     rows[at, by] = steep * seconds * walker[at, by] - slope * walker[3 + at, by]

@@ -19,7 +19,7 @@ table = walkers.sweep("fig3")
 print((1e3 * table[["radius_1", "radius_2", "velocity"]]).assign(sin_delta=table["sin_delta"]).to_string(index=False))
 
 # %%
-# The theory for the same beads: Coulomb friction, drag of the bridges and of the film.
+# The theory for the same beads: Coulomb friction, drag of the bridges.
 
 points = [walkers.Run(Path(place)).case for place in table["run"]]
 figure, axes = plt.subplots(figsize=(7, 4.5))

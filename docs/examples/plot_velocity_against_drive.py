@@ -37,7 +37,7 @@ x, mean, low, high = (table[key] for key in ("drive.peak_acceleration", "velocit
 axes.errorbar(
     x, 1e3 * mean, 1e3 * np.array([mean - low, high - mean]), fmt="o", label="engine, mean and range of 6 walkers"
 )
-axes.plot(x, 1e3 * motion_of(*points).velocity, color="0.2", label="theory: Coulomb friction, drag of bridges and film")
+axes.plot(x, 1e3 * motion_of(*points).velocity, color="0.2", label="theory: Coulomb friction, resistance of bridges")
 axes.plot(x, 1e3 * motion_of(*points, viscous=False).velocity, ":", color="0.5", label="theory: Coulomb friction alone")
 axes.set(xlabel="peak acceleration (g)", ylabel="velocity (mm/s)", ylim=(0.0, 13.0))
 axes.legend(loc="upper left")

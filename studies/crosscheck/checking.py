@@ -43,8 +43,6 @@ def crosscheck(
 
     Raises
     ------
-    ValueError
-        If a wall is round.
     runner.EngineFailure
         If the engine fails in one of the known ways.
 

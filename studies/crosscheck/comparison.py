@@ -234,11 +234,6 @@ def simulate(motion: Motion, laws: Laws, every_step: bool = True) -> Simulated:
         Of the second engine.
     every_step
         Whether to average walkers' gait over all steps after the settling cycles.
-
-    Raises
-    ------
-    ValueError
-        If a wall is round.
     """
     engine = engine_of(motion, laws)
     averaging = _Averaging(motion) if every_step and motion.groups else None
@@ -337,11 +332,6 @@ def compare(motion: Motion, laws: Laws, seconds: float | None, every_step: bool 
         Wall time that LIGGGHTS took for its steps, s, if it is known.
     every_step
         Whether to average the gait over all steps, too.
-
-    Raises
-    ------
-    ValueError
-        If a wall is round.
     """
     made = simulate(motion, laws, every_step)
     rows = [] if motion.groups or motion.case.mixture else _drift(motion, made.motion)

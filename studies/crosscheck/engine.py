@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, log, pi, sqrt
 
@@ -38,6 +38,8 @@ class Surroundings:
     ----------
     point, normal : ndarray, shape (W, 3)
         Of the walls: a point of each, m, and its unit normal toward the beads.
+    radius : ndarray, shape (W,)
+        Of upright cylinders about their points, which have beads within, m; 0 of what is flat; left out, all are.
     gravity : tuple of float
         m/s².
     harmonics : ndarray, shape (H, 6)
@@ -48,6 +50,7 @@ class Surroundings:
     normal: FloatArray
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     harmonics: FloatArray | None = None
+    radius: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -174,7 +177,7 @@ def _splined(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray
 
 
 def _bridges(radius: FloatArray, matter: Matter, laws: Laws) -> Bridges:
-    liquid = matter.liquid if laws.film else replace(matter.liquid, film_viscosity=0.0)
+    liquid = matter.liquid
     sizes, kind = np.unique(radius, return_inverse=True)
     others = [*sizes.tolist(), inf]
     between = np.empty((len(sizes), len(others)), dtype=np.int64)
@@ -202,6 +205,7 @@ def _constants(radius: FloatArray, matter: Matter, around: Surroundings, laws: L
         mass=4.0 / 3.0 * pi * radius**3 * matter.density,
         point=np.array(around.point, dtype=np.float64, order="C"),
         normal=np.array(around.normal, dtype=np.float64, order="C"),
+        hollow=np.zeros(len(around.point)) if around.radius is None else np.array(around.radius, dtype=np.float64),
         gravity=np.array(around.gravity) * laws.gravity,
         harmonics=np.ascontiguousarray(harmonics, dtype=np.float64),
         modulus=modulus / (2.0 * (1.0 - ratio**2)),

@@ -66,6 +66,8 @@ class Constants(NamedTuple):
     step : float
     radius, mass : ndarray, shape (N,)
     point, normal : ndarray, shape (W, 3)
+    hollow : ndarray, shape (W,)
+        Radii of cylinders, 0 of planes.
     gravity : ndarray, shape (3,)
     harmonics : ndarray, shape (H, 6)
         Direction, ω, peak acceleration, phase.
@@ -80,6 +82,7 @@ class Constants(NamedTuple):
     mass: FloatArray
     point: FloatArray
     normal: FloatArray
+    hollow: FloatArray
     gravity: FloatArray
     harmonics: FloatArray
     modulus: float
@@ -271,8 +274,11 @@ def wall_forces(c: Constants, state: State, moves: bool) -> None:
         radius, bridge = c.radius[bead], c.bridges.between[c.bridges.kind[bead], -1]
         velocity, spin = vector(state.velocity[bead]), vector(state.spin[bead])
         for wall in range(c.point.shape[0]):
-            n = vector(c.normal[wall])
-            gap = dot(plus(vector(state.position[bead]), -1.0, vector(c.point[wall])), n) - radius
+            n, away = vector(c.normal[wall]), plus(vector(state.position[bead]), -1.0, vector(c.point[wall]))
+            gap = dot(away, n) - radius
+            if c.hollow[wall] > 0.0:
+                out = sqrt(away[0] ** 2 + away[1] ** 2)
+                n, gap = (-away[0] / out, -away[1] / out, 0.0), c.hollow[wall] - out - radius
             bridged = still_bridged(c, bridge, gap, state.wall_bridged[bead, wall])
             state.wall_bridged[bead, wall] = bridged
             if gap >= 0.0:

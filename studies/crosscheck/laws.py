@@ -15,9 +15,7 @@ class Laws:
     capillary
         Pull of the bridges.
     lubrication
-        Their resistances, the film's drag among them.
-    film
-        Drag of the film on the walls.
+        Their resistances.
     damping
         Of Hertz's contact and of the spring along the surfaces (Tsuji, Tanaka, Ishida 1992).
     friction
@@ -30,7 +28,6 @@ class Laws:
 
     capillary: bool = True
     lubrication: bool = True
-    film: bool = True
     damping: bool = True
     friction: bool = True
     rolling_friction: bool = True
@@ -56,8 +53,8 @@ def laws_from(without: Sequence[str] = ()) -> Laws:
 
     Examples
     --------
-    >>> laws_from(["film"]).differences()
-    ['film=off']
+    >>> laws_from(["drive"]).differences()
+    ['drive=off']
     """
     for term in without:
         if term not in TERMS:

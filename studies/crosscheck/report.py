@@ -33,8 +33,7 @@ _SAMPLED = ("fig1b", "fig4b")
 """Cases whose means over all steps are told."""
 SUPPOSITIONS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("the decks' laws", ()),
-    ("no film", ("film",)),
-    ("no lubrication at all", ("lubrication",)),
+    ("no lubrication", ("lubrication",)),
     ("no rolling friction", ("rolling-friction",)),
     ("no damping of contacts", ("damping",)),
 )

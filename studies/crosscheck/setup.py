@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from walkers.inputs.boundary import Face
+from walkers.inputs.boundary import Flat, Wall
 from walkers.inputs.case import Case
 from walkers.postprocess.motion import Motion
 from walkers.studies.crosscheck.engine import Beads, Matter, SecondEngine, Surroundings
@@ -18,21 +18,14 @@ def matter_of(case: Case) -> Matter:
     return Matter(case.density, case.contact, case.liquid)
 
 
-def surroundings_of(case: Case, faces: Sequence[Face] = ()) -> Surroundings:
-    """A case's walls (or some faces), weight and drive.
-
-    Raises
-    ------
-    ValueError
-        If a wall is round.
-    """
-    if not faces:
-        faces = case.boundary.faces()
-        if any(face.of for face in faces):
-            raise ValueError("boundary.shape: the second engine has flat walls only, no cylinder")
+def surroundings_of(case: Case, walls: Sequence[Wall] = ()) -> Surroundings:
+    """A case's walls (or some others), weight and drive."""
+    walls = walls or case.boundary.walls
+    none = (0.0, 0.0, 0.0)
     return Surroundings(
-        point=np.array([face.centroid for face in faces]),
-        normal=np.array([face.normal for face in faces]),
+        point=np.array([wall.point if isinstance(wall, Flat) else none for wall in walls]),
+        normal=np.array([wall.normal if isinstance(wall, Flat) else none for wall in walls]),
+        radius=np.array([0.0 if isinstance(wall, Flat) else wall.radius for wall in walls]),
         gravity=case.gravity_vector,
         harmonics=np.array(
             [(*one.direction, one.angular_frequency, one.peak_acceleration, one.phase) for one in case.drive.harmonics]
@@ -41,23 +34,11 @@ def surroundings_of(case: Case, faces: Sequence[Face] = ()) -> Surroundings:
 
 
 def engine_of(motion: Motion, laws: Laws) -> SecondEngine:
-    """The second engine at the first frame of a motion.
-
-    Raises
-    ------
-    ValueError
-        If a wall is round.
-    """
+    """The second engine at the first frame of a motion."""
     beads = Beads(motion.radius, motion.position[0], motion.velocity[0], motion.spin[0])
     return engine_at(motion.case, beads, laws, round(float(motion.time[0]) / motion.case.run.time_step))
 
 
-def engine_at(case: Case, beads: Beads, laws: Laws, clock: int = 0, faces: Sequence[Face] = ()) -> SecondEngine:
-    """The second engine with a case's matter, walls (or some faces) and drive, and some beads, at a step.
-
-    Raises
-    ------
-    ValueError
-        If a wall is round.
-    """
-    return SecondEngine(beads, matter_of(case), surroundings_of(case, faces), laws, case.run.time_step, clock)
+def engine_at(case: Case, beads: Beads, laws: Laws, clock: int = 0, walls: Sequence[Wall] = ()) -> SecondEngine:
+    """The second engine with a case's matter, walls (or some others) and drive, and some beads, at a step."""
+    return SecondEngine(beads, matter_of(case), surroundings_of(case, walls), laws, case.run.time_step, clock)

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from walkers.studies.crosscheck.comparison import Comparison, PileComparison
 
 Cycles = Annotated[int | None, typer.Option("--cycles", help="Of the drive, in place of the case's own.")]
-Without = Annotated[list[str] | None, typer.Option("--without", metavar="TERM", help="Leave a term out, such as film.")]
+Without = Annotated[
+    list[str] | None, typer.Option("--without", metavar="TERM", help="Leave a term out, such as friction.")
+]
 Seeds = Annotated[int, typer.Option("--seeds", min=1, help="Of a pile: so many starts, for the statistics.")]
 
 
