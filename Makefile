@@ -51,6 +51,7 @@ test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test fir
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
+	.venv/bin/lint-imports
 	.venv/bin/pytest -q -m smoke
 	@$(WALKERS) theory fig1b > /dev/null # compiles the integrator once; each worker would by itself
 	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"

@@ -7,7 +7,7 @@ from pathlib import Path
 from setuptools import setup
 from setuptools.command.build_py import build_py
 
-_PROVENANCE = runpy.run_path("runner/provenance.py")
+_PROVENANCE = runpy.run_path("walkers/runner/provenance.py")
 
 
 class BuildWithCommit(build_py):

@@ -142,7 +142,7 @@ def _tables() -> str:
 def _library() -> str:
     """The library of materials and liquids with its sources."""
     contents = read_toml(INPUTS / "library.toml")
-    text = "# Materials and liquids\n\nWhat `inputs/library.toml` holds. A case may override each number.\n"
+    text = "# Materials and liquids\n\nWhat `walkers/inputs/library.toml` holds. A case may override each number.\n"
     for kind, title in _KINDS.items():
         text += f"\n## {title}\n"
         for name, entries in contents[kind].items():

@@ -97,7 +97,7 @@ def deviation(law: Law, surfaces: Surfaces) -> Deviation:
 
 
 def interpolated(text: str, gaps: FloatArray) -> FloatArray:
-    """What engine/table.h makes of a table, written down once more from the format alone.
+    """What walkers/engine/table.h makes of a table, written down once more from the format alone.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Tables of a bridge law that the contact model ``cohesion bridge`` interpolates (its format: engine/table.h).
+"""Tables of a bridge law that the contact model ``cohesion bridge`` interpolates (its format: walkers/engine/table.h).
 
 Near contact the gap h is divided by octaves of 1 + h/scale into cells; from the last octave to the rupture cells are
 even in sqrt((rupture - h)/(rupture - m)). A law may have a kink at h = scale, between two cells, and end with an

@@ -88,9 +88,9 @@ def commit_of(checkout: Path) -> str | None:
 
 
 def _commit() -> str | None:
-    package = Path(__file__).resolve().parents[1]  # the checkout, or `walkers` in site-packages
+    package = Path(__file__).resolve().parents[1]
     try:
-        return commit_of(package) or (package / COMMIT_NAME).read_text("utf-8").strip() or None
+        return commit_of(package.parent) or (package / COMMIT_NAME).read_text("utf-8").strip() or None
     except OSError:
         return None
 
