@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from math import atan2
 
-from walkers.inputs.axes import UnusableAxisError
 from walkers.inputs.bodies import Placed
 from walkers.inputs.body_tables import check_bodies, mixture_of, spaced, walkers_of
 from walkers.inputs.boundary import Box, Channel, Cylinder, Groove, Plane, Shape
 from walkers.inputs.case import Case, Run
-from walkers.inputs.changes import check_key
 from walkers.inputs.errors import UnusableKeyError
 from walkers.inputs.matter_tables import resolve_matter
 from walkers.inputs.run_tables import resolve_drive, resolve_run
@@ -26,8 +24,6 @@ def resolve(file: CaseFile, name: str) -> Case:
     UnusableKeyError
         If something is missing that the library does not know, or keys contradict each other.
     """
-    for key in file.uncertain:
-        _check_uncertain(key)
     boundary, beads = _boundary(file.boundary), file.beads
     walkers = walkers_of(file)
     mixture = mixture_of(file.mixture, boundary) if file.mixture else None
@@ -61,13 +57,6 @@ def resolve(file: CaseFile, name: str) -> Case:
     case = replace(case, walkers=tuple(spaced(case, number, file) for number in range(len(walkers))))
     check_bodies(case, file)
     return case
-
-
-def _check_uncertain(key: str) -> None:
-    try:
-        check_key(key)
-    except UnusableAxisError as unusable:
-        raise UnusableKeyError(f"uncertain.{unusable.key}", unusable.expected) from unusable
 
 
 def _boundary(table: BoundaryTable) -> Shape:

@@ -10,8 +10,8 @@ from math import isfinite
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticCustomError
 
+from walkers.inputs.errors import UnusableKeyError
 from walkers.inputs.units import (
     Acceleration,
     Angle,
@@ -30,6 +30,7 @@ from walkers.inputs.units import (
     Speed,
     SurfaceTension,
     Time,
+    refusal,
 )
 from walkers.physics.matter import DEFAULT_LAW
 
@@ -43,13 +44,13 @@ def _auto(value: object) -> object:
 def _plain_number(value: object) -> object:
     """Accept TOML's integers and floats only: neither "0.3" nor true is a coefficient."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise PydanticCustomError("plain", "{expected}", {"expected": "expected a plain number without a unit"})
+        raise refusal("expected a plain number without a unit")
     return value
 
 
 def _whole_number(value: object) -> object:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise PydanticCustomError("whole", "{expected}", {"expected": "expected a whole number"})
+        raise refusal("expected a whole number")
     return value
 
 
@@ -167,7 +168,7 @@ class LiquidTable(Table):
     kinematic_viscosity: KinematicViscosity | None = None
     dynamic_viscosity: DynamicViscosity | None = None
     volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] | None = None
-    viscosity_ratio: Annotated[Number, Field(ge=1e-3, le=1e4)] | None = None
+    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)] | None = None
     contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] | None = None
     law: str = DEFAULT_LAW
 
@@ -220,8 +221,7 @@ def _axis(value: object) -> object:
         numbers = tuple(float(one) for one in value if type(one) in (int, float) and isfinite(one))
         if len(numbers) == 3:
             return numbers
-    expected = "expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]"
-    raise PydanticCustomError("axis", "{expected}", {"expected": expected})
+    raise refusal("expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]")
 
 
 Axis = Annotated[Any, BeforeValidator(_axis)]
@@ -292,7 +292,7 @@ class EnvironmentTable(Table):
 
 def _ranges(value: object) -> object:
     """Ranges by dotted keys: each two values of one unit, the smaller first."""
-    from walkers.inputs.axes import UnusableAxisError, ends_of, flatten, is_axis
+    from walkers.inputs.axes import ends_of, flatten, is_axis
 
     if not isinstance(value, dict):
         return value
@@ -300,9 +300,9 @@ def _ranges(value: object) -> object:
         given = flatten(value, is_axis)
         ranges = {key: one if is_axis(one) else {"uniform": one} for key, one in given.items()}
         ends_of(ranges)
-    except UnusableAxisError as unusable:
+    except UnusableKeyError as unusable:
         told = f"{unusable.key}: {unusable.expected}".replace("{ uniform = [low, high] }", "[low, high]")
-        raise PydanticCustomError("ranges", "{expected}", {"expected": told}) from unusable
+        raise refusal(told) from unusable
     return ranges
 
 
