@@ -169,21 +169,21 @@ def _walk(table: type[BaseModel], prefix: str) -> Iterator[tuple[str, type[BaseM
 
 
 @cache
-def _keys(file: type[BaseModel]) -> Mapping[str, type[BaseModel] | None]:
+def keys_of(file: type[BaseModel]) -> Mapping[str, type[BaseModel] | None]:
     """All dotted keys of a kind of file; those of tables with the table's model."""
     return {"": file, **dict(_walk(file, ""))}
 
 
 def suggested_key(key: str, file: type[BaseModel] = CaseFile) -> str | None:
     """What to say of a dotted key of a kind of case file if there is no such key; None if there is."""
-    if key in _keys(file):
-        return "is a table of a case; expected one of its keys" if _keys(file)[key] else None
+    if key in keys_of(file):
+        return "is a table of a case; expected one of its keys" if keys_of(file)[key] else None
     return _unknown_key(key.split("."), file, "a case")
 
 
 def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     *tables, word = location
-    known, place = _keys(file), ""
+    known, place = keys_of(file), ""
     for part in tables:
         below = f"{place}.{part}".lstrip(".")
         place = below if below in known else f"{place}.*"

@@ -8,7 +8,7 @@ numbers, so that "500 rad/s" would pass for 500 Hz.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from math import pi
@@ -180,11 +180,12 @@ def quantity_text(value: float, kind: Kind) -> str:
     return f"{value / _USUAL[unit][1]:.6g} {unit}"
 
 
-def kind_in(annotation: Any) -> Kind | None:
-    """The kind of quantity that a field of a table holds, or None."""
-    if isinstance(annotation, Kind):
-        return annotation
-    return next((kind for one in get_args(annotation) if (kind := kind_in(one)) is not None), None)
+def kind_in(annotations: Iterable[Any]) -> Kind | None:
+    """The kind of quantity that a field of a table holds, by its metadata and annotation; or None."""
+    for one in annotations:
+        if (kind := one if isinstance(one, Kind) else kind_in(get_args(one))) is not None:
+            return kind
+    return None
 
 
 _POSITIVE, _NOT_NEGATIVE = "more than zero", "zero or more"
