@@ -164,8 +164,7 @@ def _derived(case: Case, file: CaseFile) -> Iterator[Origin]:
 
     run, drive, boundary = case.run, case.drive, case.boundary
     derived: dict[str, tuple[str, str]] = {}
-    keys = ["dimers"] * (file.dimers is not None) + [f"clusters[{number}]" for number in range(len(file.clusters))]
-    for key, walkers in zip(keys, case.walkers, strict=True):
+    for key, walkers in zip(file.walkers, case.walkers, strict=True):
         derived[f"{key}.spacing"] = (quantity_text(walkers.spacing, LENGTH), "so that walkers do not meet")
         if walkers.gap is None:
             derived[f"{key}.gap"] = ("auto", "where the forces at rest balance")

@@ -11,27 +11,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+from walkers.inputs import units
 from walkers.inputs.errors import UnusableKeyError
-from walkers.inputs.units import (
-    Acceleration,
-    Angle,
-    Density,
-    Duration,
-    DynamicViscosity,
-    FileSize,
-    Frequency,
-    KinematicViscosity,
-    Length,
-    Modulus,
-    NonNegativeAngle,
-    NonNegativeDuration,
-    Radius,
-    SignedLength,
-    Speed,
-    SurfaceTension,
-    Time,
-    refusal,
-)
+from walkers.inputs.units import Angle, Duration, Length, NonNegativeAngle, Radius, SignedLength, refusal
 from walkers.physics.matter import DEFAULT_LAW
 
 
@@ -65,14 +47,10 @@ ALTERNATIVES: dict[str, tuple[str, ...]] = {
     "run.cycles": ("run.duration", "run.most_cycles"),
     "run.most_cycles": ("run.cycles", "run.duration"),
     "run.duration": ("run.cycles", "run.most_cycles"),
-    **{
-        key: (other,)
-        for pair in (
-            ("run.samples_per_cycle", "run.frames_per_second"),
-            ("mixture.count", "mixture.fill_height"),
-        )
-        for key, other in (pair, pair[::-1])
-    },
+    "run.samples_per_cycle": ("run.frames_per_second",),
+    "run.frames_per_second": ("run.samples_per_cycle",),
+    "mixture.count": ("mixture.fill_height",),
+    "mixture.fill_height": ("mixture.count",),
 }
 """Keys that say the same in other words: a change of one puts the others out of force."""
 
@@ -94,7 +72,7 @@ class BeadsTable(Table):
     """``[beads]``: what all beads are made of."""
 
     material: str | None = None
-    density: Density | None = None
+    density: units.Density | None = None
 
 
 class WalkersTable(Table):
@@ -163,10 +141,10 @@ class LiquidTable(Table):
     """
 
     name: str | None = None
-    surface_tension: SurfaceTension | None = None
-    density: Density | None = None
-    kinematic_viscosity: KinematicViscosity | None = None
-    dynamic_viscosity: DynamicViscosity | None = None
+    surface_tension: units.SurfaceTension | None = None
+    density: units.Density | None = None
+    kinematic_viscosity: units.KinematicViscosity | None = None
+    dynamic_viscosity: units.DynamicViscosity | None = None
     volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] | None = None
     viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)] | None = None
     contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] | None = None
@@ -208,7 +186,7 @@ class ContactTable(Table):
     friction: FrictionTable = FrictionTable()
     rolling_friction: Coefficient | None = None
     restitution: Annotated[Number, Field(gt=0.05, le=1)] | None = None
-    youngs_modulus: Annotated[Modulus, Field(ge=5e6, le=1e9)] = 5e7
+    youngs_modulus: Annotated[units.Modulus, Field(ge=5e6, le=1e9)] = 5e7
     poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = 0.3
     minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] | None = None
 
@@ -232,8 +210,8 @@ class HarmonicTable(Table):
     """One of ``[[drive.harmonics]]``; exactly one of ``peak_acceleration`` and ``gamma0``."""
 
     axis: Axis | None = None
-    frequency: Frequency
-    peak_acceleration: Acceleration | None = None
+    frequency: units.Frequency
+    peak_acceleration: units.Acceleration | None = None
     gamma0: Coefficient | None = None
     phase: Angle = 0.0
 
@@ -247,8 +225,8 @@ class DriveTable(Table):
     """
 
     axis: Axis | None = None
-    frequency: Frequency | None = None
-    peak_acceleration: Acceleration | None = None
+    frequency: units.Frequency | None = None
+    peak_acceleration: units.Acceleration | None = None
     gamma0: Coefficient | None = None
     phase: Angle = 0.0
     waveform: Literal["sine", "triangle"] = "sine"
@@ -266,7 +244,7 @@ class RunTable(Table):
     nothing for ``silence``, or more than ``log_limit``, is ended: no numbers depend on these two.
     """
 
-    time_step: Annotated[Time | None, AUTO] = None
+    time_step: Annotated[units.Time | None, AUTO] = None
     allow_unstable: bool = False
     cycles: Annotated[Annotated[Whole, Field(ge=2, le=1_000_000)] | None, AUTO] = None
     most_cycles: Annotated[Whole, Field(ge=2, le=1_000_000)] | None = None
@@ -276,18 +254,18 @@ class RunTable(Table):
     bridge_samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] | None = None
     frames_per_second: Annotated[Number, Field(gt=0, le=1e6)] | None = None
     segment: Duration | None = None
-    settled_below: Speed = 5e-3
-    longest_settling: NonNegativeDuration | None = None
+    settled_below: units.Speed = 5e-3
+    longest_settling: units.NonNegativeDuration | None = None
     ranks: Annotated[Whole, Field(ge=1, le=64)] = 1
     seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 1
     silence: Annotated[Duration | None, AUTO] = None
-    log_limit: Annotated[FileSize | None, AUTO] = None
+    log_limit: Annotated[units.FileSize | None, AUTO] = None
 
 
 class EnvironmentTable(Table):
     """``[environment]``."""
 
-    gravity: Acceleration = 9.81
+    gravity: units.Acceleration = 9.81
 
 
 def _ranges(value: object) -> object:
@@ -330,3 +308,9 @@ class CaseFile(Table):
     run: RunTable = RunTable()
     environment: EnvironmentTable = EnvironmentTable()
     uncertain: Ranges = {}
+
+    @property
+    def walkers(self) -> dict[str, DimersTable | ClusterTable]:
+        """The tables of walkers by their keys, dimers first."""
+        dimers = {} if self.dimers is None else {"dimers": self.dimers}
+        return {**dimers, **{f"clusters[{number}]": table for number, table in enumerate(self.clusters)}}
