@@ -467,8 +467,6 @@ def test_a_bead_may_lie_on_a_plane_beside_walkers_or_alone(tmp_path: Path) -> No
             },
             "do not fit between the walls",
         ),
-        ({"start": {"angle": "3 deg"}}, "[start] is part of the bodies now"),
-        ({"beads": {"material": "ruby", "radii": ["0.3 mm", "0.2 mm"]}}, "the radii of dimers are in [dimers]"),
         ({}, "expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"),
         ({"clusters": [cluster("chain", "Lss")], "run": {"ranks": 2}}, "run.ranks = 2"),
     ],

@@ -15,7 +15,7 @@ from tests.conftest import REFERENCE, call, make_case, to_toml
 from walkers.inputs import InputError, library, load_case, shipped_cases
 from walkers.inputs.axes import plain
 from walkers.inputs.case import Case
-from walkers.inputs.changes import settings_of
+from walkers.inputs.changes import changed, settings_of
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import read_toml, resolve_case
 from walkers.inputs.sweep import load_sweep
@@ -102,6 +102,8 @@ def test_another_material_loses_what_was_calibrated_and_says_so() -> None:
         ({"contact.restitution": 0.2}, "contact.restitution: expected [low, high]"),
         ({"drive.frequency": ["1 Hz", "2 kHz"]}, "drive.frequency: expected one unit"),
         ({"drive.axis": ["x", "y"]}, "drive.axis: expected a number"),
+        ({"liquid.contact_angle": ["1 mm", "2 mm"]}, 'uncertain.liquid.contact_angle = "1 mm": expected an angle'),
+        ({"contact.restitution": [0.5, 2.0]}, "uncertain.contact.restitution = 2.0: expected at most 1"),
     ],
 )
 def test_ranges_that_are_none_are_refused(ranges: dict[str, object], told: str) -> None:
@@ -123,8 +125,12 @@ def test_a_changed_value_is_validated_like_a_file() -> None:
         with pytest.raises(InputError) as caught:
             load_case("fig1b", changes)
         assert told in str(caught.value)
-    # What says the same in other words goes.
+    # What says the same in other words goes, in one of several harmonics as well.
     assert load_case("fig1b", {"drive.gamma0": 0.5}).drive.peak_acceleration > 50.0
+    harmonic = {"drive.harmonics[0].peak_acceleration": "4 g"}
+    assert changed({"drive": {"harmonics": [{"gamma0": 1.0}]}}, harmonic)["drive"]["harmonics"] == [
+        {"peak_acceleration": "4 g"}
+    ]
 
 
 def test_a_drive_changed_alone_is_refused() -> None:

@@ -19,6 +19,7 @@ from sphinx.config import Config
 import walkers.inputs
 from walkers.inputs.reading import read_toml
 from walkers.inputs.schema import AUTO, CaseFile
+from walkers.inputs.units import Kind
 from walkers.main import _program
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.tables import FAMILIES, TABLES
@@ -70,7 +71,9 @@ def _expected(hint: Any) -> str:
             for name, sign in _BOUNDS.items()
             if isinstance(getattr(one, name, None), (int, float))
         )
-        told = next((_refusal(note) for note in notes if isinstance(note, BeforeValidator) and note != AUTO), None)
+        told = next(
+            (_refusal(note) for note in notes if isinstance(note, (BeforeValidator, Kind)) and note != AUTO), None
+        )
         told = told or _expected(inner)
         told += ', or `"auto"`' if AUTO in notes else ""
         return f"{told}; {bounds}" if bounds else told
@@ -84,7 +87,9 @@ def _expected(hint: Any) -> str:
     return {str: "text", bool: "true or false"}.get(hint, getattr(hint, "__name__", str(hint)))
 
 
-def _refusal(validator: BeforeValidator) -> str | None:
+def _refusal(validator: BeforeValidator | Kind) -> str | None:
+    if isinstance(validator, Kind):
+        return validator.expectation.removeprefix("expected ")
     try:
         validator.func(object())  # type: ignore[call-arg]
     except PydanticCustomError as error:

@@ -14,7 +14,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.errors import UnusableKeyError
 from walkers.inputs.library import suggestion
 from walkers.inputs.loads import contact_loads, reach
-from walkers.inputs.schema import MOST_BEADS, CaseFile, ClusterTable, DimersTable, MixtureTable, WalkersTable
+from walkers.inputs.schema import MOST_BEADS, BoundaryTable, CaseFile, ClusterTable, DimersTable, MixtureTable
 
 _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the count that fills a height."""
@@ -27,21 +27,13 @@ _WAYS: dict[str, Literal["both", "right", "left"]] = {
 """What ``facing`` says; up and down are a climber's words."""
 
 
-def walkers_of(file: CaseFile) -> tuple[Walkers, ...]:
-    """The walkers of a file: its dimers, then its clusters."""
-    made = [_made(file, "dimers", file.dimers, _radii(file.dimers))] if file.dimers else []
-    for number, table in enumerate(file.clusters):
-        key = f"clusters[{number}]"
-        made.append(_arranged(table, key, _made(file, key, table, tuple(table.radii))))
-    return tuple(made)
-
-
-def _made(file: CaseFile, key: str, table: WalkersTable, radii: tuple[float, ...]) -> Walkers:
-    if table.facing in ("up", "down") and (not file.boundary.tilt or file.boundary.uphill):
+def walkers_of(key: str, table: DimersTable | ClusterTable, boundary: BoundaryTable) -> Walkers:
+    """The walkers of a table, which stands under a key."""
+    if table.facing in ("up", "down") and (not boundary.tilt or boundary.uphill):
         told = "on a plane that is tilted along the drive alone walkers face up or down"
         raise UnusableKeyError(f"{key}.facing", f'expected "both", "right" or "left": {told}')
-    return Walkers(
-        radii=radii,
+    walkers = Walkers(
+        radii=_radii(table) if isinstance(table, DimersTable) else tuple(table.radii),
         replicates=table.replicates,
         facing=_WAYS[table.facing],
         angle=table.angle,
@@ -51,66 +43,66 @@ def _made(file: CaseFile, key: str, table: WalkersTable, radii: tuple[float, ...
         spacing=table.spacing or 0.0,
         meet=table.meet,
     )
+    if isinstance(table, DimersTable):
+        return walkers
+    if (table.arrangement is None) == (table.at is None):
+        told = f"expected either an arrangement ({', '.join(ARRANGEMENTS)}) or places (at)"
+        raise UnusableKeyError(f"{key}.arrangement", told)
+    if table.arrangement is not None:
+        return _arranged(walkers, key, table.arrangement)
+    return _at_places(walkers, key, tuple(table.at or ()))
 
 
 def _radii(table: DimersTable) -> tuple[float, float]:
+    given = {name: getattr(table, name) for name in ("mean_radius", "sin_delta") if getattr(table, name) is not None}
     if table.radii is not None:
-        other = "mean_radius" if table.mean_radius is not None else "sin_delta"
-        if table.mean_radius is not None or table.sin_delta is not None:
-            raise UnusableKeyError(
-                f"dimers.{other}", "expected either the radii or mean_radius and sin_delta, not both"
-            )
+        if given:
+            told = "expected either the radii or mean_radius and sin_delta, not both"
+            raise UnusableKeyError(f"dimers.{next(iter(given))}", told)
         return table.radii
-    if table.mean_radius is None and table.sin_delta is None:
-        raise UnusableKeyError("dimers.radii", 'missing; expected such as ["0.3 mm", "0.2 mm"]')
     if table.mean_radius is None or table.sin_delta is None:
-        lacking, example = ("mean_radius", '"0.25 mm"') if table.mean_radius is None else ("sin_delta", "0.2")
-        raise UnusableKeyError(f"dimers.{lacking}", f"missing; expected such as {example}")
+        examples = {"mean_radius": '"0.25 mm"', "sin_delta": "0.2"} if given else {"radii": '["0.3 mm", "0.2 mm"]'}
+        lacking = next(name for name in examples if name not in given)
+        raise UnusableKeyError(f"dimers.{lacking}", f"missing; expected such as {examples[lacking]}")
     first, second = (float(f"{table.mean_radius * share:.15g}") for share in (1 + table.sin_delta, 1 - table.sin_delta))
     return first, second
 
 
-def _arranged(table: ClusterTable, key: str, walkers: Walkers) -> Walkers:
-    """A cluster in its arrangement, or at its places."""
-    if (table.arrangement is None) == (table.at is None):
-        told = f"expected either an arrangement ({', '.join(ARRANGEMENTS)}) or places (at)"
-        raise UnusableKeyError(f"{key}.arrangement", told)
-    if table.at is not None:
-        return _at_places(table.at, key, walkers)
-    name = table.arrangement or ""
+def _arranged(walkers: Walkers, key: str, name: str) -> Walkers:
+    """A cluster in an arrangement."""
     known = ARRANGEMENTS.get(name)
     if known is None:
         told = f"expected one of {', '.join(ARRANGEMENTS)}{suggestion(name, ARRANGEMENTS)}"
         raise UnusableKeyError(f"{key}.arrangement", told)
+    key = f"{key}.radii"
     if not known.fewest <= len(walkers.radii) <= known.most:
         bound = f"at least {known.fewest}" if known.fewest < known.most else str(known.most)
-        raise UnusableKeyError(f"{key}.radii", f"expected {bound} beads in a {name}")
+        raise UnusableKeyError(key, f"expected {bound} beads in a {name}")
     walkers = replace(walkers, arrangement=name)
     try:
         overlap = _overlap(walkers)
     except ValueError as error:
-        raise UnusableKeyError(f"{key}.radii", str(error)) from error
+        raise UnusableKeyError(key, str(error)) from error
     if overlap is not None:
-        told = f"beads {overlap[0] + 1} and {overlap[1] + 1} would overlap in a {name}"
-        raise UnusableKeyError(f"{key}.radii", told)
+        raise UnusableKeyError(key, f"beads {overlap[0] + 1} and {overlap[1] + 1} would overlap in a {name}")
     return walkers
 
 
-def _at_places(places: list[tuple[float, float]], key: str, walkers: Walkers) -> Walkers:
+def _at_places(walkers: Walkers, key: str, places: tuple[tuple[float, float], ...]) -> Walkers:
     """A cluster whose beads are given places: they touch, do not overlap, and have a heading."""
-    if len(places) != len(walkers.radii):
-        raise UnusableKeyError(f"{key}.at", f"expected a place for each of the {len(walkers.radii)} beads")
-    walkers = replace(walkers, arrangement="given", places=tuple(places))
+    key, everyone = f"{key}.at", set(range(len(walkers.radii)))
+    if len(places) != len(everyone):
+        raise UnusableKeyError(key, f"expected a place for each of the {len(everyone)} beads")
+    walkers = replace(walkers, arrangement="given", places=places)
     if (overlap := _overlap(walkers)) is not None:
-        raise UnusableKeyError(f"{key}.at[{overlap[1]}]", f"overlaps with {key}.at[{overlap[0]}]")
+        raise UnusableKeyError(f"{key}[{overlap[1]}]", f"overlaps with {key}[{overlap[0]}]")
     if not any(walkers.front):
-        raise UnusableKeyError(f"{key}.at", "expected some beads ahead of others: this has no heading")
+        raise UnusableKeyError(key, "expected some beads ahead of others: this has no heading")
     joined = {0}
-    for _ in walkers.radii:
+    for _ in everyone:
         joined |= {bead for pair in walkers.pairs if joined & {*pair} for bead in pair}
-    if len(joined) < len(walkers.radii):
-        alone = min({*range(len(walkers.radii))} - joined)
-        raise UnusableKeyError(f"{key}.at[{alone}]", "expected beads that touch: nothing joins this one to the first")
+    if alone := everyone - joined:
+        raise UnusableKeyError(f"{key}[{min(alone)}]", "expected beads that touch: nothing joins this one to the first")
     return walkers
 
 
@@ -158,13 +150,13 @@ def _sizes(key: str, bounds: tuple[float, float], number: int) -> tuple[float, .
 
 def check_bodies(case: Case, file: CaseFile) -> None:
     """Room for all bodies within the boundary, and no overlaps."""
-    boundary, ranks = case.boundary, case.run.ranks
-    if ranks > 1 and not boundary.closed:
+    boundary, mixture = case.boundary, case.mixture
+    if case.run.ranks > 1 and not boundary.closed:
         raise UnusableKeyError("run.ranks", "expected 1: walkers on a plane are slower on several")
-    if case.placed is not None and case.mixture is None and "seed" in file.run.model_fields_set and not case.walkers:
+    if not case.walkers and mixture is None and "seed" in file.run.model_fields_set:
         raise UnusableKeyError("run.seed", "expected none where the beads are placed: every start would be the same")
-    if case.mixture is not None:
-        _check_pour(case.mixture, boundary, case.tops_of_others(case.mixture))
+    if mixture is not None:
+        _check_pour(mixture, boundary, case.tops_of_others(mixture))
     if case.placed is not None:
         _check_places(case.placed, boundary)
     if case.walkers and (not boundary.bare or case.placed is not None):
@@ -173,27 +165,32 @@ def check_bodies(case: Case, file: CaseFile) -> None:
 
 def _check_walkers(case: Case, file: CaseFile) -> None:
     """Walkers between the walls and beside the beads that are placed."""
-    keys = [key for number, one in enumerate(case.walkers) for key in [_key_of(file, number)] * one.replicates]
-    grid = case.boundary.grid(len(keys), max(walkers.spacing for walkers in case.walkers))
+    boundary = case.boundary
+    keys = [key for key, table in file.walkers.items() for _ in range(table.replicates)]
     standing: list[Standing] = []
     try:
         standing.extend(one for _, one in islice(case.standing(), len(keys)))
     except ValueError as error:
         raise UnusableKeyError(f"{keys[len(standing)]}.radii", str(error)) from error
     largest = max(radius for walkers in case.walkers for radius in walkers.radii)
-    if case.boundary.inner_width / 2.0 < (1.0 - _OVERLAP) * largest:
+    if boundary.inner_width / 2.0 < (1.0 - _OVERLAP) * largest:
         raise UnusableKeyError("boundary.width", "expected more than a bead's diameter")
     others = case.placed.beads if case.placed is not None else ()
-    for key, (x, y), walker in zip(keys, grid, standing, strict=True):
-        for bead in walker.beads:
-            if case.boundary.side_clearance(x + bead.x, y + bead.y, bead.z) < (1.0 - _OVERLAP) * bead.radius:
-                told = f"so many walkers, or such, do not fit between the walls of the {case.boundary.shape}"
-                raise UnusableKeyError(f"{key}.replicates", told)
-            if bead.z + bead.radius > case.boundary.top:
-                raise UnusableKeyError("boundary.height", f"too low for the walkers of {key}")
-            for number, (*there, size) in enumerate(others):
-                if dist((x + bead.x, y + bead.y, bead.z), there) < (1.0 - _OVERLAP) * (bead.radius + size):
-                    raise UnusableKeyError(f"placed[{number}].at", f"overlaps with one of {key}")
+    grid = boundary.grid(len(keys), max(walkers.spacing for walkers in case.walkers))
+    beads = [
+        (key, (x + bead.x, y + bead.y, bead.z), bead.radius)
+        for key, (x, y), walker in zip(keys, grid, standing, strict=True)
+        for bead in walker.beads
+    ]
+    for key, place, radius in beads:
+        if boundary.side_clearance(*place) < (1.0 - _OVERLAP) * radius:
+            told = f"so many walkers, or such, do not fit between the walls of the {boundary.shape}"
+            raise UnusableKeyError(f"{key}.replicates", told)
+        if place[2] + radius > boundary.top:
+            raise UnusableKeyError("boundary.height", f"too low for the walkers of {key}")
+        for number, (*there, size) in enumerate(others):
+            if dist(place, there) < (1.0 - _OVERLAP) * (radius + size):
+                raise UnusableKeyError(f"placed[{number}].at", f"overlaps with one of {key}")
 
 
 def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
@@ -210,40 +207,33 @@ def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
 
 def _check_places(placed: Placed, boundary: Boundary) -> None:
     """Beads within the boundary that do not overlap by more than a hundredth of a radius."""
+    from scipy.spatial import cKDTree
+
     for number, (x, y, z, radius) in enumerate(placed.beads):
-        slack = _OVERLAP * radius
-        if boundary.side_clearance(x, y, z) < radius - slack or z < radius - slack or z + radius > boundary.top:
+        least = (1.0 - _OVERLAP) * radius
+        if boundary.side_clearance(x, y, z) < least or z < least or z + radius > boundary.top:
             raise UnusableKeyError(f"placed[{number}].at", "expected a bead within the boundary")
-        for other in range(number):
-            *there, size = placed.beads[other]
-            if dist((x, y, z), there) < radius + size - _OVERLAP * min(radius, size):
-                raise UnusableKeyError(f"placed[{number}].at", f"overlaps with placed[{other}]")
+    places, radii = [bead[:3] for bead in placed.beads], placed.all_radii
+    for one, other in sorted(cKDTree(places).query_pairs(2.0 * max(radii)), key=lambda pair: pair[::-1]):
+        first, second = radii[one], radii[other]
+        if dist(places[one], places[other]) < first + second - _OVERLAP * min(first, second):
+            raise UnusableKeyError(f"placed[{other}].at", f"overlaps with placed[{one}]")
 
 
-def _key_of(file: CaseFile, number: int) -> str:
-    """Key of the table of a case's walkers."""
-    dimers = file.dimers is not None
-    return "dimers" if dimers and number == 0 else f"clusters[{number - dimers}]"
-
-
-def spaced(case: Case, number: int, file: CaseFile) -> Walkers:
-    """Settle the spacing of walkers and refuse starts in which beads overlap."""
-    walkers, key = case.walkers[number], _key_of(file, number)
-    smallest, gap = min(walkers.radii), walkers.gap
+def spaced(case: Case, key: str, walkers: Walkers) -> Walkers:
+    """Settle the spacing of the walkers under a key and refuse starts in which beads overlap."""
+    gap = walkers.gap
     if gap is not None and gap > 0.0:
         raise UnusableKeyError(f"{key}.gap", "expected zero or less: a bridge forms on contact, beads apart have none")
     overlaps = contact_loads(case, walkers).overlaps if gap is None else (-gap,)
-    if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * smallest:
+    if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
         blamed = f"{key}.gap" if gap is not None else "contact.youngs_modulus"
         raise UnusableKeyError(blamed, "the beads overlap by more than 2 % of the smallest radius")
-    many = sum(one.replicates for one in case.walkers) > 1
+    if not walkers.spacing:
+        return replace(walkers, spacing=2.0 * walkers.length if walkers.meet else 2.0 * reach(case))
     # Beads of different walkers may touch, but not overlap, if they are meant to meet.
     least = (1.0 if walkers.meet else 1.5) * walkers.length
-    if walkers.spacing and many and walkers.spacing < least:
-        raise UnusableKeyError(
-            f"{key}.spacing",
-            f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"',
-        )
-    if walkers.spacing:
-        return walkers
-    return replace(walkers, spacing=2.0 * walkers.length if walkers.meet else 2.0 * reach(case))
+    if walkers.spacing < least and sum(one.replicates for one in case.walkers) > 1:
+        told = f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"'
+        raise UnusableKeyError(f"{key}.spacing", told)
+    return walkers

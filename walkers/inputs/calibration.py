@@ -27,16 +27,15 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from walkers.inputs.axes import Value, flatten
+from walkers.inputs.axes import flatten
+from walkers.inputs.changes import Value
 from walkers.inputs.errors import InputError, Problem
-from walkers.inputs.kinds import check_kind
 from walkers.inputs.library import suggestion
 from walkers.inputs.messages import validated
-from walkers.inputs.reading import find_input, read_toml
+from walkers.inputs.reading import check_kind, find_input, read_toml, shipped
 from walkers.inputs.schema import Number, Whole
 from walkers.inputs.units import ANGLE, SPEED, Kind, parse_quantity
 
-_SHIPPED = Path(__file__).parent / "calibrations"
 _MOST = 10_000
 Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3"]
 """A column of a sweep's table that is a speed."""
@@ -186,7 +185,7 @@ class Calibration:
 
 def shipped_calibrations() -> dict[str, Path]:
     """The calibrations that come with the project: name to file."""
-    return {path.stem: path for path in sorted(_SHIPPED.glob("*.toml"))}
+    return shipped("calibration")
 
 
 def load_calibration(calibration: str | Path) -> Calibration:
@@ -198,7 +197,7 @@ def load_calibration(calibration: str | Path) -> Calibration:
         If there is no such file or anything in it cannot be used.
     """
     check_kind(calibration, "calibration")
-    path = find_input(calibration, shipped_calibrations(), "calibration")
+    path = find_input(calibration, "calibration")
     return read_calibration(read_toml(path), source=str(calibration), name=path.stem, folder=path.parent)
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from math import cos, hypot, inf, isclose, sin
 from typing import Annotated, Any
-from zlib import crc32
 
 from pydantic import Field, TypeAdapter, ValidationError
+from pydantic_core import to_jsonable_python
 
 from walkers.inputs.bodies import Body, Mixture, Placed, Standing, Walkers
 from walkers.inputs.boundary import Shape
@@ -34,6 +34,8 @@ FIRST_ATTEMPTS = (12, 24)
 
 BOUNDS = ("silence", "log_limit")
 """Of `Run`: upon these depends whether a run ends, not what it gives."""
+
+_TOLD = ("document", "recorded")
 
 
 def settling_of(cycles: int) -> int:
@@ -149,9 +151,9 @@ class Case:
     """Bodies on a boundary under a drive, resolved.
 
     Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²). ``seed`` is that of all that is drawn at
-    the start. ``name``, ``title``, ``document`` (the tables that it was read from), ``recorded`` (the `origins` that
-    were written down with a run) and ``fingerprint`` (of what these two tell of) do not determine the run: they stay
-    out of `determinants`, the last three out of comparisons too; so do the `BOUNDS` of the run.
+    the start. ``name``, ``title`` and the `BOUNDS` of the run do not determine it. ``document`` (the tables that the
+    case was read from) and ``recorded`` (the `origins` that were written down with a run) are part of no comparison,
+    and are lost where `dataclasses.replace` changes the case: they would tell of another one.
 
     Raises
     ------
@@ -173,9 +175,8 @@ class Case:
     contact: Contact
     seed: int
     run: Run
-    document: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
-    recorded: tuple[Origin, ...] = field(default=(), compare=False, repr=False)
-    fingerprint: int = field(default=0, compare=False, repr=False)
+    document: Mapping[str, Any] = field(default_factory=dict, init=False, compare=False, repr=False)
+    recorded: tuple[Origin, ...] = field(default=(), init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse a drive that was changed alone: its step and sampling would be another's."""
@@ -189,25 +190,27 @@ class Case:
     @property
     def origins(self) -> tuple[Origin, ...]:
         """Where each of its values comes from; empty for one that was not read, or was changed since."""
-        return (self.recorded or origins_of(self)) if self.as_read else ()
+        return self.recorded or origins_of(self)
 
     @property
     def as_read(self) -> bool:
         """Whether it is what its document says: it was read, and not changed since."""
-        return bool(self.document) and self.fingerprint == self._fingerprint()
-
-    def _fingerprint(self) -> int:
-        told = (self.walkers, self.mixture, self.placed, self.boundary, self.drive, self.gravity, self.material)
-        return crc32(repr((*told, self.density, self.liquid, self.contact, self.seed, self.run)).encode())
+        return bool(self.document)
 
     def read_from(self, document: Mapping[str, Any], recorded: tuple[Origin, ...] = ()) -> Case:
         """The same with the tables that it was read from, and the origins that were written down with a run."""
-        return replace(self, document=dict(document), recorded=recorded, fingerprint=self._fingerprint())
+        case = replace(self)
+        object.__setattr__(case, "document", document)
+        object.__setattr__(case, "recorded", recorded)
+        return case
+
+    def renamed(self, name: str) -> Case:
+        """The same case under another name."""
+        return replace(self, name=name).read_from(self.document, self.recorded)
 
     def for_cycles(self, cycles: int) -> Case:
         """The same for so many cycles at a stretch, of a case whose run ends when its walkers are steady."""
-        shorter = replace(self, run=self.run.for_cycles(cycles))
-        return shorter.read_from(self.document, self.recorded) if self.as_read else shorter
+        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.recorded)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -310,14 +313,14 @@ class Case:
 
     def determinants(self) -> dict[str, Any]:
         """Everything that the run's outcome depends on, as plain JSON types."""
-        left_out = dict.fromkeys(("name", "title", "document", "recorded", "fingerprint"), True)
-        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude={**left_out, "run": set(BOUNDS)})
+        exclude: dict[str, Any] = {**dict.fromkeys(("name", "title", *_TOLD), True), "run": set(BOUNDS)}
+        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=exclude)
         return values
 
     def as_dict(self) -> dict[str, Any]:
         """The whole case as plain JSON types, SI units, with the origins of its values."""
-        told = replace(self, recorded=self.origins, document=self.document if self.as_read else {})
-        values: dict[str, Any] = _adapter().dump_python(told, mode="json", exclude={"fingerprint"})
+        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=set(_TOLD))
+        values |= to_jsonable_python({"document": self.document, "recorded": self.origins})
         return values
 
     @classmethod
@@ -330,17 +333,18 @@ class Case:
             If it is none.
         """
         try:
-            case = _adapter().validate_python(values)
-            return case.read_from(case.document, case.recorded)
+            recorded = _origins_adapter().validate_python(values.get("recorded", ()))
+            return _adapter().validate_python(values).read_from(values.get("document", {}), recorded)
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
-
-    def renamed(self, name: str) -> Case:
-        """The same case under another name."""
-        return replace(self, name=name)
 
 
 @cache
 def _adapter() -> TypeAdapter[Case]:
     return TypeAdapter(Case)
+
+
+@cache
+def _origins_adapter() -> TypeAdapter[tuple[Origin, ...]]:
+    return TypeAdapter(tuple[Origin, ...])

@@ -5,15 +5,15 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from walkers.inputs.axes import UnusableAxisError, Value
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import InputError, Problem, UnusableKeyError
+
+Value = Any
+"""A TOML value: text with a unit, a number, or a list of such."""
 
 _PART = re.compile(r"(?P<name>[^.\[\]]+)(?:\[(?P<index>\d+)\])?")
-_INDEX = re.compile(r"\[\d+\]")
-_LAST_INDEX = re.compile(r"\[\d+\][^\[]*$")
 
 
 def settings_of(words: Iterable[str]) -> dict[str, Value]:
@@ -55,17 +55,15 @@ def check_key(key: str) -> None:
 
     Raises
     ------
-    UnusableAxisError
+    UnusableKeyError
         If it is one.
     """
     from walkers.inputs.messages import suggested_key
-    from walkers.inputs.schema import CaseFile
 
     if "" in key.split("."):
-        raise UnusableAxisError(key, None, "is no key of a case")
-    unknown = suggested_key(_INDEX.sub("", key), CaseFile)
-    if unknown is not None:
-        raise UnusableAxisError(key, None, unknown)
+        raise UnusableKeyError(key, "is no key of a case")
+    if unknown := suggested_key(re.sub(r"\[\d+\]", "", key)):
+        raise UnusableKeyError(key, unknown)
 
 
 def changed(document: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[str, Any]:
@@ -73,52 +71,43 @@ def changed(document: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[s
 
     Raises
     ------
-    UnusableAxisError
+    UnusableKeyError
         If there is no such place in a list.
 
     What a new value stands for in other words (`walkers.inputs.schema.ALTERNATIVES`) goes, unless it changes too.
     """
     from walkers.inputs.schema import ALTERNATIVES
 
-    changed_document = copy.deepcopy(dict(document))
-    for key in changes:
-        for other in ALTERNATIVES.get(key, ()):
-            if other not in changes:
-                _remove(changed_document, other)
+    tables = copy.deepcopy(dict(document))
     for key, value in changes.items():
-        _put(changed_document, key, value)
-    return changed_document
+        place, _, name = key.rpartition(".")
+        others = [other.rpartition(".")[2] for other in ALTERNATIVES.get(f"{key.split('.')[0]}.{name}", ())]
+        _put(tables, key, value, [other for other in others if f"{place}.{other}" not in changes])
+    return tables
 
 
-def _remove(document: dict[str, Any], key: str) -> None:
-    *tables, name = key.split(".")
-    table: Any = document
-    for part in tables:
-        table = table.get(part) if isinstance(table, dict) else None
-    if isinstance(table, dict):
-        table.pop(name, None)
-
-
-def _put(document: dict[str, Any], key: str, value: Value) -> None:
-    """Give the place of a dotted key, such as ``drive.harmonics[1].phase``, another value."""
-    *tables, last = [(match["name"], match["index"]) for match in _PART.finditer(key)]
+def _put(document: dict[str, Any], key: str, value: Value, without: Sequence[str]) -> None:
+    """Give the place of a dotted key, such as ``drive.harmonics[1].phase``, another value; other keys there go."""
+    *tables, (last, last_index) = [(match["name"], match["index"]) for match in _PART.finditer(key)]
     table: Any = document
     for name, index in tables:
-        table = table.setdefault(name, {}) if index is None else _entry(table, name, int(index), key, value)
+        table = table.setdefault(name, {}) if index is None else _entries(table, name, index, key, value)[int(index)]
         if isinstance(table, list):
-            raise UnusableAxisError(key, value, f"{name} is a list: say which one, such as {name}[0]")
+            raise UnusableKeyError(key, f"{name} is a list: say which one, such as {name}[0]", value)
         if not isinstance(table, dict):  # the base case is wrong there, which its own check tells
             return
-    name, index = last
-    if index is None:
-        table[name] = value
+    for other in without:
+        table.pop(other, None)
+    if last_index is None:
+        table[last] = value
     else:
-        _entry(table, name, int(index), key, value)
-        table[name] = [value if place == int(index) else one for place, one in enumerate(table[name])]
+        entries = _entries(table, last, last_index, key, value)
+        table[last] = [value if place == int(last_index) else one for place, one in enumerate(entries)]
 
 
-def _entry(table: dict[str, Any], name: str, index: int, key: str, value: Value) -> Any:
+def _entries(table: dict[str, Any], name: str, index: str, key: str, value: Value) -> list[Any]:
     entries = table.get(name)
-    if not isinstance(entries, list) or index >= len(entries):
-        raise UnusableAxisError(key, value, f"the base case has no {_LAST_INDEX.sub('', key)} of that length")
-    return entries[index]
+    if not isinstance(entries, list) or int(index) >= len(entries):
+        listed = re.sub(r"\[\d+\][^\[]*$", "", key)
+        raise UnusableKeyError(key, f"the base case has no {listed} of that length", value)
+    return entries

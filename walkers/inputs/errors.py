@@ -88,10 +88,9 @@ class InputError(WalkersError):
         super().__init__("\n".join(f"{named}: {problem}" for problem in self.problems))
 
 
-class UnusableKeyError(Exception):
-    """A problem found between keys; `walkers.inputs.reading` adds the file and the value."""
+class UnusableKeyError(ValueError):
+    """What cannot be used under a key, and the value if it is not the document's; the reader adds file and value."""
 
-    def __init__(self, key: str, expected: str) -> None:
-        self.key = key
-        self.expected = expected
+    def __init__(self, key: str, expected: str, value: object = None) -> None:
+        self.key, self.expected, self.value = key, expected, value
         super().__init__(expected)

@@ -42,10 +42,8 @@ class Known:
 
     Attributes
     ----------
-    value
-        SI.
-    text
-        As the library has it, with its unit.
+    value, text
+        SI, and as the library has it, with its unit.
     source
         Where it is from.
     range
@@ -56,7 +54,7 @@ class Known:
 
     value: float
     text: str
-    source: str
+    source: str = ""
     range: tuple[Any, Any] | None = None
     calibrated_with: tuple[str, ...] = ()
 
@@ -65,7 +63,7 @@ class Known:
 class Unmeasured:
     """What nobody measures and a case may leave out: what is usual then, None if it must be said, and its range.
 
-    ``logarithmic`` says whether the range is of magnitudes; ``usual`` is SI, ``range`` as a case would write it.
+    ``logarithmic`` says whether the range is of magnitudes; ``range`` is as a case would write it.
     """
 
     usual: Known | None
@@ -73,17 +71,12 @@ class Unmeasured:
     logarithmic: bool
 
 
-def _known(key: str, entry: Mapping[str, Any]) -> Known:
-    value = entry["value"]
-    return Known(_number(key, value), value if isinstance(value, str) else f"{value:g}", entry["source"], _range(entry))
-
-
-def _range(entry: Mapping[str, Any]) -> tuple[Any, Any] | None:
-    return (entry["range"][0], entry["range"][1]) if "range" in entry else None
-
-
-def _number(key: str, value: Any) -> float:
-    return units.parse_quantity(value, _KINDS[key]) if isinstance(value, str) else float(value)
+def _known(key: str, value: Any, entry: Mapping[str, Any], liquids: tuple[str, ...] = ()) -> Known:
+    kind = _KINDS.get(key.rpartition(".")[2])
+    number = units.parse_quantity(value, kind) if kind else float(value)
+    source = f"calibrated with {' and '.join(liquids)}" if liquids else entry.get("source", "")
+    between = (entry["range"][0], entry["range"][1]) if "range" in entry else None
+    return Known(number, str(value), source, between, liquids)
 
 
 @cache
@@ -95,7 +88,7 @@ def material(name: str) -> Mapping[str, Known]:
     KeyError
         If the library has no such material.
     """
-    return {key: _known(key, entry) for key, entry in _contents()["materials"][name].items()}
+    return {key: _known(key, entry["value"], entry) for key, entry in _contents()["materials"][name].items()}
 
 
 @cache
@@ -107,26 +100,22 @@ def liquid(name: str) -> Mapping[str, Known]:
     KeyError
         If the library has no such liquid.
     """
-    return {key: _known(key, entry) for key, entry in _contents()["liquids"][name].items()}
+    return {key: _known(key, entry["value"], entry) for key, entry in _contents()["liquids"][name].items()}
 
 
 @cache
-def surface_pair(first: str | None, second: str | None) -> Mapping[str, Known] | None:
-    """How two wet surfaces touch, or None where the library has no value for them.
+def surface_pair(first: str | None, second: str | None) -> Mapping[str, Known]:
+    """How two wet surfaces touch; empty where the library has no value for them.
 
     ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio``, ``viscosity_ratio``,
     ``contact_angle`` (rad), ``volume_fraction`` and ``restitution``.
     """
-    for entry in _contents()["surface_pairs"]:
-        if sorted(entry["materials"]) == sorted([first or "", second or ""]):
-            liquids = tuple(entry["calibrated_with"])
-            source = f"calibrated with {' and '.join(liquids)}"
-            return {
-                key: Known(_number(key, one["value"]), str(one["value"]), source, _range(one), liquids)
-                for key, one in entry.items()
-                if isinstance(one, dict)
-            }
-    return None
+    for pair in _contents()["surface_pairs"]:
+        if sorted(pair["materials"]) == sorted([first or "", second or ""]):
+            numbers = {key: one for key, one in pair.items() if isinstance(one, dict)}
+            liquids = tuple(pair["calibrated_with"])
+            return {key: _known(key, one["value"], one, liquids) for key, one in numbers.items()}
+    return {}
 
 
 @cache
@@ -134,7 +123,7 @@ def unmeasured() -> Mapping[str, Unmeasured]:
     """What nobody measures, by the keys of a case."""
     return {
         key: Unmeasured(
-            _known(key.split(".")[-1], {"value": entry["usual"], "source": ""}) if "usual" in entry else None,
+            _known(key, entry["usual"], {}) if "usual" in entry else None,
             (entry["range"][0], entry["range"][1]),
             entry.get("log", False),
         )

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from walkers.inputs.errors import InputError, Problem, shortened
+from walkers.inputs.errors import InputError, Problem, UnusableKeyError, shortened
 from walkers.inputs.library import suggestion
 from walkers.inputs.schema import CaseFile
 
@@ -50,19 +52,35 @@ _PLAIN = {
 }
 
 
+def _shown(value: Any) -> str:
+    """A value as the user may have written it, shortened."""
+    try:
+        text = json.dumps(value, ensure_ascii=False, default=str)
+    except (ValueError, RecursionError):  # integers of thousands of digits, brackets without end
+        return "..."
+    return shortened(text)
+
+
 def quoted(document: Mapping[str, Any], location: Sequence[str | int]) -> str | None:
-    """The value at a place of a document as the user may have written it, shortened; None if there is none."""
+    """The value at a place of a document, quoted; None if there is none."""
     value: Any = document
     for part in location:
         known = value if isinstance(value, Mapping) else dict(enumerate(value)) if isinstance(value, list) else {}
         if part not in known:
             return None
         value = known[part]
+    return _shown(value)
+
+
+@contextmanager
+def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[None]:
+    """Tell an `UnusableKeyError` as an `InputError` of a source, with the value at fault or the document's there."""
     try:
-        text = json.dumps(value, ensure_ascii=False, default=str)
-    except (ValueError, RecursionError):  # integers of thousands of digits, brackets without end
-        return "..."
-    return shortened(text)
+        yield
+    except UnusableKeyError as error:
+        parts = [int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", error.key)]
+        value = quoted(document or {}, parts) if error.value is None else _shown(error.value)
+        raise InputError(source, [Problem(error.key, value, error.expected)]) from error
 
 
 def validated(model: type[File], document: Mapping[str, Any], source: str, whole: str = "a case") -> File:
@@ -132,59 +150,48 @@ def _expectation(details: ErrorDetails, key: str, file: type[BaseModel], whole: 
     return f"expected {bounds}{_BOUND_UNITS.get(key, '')}" if bounds else details["msg"]
 
 
-def _table_at(location: Sequence[str], file: type[BaseModel]) -> type[BaseModel] | None:
-    table, parts = file, iter(location)
-    for part in parts:
-        field = table.model_fields.get(part)
-        nested = _model_in(field.annotation) if field is not None else None
-        if nested is None:
-            return None
-        table, named = nested
-        if named and next(parts, None) is None:  # a table of tables that have names of the user's
-            return None
-    return table
-
-
-def _model_in(annotation: Any) -> tuple[type[BaseModel], bool] | None:
-    """The model that a field holds, whether alone, in a list or by names (which is told), or None."""
+def _nested(annotation: Any) -> tuple[type[BaseModel], str] | None:
+    """The model that a field holds, alone or in a list, or by names of the user's (then with ``.*``), or None."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation, False
+        return annotation, ""
     for inner in get_args(annotation):
-        if (found := _model_in(inner)) is not None:
-            return found[0], found[1] or get_origin(annotation) is dict
+        if (found := _nested(inner)) is not None:
+            return found[0], ".*" if get_origin(annotation) is dict else found[1]
     return None
 
 
-def _all_keys(file: type[BaseModel], prefix: str = "") -> list[str]:
-    keys: list[str] = []
-    table = _table_at(prefix.split("."), file) if prefix else file
-    for name in table.model_fields if table else ():
-        dotted = f"{prefix}.{name}" if prefix else name
-        keys += _all_keys(file, dotted) if _table_at(dotted.split("."), file) else [dotted]
-    return keys
+def _walk(table: type[BaseModel], prefix: str) -> Iterator[tuple[str, type[BaseModel] | None]]:
+    for name, field in table.model_fields.items():
+        inner, named = _nested(field.annotation) or (None, "")
+        yield f"{prefix}{name}{named}", inner
+        if inner is not None:
+            yield from _walk(inner, f"{prefix}{name}{named}.")
 
 
 @cache
-def _case_keys(file: type[BaseModel]) -> frozenset[str]:
-    return frozenset(_all_keys(file))
+def keys_of(file: type[BaseModel]) -> Mapping[str, type[BaseModel] | None]:
+    """All dotted keys of a kind of file; those of tables with the table's model."""
+    return {"": file, **dict(_walk(file, ""))}
 
 
 def suggested_key(key: str, file: type[BaseModel] = CaseFile) -> str | None:
     """What to say of a dotted key of a kind of case file if there is no such key; None if there is."""
-    if key in _case_keys(file):
-        return None
-    if _table_at(key.split("."), file):
-        return "is a table of a case; expected one of its keys"
+    if key in keys_of(file):
+        return "is a table of a case; expected one of its keys" if keys_of(file)[key] else None
     return _unknown_key(key.split("."), file, "a case")
 
 
 def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
-    word = location[-1]
-    table = _table_at(location[:-1], file)
+    *tables, word = location
+    known, place = keys_of(file), ""
+    for part in tables:
+        below = f"{place}.{part}".lstrip(".")
+        place = below if below in known else f"{place}.*"
+    table = known.get(place)
     siblings = [field.alias or name for name, field in table.model_fields.items()] if table else []
     hint = suggestion(word, siblings)
-    elsewhere = [key for key in _all_keys(file) if key.split(".")[-1] == word]
+    elsewhere = [key for key, inner in known.items() if inner is None and key.split(".")[-1] == word]
     if not hint and elsewhere:
         hint = f'; did you mean "{elsewhere[0]}"?'
-    place = f"[{'.'.join(location[:-1])}]" if location[:-1] else whole
-    return f"unknown key{f'; {place} takes ' if siblings else ''}{', '.join(siblings)}{hint}"
+    within = f"[{'.'.join(tables)}]" if tables else whole
+    return f"unknown key{f'; {within} takes ' if siblings else ''}{', '.join(siblings)}{hint}"

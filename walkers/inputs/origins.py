@@ -11,8 +11,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from walkers.inputs.library import Known, unmeasured
-
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
@@ -60,52 +58,6 @@ class Origin:
         return self.uncertain or (self.range is not None and self.origin == "default")
 
 
-class Choices:
-    """Chooses, of what may say a value, who says it first; and keeps from where it came.
-
-    What was calibrated with other liquids is a guess for this one.
-
-    Parameters
-    ----------
-    liquid
-        Name of the case's.
-
-    Attributes
-    ----------
-    origins
-        Of all that the case does not say itself, by its key.
-    """
-
-    def __init__(self, liquid: str | None) -> None:
-        self.origins: dict[str, Origin] = {}
-        self._liquid = liquid
-
-    def choose(self, key: str, given: float | None, known: Known | None) -> float | None:
-        """The value of a key as given, else as the library knows it, else as is usual; None if nobody says it."""
-        if given is not None:
-            return given
-        if known is not None:
-            self.origins[key] = self._known(key, known)
-            return known.value
-        loose = unmeasured().get(key)
-        if loose is None or loose.usual is None:
-            return None
-        self.origins[key] = Origin(key, loose.usual.text, "default", "", loose.range, loose.logarithmic)
-        return loose.usual.value
-
-    def _known(self, key: str, known: Known) -> Origin:
-        loose = unmeasured().get(key)
-        if loose is None or not known.calibrated_with:
-            return Origin(key, known.text, "library", known.source)
-        if self._liquid in known.calibrated_with:
-            return Origin(key, known.text, "calibrated", known.source, known.range, loose.logarithmic)
-        return Origin(key, known.text, "default", known.source, loose.range, loose.logarithmic)
-
-    def derive(self, key: str, text: str, source: str) -> None:
-        """Keep from what a value follows."""
-        self.origins[key] = Origin(key, text, "derived", source)
-
-
 def origins_of(case: Case) -> tuple[Origin, ...]:
     """Where the values of a case come from, in the order of a case file's tables.
 
@@ -120,7 +72,7 @@ def origins_of(case: Case) -> tuple[Origin, ...]:
     from walkers.inputs.schema import CaseFile
 
     file = CaseFile.model_validate(case.document)
-    known = resolve_matter(file)[-1].origins | {one.key: one for one in _derived(case, file)}
+    known = resolve_matter(file)[-1] | {one.key: one for one in _derived(case, file)}
     found = [
         _origin(key, raw, default, known)
         for key, raw, default in _leaves(file, case.document)
@@ -200,56 +152,50 @@ def _default_text(table: BaseModel, name: str) -> str | None:
     field, value = type(table).model_fields[name], getattr(table, name)
     if value is None or value == "":
         return None
-    kind = next((one for one in map(kind_in, [*field.metadata, field.annotation]) if one), None)
+    kind = kind_in([*field.metadata, field.annotation])
     if name == "gravity":
         return f"{value:g} m/s^2"  # not in g: there are two
     return quantity_text(value, kind) if kind is not None else text_of(value)
 
 
 def _derived(case: Case, file: CaseFile) -> Iterator[Origin]:
-    """What a case's own words leave to follow from others."""
+    """What a case's own words leave to follow from others, and defaults that depend on others."""
     from walkers.inputs.units import ACCELERATION, ANGLE, DURATION, FILE_SIZE, LENGTH, TIME, quantity_text
 
-    def derived(key: str, text: str, source: str) -> Origin:
-        return Origin(key, text, "derived", source)
-
-    run, drive = case.run, case.drive
-    keys = ["dimers"] * (file.dimers is not None) + [f"clusters[{number}]" for number in range(len(file.clusters))]
-    for key, walkers in zip(keys, case.walkers, strict=True):
-        yield derived(f"{key}.spacing", quantity_text(walkers.spacing, LENGTH), "so that walkers do not meet")
+    run, drive, boundary = case.run, case.drive, case.boundary
+    derived: dict[str, tuple[str, str]] = {}
+    for key, walkers in zip(file.walkers, case.walkers, strict=True):
+        derived[f"{key}.spacing"] = (quantity_text(walkers.spacing, LENGTH), "so that walkers do not meet")
         if walkers.gap is None:
-            yield derived(f"{key}.gap", "auto", "where the forces at rest balance")
+            derived[f"{key}.gap"] = ("auto", "where the forces at rest balance")
     if file.dimers is not None and file.dimers.radii is None:
         radii = ", ".join(quantity_text(radius, LENGTH) for radius in case.walkers[0].radii)
-        yield derived("dimers.radii", radii, "from mean_radius and sin_delta")
+        derived["dimers.radii"] = (radii, "from mean_radius and sin_delta")
     if not file.drive.harmonics:
         axis = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}.get(drive.direction)
-        yield Origin("drive.axis", axis or text_of(drive.direction), "default", f"of a {case.boundary.shape}")
+        yield Origin("drive.axis", axis or text_of(drive.direction), "default", f"of a {boundary.shape}")
         peak = quantity_text(file.drive.peak_acceleration or drive.peak_acceleration, ACCELERATION)
-        yield derived("drive.peak_acceleration", peak, "from gamma0, the dimer and the liquid")
-    yield Origin("drive.frame", drive.frame, "default")
-    yield derived(
-        "run.time_step", quantity_text(run.time_step, TIME), "auto: its share of the limits, fitted into a cycle"
-    )
-    most = f"until steady, at most {run.cycles}" if run.until_steady else str(run.cycles)
-    yield derived(
-        "run.cycles", most, "from the duration" if file.run.duration else "walkers are looked at after 12 and 24"
-    )
-    silence = quantity_text(run.longest_silence(case.count), DURATION)
-    yield derived("run.silence", silence, "an engine that writes nothing for so long is ended")
-    yield derived(
-        "run.log_limit", quantity_text(run.most_log, FILE_SIZE), "an engine that writes a longer log is ended"
-    )
-    yield derived("run.settling_cycles", str(run.settling_cycles), "a third of the cycles, at most 20")
+        derived["drive.peak_acceleration"] = (peak, "from gamma0, the dimer and the liquid")
     often = str(run.samples_per_cycle) if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
-    yield Origin(
-        "run.samples_per_cycle",
-        often,
-        "derived" if case.loose else "default",
-        "from frames_per_second" if case.loose else "",
-    )
     if case.loose:
-        yield derived("run.segment", quantity_text(run.cycles_per_segment / drive.frequency, DURATION), "about 0.5 s")
-        yield Origin("run.longest_settling", quantity_text(run.longest_settling, DURATION), "default", "of loose beads")
-    if case.boundary.tilt and file.boundary.uphill == 0.0:
+        derived["run.samples_per_cycle"] = (often, "from frames_per_second")
+        segment = quantity_text(run.cycles_per_segment / drive.frequency, DURATION)
+        derived["run.segment"] = (segment, "about 0.5 s")
+        rest = quantity_text(run.longest_settling, DURATION)
+        yield Origin("run.longest_settling", rest, "default", "of loose beads")
+    else:
+        yield Origin("run.samples_per_cycle", often, "default")
+    step = quantity_text(run.time_step, TIME)
+    most = f"until steady, at most {run.cycles}" if run.until_steady else str(run.cycles)
+    silence, log = quantity_text(run.longest_silence(case.count), DURATION), quantity_text(run.most_log, FILE_SIZE)
+    derived |= {
+        "run.time_step": (step, "auto: its share of the limits, fitted into a cycle"),
+        "run.cycles": (most, "from the duration" if file.run.duration else "walkers are looked at after 12 and 24"),
+        "run.silence": (silence, "an engine that writes nothing for so long is ended"),
+        "run.log_limit": (log, "an engine that writes a longer log is ended"),
+        "run.settling_cycles": (str(run.settling_cycles), "a third of the cycles, at most 20"),
+    }
+    yield Origin("drive.frame", drive.frame, "default")
+    if boundary.tilt and file.boundary.uphill == 0.0:
         yield Origin("boundary.uphill", quantity_text(0.0, ANGLE), "default", "the direction of the drive")
+    yield from (Origin(key, text, "derived", source) for key, (text, source) in derived.items())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import cache
 from math import isclose, pi
 from typing import Any
 
@@ -22,21 +23,6 @@ READABLE_UNITS: Mapping[str, tuple[str, float]] = {
     "kg/m^3": ("g/cm^3", 1e3),
 }
 """For SI units the unit in which the field states such quantities, and what it is in the SI unit."""
-_TIME_STEP = ("us", 1e-6)
-_KINDS: Mapping[str, Kind] = {
-    **dict.fromkeys(("radii", "small", "large", "gap", "spacing", "width", "height", "places", "beads"), units.LENGTH),
-    **dict.fromkeys(("angle", "angle_spread", "tilt", "uphill", "opening", "phase", "contact_angle"), units.ANGLE),
-    **dict.fromkeys(("peak_acceleration", "gravity"), units.ACCELERATION),
-    **dict.fromkeys(("dynamic_viscosity", "bridge_viscosity"), units.DYNAMIC_VISCOSITY),
-    "frequency": units.FREQUENCY,
-    "density": units.DENSITY,
-    "surface_tension": units.SURFACE_TENSION,
-    "youngs_modulus": units.MODULUS,
-    "settled_below": units.SPEED,
-    "longest_settling": units.DURATION,
-    "time_step": units.TIME,
-}
-"""What the numbers of a resolved case are, by the last part of their keys; the others are pure numbers."""
 _RENAMED = {
     "material": "beads.material",
     "density": "beads.density",
@@ -49,22 +35,16 @@ _RENAMED = {
 """Values that a case file has under another key."""
 _SOLE = {"walkers[0].": "walkers.", "drive.harmonics[0].": "drive."}
 """Entries of lists that are told by the list's name where they are the only one."""
-_FOLLOWS: Mapping[str, tuple[str, ...] | None] = {
-    **dict.fromkeys(("run.time_step", "run.steps_per_cycle", "run.until_steady", "boundary.uphill"), None),
-    **dict.fromkeys(("liquid.surface_tension", "liquid.dynamic_viscosity", "liquid.density"), ("liquid.name",)),
-    "beads.density": ("beads.material",),
-}
-"""Values that may follow from others: from those of these keys, or (None) from any."""
-_GIVEN_BY: Mapping[str, tuple[str, ...]] = {
+_FOLLOWS: Mapping[str, tuple[str, ...]] = {
+    **{key: (key,) for key in ("run.time_step", "boundary.uphill", "beads.density")},
+    **{key: (key,) for key in ("liquid.surface_tension", "liquid.density")},
     "run.steps_per_cycle": ("run.time_step",),
     "run.until_steady": ("run.cycles", "run.duration"),
     "liquid.dynamic_viscosity": ("liquid.dynamic_viscosity", "liquid.kinematic_viscosity", "liquid.density"),
 }
-"""The keys by which a case file gives such a value, where they are others than its own."""
-_NOT_COMPARED = ("name", "title", "document", "recorded")
-"""What does not determine a run, and …"""
-_BOUNDS = tuple(f"run.{bound}" for bound in BOUNDS)
-"""… what only says when it is ended."""
+"""Values that may follow from others, with the keys by which a case file would give them."""
+_NOT_COMPARED = ("name", "title", "document", "recorded", *(f"run.{bound}" for bound in BOUNDS))
+"""What does not determine a run, or only says when it is ended."""
 
 
 class FlatCase(dict[str, Any]):
@@ -95,16 +75,16 @@ def flattened(case: Mapping[str, Any]) -> FlatCase:
         ``liquid.bridge_viscosity`` stands for the liquid's viscosity and the bridges' ratio to it where these were not
         recorded.
     """
-    compared = {key: value for key, value in case.items() if key not in _NOT_COMPARED}
-    flat = {key: value for key, value in dotted(compared) if key not in _BOUNDS}
+    told = {key: value for key, value in case.items() if key not in _NOT_COMPARED}
+    flat = {key: value for key, value in dotted(told) if key not in _NOT_COMPARED}
     for listed, alone in _SOLE.items():
         if not any(key.startswith(listed.replace("0", "1")) for key in flat):
             flat = {alone + key.removeprefix(listed) if key.startswith(listed) else key: flat[key] for key in flat}
     recorded = {one["key"]: one for one in case.get("recorded") or ()}
-    told = FlatCase(_with_ratio({_RENAMED.get(key, key): value for key, value in flat.items()}, recorded))
+    found = FlatCase(_with_ratio({_RENAMED.get(key, key): value for key, value in flat.items()}, recorded))
     if recorded:
-        told.given = {key: one["text"] for key, one in recorded.items() if one["origin"] == "given"}
-    return told
+        found.given = {key: one["text"] for key, one in recorded.items() if one["origin"] == "given"}
+    return found
 
 
 def _with_ratio(flat: dict[str, Any], recorded: Mapping[str, Any]) -> dict[str, Any]:
@@ -119,10 +99,9 @@ def _with_ratio(flat: dict[str, Any], recorded: Mapping[str, Any]) -> dict[str, 
     if product not in flat or not isclose(viscosity * ratio, flat[product], rel_tol=1e-4, abs_tol=1e-12):
         return flat
     factors = {"liquid.dynamic_viscosity": viscosity, "liquid.viscosity_ratio": ratio}
-    told: dict[str, Any] = {}
-    for key, value in flat.items():
-        told |= factors if key == product else {key: value}
-    return told
+    items = list(flat.items())
+    place = list(flat).index(product)
+    return {**dict(items[:place]), **factors, **dict(items[place + 1 :])}
 
 
 def dotted(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
@@ -141,10 +120,10 @@ def readable(key: str, value: Any) -> str:
     """A value of `flattened` in the usual unit, such as ``4 g`` or ``0.3/0.2 mm``; a dash for none."""
     if value is None:
         return "-"
-    kind = _kind_of(key)
+    kind = _kinds().get(key.rpartition(".")[2])
     if kind is None or isinstance(value, str):
         return _number(value, 1.0)
-    unit, size = readable_unit(kind.unit) if kind is not units.TIME else _TIME_STEP
+    unit, size = readable_unit(kind.unit) if kind is not units.TIME else ("us", 1e-6)
     if key == "environment.gravity":  # the paper's g, 9.8 m/s², is not the case's gravity
         unit, size = kind.unit, 1.0
     return f"{_number(value, size)} {unit}"
@@ -155,8 +134,19 @@ def readable_unit(unit: str) -> tuple[str, float]:
     return READABLE_UNITS.get(unit, (unit, 1.0))
 
 
-def _kind_of(key: str) -> Kind | None:
-    return _KINDS.get(key.rpartition(".")[2])
+@cache
+def _kinds() -> Mapping[str, Kind]:
+    """What the numbers of a resolved case are, by the last part of their keys; the others are pure numbers."""
+    from walkers.inputs.messages import keys_of
+    from walkers.inputs.schema import CaseFile
+
+    found = {"beads": units.LENGTH, "places": units.LENGTH, "bridge_viscosity": units.DYNAMIC_VISCOSITY}
+    for table in filter(None, keys_of(CaseFile).values()):
+        of_table = {
+            name: units.kind_in([*field.metadata, field.annotation]) for name, field in table.model_fields.items()
+        }
+        found |= {name: kind for name, kind in of_table.items() if kind is not None and name != "radius"}
+    return found
 
 
 def _number(value: Any, size: float) -> str:
@@ -168,51 +158,24 @@ def _number(value: Any, size: float) -> str:
 
 
 def differing(cases: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The keys whose values differ among flattened cases, without those that merely follow from others.
+    """The keys whose values differ among flattened cases, in the cases' order, without those that follow from others.
 
-    Parameters
-    ----------
-    cases
-        From `flattened`.
-
-    Returns
-    -------
-    list of str
-        In the order of the cases. A time step that ``"auto"`` chose, and the numbers of a liquid that the library
-        knows by name, are left out where they are the same in all cases that agree in what they follow from; what one
-        of the cases gives itself, and another does not or otherwise, never is.
+    A time step that ``"auto"`` chose, and the numbers of a liquid that the library knows by name, are left out where
+    something else differs; what one of the cases gives itself, and another does not or otherwise, never is.
     """
     keys = dict.fromkeys(key for case in cases for key in case)
-    values = {key: [_comparable(case.get(key)) for case in cases] for key in keys}
-    varied = [key for key, column in values.items() if len(set(column)) > 1]
-    found = [key for key in varied if not _may_follow(key, cases)]
-
-    def follows(key: str, parents: Sequence[str]) -> bool:
-        of_parents: dict[tuple[Hashable, ...], Hashable] = {}
-        for number, value in enumerate(values[key]):
-            if of_parents.setdefault(tuple(values[one][number] for one in parents if one in values), value) != value:
-                return False
-        return True
-
-    # Those of known parents first: one that does not follow from them may be what others follow from.
-    for key in sorted((key for key in varied if key not in found), key=lambda key: _FOLLOWS.get(key) is None):
-        named = _FOLLOWS.get(key)
-        if not follows(key, found if named is None else named):
-            found.append(key)
-    return sorted(found, key=varied.index)
+    varied = [key for key in keys if len({_comparable(case.get(key)) for case in cases}) > 1]
+    return [key for key in varied if not _may_follow(key, cases)] or varied
 
 
 def _may_follow(key: str, cases: Sequence[Mapping[str, Any]]) -> bool:
     """Whether a value may follow from others: none of the cases gives it, or all give it in the same words."""
-    if key not in _FOLLOWS and not key.endswith(".spacing"):
-        return False
     told = set()
     for case in cases:
         given = case.given if isinstance(case, FlatCase) else None
-        if given is None:
+        if given is None or not (key in _FOLLOWS or key.endswith(".spacing")):
             return False
-        keys = [one for one in given if one.endswith(".spacing")] if key not in _FOLLOWS else _GIVEN_BY.get(key, (key,))
-        told.add(tuple(given.get(one) for one in keys))
+        told.add(tuple(given.get(one) for one in _FOLLOWS.get(key, [one for one in given if one.endswith(".spacing")])))
     return len(told) == 1
 
 
@@ -244,17 +207,16 @@ def has_key(case: Mapping[str, Any], key: str) -> bool:
 
 def _names(given: str, key: str) -> bool:
     for table in ("dimers.", "clusters[0]."):
-        if given.startswith(table):
-            given = "walkers." + given.removeprefix(table)
-    return key == given or key.endswith(f".{given}")
+        given = given.replace(table, "walkers.") if given.startswith(table) else given
+    return f".{key}".endswith(f".{given}")
 
 
 def _is(key: str, value: Any, wanted: str) -> bool:
-    if readable(key, value) == wanted or str(value) == wanted:
+    if wanted in (readable(key, value), str(value)):
         return True
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return str(value).lower() == wanted.lower()
-    kind = _kind_of(key)
+    kind = _kinds().get(key.rpartition(".")[2])
     with suppress(ValueError):
         return isclose(units.parse_quantity(wanted, kind) if kind else float(wanted), value, rel_tol=1e-6)
     return False

@@ -5,27 +5,68 @@ Whatever is wrong ends as one `InputError` that names the file, the key, the val
 
 from __future__ import annotations
 
-import re
 import stat
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import InputError, Problem, UnusableKeyError, check_utf8, shortened
-from walkers.inputs.kinds import check_kind
+from walkers.inputs.errors import InputError, Problem, check_utf8, shortened
 from walkers.inputs.library import suggestion
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
+    from walkers.inputs.schema import CaseFile
 
-_SHIPPED = Path(__file__).parent / "cases"
+_HERE = Path(__file__).parent
 _MOST_BYTES = 16 << 20
+_COMMANDS = {
+    "case": "a case: walkers run {}",
+    "sweep": "a sweep: walkers sweep {}",
+    "calibration": "a calibration: walkers calibrate {}",
+    "case.json": "a run's directory: walkers result {}, or plot, render, vtk",
+    "sweep.json": "a sweep's directory: walkers table {}, or plot, status; its file goes to walkers sweep",
+}
+"""What takes which kind of input."""
+
+
+def shipped(kind: str) -> dict[str, Path]:
+    """The files of a kind (case, sweep, calibration) that come with the project, by name."""
+    return {path.stem: path for path in sorted((_HERE / f"{kind}s").glob("*.toml"))}
 
 
 def shipped_cases() -> dict[str, Path]:
     """The cases that come with the project: name to file."""
-    return {path.stem: path for path in sorted(_SHIPPED.glob("*.toml"))}
+    return shipped("case")
+
+
+def check_kind(name: str | Path, wanted: str) -> None:
+    """Refuse what is known to be another kind of input (case, sweep, calibration) than is wanted.
+
+    Raises
+    ------
+    InputError
+        With what it is, and the command that takes it.
+    """
+    found = _kind_of(name)
+    if found not in (None, wanted):
+        raise InputError(str(name), [Problem("", None, f"is {_COMMANDS[str(found)].format(name)}")])
+
+
+def _kind_of(name: str | Path) -> str | None:
+    """The kind, None where it is not known; files come before shipped names."""
+    path = Path(name)
+    with suppress(OSError, InputError):
+        if path.is_dir():
+            return next((file for file in ("sweep.json", "case.json") if (path / file).is_file()), None)
+        if path.is_file():
+            document = read_toml(path) if path.stem not in (".", "..") else {}  # refused for its name
+            if document.keys() & {"beads", "boundary", "drive", "liquid"}:
+                return "case"
+            of_calibrations = document.keys() & {"parameters", "experiments", "observations"}
+            return ("calibration" if of_calibrations else "sweep") if "case" in document else None
+    return next((kind for kind in ("case", "sweep", "calibration") if str(name) in shipped(kind)), None)
 
 
 def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Case:
@@ -58,47 +99,39 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
     """
     if str(case) not in shipped_cases():
         check_kind(case, "case")
-    path = find_input(case, shipped_cases(), "case")
+    path = find_input(case, "case")
     document = read_toml(path)
     if changes:
-        document = _with_changes(document, changes, str(case))
+        from walkers.inputs.changes import changed, check_key
+        from walkers.inputs.messages import blaming
+
+        with blaming(str(case)):
+            for key in changes:
+                check_key(key)
+            document = changed(document, changes)
     return resolve_case(document, source=str(case), name=path.stem)
 
 
-def _with_changes(document: Mapping[str, Any], changes: Mapping[str, Any], source: str) -> dict[str, Any]:
-    from walkers.inputs.axes import UnusableAxisError
-    from walkers.inputs.changes import changed, check_key
-    from walkers.inputs.messages import quoted
-
-    try:
-        for key in changes:
-            check_key(key)
-        return changed(document, changes)
-    except UnusableAxisError as unusable:
-        value = quoted({"value": changes.get(unusable.key)}, ["value"])
-        raise InputError(source, [Problem(unusable.key, value, unusable.expected)]) from unusable
-
-
-def find_input(name: str | Path, shipped: Mapping[str, Path], kind: str) -> Path:
-    """A file by its path, or a shipped one by its name.
+def find_input(name: str | Path, kind: str) -> Path:
+    """A file of a kind (case, sweep, calibration) by its path, or a shipped one by its name.
 
     Raises
     ------
     InputError
-        If there is neither; ``kind`` is what the message calls it.
+        If there is neither.
     """
     check_utf8(name)
-    path = Path(name)
+    path, known = Path(name), shipped(kind)
     try:
-        if path.is_file() or (path.exists() and str(name) not in shipped):
+        if path.is_file() or (path.exists() and str(name) not in known):
             if path.stem in (".", ".."):  # of "...toml"
                 raise InputError(str(name), [Problem("", None, "expected a name before .toml")])
             return path
     except OSError as error:
         raise InputError(shortened(str(name)), [Problem("", None, f"cannot be read: {error.strerror}")]) from error
-    if str(name) in shipped:
-        return shipped[str(name)]
-    told = f"no such file, nor a shipped {kind} ({', '.join(shipped)}){suggestion(str(name), shipped)}"
+    if str(name) in known:
+        return known[str(name)]
+    told = f"no such file, nor a shipped {kind} ({', '.join(known)}){suggestion(str(name), known)}"
     raise InputError(str(name), [Problem("", None, told)])
 
 
@@ -142,49 +175,33 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
         If anything in it cannot be used.
     """
     # Not above: that there is no such file is told before all that a case may say is built.
-    from walkers.inputs.messages import quoted, validated
+    from walkers.inputs.messages import blaming, validated
     from walkers.inputs.resolving import resolve
     from walkers.inputs.schema import CaseFile
 
-    _refuse_old_words(document, source)
     file = validated(CaseFile, document, source)
     try:
-        return resolve(file, name).read_from(document)
+        with blaming(source, document):
+            case = resolve(file, name).read_from(document)
     except ArithmeticError as error:
         raise InputError(source, [Problem("", None, f"inconsistent values: {error}")]) from error
-    except UnusableKeyError as unusable:
-        parts = re.findall(r"[^.\[\]]+", unusable.key)
-        value = quoted(document, [int(part) if part.isdigit() else part for part in parts])
-        raise InputError(source, [Problem(unusable.key, value, unusable.expected)]) from unusable
+    _check_uncertain(file, document, source)
+    return case
 
 
-_OLD_WORDS = {
-    "kind": "there are no kinds any more: [boundary] says where the beads are (a climber's tilt is 90 deg, a pile's "
-    'shape "box" or "cylinder")',
-    "substrate": "[substrate] is now [boundary]: its material, and its tilt if it is not level",
-    "container": "[container] is now [boundary], with its shape",
-    "start": "[start] is part of the bodies now: [dimers] has replicates, facing, angle, gap, spacing; [run] the seed",
-    **dict.fromkeys(
-        ("beads.radii", "beads.mean_radius", "beads.sin_delta"),
-        "[beads] says what beads are made of; the radii of dimers are in [dimers]",
-    ),
-    **dict.fromkeys(
-        ("beads.small", "beads.large", "beads.count", "beads.fill_height", "beads.small_share", "beads.mixed_by"),
-        "[beads] says what beads are made of; what is poured is a [mixture]",
-    ),
-    "beads.placed": "[[beads.placed]] is now [[placed]]",
-}
+def _check_uncertain(file: CaseFile, document: Mapping[str, Any], source: str) -> None:
+    """Refuse ranges of what is no key of the case, or whose ends it could not say."""
+    from walkers.inputs.changes import changed, check_key
+    from walkers.inputs.messages import blaming, validated
 
-
-def _refuse_old_words(document: Mapping[str, Any], source: str) -> None:
-    """Say what the words of older case files are called now."""
-    from walkers.inputs.messages import quoted
-
-    problems = []
-    for key, told in _OLD_WORDS.items():
-        table, _, name = key.rpartition(".")
-        within = document.get(table, {}) if table else document
-        if isinstance(within, Mapping) and name in within:
-            problems.append(Problem(key, quoted(document, key.split(".")), told))
-    if problems:
-        raise InputError(source, problems)
+    for key, given in file.uncertain.items():
+        (ends,) = given.values()
+        for end in ends:
+            try:
+                with blaming(source):
+                    check_key(key)
+                    document = changed(document, {key: end})
+                validated(type(file), document, source)
+            except InputError as error:
+                told = [Problem(f"uncertain.{one.key}", one.value, one.expected) for one in error.problems]
+                raise InputError(source, told) from error

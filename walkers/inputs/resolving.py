@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import fields, replace
 from math import atan2
 
-from walkers.inputs.axes import UnusableAxisError
 from walkers.inputs.bodies import Placed
 from walkers.inputs.body_tables import check_bodies, mixture_of, spaced, walkers_of
 from walkers.inputs.boundary import Box, Channel, Cylinder, Groove, Plane, Shape
 from walkers.inputs.case import Case, Run
-from walkers.inputs.changes import check_key
 from walkers.inputs.errors import UnusableKeyError
 from walkers.inputs.matter_tables import resolve_matter
 from walkers.inputs.run_tables import resolve_drive, resolve_run
@@ -26,10 +25,8 @@ def resolve(file: CaseFile, name: str) -> Case:
     UnusableKeyError
         If something is missing that the library does not know, or keys contradict each other.
     """
-    for key in file.uncertain:
-        _check_uncertain(key)
-    boundary, beads = _boundary(file.boundary), file.beads
-    walkers = walkers_of(file)
+    boundary = _boundary(file.boundary)
+    walkers = tuple(walkers_of(key, table, file.boundary) for key, table in file.walkers.items())
     mixture = mixture_of(file.mixture, boundary) if file.mixture else None
     placed = Placed(tuple((*bead.at, bead.radius) for bead in file.placed)) if file.placed else None
     if not (walkers or mixture or placed):
@@ -37,7 +34,6 @@ def resolve(file: CaseFile, name: str) -> Case:
     density, liquid, contact, _ = resolve_matter(file)
     first = walkers[0].radii if walkers else ()
     dimer = Dimer((first[0], first[1]), density, liquid.surface_tension) if len(first) == 2 else None
-    drive = resolve_drive(file.drive, boundary.drive_axis, dimer)
     case = Case(
         name=name,
         title=file.title,
@@ -45,9 +41,9 @@ def resolve(file: CaseFile, name: str) -> Case:
         mixture=mixture,
         placed=placed,
         boundary=boundary,
-        drive=drive,
+        drive=resolve_drive(file.drive, boundary.drive_axis, dimer),
         gravity=file.environment.gravity,
-        material=beads.material,
+        material=file.beads.material,
         density=density,
         liquid=liquid,
         contact=contact,
@@ -58,38 +54,28 @@ def resolve(file: CaseFile, name: str) -> Case:
     along, across, _ = case.drive_axis
     uphill = atan2(across, along) + file.boundary.uphill if boundary.tilt else 0.0
     case = replace(case, boundary=replace(boundary, uphill=uphill))
-    case = replace(case, walkers=tuple(spaced(case, number, file) for number in range(len(walkers))))
+    made = zip(file.walkers, case.walkers, strict=True)
+    case = replace(case, walkers=tuple(spaced(case, key, one) for key, one in made))
     check_bodies(case, file)
     return case
 
 
-def _check_uncertain(key: str) -> None:
-    try:
-        check_key(key)
-    except UnusableAxisError as unusable:
-        raise UnusableKeyError(f"uncertain.{unusable.key}", unusable.expected) from unusable
+_SHAPES: Mapping[str, type[Shape]] = {
+    "plane": Plane,
+    "channel": Channel,
+    "groove": Groove,
+    "box": Box,
+    "cylinder": Cylinder,
+}
+_EXAMPLES = {"opening": "120 deg", "width": "5.3 mm", "height": "5.3 mm"}
 
 
 def _boundary(table: BoundaryTable) -> Shape:
-    material, tilt = table.material, table.tilt
-    for key, of in (
-        ("opening", ("groove",)),
-        ("width", ("channel", "box", "cylinder")),
-        ("height", ("box", "cylinder")),
-    ):
-        given = getattr(table, key)
-        if (given is None) == (table.shape in of):
-            example = "120 deg" if key == "opening" else "5.3 mm"
-            expected = (
-                f'missing; expected such as "{example}"' if given is None else f"expected none of a {table.shape}"
-            )
-            raise UnusableKeyError(f"boundary.{key}", expected)
-    width, height, opening = (value or 0.0 for value in (table.width, table.height, table.opening))
-    shapes: dict[str, Shape] = {
-        "plane": Plane(material=material, tilt=tilt),
-        "channel": Channel(material=material, tilt=tilt, width=width),
-        "groove": Groove(material=material, tilt=tilt, opening=opening),
-        "box": Box(material=material, tilt=tilt, width=width, height=height),
-        "cylinder": Cylinder(material=material, tilt=tilt, width=width, height=height),
-    }
-    return shapes[table.shape]
+    made = _SHAPES[table.shape]
+    needed = {field.name for field in fields(made)} & _EXAMPLES.keys()
+    for key, example in _EXAMPLES.items():
+        if (getattr(table, key) is None) == (key in needed):
+            missing = f'missing; expected such as "{example}"'
+            raise UnusableKeyError(f"boundary.{key}", missing if key in needed else f"expected none of a {table.shape}")
+    sizes = {key: getattr(table, key) for key in needed}
+    return made(material=table.material, tilt=table.tilt, **sizes)

@@ -10,27 +10,10 @@ from math import isfinite
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticCustomError
 
-from walkers.inputs.units import (
-    Acceleration,
-    Angle,
-    Density,
-    Duration,
-    DynamicViscosity,
-    FileSize,
-    Frequency,
-    KinematicViscosity,
-    Length,
-    Modulus,
-    NonNegativeAngle,
-    NonNegativeDuration,
-    Radius,
-    SignedLength,
-    Speed,
-    SurfaceTension,
-    Time,
-)
+from walkers.inputs import units
+from walkers.inputs.errors import UnusableKeyError
+from walkers.inputs.units import Angle, Duration, Length, NonNegativeAngle, Radius, SignedLength, refusal
 from walkers.physics.matter import DEFAULT_LAW
 
 
@@ -43,13 +26,13 @@ def _auto(value: object) -> object:
 def _plain_number(value: object) -> object:
     """Accept TOML's integers and floats only: neither "0.3" nor true is a coefficient."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise PydanticCustomError("plain", "{expected}", {"expected": "expected a plain number without a unit"})
+        raise refusal("expected a plain number without a unit")
     return value
 
 
 def _whole_number(value: object) -> object:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise PydanticCustomError("whole", "{expected}", {"expected": "expected a whole number"})
+        raise refusal("expected a whole number")
     return value
 
 
@@ -64,14 +47,10 @@ ALTERNATIVES: dict[str, tuple[str, ...]] = {
     "run.cycles": ("run.duration", "run.most_cycles"),
     "run.most_cycles": ("run.cycles", "run.duration"),
     "run.duration": ("run.cycles", "run.most_cycles"),
-    **{
-        key: (other,)
-        for pair in (
-            ("run.samples_per_cycle", "run.frames_per_second"),
-            ("mixture.count", "mixture.fill_height"),
-        )
-        for key, other in (pair, pair[::-1])
-    },
+    "run.samples_per_cycle": ("run.frames_per_second",),
+    "run.frames_per_second": ("run.samples_per_cycle",),
+    "mixture.count": ("mixture.fill_height",),
+    "mixture.fill_height": ("mixture.count",),
 }
 """Keys that say the same in other words: a change of one puts the others out of force."""
 
@@ -93,7 +72,7 @@ class BeadsTable(Table):
     """``[beads]``: what all beads are made of."""
 
     material: str | None = None
-    density: Density | None = None
+    density: units.Density | None = None
 
 
 class WalkersTable(Table):
@@ -162,12 +141,12 @@ class LiquidTable(Table):
     """
 
     name: str | None = None
-    surface_tension: SurfaceTension | None = None
-    density: Density | None = None
-    kinematic_viscosity: KinematicViscosity | None = None
-    dynamic_viscosity: DynamicViscosity | None = None
+    surface_tension: units.SurfaceTension | None = None
+    density: units.Density | None = None
+    kinematic_viscosity: units.KinematicViscosity | None = None
+    dynamic_viscosity: units.DynamicViscosity | None = None
     volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] | None = None
-    viscosity_ratio: Annotated[Number, Field(ge=1e-3, le=1e4)] | None = None
+    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)] | None = None
     contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] | None = None
     law: str = DEFAULT_LAW
 
@@ -207,7 +186,7 @@ class ContactTable(Table):
     friction: FrictionTable = FrictionTable()
     rolling_friction: Coefficient | None = None
     restitution: Annotated[Number, Field(gt=0.05, le=1)] | None = None
-    youngs_modulus: Annotated[Modulus, Field(ge=5e6, le=1e9)] = 5e7
+    youngs_modulus: Annotated[units.Modulus, Field(ge=5e6, le=1e9)] = 5e7
     poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = 0.3
     minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] | None = None
 
@@ -220,8 +199,7 @@ def _axis(value: object) -> object:
         numbers = tuple(float(one) for one in value if type(one) in (int, float) and isfinite(one))
         if len(numbers) == 3:
             return numbers
-    expected = "expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]"
-    raise PydanticCustomError("axis", "{expected}", {"expected": expected})
+    raise refusal("expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]")
 
 
 Axis = Annotated[Any, BeforeValidator(_axis)]
@@ -232,8 +210,8 @@ class HarmonicTable(Table):
     """One of ``[[drive.harmonics]]``; exactly one of ``peak_acceleration`` and ``gamma0``."""
 
     axis: Axis | None = None
-    frequency: Frequency
-    peak_acceleration: Acceleration | None = None
+    frequency: units.Frequency
+    peak_acceleration: units.Acceleration | None = None
     gamma0: Coefficient | None = None
     phase: Angle = 0.0
 
@@ -247,8 +225,8 @@ class DriveTable(Table):
     """
 
     axis: Axis | None = None
-    frequency: Frequency | None = None
-    peak_acceleration: Acceleration | None = None
+    frequency: units.Frequency | None = None
+    peak_acceleration: units.Acceleration | None = None
     gamma0: Coefficient | None = None
     phase: Angle = 0.0
     waveform: Literal["sine", "triangle"] = "sine"
@@ -266,7 +244,7 @@ class RunTable(Table):
     nothing for ``silence``, or more than ``log_limit``, is ended: no numbers depend on these two.
     """
 
-    time_step: Annotated[Time | None, AUTO] = None
+    time_step: Annotated[units.Time | None, AUTO] = None
     allow_unstable: bool = False
     cycles: Annotated[Annotated[Whole, Field(ge=2, le=1_000_000)] | None, AUTO] = None
     most_cycles: Annotated[Whole, Field(ge=2, le=1_000_000)] | None = None
@@ -276,23 +254,23 @@ class RunTable(Table):
     bridge_samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] | None = None
     frames_per_second: Annotated[Number, Field(gt=0, le=1e6)] | None = None
     segment: Duration | None = None
-    settled_below: Speed = 5e-3
-    longest_settling: NonNegativeDuration | None = None
+    settled_below: units.Speed = 5e-3
+    longest_settling: units.NonNegativeDuration | None = None
     ranks: Annotated[Whole, Field(ge=1, le=64)] = 1
     seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 1
     silence: Annotated[Duration | None, AUTO] = None
-    log_limit: Annotated[FileSize | None, AUTO] = None
+    log_limit: Annotated[units.FileSize | None, AUTO] = None
 
 
 class EnvironmentTable(Table):
     """``[environment]``."""
 
-    gravity: Acceleration = 9.81
+    gravity: units.Acceleration = 9.81
 
 
 def _ranges(value: object) -> object:
     """Ranges by dotted keys: each two values of one unit, the smaller first."""
-    from walkers.inputs.axes import UnusableAxisError, ends_of, flatten, is_axis
+    from walkers.inputs.axes import ends_of, flatten, is_axis
 
     if not isinstance(value, dict):
         return value
@@ -300,9 +278,9 @@ def _ranges(value: object) -> object:
         given = flatten(value, is_axis)
         ranges = {key: one if is_axis(one) else {"uniform": one} for key, one in given.items()}
         ends_of(ranges)
-    except UnusableAxisError as unusable:
+    except UnusableKeyError as unusable:
         told = f"{unusable.key}: {unusable.expected}".replace("{ uniform = [low, high] }", "[low, high]")
-        raise PydanticCustomError("ranges", "{expected}", {"expected": told}) from unusable
+        raise refusal(told) from unusable
     return ranges
 
 
@@ -330,3 +308,9 @@ class CaseFile(Table):
     run: RunTable = RunTable()
     environment: EnvironmentTable = EnvironmentTable()
     uncertain: Ranges = {}
+
+    @property
+    def walkers(self) -> dict[str, DimersTable | ClusterTable]:
+        """The tables of walkers by their keys, dimers first."""
+        dimers = {} if self.dimers is None else {"dimers": self.dimers}
+        return {**dimers, **{f"clusters[{number}]": table for number, table in enumerate(self.clusters)}}

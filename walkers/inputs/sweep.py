@@ -18,13 +18,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from walkers.inputs.axes import (
     MOST_POINTS,
     Axis,
-    UnusableAxisError,
-    Value,
     combinations,
     different,
     flatten,
@@ -37,25 +35,19 @@ from walkers.inputs.axes import (
     zipped,
 )
 from walkers.inputs.case import BOUNDS, Case
-from walkers.inputs.changes import changed, check_key
-from walkers.inputs.errors import InputError, Problem
-from walkers.inputs.kinds import check_kind
-from walkers.inputs.messages import quoted, validated
-from walkers.inputs.reading import find_input, read_toml, resolve_case, shipped_cases
-from walkers.inputs.schema import Whole
+from walkers.inputs.changes import Value, changed, check_key
+from walkers.inputs.errors import InputError, Problem, UnusableKeyError
+from walkers.inputs.messages import blaming, validated
+from walkers.inputs.reading import check_kind, find_input, read_toml, resolve_case, shipped
+from walkers.inputs.schema import Table, Whole
 from walkers.inputs.units import Speed
 
-_SHIPPED = Path(__file__).parent / "sweeps"
 _LONGEST_NAME = 120
 _SAME_RUN = ("title", *(f"run.{bound}" for bound in BOUNDS))
 """Keys that do not determine a run."""
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class SampleTable(_Table):
+class SampleTable(Table):
     """``[[sample]]``: a sampler of scipy.stats.qmc over ranges of keys."""
 
     method: Literal["sobol", "halton", "latin-hypercube"] = "sobol"
@@ -64,7 +56,7 @@ class SampleTable(_Table):
     ranges: dict[str, Any]
 
 
-class DescendTable(_Table):
+class DescendTable(Table):
     """``[descend]``: a key that is lowered step by step until the walkers stop."""
 
     key: str = "drive.peak_acceleration"
@@ -74,15 +66,15 @@ class DescendTable(_Table):
     until_below: Speed
 
 
-class SweepFile(_Table):
+class SweepFile(Table):
     """A sweep file."""
 
     title: str = ""
     case: str
-    set: dict[str, Any] = {}
-    axes: dict[str, Any] = {}
-    zip: list[dict[str, Any]] = []
-    sample: list[SampleTable] = []
+    set: dict[str, Any] = Field({})
+    axes: dict[str, Any] = Field({})
+    zip: list[dict[str, Any]] = Field([])
+    sample: list[SampleTable] = Field([])
     descend: DescendTable | None = None
 
 
@@ -150,18 +142,17 @@ class Sweep:
             If a point cannot be used; it says which.
         """
         for number, row in enumerate(self.rows):
-            told = ", ".join(f"{key} = {value}" for key, value in zip(self.keys, row, strict=True))
+            changes = dict(zip(self.keys, row, strict=True))
+            told = ", ".join(f"{key} = {value}" for key, value in changes.items())
             where = f"{self.source}: point {number} ({told})" if told else self.source
-            try:
-                document = changed(self.document, dict(zip(self.keys, row, strict=True)))
-            except UnusableAxisError as unusable:
-                raise InputError(where, [Problem(unusable.key, None, unusable.expected)]) from unusable
+            with blaming(where):
+                document = changed(self.document, changes)
             yield resolve_case(document, source=where, name=self.case_name)
 
 
 def shipped_sweeps() -> dict[str, Path]:
     """The sweeps that come with the project: name to file."""
-    return {path.stem: path for path in sorted(_SHIPPED.glob("*.toml"))}
+    return shipped("sweep")
 
 
 def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) -> Sweep:
@@ -180,12 +171,12 @@ def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) ->
         If there is no such file or anything in it cannot be used. Its points are checked by `Sweep.cases`.
     """
     check_kind(sweep, "sweep")
-    path = find_input(sweep, shipped_sweeps(), "sweep")
+    path = find_input(sweep, "sweep")
     document, name = read_toml(path), path.stem
     if changes:
         try:
             document = {**document, "set": {**flatten(document.get("set", {}), lambda _: False), **changes}}
-        except (AttributeError, UnusableAxisError) as error:
+        except (AttributeError, UnusableKeyError) as error:
             raise InputError(str(sweep), [Problem("set", None, f"expected a table of keys ({error})")]) from error
         name = _name_with(name, changes)
     made = expand(document, source=str(sweep), name=name, folder=path.parent)
@@ -228,19 +219,16 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
     file = validated(SweepFile, document, source, "a sweep")
     base = _base(file.case, source, folder)
     try:
-        keys, rows, units, descent = _points(file)
-        settings = flatten(file.set, lambda _: False)
-        given = read_toml(base)
-        for key in (*settings, *keys):
-            if key in _SAME_RUN and key in keys:
-                told = f"does not vary: points with another {key} alone are the same run"
-                raise UnusableAxisError(key, None, told)
-            check_key(key)
-        tables = changed(given, settings)
-        changed(tables, dict(zip(keys, rows[0], strict=True)))
-    except UnusableAxisError as unusable:
-        value = quoted({"value": unusable.value}, ["value"]) if unusable.value is not None else None
-        raise InputError(source, [Problem(unusable.key, value, unusable.expected)]) from unusable
+        with blaming(source):
+            keys, rows, units, descent = _points(file)
+            settings = flatten(file.set, lambda _: False)
+            for key in (*settings, *keys):
+                if key in _SAME_RUN and key in keys:
+                    told = f"does not vary: points with another {key} alone are the same run"
+                    raise UnusableKeyError(key, told)
+                check_key(key)
+            tables = changed(read_toml(base), settings)
+            changed(tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
         raise InputError(source, [Problem("", None, "has tables within tables without end")]) from error
     return Sweep(
@@ -260,7 +248,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
 def _base(case: str, source: str, folder: Path) -> Path:
     beside = folder / case
     try:
-        return beside if case and beside.is_file() else find_input(case or "no name", shipped_cases(), "case")
+        return beside if case and beside.is_file() else find_input(case or "no name", "case")
     except OSError as error:
         raise InputError(source, [Problem("case", f'"{case[:40]}…"', f"cannot be read: {error.strerror}")]) from error
     except InputError as error:
@@ -270,20 +258,20 @@ def _base(case: str, source: str, folder: Path) -> Path:
 def _points(
     file: SweepFile,
 ) -> tuple[tuple[str, ...], list[tuple[Value, ...]], tuple[str | None, ...], Descent | None]:
-    axes = [
-        Axis((key,), tuple((value,) for value in different(key, values_of(key, given))))
-        for key, given in flatten(file.axes, is_axis).items()
-    ]
+    """Keys, points and units of all axes, and how the points depend on each other."""
+    lists = flatten(file.axes, is_axis).items()
+    axes = [Axis.of(key, different(key, values_of(key, given))) for key, given in lists]
     axes += [zipped(table) for table in file.zip]
     axes += [sampled(table.method, table.points, table.seed, table.ranges) for table in file.sample]
     descent = None
-    if file.descend is not None:
-        values = _descending(file.descend)
-        axes.append(Axis((file.descend.key,), tuple((value,) for value in values)))
-        descent = Descent(file.descend.key, len(values), file.descend.until_below)
+    if (table := file.descend) is not None:
+        axes.append(Axis.of(table.key, _descending(table)))
+        descent = Descent(table.key, len(axes[-1].rows), table.until_below)
     keys, rows = combinations(axes)
-    units = [unit_of(key, [row[number] for row in axis.rows]) for axis in axes for number, key in enumerate(axis.keys)]
-    return keys, rows, tuple(units), descent
+    columns = [
+        (key, column) for axis in axes for key, column in zip(axis.keys, zip(*axis.rows, strict=True), strict=True)
+    ]
+    return keys, rows, tuple(unit_of(key, column) for key, column in columns), descent
 
 
 def _descending(table: DescendTable) -> list[Value]:
@@ -291,8 +279,7 @@ def _descending(table: DescendTable) -> list[Value]:
     start, to, step = (number_of(name, value)[0] for name, value in given.items())
     unit = unit_of(table.key, list(given.values()))
     if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
-        raise UnusableAxisError(
-            "descend", f"{table.start} to {table.to}", "`from` must not be below `to`, and `step` must be positive"
-        )
+        told = "`from` must not be below `to`, and `step` must be positive"
+        raise UnusableKeyError("descend", told, f"{table.start} to {table.to}")
     number = int((start - to) / step + 1e-9) + 1
     return [written(start - step * count, unit) for count in range(number)]

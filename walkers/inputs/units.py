@@ -8,14 +8,15 @@ numbers, so that "500 rad/s" would pass for 500 Hz.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from math import pi
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from pydantic import BeforeValidator
-from pydantic_core import PydanticCustomError
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError
+from pydantic_core.core_schema import no_info_before_validator_function
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -48,9 +49,11 @@ _USUAL: Mapping[str, tuple[str, float]] = {
 
 @dataclass(frozen=True)
 class Kind:
-    """What a quantity is: its name, its SI unit, an example to show to a user who got it wrong, and physical bounds.
+    """What a quantity is: its name, its SI unit, an example for messages, and physical bounds of its magnitude.
 
-    The bounds are generous; they keep slips of the exponent out of formulas that would overflow.
+    The bounds are generous; they keep slips of the exponent out of formulas that would overflow. ``sign`` says what is
+    accepted in files: ``more than zero``, ``zero or more``, or anything. As an annotation of a float it makes pydantic
+    read a text with a unit.
     """
 
     name: str
@@ -58,12 +61,32 @@ class Kind:
     example: str
     largest: float
     smallest: float = 0.0
+    sign: str = ""
 
     @property
     def expectation(self) -> str:
         """The end of an error message."""
         article = "an" if self.name[0] in "aeiou" else "a"
         return f'expected {article} {self.name} with its unit, such as "{self.example}"'
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return no_info_before_validator_function(self._read, handler(source))
+
+    def _read(self, value: object) -> float:
+        if not isinstance(value, str):
+            raise refusal(self.expectation)
+        try:
+            number = parse_quantity(value, self)
+        except ValueError as error:
+            raise refusal(str(error)) from error
+        if (self.sign and number < 0.0) or (number == 0.0 and self.sign == _POSITIVE):
+            raise refusal(f"{self.expectation}; it must be {self.sign}")
+        return number
+
+
+def refusal(expected: str) -> PydanticCustomError:
+    """What a validator raises, with the end of the message."""
+    return PydanticCustomError("expected", "{expected}", {"expected": expected})
 
 
 @cache
@@ -112,35 +135,27 @@ def parse_quantity(text: str, kind: Kind) -> float:
 
 def _si_units_in(symbol: str, kind: Kind) -> float:
     """How many of the kind's SI unit a unit is."""
-    usual = _USUAL.get(symbol)
-    if usual is None:
-        return si_units_by_pint(symbol, kind)
-    unit, factor = usual
+    unit, factor = _USUAL.get(symbol) or (kind.unit, _by_pint(symbol, kind))
     if unit != kind.unit:
         raise ValueError(kind.expectation)
     return factor
 
 
 @lru_cache(maxsize=1024)  # a sweep reads thousands of quantities in the same few units
-def si_units_by_pint(symbol: str, kind: Kind) -> float:
-    """How many of the kind's SI unit a unit is, whatever unit it is.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or one of something else.
-    """
+def _by_pint(symbol: str, kind: Kind) -> float:
     units = registry()
     try:
-        unit = units.parse_units(_GRAM_SYMBOL.sub("gee", symbol) if kind is ACCELERATION else symbol)
+        unit = units.parse_units(_GRAM_SYMBOL.sub("gee", symbol) if kind.unit == ACCELERATION.unit else symbol)
         factor = float(units.Quantity(1.0, unit).to(kind.unit).magnitude)
+        root = str(units.Quantity(1.0, unit).to_root_units().units)
     except Exception as error:  # pint's parser raises a dozen types, the tokenizer's errors among them
         raise ValueError(kind.expectation) from error
-    if kind is ANGLE and str(unit) not in _ANGLE_UNITS:
+    # Pint takes radians and bits for pure numbers.
+    if kind.unit == ANGLE.unit and str(unit) not in _ANGLE_UNITS:
         raise ValueError(kind.expectation)
-    if kind is FILE_SIZE and str(units.Quantity(1.0, unit).to_root_units().units) != "bit":
-        raise ValueError(kind.expectation)  # pint takes both bits and radians for pure numbers
-    if kind is FREQUENCY and "radian" in str(units.Quantity(1.0, unit).to_root_units().units):
+    if kind.unit == FILE_SIZE.unit and root != "bit":
+        raise ValueError(kind.expectation)
+    if kind.unit == FREQUENCY.unit and "radian" in root:
         raise ValueError(kind.expectation + " (cycles a second, not an angular frequency)")
     return factor
 
@@ -165,58 +180,44 @@ def quantity_text(value: float, kind: Kind) -> str:
     return f"{value / _USUAL[unit][1]:.6g} {unit}"
 
 
-def kind_in(annotation: Any) -> Kind | None:
-    """The kind of quantity that a field of a table holds, or None."""
-    if isinstance(annotation, Kind):
-        return annotation
-    return next((kind for one in get_args(annotation) if (kind := kind_in(one)) is not None), None)
+def kind_in(annotations: Iterable[Any]) -> Kind | None:
+    """The kind of quantity that a field of a table holds, by its metadata and annotation; or None."""
+    for one in annotations:
+        if (kind := one if isinstance(one, Kind) else kind_in(get_args(one))) is not None:
+            return kind
+    return None
 
 
-def _validator(kind: Kind, *, positive: bool, zero: bool) -> Any:
-    def validate(value: object) -> float:
-        if not isinstance(value, str):
-            raise PydanticCustomError("quantity", "{expected}", {"expected": kind.expectation})
-        try:
-            number = parse_quantity(value, kind)
-        except ValueError as error:
-            raise PydanticCustomError("quantity", "{expected}", {"expected": str(error)}) from error
-        if positive and (number < 0 or (number == 0 and not zero)):
-            bound = "zero or more" if zero else "more than zero"
-            raise PydanticCustomError("quantity", "{expected}", {"expected": f"{kind.expectation}; it must be {bound}"})
-        return number
+_POSITIVE, _NOT_NEGATIVE = "more than zero", "zero or more"
 
-    return BeforeValidator(validate)
-
-
-LENGTH = Kind("length", "m", "0.3 mm", 1.0, 1e-9)
-RADIUS = Kind("length", "m", "0.3 mm", 0.02, 1e-6)
-FREQUENCY = Kind("frequency", "Hz", "80 Hz", 1e6, 1e-2)
-ACCELERATION = Kind("acceleration", "m/s^2", "4 g", 1e6, 1e-9)
-SPEED = Kind("speed", "m/s", "0.02 mm/s", 1e4, 1e-12)
-TIME = Kind("time", "s", "2 us", 1.0, 1e-12)
-DURATION = Kind("duration", "s", "4 s", 1e4, 1e-6)
+LENGTH = Kind("length", "m", "0.3 mm", 1.0, 1e-9, _POSITIVE)
+FREQUENCY = Kind("frequency", "Hz", "80 Hz", 1e6, 1e-2, _POSITIVE)
+ACCELERATION = Kind("acceleration", "m/s^2", "4 g", 1e6, 1e-9, _NOT_NEGATIVE)
+SPEED = Kind("speed", "m/s", "0.02 mm/s", 1e4, 1e-12, _POSITIVE)
+TIME = Kind("time", "s", "2 us", 1.0, 1e-12, _POSITIVE)
+DURATION = Kind("duration", "s", "4 s", 1e4, 1e-6, _POSITIVE)
 ANGLE = Kind("angle", "rad", "10 deg", 1e3)
-DENSITY = Kind("density", "kg/m^3", "4.0 g/cm^3", 1e5, 1.0)
-SURFACE_TENSION = Kind("surface tension", "N/m", "19.2 mN/m", 10.0, 1e-9)
-KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0)
-DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4)
-MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3)
-FILE_SIZE = Kind("size of a file", "byte", "64 MB", 1e15, 1.0)
+DENSITY = Kind("density", "kg/m^3", "4.0 g/cm^3", 1e5, 1.0, _POSITIVE)
+SURFACE_TENSION = Kind("surface tension", "N/m", "19.2 mN/m", 10.0, 1e-9, _POSITIVE)
+KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0, sign=_NOT_NEGATIVE)
+DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4, sign=_NOT_NEGATIVE)
+MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3, _POSITIVE)
+FILE_SIZE = Kind("size of a file", "byte", "64 MB", 1e15, 1.0, _POSITIVE)
 
-Length = Annotated[float, LENGTH, _validator(LENGTH, positive=True, zero=False)]
-Radius = Annotated[float, RADIUS, _validator(RADIUS, positive=True, zero=False)]
-SignedLength = Annotated[float, LENGTH, _validator(LENGTH, positive=False, zero=True)]
-Frequency = Annotated[float, FREQUENCY, _validator(FREQUENCY, positive=True, zero=False)]
-Acceleration = Annotated[float, ACCELERATION, _validator(ACCELERATION, positive=True, zero=True)]
-Speed = Annotated[float, SPEED, _validator(SPEED, positive=True, zero=False)]
-Time = Annotated[float, TIME, _validator(TIME, positive=True, zero=False)]
-Duration = Annotated[float, DURATION, _validator(DURATION, positive=True, zero=False)]
-NonNegativeDuration = Annotated[float, DURATION, _validator(DURATION, positive=True, zero=True)]
-Angle = Annotated[float, ANGLE, _validator(ANGLE, positive=False, zero=True)]
-NonNegativeAngle = Annotated[float, ANGLE, _validator(ANGLE, positive=True, zero=True)]
-Density = Annotated[float, DENSITY, _validator(DENSITY, positive=True, zero=False)]
-SurfaceTension = Annotated[float, SURFACE_TENSION, _validator(SURFACE_TENSION, positive=True, zero=False)]
-KinematicViscosity = Annotated[float, KINEMATIC_VISCOSITY, _validator(KINEMATIC_VISCOSITY, positive=True, zero=True)]
-DynamicViscosity = Annotated[float, DYNAMIC_VISCOSITY, _validator(DYNAMIC_VISCOSITY, positive=True, zero=True)]
-Modulus = Annotated[float, MODULUS, _validator(MODULUS, positive=True, zero=False)]
-FileSize = Annotated[float, FILE_SIZE, _validator(FILE_SIZE, positive=True, zero=False)]
+Length = Annotated[float, LENGTH]
+Radius = Annotated[float, replace(LENGTH, largest=0.02, smallest=1e-6)]
+SignedLength = Annotated[float, replace(LENGTH, sign="")]
+Frequency = Annotated[float, FREQUENCY]
+Acceleration = Annotated[float, ACCELERATION]
+Speed = Annotated[float, SPEED]
+Time = Annotated[float, TIME]
+Duration = Annotated[float, DURATION]
+NonNegativeDuration = Annotated[float, replace(DURATION, sign=_NOT_NEGATIVE)]
+Angle = Annotated[float, ANGLE]
+NonNegativeAngle = Annotated[float, replace(ANGLE, sign=_NOT_NEGATIVE)]
+Density = Annotated[float, DENSITY]
+SurfaceTension = Annotated[float, SURFACE_TENSION]
+KinematicViscosity = Annotated[float, KINEMATIC_VISCOSITY]
+DynamicViscosity = Annotated[float, DYNAMIC_VISCOSITY]
+Modulus = Annotated[float, MODULUS]
+FileSize = Annotated[float, FILE_SIZE]
