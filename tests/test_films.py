@@ -15,13 +15,12 @@ from walkers.inputs import InputError
 from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Plane
 from walkers.postprocess import read_motion
 from walkers.postprocess.analysis import current_result
-from walkers.postprocess.film_stage import Stage
-from walkers.postprocess.film_times import film_times, positions_at, round_below
+from walkers.postprocess.film_times import film_times, positions_at
 from walkers.postprocess.films import parse_size, told_speed
 from walkers.postprocess.motion import Motion
 from walkers.postprocess.paraview import boundary_of
 from walkers.postprocess.rolling import turns_of
-from walkers.postprocess.scene import camera_axes
+from walkers.postprocess.scene import Camera, Window, camera_axes, round_below
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +62,7 @@ def test_spins_that_are_whole_cycles_apart_give_no_orientation(motion: Motion) -
 
 def test_places_between_frames_lie_on_the_motion(motion: Motion) -> None:
     """Each second frame, predicted from its neighbours, to a hundredth of what it moves meanwhile."""
-    rare = motion.part(slice(None, None, 2))
+    rare = motion.select(slice(None, None, 2))
     errors = [np.abs(positions_at(rare, k, 0.5) - motion.position[2 * k + 1]).max() for k in range(20, 60)]
     moved = np.abs(np.diff(motion.position, axis=0)).max()
     assert max(errors) < 0.1 * moved
@@ -96,21 +95,12 @@ def test_nothing_to_show_is_refused(motion: Motion, begin: float, end: float | N
 
 def test_a_scale_bar_is_as_long_as_beads_say(motion: Motion) -> None:
     """The red of one bead, seen without perspective, is as wide and as high as its diameter in pixels."""
-    single = replace(
-        motion,
-        position=motion.position[:1, :1],
-        velocity=motion.velocity[:1, :1],
-        spin=motion.spin[:1, :1],
-        mean_spin=None,
-        radius=motion.radius[:1],
-        substrate=motion.substrate[:1],
-        walkers=(),
-    )
-    stage = Stage(single, (400, 300), rolling=False)
-    picture = stage.picture(single.position[0], np.zeros(3), None, {0}).astype(int)
-    stage.close()
+    single = motion.select(slice(1), np.array([0]))
+    window = Window(single, Camera.around(single, camera_axes(single), share=1.2), (400, 300))
+    picture = window.picture(single.position[0], {0}).astype(int)
+    window.close()
     rows, columns = np.nonzero(picture[..., 0] > 1.3 * picture[..., 1])
-    diameter = 2e3 * motion.radius[0] * stage.pixels_per_mm
+    diameter = 2e3 * motion.radius[0] * window.pixels_per_mm
     assert np.ptp(columns) + 1 == pytest.approx(diameter, abs=2.5)
     assert np.ptp(rows) + 1 == pytest.approx(diameter, abs=2.5)
 

@@ -19,8 +19,7 @@ from walkers.postprocess.analysis import plot_run
 from walkers.postprocess.drawing import legend_below, new_figure, series_look, styled
 from walkers.postprocess.figures import _gait_figure, _walk_figure
 from walkers.postprocess.paraview import write_vtk
-from walkers.postprocess.pictures import render_run
-from walkers.postprocess.series import _panels
+from walkers.postprocess.series import _panels, render_run
 
 
 @pytest.fixture(scope="module")

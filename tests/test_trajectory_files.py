@@ -42,7 +42,7 @@ def test_ase_reads_the_extended_xyz(directory: Path, motion: Motion, tmp_path: P
     np.testing.assert_array_equal(frames[0].arrays["walker"], [0, 0, 1, 1])
     np.testing.assert_array_equal(frames[0].arrays["large"], [1, 0, 1, 0])
     np.testing.assert_array_equal(frames[0].arrays["id"], [1, 2, 3, 4])
-    low, high = box_of(motion.part(slice(None, None, 4)))
+    low, high = box_of(motion.select(slice(None, None, 4)))
     np.testing.assert_allclose(frames[0].cell.lengths(), high - low)
     np.testing.assert_allclose(frames[0].info["Origin"], low)
 

@@ -163,8 +163,8 @@ class Run:
         return render_film(self.directory, to, options, on_progress=on_progress)
 
     def render(self, to: Path | None = None, *, images: int = 6) -> Pictures:
-        """Render pictures of it, see `walkers.postprocess.pictures.render_run`: paths, which a notebook shows."""
-        from walkers.postprocess.pictures import render_run
+        """Render pictures of it, see `walkers.postprocess.series.render_run`: paths, which a notebook shows."""
+        from walkers.postprocess.series import render_run
 
         return Pictures(render_run(self.directory, to, images=images))
 

@@ -109,7 +109,7 @@ def refuse(option: str, wrong: bool, told: str) -> None:
 
 def refuse_as_placed(as_placed: bool, case: ResolvedCase) -> None:
     """Refuse ``--as-placed`` of walkers that are nowhere else."""
-    refuse("--as-placed", as_placed and not case.independent, "is for independent walkers: these stand where they are")
+    refuse("--as-placed", as_placed and not case.apart, "is for independent walkers: these stand where they are")
 
 
 def check_folder(option: str, folder: Path) -> None:

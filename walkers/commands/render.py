@@ -28,7 +28,6 @@ def command(
 ) -> None:
     """Render a walker at several times, or views of a whole run (off-screen); for films: walkers film."""
     from walkers.pipeline import find_run
-    from walkers.postprocess.pictures import render_walker
     from walkers.postprocess.series import render_series, seconds_apart
 
     found = find_run(run, out)
@@ -37,12 +36,11 @@ def command(
         count = sum(make.replicates for make in found.case.walkers)
         refuse("--walker", not count, "the run has none")
         refuse("--walker", walker >= count, f"expected less than {count}, the run's number of walkers")
-        print(render_walker(found.directory, to, walker=walker, images=images or 6))
+        paths = render_series(found.directory, to, images=images or 6, walker=walker)
     elif interval is not None:
-        for path in render_series(
-            found.directory, to, images=images or 6, apart=seconds_apart(interval, found.directory)
-        ):
-            print(path)
+        apart = seconds_apart(interval, found.directory)
+        paths = render_series(found.directory, to, images=images or 6, apart=apart)
     else:
-        for path in found.render(to, images=images or 6):
-            print(path)
+        paths = found.render(to, images=images or 6)
+    for path in paths:
+        print(path)

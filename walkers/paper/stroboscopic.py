@@ -9,7 +9,7 @@ import numpy as np
 from walkers.paper import dimers
 from walkers.paper.sources import Sources
 from walkers.postprocess.drawing import ONE_COLUMN, letter_panels, new_figure, styled
-from walkers.postprocess.pictures import top_view
+from walkers.postprocess.series import top_view
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

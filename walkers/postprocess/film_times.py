@@ -10,6 +10,7 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion
 from walkers.postprocess.rolling import follows_cycles
+from walkers.postprocess.scene import round_below
 
 _SECONDS = 10.0
 """A film lasts so long, or less, if no slowdown is given."""
@@ -97,12 +98,6 @@ def _usual_slowdown(seconds: float, between: float | None) -> float:
     if between is not None:
         largest = min(largest, 1.0 / (_LEAST_SEEN * between))
     return max(1.0, round_below(largest))
-
-
-def round_below(value: float) -> float:
-    """The largest of …, 1, 2, 5, 10, … that is no larger."""
-    decade = 10.0 ** np.floor(np.log10(value) + 1e-9)
-    return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1.0 + 1e-9)))
 
 
 def positions_at(motion: Motion, frame: int, share: float) -> FloatArray:

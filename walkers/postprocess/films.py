@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, log10
 from pathlib import Path
 
@@ -17,11 +17,10 @@ import numpy as np
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.film_files import check_film, write_film
-from walkers.postprocess.film_stage import Stage
-from walkers.postprocess.film_times import FilmTimes, film_times, positions_at, round_below
+from walkers.postprocess.film_times import FilmTimes, film_times, positions_at
 from walkers.postprocess.motion import Motion, boundary_motion, read_motion
 from walkers.postprocess.rolling import turns_of
-from walkers.postprocess.scene import Picture, pointed_out
+from walkers.postprocess.scene import Camera, Picture, Window, camera_axes, pointed_out, round_below
 
 FILM_NAME = "film.mp4"
 FPS = 25
@@ -33,6 +32,8 @@ _LETTERS = 24
 """Of them, one below the other, would fill a picture."""
 _LEAST_LETTERS = 15
 """Pixels."""
+_AROUND = 1.2
+"""Height and width of the picture over those of what the beads reach."""
 
 
 @dataclass(frozen=True)
@@ -156,18 +157,7 @@ def _shown(motion: Motion, walker: int | None) -> Motion:
         return motion
     if walker is not None and walker >= count:
         raise InputError("--walker", [Problem("", None, f"{walker}: expected less than {count}, the run's walkers")])
-    one = motion.walkers[walker or 0]
-    beads = np.array(one.beads) - motion.first_id
-    placed = replace(one, beads=tuple(range(motion.first_id, motion.first_id + len(beads))))
-    return replace(
-        motion,
-        position=motion.position[:, beads],
-        velocity=motion.velocity[:, beads],
-        spin=motion.spin[:, beads],
-        mean_spin=None if motion.mean_spin is None else motion.mean_spin[:, beads],
-        radius=motion.radius[beads],
-        walkers=(placed,),
-    )
+    return motion.of_walkers(motion.walkers[walker or 0 :][:1])
 
 
 class _Film:
@@ -177,21 +167,22 @@ class _Film:
         self._motion, self._times = motion, times
         self._chosen, self._turns = pointed_out(motion), turns_of(motion)
         self._shift, _ = boundary_motion(motion.case.drive, times.time)
-        seen = motion.part(slice(int(times.frame[0]), int(times.frame[-1]) + 2))
-        self._stage = Stage(seen, size, rolling=self._turns is not None)
-        self._caption = _Caption(motion, times, self._stage.pixels_per_mm, size)
+        seen = motion.select(slice(int(times.frame[0]), int(times.frame[-1]) + 2))
+        camera = Camera.around(seen, camera_axes(motion), share=_AROUND)
+        self._window = Window(seen, camera, size, rolling=self._turns is not None)
+        self._caption = _Caption(motion, times, self._window.pixels_per_mm, size)
 
     def picture(self, number: int) -> Picture:
         """One of them."""
         frame, share = int(self._times.frame[number]), float(self._times.share[number])
         place = positions_at(self._motion, frame, share)
         turned = None if self._turns is None else self._turns.at(frame, share)
-        scene = self._stage.picture(place, self._shift[number], turned, self._chosen(frame))
+        scene = self._window.picture(place, self._chosen(frame), self._shift[number], turned)
         return self._caption.on(scene, float(self._times.time[number]))
 
     def close(self) -> None:
         """Give back the window."""
-        self._stage.close()
+        self._window.close()
 
 
 class _Caption:
@@ -205,7 +196,8 @@ class _Caption:
         font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
         self._size, self._letters = size, max(_LEAST_LETTERS, size[1] // _LETTERS)
         self._large, self._small = (ImageFont.truetype(font, round(share * self._letters)) for share in (1.2, 0.85))
-        between = float(np.diff(times.time).max()) if len(times.time) > 1 else 1.0
+        # All pictures may be of one frame, where frames are rarer than pictures.
+        between = float(np.diff(times.time).max(initial=0.0)) or 1.0
         self._decimals = max(0, ceil(-log10(between) - 1e-9))
         self._bar = round_below(size[0] / 5.0 / pixels_per_mm)
         self._bar_pixels = self._bar * pixels_per_mm

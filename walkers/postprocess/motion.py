@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -24,6 +24,8 @@ from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 IntArray = npt.NDArray[np.int64]
 FLOOR = 0
 """Number of the floor among the walls of a container; the others are the side walls."""
+_OF_FRAMES = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin")
+_OF_BEADS = ("position", "velocity", "spin", "mean_spin")
 
 
 @dataclass(frozen=True, repr=False)
@@ -84,17 +86,24 @@ class Motion:
     @property
     def driven(self) -> Motion:
         """The motion without the rest before the drive."""
-        first = self.first_driven
-        if not first:
-            return self
-        return self.part(slice(first, None))
+        return self.select(slice(self.first_driven, None)) if self.first_driven else self
 
-    def part(self, frames: slice, **changes: Any) -> Motion:
-        """Some of the frames, with changes."""
-        names = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin")
-        kept: dict[str, Any] = {name: getattr(self, name) for name in names if name not in changes}
-        parts: dict[str, Any] = {name: part if part is None else part[frames] for name, part in kept.items()}
-        return replace(self, **parts, **changes)
+    def select(self, frames: slice = slice(None), beads: IntArray | None = None, **changes: Any) -> Motion:
+        """Some of the frames and beads, with changes; beads are numbered anew, walkers keep their numbers."""
+        parts: dict[str, Any] = {
+            name: None if (one := getattr(self, name)) is None else one[frames] for name in _OF_FRAMES
+        } | changes
+        if beads is not None:
+            parts |= {name: None if (one := parts[name]) is None else one[:, beads] for name in _OF_BEADS}
+            place = {bead + self.first_id: number for number, bead in enumerate(beads.tolist(), self.first_id)}
+            kept = (one for one in self.walkers if place.keys() >= set(one.beads))
+            parts["radius"] = self.radius[beads]
+            parts["walkers"] = tuple(replace(one, beads=tuple(place[bead] for bead in one.beads)) for one in kept)
+        return replace(self, **parts)
+
+    def of_walkers(self, walkers: Collection[PlacedWalker]) -> Motion:
+        """That of the beads of some walkers alone."""
+        return self.select(beads=np.array([bead - self.first_id for one in walkers for bead in one.beads]))
 
     @property
     def averaged(self) -> Motion:
@@ -107,7 +116,7 @@ class Motion:
         interval = np.diff(self.time)[:, None, None]
         position = (self.position[1:] + self.position[:-1]) / 2.0
         velocity = np.diff(self.position, axis=0) / interval
-        return self.part(slice(1, None), position=position, velocity=velocity, spin=spin)
+        return self.select(slice(1, None), position=position, velocity=velocity, spin=spin)
 
     def between(self, share: float) -> Motion:
         """The F - 1 places at a share of the intervals between frames, by cubics through places and velocities."""
@@ -115,7 +124,7 @@ class Motion:
         begin, end, left = self.position[:-1], self.position[1:], 1.0 - share
         position = left**2 * (1.0 + 2.0 * share) * begin + share**2 * (3.0 - 2.0 * share) * end
         position += share * left * interval * (left * self.velocity[:-1] - share * self.velocity[1:])
-        return self.part(slice(1, None), position=position)
+        return self.select(slice(1, None), position=position)
 
     @property
     def large(self) -> npt.NDArray[np.bool_]:
@@ -249,12 +258,7 @@ def gathered(motion: Motion, lane: float = 2.0) -> Motion:
     across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
     shift = np.array([-number * lane * across - [*one.origin, 0.0] for number, one in enumerate(motion.walkers)])
     moved = replace(motion, position=motion.position + shift[motion.walker_of])
-    if case.boundary.bare:
-        return moved
-    count = len(motion.walkers[0].beads)
-    names = ("position", "velocity", "spin", "mean_spin")
-    arrays: dict[str, Any] = {name: None if (one := getattr(moved, name)) is None else one[:, :count] for name in names}
-    return replace(moved, **arrays, radius=motion.radius[:count], walkers=motion.walkers[:1])
+    return moved if case.boundary.bare else moved.of_walkers(moved.walkers[:1])
 
 
 def read_motion(directory: str | Path) -> Motion:

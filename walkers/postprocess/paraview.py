@@ -6,8 +6,7 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -66,63 +65,48 @@ def write_vtk(
     InputError
         If the folder holds anything else than such files.
     """
-    motion = read_motion(directory)
-    if motion.case.independent and not as_placed:
-        motion = gathered(motion)
+    motion = shown_in_paraview(directory, as_placed=as_placed)
     frames = _frames(motion, every or motion.case.run.samples_per_cycle)
-    return write_series(destination or directory / FOLDER_NAME, COLLECTION_NAME, frames, vtu=vtu)
+    return _write_series(destination or directory / FOLDER_NAME, frames, vtu=vtu)
 
 
-@dataclass(frozen=True)
-class Frame:
-    """What a frame shows: its time in s, its number, and from the numbers of the parts to their names and meshes."""
-
-    time: float
-    number: int
-    meshes: Mapping[int, tuple[str, pv.PolyData]]
+def shown_in_paraview(directory: Path, *, as_placed: bool) -> Motion:
+    """The motion that the files hold and the camera sees: walkers side by side, unless they are left as placed."""
+    motion = read_motion(directory)
+    return gathered(motion) if motion.case.boundary.bare and not as_placed else motion
 
 
-def write_series(destination: Path, name: str, frames: Iterable[Frame], *, vtu: bool = False) -> Path:
-    """Write frames as ``.vtp`` with a ``.pvd`` in seconds, beside the folder and rename it.
+Meshes = dict[str, "pv.PolyData"]
+"""Of a frame: ``beads``, ``boundary`` and, where they were recorded, ``bridges``: parts 0, 1 and 2."""
 
-    Parameters
-    ----------
-    destination
-        Folder to write, replaced if it holds nothing but files of this function.
-    name
-        Of the ``.pvd``.
-    frames
-        In the order of time.
-    vtu
-        Also write part 0 as ``.vtu`` (through meshio).
 
-    Raises
-    ------
-    InputError
-        If the folder holds anything else than such files.
-    """
+def _write_series(destination: Path, frames: Iterable[tuple[float, int, Meshes]], *, vtu: bool) -> Path:
+    """Write times (s), numbers and meshes of frames beside the folder and rename it."""
     place = destination.resolve()
     _check_replaceable(place)
     place.parent.mkdir(parents=True, exist_ok=True)
     beside = Path(tempfile.mkdtemp(prefix=f".{place.name}-", dir=place.parent))
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    collection = ElementTree.SubElement(root, "Collection")
     try:
         beside.chmod(0o755)
-        entries: list[_Entry] = []
-        for frame in frames:
-            for part, (kind, mesh) in frame.meshes.items():
-                file = f"{kind}_{frame.number:06d}.vtp"
+        for time, number, meshes in frames:
+            for part, (kind, mesh) in enumerate(meshes.items()):
+                file = f"{kind}_{number:06d}.vtp"
                 _save(mesh, beside / file)
-                entries.append(_Entry(frame.time, part, file))
-                if vtu and part == 0:
-                    _write_vtu((beside / file).with_suffix(".vtu"), mesh)
-        _write_collection(beside / name, entries)
+                entry = {"timestep": repr(time), "group": "", "part": str(part), "file": file}
+                ElementTree.SubElement(collection, "DataSet", entry)
+            if vtu:
+                _write_vtu(beside / f"beads_{number:06d}.vtu", meshes["beads"])
+        ElementTree.indent(root)
+        ElementTree.ElementTree(root).write(beside / COLLECTION_NAME, encoding="utf-8", xml_declaration=True)
         if place.exists():
             shutil.rmtree(place)
         beside.rename(place)
     except BaseException:
         shutil.rmtree(beside, ignore_errors=True)
         raise
-    return destination / name
+    return destination / COLLECTION_NAME
 
 
 def _save(mesh: pv.PolyData, path: Path) -> None:
@@ -154,14 +138,8 @@ def _check_replaceable(place: Path) -> None:
             raise InputError(str(place), [Problem("", None, f"{expected}; it holds {path.name}")])
 
 
-@dataclass(frozen=True)
-class _Entry:
-    time: float
-    part: int
-    file: str
-
-
-def _frames(motion: Motion, every: int) -> Iterator[Frame]:
+def _frames(motion: Motion, every: int) -> Iterator[tuple[float, int, Meshes]]:
+    """Times, numbers and meshes of one of so many frames of the drive."""
     recorded = read_bridges(motion)
     following = next(recorded, None)
     further = [one.point_data(motion) for one in analyses_of(motion.case)]
@@ -169,15 +147,15 @@ def _frames(motion: Motion, every: int) -> Iterator[Frame]:
     for frame in range(motion.first_driven, len(motion.time), every):
         while following is not None and following.frame < frame:
             following = next(recorded, None)
-        bridges = following if following is not None and following.frame == frame else None
-        beads = beads_at(motion, frame)
-        meshes = {0: ("beads", beads), 1: ("boundary", outline.translate(motion.substrate[frame], inplace=False))}
-        if bridges is not None:
-            for arrays in (one(bridges) for one in further):
-                for name, values in arrays.items():
-                    beads.point_data[name] = values
-            meshes[2] = ("bridges", bridges_at(motion, bridges))
-        yield Frame(float(motion.time[frame]), frame, meshes)
+        meshes = {
+            "beads": beads_at(motion, frame),
+            "boundary": outline.translate(motion.substrate[frame], inplace=False),
+        }
+        if following is not None and following.frame == frame:
+            for name, values in (pair for one in further for pair in one(following).items()):
+                meshes["beads"].point_data[name] = values
+            meshes["bridges"] = bridges_at(motion, following)
+        yield float(motion.time[frame]), frame, meshes
 
 
 def beads_at(motion: Motion, frame: int) -> pv.PolyData:
@@ -298,14 +276,3 @@ def _write_vtu(path: Path, beads: pv.PolyData) -> None:
     cells = [("vertex", np.arange(len(points)).reshape(-1, 1))]
     arrays = {name: np.asarray(beads.point_data[name]) for name in beads.point_data}
     meshio.Mesh(points, cells, point_data=arrays).write(path)
-
-
-def _write_collection(path: Path, entries: Iterable[_Entry]) -> None:
-    root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
-    collection = ElementTree.SubElement(root, "Collection")
-    for entry in entries:
-        ElementTree.SubElement(
-            collection, "DataSet", timestep=repr(entry.time), group="", part=str(entry.part), file=entry.file
-        )
-    ElementTree.indent(root)
-    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)

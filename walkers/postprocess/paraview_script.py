@@ -17,9 +17,9 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.text import rendered
 from walkers.postprocess.analysis import analyses_of
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.motion import Motion, gathered, read_bridges, read_motion
-from walkers.postprocess.paraview import COLLECTION_NAME, SCRIPT_NAME, beads_at, write_vtk
-from walkers.postprocess.scene import camera_axes
+from walkers.postprocess.motion import Motion, read_bridges
+from walkers.postprocess.paraview import COLLECTION_NAME, SCRIPT_NAME, beads_at, shown_in_paraview, write_vtk
+from walkers.postprocess.scene import Camera, camera_axes
 from walkers.runner.files import write_text
 
 _WIDE = 16.0 / 9.0
@@ -56,12 +56,9 @@ def write_paraview(
     InputError
         If there is no such array, or the folder holds anything else than such files.
     """
-    motion = read_motion(directory)
-    if not options.get("as_placed"):
-        motion = gathered(motion)
-    driven = motion.driven
+    driven = shown_in_paraview(directory, as_placed=options.get("as_placed", False)).driven
     names = _arrays(driven)
-    colour = colour or ("walker" if motion.walkers else "speed")
+    colour = colour or ("walker" if driven.walkers else "speed")
     if colour not in names:
         raise InputError("--colour", [Problem("", None, f"{colour!r}: expected one of {', '.join(names)}")])
     collection = write_vtk(directory, destination=destination, **options)
@@ -97,11 +94,8 @@ def open_paraview(script: Path) -> None:
 
 
 def _script(motion: Motion, colour: str, folder: Path) -> str:
-    right, up, toward = camera_axes(motion)
-    seen = motion.position + motion.substrate[:, None]
-    low, high = (_reach(motion, seen, np.array([right, up]), side) for side in (-1.0, 1.0))
-    middle = right * (low[0] + high[0]) / 2.0 + up * (low[1] + high[1]) / 2.0 + toward * (seen @ toward).mean()
-    tall = _AROUND * max(high[1] - low[1], (high[0] - low[0]) / _WIDE)
+    camera = Camera.around(motion, camera_axes(motion), share=_AROUND)
+    tall = camera.height(_WIDE)
 
     def listed(vector: FloatArray) -> str:
         return ", ".join(repr(float(value)) for value in vector)
@@ -119,10 +113,10 @@ def _script(motion: Motion, colour: str, folder: Path) -> str:
         rounds=48 if len(motion.radius) < 100 else 24,
         neck=_NECK * float(motion.radius.min()),
         closed=motion.case.boundary.closed,
-        middle=listed(middle),
-        camera=listed(middle + 10.0 * tall * toward),
-        up=listed(up),
-        half=tall / 2.0,
+        middle=listed(1e-3 * camera.middle),
+        camera=listed(1e-3 * camera.place(10.0 * tall)),
+        up=listed(camera.axes[1]),
+        half=1e-3 * tall / 2.0,
     )
 
 
@@ -130,13 +124,3 @@ def _extent(motion: Motion, colour: str) -> tuple[float, float] | None:
     """Of the scale of what changes from frame to frame: from nothing to what one in a hundred exceeds."""
     vectors = {"speed": motion.velocity, "velocity": motion.velocity, "omega": motion.spin}.get(colour)
     return None if vectors is None else (0.0, float(np.percentile(np.linalg.norm(vectors, axis=-1), 99.0)))
-
-
-def _reach(motion: Motion, seen: FloatArray, axes: FloatArray, side: float) -> FloatArray:
-    """How far the beads, and the width and the floor of a container, reach along axes: to the one side or the other."""
-    along = seen @ axes.T + side * motion.radius[:, None]
-    reach: FloatArray = along.min(axis=(0, 1)) if side < 0.0 else along.max(axis=(0, 1))
-    if motion.case.boundary.closed:
-        half = side * motion.case.boundary.inner_width / 2.0
-        reach = np.array([min(reach[0], half), min(reach[1], 0.0)] if side < 0.0 else [max(reach[0], half), reach[1]])
-    return reach

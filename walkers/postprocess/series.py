@@ -1,9 +1,9 @@
-"""Views of a whole run beside each other: containers from the side, as in Fig. 1a of Khan et al., planes from above."""
+"""Views of a run, or of one walker, beside each other: containers from the side, planes from above (Khan, Fig. 1)."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from dataclasses import replace
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,16 +13,15 @@ import numpy as np
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_picture, new_figure, save_figure, styled
-from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.motion import Motion, gathered, read_motion
-from walkers.postprocess.scene import Beads, Picture, new_plotter, pointed_out
+from walkers.postprocess.motion import Group, Motion, gathered, read_motion
+from walkers.postprocess.scene import Camera, Picture, Window, axes_toward, pointed_out
 from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SERIES_NAME = "series.png"
+SERIES_NAME, PICTURE_NAME = "series.png", "walker.png"
 SHOWN = 6
 """Pictures in a time series."""
 _TOLERANCE = 0.1
@@ -39,69 +38,22 @@ _BESIDE, _BENEATH, _EDGES = 0.3, 0.8, (0.9, 0.1)
 """Inches between pictures: for what sticks out of tick labels, for time, ticks and label; and about all of them."""
 
 
-class View:
-    """A run seen from the side, along y, or from above, without perspective; one window for any number of frames.
+def render_run(directory: Path, destination: Path | None = None, *, images: int = SHOWN) -> list[Path]:
+    """Render a run: of independent walkers the first at several times, of all else views of the whole.
 
-    Parameters
-    ----------
-    motion
-        Of the run.
-
-    Attributes
-    ----------
-    low, high : ndarray, shape (2,)
-        Corners of the picture, m: along x, and the height or along y.
-    axes
-        What they are called.
+    Parameters and errors are those of `render_series`.
     """
-
-    def __init__(self, motion: Motion) -> None:
-        self._motion = motion
-        sideways = motion.case.boundary.closed
-        self.axes = ("x", "height" if sideways else "y")
-        self.low, self.high = _corners(motion, sideways)
-        extents = self.high - self.low
-        wide, tall = 1e3 * extents
-        pixels = min(max(_TALL / tall, min(_PIXELS, _TALLEST / tall)), _WIDEST / wide)
-        size = [max(1, round(extent * pixels)) for extent in (wide, tall)]
-        self._plotter = new_plotter(size, "white")
-        self._beads = Beads(self._plotter, motion.radius, motion.large)
-        x, up = (self.low + self.high) / 2.0 * 1e3
-        middle = (x, 0.0, up) if sideways else (x, up, 0.0)
-        camera = (x, -1e2, up) if sideways else (x, up, 1e2)
-        self._plotter.camera_position = [camera, middle, (0.0, 0.0, 1.0) if sideways else (0.0, 1.0, 0.0)]
-        self._plotter.camera.parallel_projection = True
-        self._plotter.camera.parallel_scale = extents[1] / 2.0 * 1e3
-
-    def picture(self, frame: int, coloured: Collection[int]) -> Picture:
-        """The beads in a frame, with some beads in another colour."""
-        self._beads.colour(coloured)
-        self._beads.move(self._motion.position[frame] * 1e3)
-        self._plotter.render()  # a screenshot does so the first time only
-        return np.array(self._plotter.screenshot(return_img=True), dtype=np.uint8)
-
-    def close(self) -> None:
-        """Give back the window."""
-        self._plotter.close()
-
-
-def _corners(motion: Motion, sideways: bool) -> tuple[FloatArray, FloatArray]:
-    """Of the picture: from the floor to a little above what any bead reaches; from above, all that they reach."""
-    start, radius = motion.first_driven, motion.radius[:, None]
-    reached = motion.position[start:]
-    if sideways:
-        half = motion.case.boundary.inner_width / 2.0
-        return np.array([-half, 0.0]), np.array([half, 1.05 * float((reached[..., 2] + motion.radius).max())])
-    margin = float(motion.radius.max())
-    return (
-        (reached[..., :2] - radius).min(axis=(0, 1)) - margin,
-        (reached[..., :2] + radius).max(axis=(0, 1)) + margin,
-    )
+    return render_series(directory, destination, images=images, walker=0 if case_of(directory).apart else None)
 
 
 @styled
 def render_series(
-    directory: Path, destination: Path | None = None, *, images: int = SHOWN, apart: float | None = None
+    directory: Path,
+    destination: Path | None = None,
+    *,
+    images: int = SHOWN,
+    apart: float | None = None,
+    walker: int | None = None,
 ) -> list[Path]:
     """Views of a run beside each other, in rows, walkers and climbers coloured, with times and scales.
 
@@ -110,38 +62,79 @@ def render_series(
     directory
         A run directory.
     destination
-        The PNG to write; ``series.png`` in the run directory if None.
+        The PNG to write; ``series.png``, of one walker ``walker.png``, in the run directory if None.
     images
         How many, evenly through the drive.
     apart
         Seconds between them: the last ones of the run then, as many as ``images``.
+    walker
+        Number of a walker to show by itself.
 
     Raises
     ------
     InputError
-        If frames were recorded less often, or the drive was shorter than that.
+        If the destination is no PNG, frames were recorded less often, or the drive was shorter than that.
     """
-    path = destination or directory / SERIES_NAME
+    path = destination or directory / (SERIES_NAME if walker is None else PICTURE_NAME)
     check_picture(path, ".png")
-    motion = gathered(read_motion(directory))
+    whole = read_motion(directory)
+    motion = gathered(whole) if walker is None else whole.of_walkers(whole.walkers[walker : walker + 1])
     frames = _frames_evenly(motion, images) if apart is None else _frames_apart(motion, images, apart, directory)
-    chosen = pointed_out(motion)
-    view = View(motion)
-    sides = (1e3 * view.low[0], 1e3 * view.high[0], 1e3 * view.low[1], 1e3 * view.high[1])
+    sideways, chosen = motion.case.boundary.closed, pointed_out(motion)
+    axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) if sideways else np.eye(3)
+    camera = Camera.around(motion.driven, axes, share=1.0 if sideways else 1.1, shaken=False)
+    (left, low, _), (right, high, _) = camera.low, camera.high
+    high += 0.05 * (high - low) if sideways else 0.0
+    camera = replace(camera, high=np.array([right, high, camera.high[2]]))
+    window = Window(motion, camera, _pixels(right - left, high - low))
     decimals = 2 if apart is None or apart >= 0.1 else 4
-    figure, panels = _panels(len(frames), sides[1] - sides[0], sides[3] - sides[2])
+    figure, panels = _panels(len(frames), right - left, high - low)
     for panel, frame in zip(panels, frames, strict=True):
-        panel.imshow(view.picture(frame, chosen(frame)), extent=sides, interpolation="antialiased")
+        picture = window.picture(motion.position[frame], chosen(frame))
+        panel.imshow(picture, extent=(left, right, low, high), interpolation="antialiased")
         panel.set_title(f"{motion.time[frame]:.{decimals}f} s", fontsize=10)
-        panel.set_xlabel(f"{view.axes[0]} (mm)")
+        panel.set_xlabel("x (mm)")
         panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])
-        panel.spines["right"].set_visible(motion.case.boundary.closed)  # as the left one, a wall
+        panel.spines["right"].set_visible(sideways)  # as the left one, a wall
         panel.grid(visible=False)
         foremost = panel.get_position().x0 == panels[0].get_position().x0
         panel.tick_params(labelleft=foremost)
-        panel.set_ylabel(f"{view.axes[1]} (mm)" if foremost else "")
-    view.close()
+        panel.set_ylabel(f"{'height' if sideways else 'y'} (mm)" if foremost else "")
+    window.close()
     return save_figure(figure, path, [directory.name])
+
+
+def _pixels(wide: float, tall: float) -> list[int]:
+    """Of a view of so many mm, across and up."""
+    pixels = min(max(_TALL / tall, min(_PIXELS, _TALLEST / tall)), _WIDEST / wide)
+    return [max(1, round(extent * pixels)) for extent in (wide, tall)]
+
+
+def top_view(group: Group, walker: int, frame: int, along: tuple[float, float], across: tuple[float, float]) -> Picture:
+    """One walker seen from above, as a stroboscope shows it.
+
+    Parameters
+    ----------
+    group
+        Of the walkers.
+    walker, frame
+        Which of them, and when.
+    along, across
+        Bounds of the picture along and across the drive axis, m, relative to the substrate.
+
+    Returns
+    -------
+    ndarray, shape (height, width, 3)
+        Red, green, blue; the first row is the farthest to the left of the drive axis, 120 pixels to the smaller radius.
+    """
+    motion = group.motion.of_walkers(group.walkers[walker : walker + 1])
+    bounds = 1e3 * np.array([along, across, (0.0, 2.0 * group.radii.max())])
+    camera = Camera(axes_toward(np.array([0.0, 0.0, 1.0]), group.across_axis), *bounds.T)
+    pixels = 120.0 / (1e3 * float(group.radii.min()))
+    window = Window(motion, camera, [round(float(high - low) * pixels) for low, high in bounds[:2]])
+    picture = window.picture(motion.position[frame], range(len(motion.radius)))
+    window.close()
+    return picture
 
 
 def _panels(count: int, wide: float, tall: float) -> tuple[Figure, list[Axes]]:

@@ -49,8 +49,7 @@ def write_trajectory(directory: Path, destination: Path, *, every: int = 1) -> P
     if write is None or destination.is_dir():
         expected = f"{destination}: expected the name of a .xyz, .extxyz or .lammpstrj file"
         raise InputError("--to", [Problem("", None, expected)])
-    motion = read_motion(directory).driven
-    motion = motion.part(slice(None, None, every))
+    motion = read_motion(directory).driven.select(slice(None, None, every))
     destination.parent.mkdir(parents=True, exist_ok=True)
     with beside(destination) as new, new.open("w", encoding="ascii") as file:
         _write(file, motion, write)

@@ -37,8 +37,7 @@ from walkers.paper.model_terms import try_model_terms, write_model_terms
 from walkers.pipeline import run
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.films import FilmOptions
-from walkers.postprocess.pictures import render_run
-from walkers.postprocess.series import render_series
+from walkers.postprocess.series import render_run, render_series
 from walkers.runner.files import read_json, write_json, write_text
 from walkers.studies.validate import validate
 from walkers.sweeps.scheduler import Options

@@ -17,7 +17,16 @@ import numpy.typing as npt
 from walkers.postprocess.motion import Motion, gathered, read_motion
 from walkers.postprocess.paraview import boundary_of
 from walkers.postprocess.rolling import turns_of
-from walkers.postprocess.scene import GLASS, RUBY, against_gravity, pointed_out
+from walkers.postprocess.scene import (
+    GLASS,
+    RUBY,
+    Camera,
+    against_gravity,
+    axes_toward,
+    beach_ball,
+    pointed_out,
+    round_below,
+)
 
 if TYPE_CHECKING:
     import k3d
@@ -29,8 +38,10 @@ MOST_PLACES = 8000
 _FEWEST_INSTANTS = 150
 """Before instants are left out beyond this, walkers are."""
 _WHITE, _FLOOR, _RULE = "#f6efe9", "#dfe5e8", "#9aa6ae"
-_GORES, _AROUND, _UP = 8, 3, 16
-"""Of a beach ball: its gores, and the pieces of each around and along its axis."""
+_ROUNDS = 24
+"""Cells around a ball."""
+_MARGIN = 1.15
+"""Extent of the view over that of the beads."""
 _GRID = 2.0**-13
 """mm, to which places are rounded: 0.1 µm. What is rounded to powers of two can be packed."""
 _LANE = 1.25
@@ -39,8 +50,6 @@ _VIEW = 30.0
 """Degrees, of the camera's view."""
 _ASPECT = 1.5
 """Width of a picture over its height, at least."""
-_RULES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Millimetres between the lines on a floor."""
 
 
 @dataclass(frozen=True)
@@ -139,18 +148,8 @@ def _thinned(motion: Motion, places: int) -> tuple[Motion, npt.NDArray[np.int64]
     if stride > 1:
         often = f"{samples // stride} instants a cycle" if stride < samples else f"every {stride // samples}th cycle"
         captions.append(f"{often.capitalize()} {'are' if stride < samples else 'is'} shown, with what is between them.")
-    part = motion.part(slice(None, None, stride))
-    return _of_beads(part, beads, walkers), frames, beads, captions
-
-
-def _of_beads(motion: Motion, beads: npt.NDArray[np.bool_], walkers: Any) -> Motion:
-    """Some of the beads of a motion, which is looked at and not measured."""
-    from dataclasses import replace
-
-    if beads.all():
-        return motion
-    arrays = {name: getattr(motion, name)[:, beads] for name in ("position", "velocity", "spin")}
-    return replace(motion, **arrays, mean_spin=None, radius=motion.radius[beads], walkers=walkers)
+    part = motion.select(slice(None, None, stride), None if beads.all() else np.flatnonzero(beads))
+    return part, frames, beads, captions
 
 
 def _balls(motion: Motion, turned: FloatArray, colours: npt.NDArray[np.uint32]) -> list[Any]:
@@ -158,7 +157,7 @@ def _balls(motion: Motion, turned: FloatArray, colours: npt.NDArray[np.uint32]) 
     import k3d
     from scipy.spatial.transform import Rotation
 
-    vertices, indices, white = _beach_ball()
+    vertices, indices, white = beach_ball(_ROUNDS)
     times = [f"{time:.6f}" for time in motion.time]
     balls = []
     for bead, radius in enumerate(motion.radius * 1e3):
@@ -168,7 +167,7 @@ def _balls(motion: Motion, turned: FloatArray, colours: npt.NDArray[np.uint32]) 
         matrices[:, 3, 3] = 1.0
         ball = k3d.mesh(
             vertices,
-            indices,
+            indices.astype(np.uint32),
             normals=vertices,
             colors=np.where(white, _packed(_WHITE), colours[bead]).astype(np.uint32),
             flat_shading=False,
@@ -178,25 +177,6 @@ def _balls(motion: Motion, turned: FloatArray, colours: npt.NDArray[np.uint32]) 
         ball.model_matrix = dict(zip(times, matrices, strict=True))
         balls.append(ball)
     return balls
-
-
-def _beach_ball() -> tuple[FloatArray, npt.NDArray[np.uint32], npt.NDArray[np.bool_]]:
-    """Vertices of a unit ball, its triangles, and which vertices are of a white gore; gores share no vertices."""
-    turns = np.linspace(0.0, 2.0 * np.pi, _GORES * _AROUND + 1).astype(np.float32)
-    down = np.linspace(0.0, np.pi, _UP + 1).astype(np.float32)
-    vertices, triangles, white = [], [], []
-    for gore in range(_GORES):
-        first = gore * (_AROUND + 1) * (_UP + 1)
-        around, rows = np.meshgrid(turns[gore * _AROUND : (gore + 1) * _AROUND + 1], down, indexing="ij")
-        # The axis is y, about which a bead rolls that goes along x.
-        vertices.append(np.stack([np.sin(rows) * np.cos(around), np.cos(rows), np.sin(rows) * np.sin(around)], axis=-1))
-        white += [bool(gore % 2)] * around.size
-        for column in range(_AROUND):
-            for row in range(_UP):
-                corner = first + column * (_UP + 1) + row
-                beside = corner + _UP + 1
-                triangles += [(corner, beside, beside + 1), (corner, beside + 1, corner + 1)]
-    return np.concatenate([one.reshape(-1, 3) for one in vertices]), np.array(triangles, np.uint32), np.array(white)
 
 
 def _points(motion: Motion, colours: npt.NDArray[np.uint32]) -> Any:
@@ -251,7 +231,7 @@ def _rules(low: FloatArray, high: FloatArray) -> Any:
     """Lines across a floor."""
     import k3d
 
-    step = next((one for one in _RULES if (high[0] - low[0]) / one <= 20), _RULES[-1])
+    step = round_below(float(high[0] - low[0]) / 8.0)
     marks = np.arange(np.ceil(low[0] / step), np.floor(high[0] / step) + 1) * step
     ends = np.array([[(x, low[1], 0.0), (x, high[1], 0.0)] for x in marks], dtype=np.float32).reshape(-1, 3)
     indices = np.arange(len(ends), dtype=np.uint32).reshape(-1, 2)
@@ -262,10 +242,6 @@ def _rules(low: FloatArray, high: FloatArray) -> Any:
 
 def cameras_of(motion: Motion) -> dict[str, list[float]]:
     """Where to look from so that everything is in view, gravity downward: `Scene.cameras`."""
-    reached = motion.position * 1e3
-    margin = 1.5 * float(motion.radius.max()) * 1e3
-    low, high = reached.min(axis=(0, 1)) - margin, reached.max(axis=(0, 1)) + margin
-    corners = np.array([[(low, high)[bit][axis] for axis, bit in enumerate(bits)] for bits in np.ndindex(2, 2, 2)])
     closed, upward = motion.case.boundary.closed, against_gravity(motion)
     steep = upward[2] < 0.5
     first = np.array([-0.25, -1.0, 0.2] if closed else [-0.1, -0.7, 0.9] if steep else [-0.55, -0.8, 0.6])
@@ -274,19 +250,15 @@ def cameras_of(motion: Motion) -> dict[str, list[float]]:
         "from the side": (np.array([0.0, -1.0, 0.0]), upward),
         "onto the floor": (np.array([0.0, 0.0, 1.0]), upward if steep else np.array([0.0, 1.0, 0.0])),
     }
-    return {name: _camera(corners, way / np.linalg.norm(way), up) for name, (way, up) in ways.items()}
+    return {name: _camera(motion, way, up) for name, (way, up) in ways.items()}
 
 
-def _camera(corners: FloatArray, way: FloatArray, up: FloatArray) -> list[float]:
-    """A camera that way from the middle of some points, as near as all of them are seen."""
-    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
-    right = np.cross(up, way)
-    right /= np.linalg.norm(right)
-    away = corners - middle
-    steep = np.tan(np.radians(_VIEW / 2.0))
-    needed = np.maximum(np.abs(away @ right) / (steep * _ASPECT), np.abs(away @ np.cross(way, right)) / steep)
-    distance = float((needed + away @ way).max())
-    return [float(one) for one in (*(middle + way * distance), *middle, *up)]
+def _camera(motion: Motion, way: FloatArray, up: FloatArray) -> list[float]:
+    """A camera that way from the middle of the beads, as near as all of them are seen."""
+    seen = Camera.around(motion, axes_toward(way, up), share=_MARGIN, shaken=False)
+    depth = float(seen.high[2] - seen.low[2])
+    distance = seen.height(_ASPECT) / 2.0 / float(np.tan(np.radians(_VIEW / 2.0))) + depth / 2.0
+    return [float(one) for one in (*seen.place(distance), *seen.middle, *up)]
 
 
 def _packed(colour: str) -> int:

@@ -460,7 +460,7 @@ def compare_piles(motions: Sequence[Motion], laws: Laws, seconds: Sequence[float
 
 def _later_half(motion: Motion) -> Motion:
     """The second half of the drive."""
-    return motion.part(slice(int(np.searchsorted(motion.time, motion.time[-1] / 2.0)), None))
+    return motion.select(slice(int(np.searchsorted(motion.time, motion.time[-1] / 2.0)), None))
 
 
 def _mean_height(motion: Motion) -> float:
