@@ -28,16 +28,9 @@ _MOST_THREADS = 4
 
 
 def manifest(
-    case: Case,
-    name: str,
-    engine: Engine,
-    report: EngineReport,
-    *,
-    started: float,
-    directory: Path,
-    described: Collection[str] = (),
+    case: Case, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path
 ) -> dict[str, Any]:
-    """What the manifest of a run, or of an ensemble, says.
+    """What the manifest of a run says.
 
     Parameters
     ----------
@@ -47,8 +40,6 @@ def manifest(
         Seconds since the epoch.
     directory
         The run directory, all of its files written but this one.
-    described
-        Names of folders in it that have manifests of their own: checksums of their files are there.
     """
     finished = time.time()
     audit, plugin = read_audit(engine.sha256), plugin_of(engine)
@@ -82,7 +73,7 @@ def manifest(
         "steps": report.steps,
         "steps_per_second": report.steps / report.loop_seconds if report.loop_seconds else None,
         "files": files,
-        "sha256": checksums(directory, [file for file in files if file.partition("/")[0] not in described]),
+        "sha256": checksums(directory, files),
     }
 
 

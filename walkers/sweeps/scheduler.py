@@ -18,11 +18,9 @@ from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.runner.binary import Engine
 from walkers.runner.cost import pairs_of_beads
-from walkers.runner.ensemble import remove_remains
 from walkers.runner.locks import is_locked
-from walkers.sweeps.belongings import PARSL
 from walkers.sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, PlannedDeck, halves, pack, unfinished_parts
-from walkers.sweeps.record import PointState, SweepRecord, chains, states, velocity_of
+from walkers.sweeps.record import PARSL, PointState, SweepRecord, chains, states, velocity_of
 from walkers.sweeps.site import Site, pilots, threads
 from walkers.sweeps.worker import STOPS, Report, SweepStopped, Task, work
 from walkers.templates.sharing import sharing_key
@@ -175,7 +173,6 @@ def schedule(
     _raise_file_limit()
     out = record.out
     out.mkdir(parents=True, exist_ok=True)
-    remove_remains(out)
     with _workers(options, record) as workers:
         return _Scheduler(record, cases, engine, options, workers, on_progress).run()
 
