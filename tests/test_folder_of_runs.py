@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 
 import walkers
@@ -19,6 +20,7 @@ from walkers.runner.directory import MANIFEST_NAME, finished_places
 from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import locked
 from walkers.sweeps.listing import bytes_text
+from walkers.sweeps.matching import _matched
 
 STEP = ["run.time_step", "run.steps_per_cycle"]
 SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
@@ -212,6 +214,13 @@ def test_compare_matches_the_points_of_two_sweeps(out: Path) -> None:
     for other, told in (("three", "vary the same keys"), ("fig1b", "is a sweep, to be compared")):
         done = call("compare", "grid", other)
         assert (done.returncode, told in done.stderr) == (2, True)
+
+
+def test_points_of_sweeps_match_by_what_their_numbers_are() -> None:
+    first = pd.DataFrame({"key": [0, 1.0, "auto"], "point": range(3)})
+    second = pd.DataFrame({"key": ["auto", 0.0, 2], "point": range(3)})
+    found = _matched([first, second], ["key"])
+    assert list(zip(found["point_first"], found["point_second"], strict=True)) == [(0, 1), (2, 0)]
 
 
 def test_clean_removes_leftovers_alone(out: Path) -> None:

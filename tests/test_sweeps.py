@@ -4,6 +4,7 @@ import io
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import time
@@ -488,8 +489,11 @@ def test_a_folder_of_the_name_of_a_shipped_sweep(in_folder: Path) -> None:
 def test_a_column_of_numbers_and_words(sweep_file: Callable[..., str]) -> None:
     name = sweep_file(text='[axes]\nrun.time_step = ["auto", "1 us"]')
     _sweep(name)
+    shutil.rmtree(load("runs/test")["run"][1])
     told = subprocess.run([PROGRAM, "table", "runs/test", "--parquet"], capture_output=True, check=True).stdout
-    assert pq.read_table(io.BytesIO(told)).column("run.time_step").to_pylist() == ["auto", "1.0"]
+    table = pq.read_table(io.BytesIO(told))
+    assert table.column("run.time_step").to_pylist() == ["auto", "1.0"]
+    assert table.column("walkers_met").to_pylist() == [False, None], "truths stay truths where a point is missing"
 
 
 def test_two_sweeps_of_one_process_do_not_stop_each_other(sweep_file: Callable[..., str], in_folder: Path) -> None:

@@ -19,6 +19,7 @@ from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import EngineReport
 from walkers.runner.plugin import plugin_of
 from walkers.runner.provenance import software
+from walkers.templates.deck import CONTENT_VERSION
 
 MANIFEST_NAME = "manifest.json"
 FORMAT = 2
@@ -59,6 +60,7 @@ def manifest(
             "sha256": engine.sha256,
             "audit": audit.summary() if audit else None,
         },
+        "deck_version": CONTENT_VERSION,
         "contact_model": {"path": str(plugin), "sha256": checksums(plugin.parent, [plugin.name])[plugin.name]},
         **_made_by(),
         "host": platform.node(),

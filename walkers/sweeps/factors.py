@@ -119,15 +119,16 @@ def _category(columns: Mapping[str, list[Any]], units: Mapping[str, str | None])
     """A factor of texts: of the key that tells its levels apart, or of all together."""
     whole = _count(zip(*columns.values(), strict=True))
     shown = next(([key] for key, values in columns.items() if _count(values) == whole), list(columns))
-    told = [[f"{_text(value)} {units[key] or ''}".strip() for value in columns[key]] for key in shown]
+    told = [[f"{value_text(value)} {units[key] or ''}".strip() for value in columns[key]] for key in shown]
     rest = [key for key in columns if key not in shown]
     label = ", ".join(map(readable_key, shown)) + _with(rest)
     return Factor((*shown, *rest), label, [", ".join(row) for row in zip(*told, strict=True)], False)
 
 
-def _text(value: Any) -> str:
+def value_text(value: Any) -> str:
+    """A value of a key as text, several with strokes between them."""
     if isinstance(value, list):
-        return "/".join(map(_text, value))
+        return "/".join(map(value_text, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

@@ -61,7 +61,7 @@ class Report:
     Attributes
     ----------
     finished
-        From names of runs to their directories and mean velocities (m/s).
+        From names of runs to their mean velocities (m/s).
     busy
         Names of runs that somebody else is making.
     failure
@@ -70,7 +70,7 @@ class Report:
         What it says and where its remains are.
     """
 
-    finished: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    finished: Mapping[str, float] = field(default_factory=dict)
     busy: tuple[str, ...] = ()
     failure: str | None = None
     message: str = ""
@@ -108,7 +108,5 @@ def _made(task: Task, look: Callable[[object], None]) -> Report:
     if task.runs != tuple(run_place(case, engine, task.out).name for case in task.cases):
         raise ProgramDiffers
     made = make_runs(task.cases, task.out, engine, on_progress=look, time_limit=task.time_limit)
-    finished = {
-        name: (str(run.directory), velocity_in(current_result(run.directory))) for name, run in made.runs.items()
-    }
+    finished = {name: velocity_in(current_result(run.directory)) for name, run in made.runs.items()}
     return Report(finished=finished, busy=tuple(sorted(made.busy)))
