@@ -7,6 +7,7 @@ removal be interrupted, what is left is no run, and goes the next time.
 from __future__ import annotations
 
 import shutil
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,28 +34,20 @@ class Cleaning:
 
     Attributes
     ----------
-    out
-        The folder.
     remove
         Runs and sweeps.
     locks
         Lock files that lock nothing.
-    sweeps_of
-        From the name of a run to those of the sweeps that have it.
+    needed
+        From the names of sweeps that stay to how many of their runs go.
     kept
         Why something that was asked for stays, and how much of it.
     """
 
-    out: Path
     remove: Sequence[Entry]
     locks: Sequence[Path]
-    sweeps_of: Mapping[str, Sequence[str]]
+    needed: Mapping[str, int]
     kept: Mapping[str, int]
-
-    @property
-    def size(self) -> int:
-        """Bytes that it frees."""
-        return sum(_bytes(entry) for entry in self.remove)
 
     def as_text(self) -> str:
         """What goes, what of sweeps, what stays, and how much it is."""
@@ -65,33 +58,17 @@ class Cleaning:
         lines = [aligned(rows)] if rows else []
         if len(self.remove) > _MOST_LINES:
             lines.append(f"and {len(self.remove) - _MOST_LINES} more")
-        lines += [
-            f"needed by the sweep {sweep}, which would make them again: {n}" for sweep, n in self._needed().items()
-        ]
+        lines += [f"needed by the sweep {sweep}, which would make them again: {n}" for sweep, n in self.needed.items()]
         lines += [f"stays: {number} {reason}" for reason, number in self.kept.items()]
         for sweep in self.remove:
             if sweep.is_sweep and not sweep.directory.is_symlink():
                 theirs = sorted(set(sweep.directory.iterdir()) - set(_own_files(sweep.directory)))
                 names = ", ".join(path.name for path in theirs)
-            else:
-                names = ""
-            if names:
-                lines.append(f"stays, for walkers did not write it: {names} (in {sweep.directory})")
-        lines.append(f"{self._counted() or 'nothing'} to remove, {bytes_text(self.size)}")
-        return "\n".join(lines)
-
-    def _needed(self) -> dict[str, int]:
-        """Runs that go, by the sweeps that have them and stay."""
-        going = {entry.name for entry in self.remove if entry.is_sweep}
-        runs = [entry for entry in self.remove if not entry.is_sweep]
-        names = [name for entry in runs for name in self.sweeps_of.get(entry.name, ()) if name not in going]
-        return {name: names.count(name) for name in dict.fromkeys(names)}
-
-    def _counted(self) -> str:
-        kinds = ["sweep" if entry.is_sweep else f"{entry.status} run" for entry in self.remove]
-        kinds += ["stale lock"] * len(self.locks)
-        count = {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
-        return ", ".join(f"{number} {kind}{'s' if number > 1 else ''}" for kind, number in count.items())
+                lines += [f"stays, for walkers did not write it: {names} (in {sweep.directory})"] if theirs else []
+        kinds = Counter("sweep" if entry.is_sweep else f"{entry.status} run" for entry in self.remove)
+        kinds.update(["stale lock"] * len(self.locks))
+        told = ", ".join(f"{number} {kind}{'s' if number > 1 else ''}" for kind, number in kinds.items())
+        return "\n".join([*lines, f"{told or 'nothing'} to remove, {bytes_text(sum(map(_bytes, self.remove)))}"])
 
 
 def _kind(entry: Entry) -> str:
@@ -166,30 +143,34 @@ def plan_cleaning(
             read_record(sweep_file.parent)  # of one that cannot be read nobody knows which runs it has
     sweeps_of: dict[str, list[str]] = {}
     for sweep in entries:
-        for run in sweep.runs if sweep.is_sweep else ():
+        for run in sweep.runs:
             sweeps_of.setdefault(run, []).append(sweep.name)
-    statuses = (*LEFTOVERS, "finished") if finished else LEFTOVERS
-    wanted = _given(given, entries, sweeps_of) if given else [one for one in entries if not one.is_sweep]
-    wanted = select(
-        [one for one in wanted if given or one.status in (*statuses, "running")], case=case, older_than=older_than
+    statuses = {*LEFTOVERS, "running", *(["finished"] if finished else [])}
+    wanted = [one for one in entries if not one.is_sweep and one.status in statuses]
+    wanted = select(_given(given, entries, sweeps_of) if given else wanted, case=case, older_than=older_than)
+    reasons = {
+        entry.directory: _reason_to_stay(entry, [] if given else sweeps_of.get(entry.name, [])) for entry in wanted
+    }
+    remove = [entry for entry in wanted if reasons[entry.directory] is None]
+    going = {entry.name for entry in remove if entry.is_sweep}
+    needing = [name for entry in remove if not entry.is_sweep for name in sweeps_of.get(entry.name, ())]
+    return Cleaning(
+        remove,
+        [] if given or case or older_than else _stale_locks(out),
+        Counter(name for name in needing if name not in going),
+        Counter(reason for reason in reasons.values() if reason is not None),
     )
-    kept: dict[str, int] = {}
 
-    def stays(entry: Entry) -> bool:
-        reason = None
-        if entry.status == "running":
-            reason = "running"
-        elif not given and entry.status == "finished" and entry.name in sweeps_of:
-            reason = f"finished, of the sweep {sweeps_of[entry.name][0]} (give its name to remove it)"
-        elif entry.directory.name.endswith(REPLACED) and not entry.place.exists():
-            reason = "about to be put back in its place"
-        if reason is not None:
-            kept[reason] = kept.get(reason, 0) + 1
-        return reason is not None
 
-    remove = [entry for entry in wanted if not stays(entry)]
-    locks = [] if given or case or older_than else [path for path in _locks(out) if not is_locked(_place(path))]
-    return Cleaning(out, remove, locks, sweeps_of, kept)
+def _reason_to_stay(entry: Entry, sweeps: Sequence[str]) -> str | None:
+    """Why a run or a sweep stays, which of these sweeps have; None if it goes."""
+    if entry.status == "running":
+        return "running"
+    if entry.status == "finished" and sweeps:
+        return f"finished, of the sweep {sweeps[0]} (give its name to remove it)"
+    if entry.directory.name.endswith(REPLACED) and not entry.place.exists():
+        return "about to be put back in its place"
+    return None
 
 
 def _given(given: Sequence[str], entries: Sequence[Entry], sweeps_of: Mapping[str, Sequence[str]]) -> list[Entry]:
@@ -210,8 +191,8 @@ def _given(given: Sequence[str], entries: Sequence[Entry], sweeps_of: Mapping[st
     return list(found.values())
 
 
-def _locks(out: Path) -> list[Path]:
-    return [path for path in sorted(out.glob("*.lock")) if is_run_name(path.stem)]
+def _stale_locks(out: Path) -> list[Path]:
+    return [path for path in sorted(out.glob("*.lock")) if is_run_name(path.stem) and not is_locked(_place(path))]
 
 
 def _place(lock: Path) -> Path:
@@ -244,14 +225,10 @@ def clean(cleaning: Cleaning) -> dict[Path, str]:
                     recover(entry.place)
                     _remove(entry.directory)
             except OSError as error:
-                left[entry.directory] = _refused(error)
+                left[entry.directory] = f"cannot be removed whole: {error.strerror or error} ({error.filename})"
     with locked(_place(lock) for lock in cleaning.locks if lock.exists()):
         pass  # a lock file goes with its lock
     return left
-
-
-def _refused(error: OSError) -> str:
-    return f"cannot be removed whole: {error.strerror or error} ({error.filename})"
 
 
 def _remove_sweep(directory: Path) -> None:
