@@ -25,7 +25,6 @@ from walkers.inputs import load_case
 from walkers.inputs.case import Case
 from walkers.runner import FinishedRun, find_engine
 from walkers.runner.directory import write_deck
-from walkers.runner.ensemble import finished_place
 from walkers.runner.plugin import plugin_of
 from walkers.sweeps.record import read_record
 from walkers.templates.deck import DECK_NAME, Segment, render_deck
@@ -113,11 +112,10 @@ def measure_figures(folder: Path) -> None:
     """Time of ``walkers figures`` from nothing, and of the engines within it."""
     program, out = str(Path(sys.executable).with_name("walkers")), folder / "figures-runs"
     seconds = _seconds([program, "figures", "--out", str(out), "--to", str(folder / "figures")], folder)
-    manifests = [*out.glob("*/manifest.json"), *out.glob("ensembles/*/manifest.json")]
-    decks = [json.loads(path.read_text()) for path in manifests]
-    loops = {deck["run"]: deck["seconds"]["engine_loop"] for deck in decks}
-    places = [finished_place(out, name) for name in read_record(out / "fig2").runs]
-    fig2 = {place.parent.name if place.parent != out else place.name for place in places if place}
+    manifests = {path.parent.name: json.loads(path.read_text()) for path in out.glob("*/manifest.json")}
+    deck_of = {name: run.get("shared_deck", {}).get("first", name) for name, run in manifests.items()}
+    loops = {deck_of[name]: run["seconds"]["engine_loop"] for name, run in manifests.items()}
+    fig2 = {deck_of[name] for name in read_record(out / "fig2").runs}
     print("\n| | |\n|---|---|")
     print(f"| `walkers figures` from nothing, wall time | {seconds:.0f} s |")
     print(f"| of the engines' loops, on all cores | {sum(loops.values()):.0f} core-seconds in {len(loops)} decks |")

@@ -57,7 +57,9 @@ def _run(folder: Path, *arguments: str) -> _Cost:
 
 def _engine_seconds(manifests: Iterable[Path]) -> tuple[int, float, float]:
     """Number of decks, time in the engines' loops and of the engines as a whole, s."""
-    seconds = [json.loads(manifest.read_text())["seconds"] for manifest in manifests]
+    runs = [json.loads(manifest.read_text()) for manifest in manifests]
+    decks = {run.get("shared_deck", {}).get("first", run["run"]): run["seconds"] for run in runs}
+    seconds = list(decks.values())
     return len(seconds), sum(one["engine_loop"] for one in seconds), sum(one["engine"] for one in seconds)
 
 
@@ -69,7 +71,7 @@ def measure_machinery(folder: Path) -> None:
     dry = _run(folder, "sweep", "grid.toml", "--dry-run")
     print(f"| dry run of 10,000 points | {dry.seconds:.2f} | {dry.megabytes:.0f} |")
     real = _run(folder, "sweep", "trivial.toml", "-j", str(_WORKERS))
-    decks, _, engine = _engine_seconds(folder.glob("runs/ensembles/*/manifest.json"))
+    decks, _, engine = _engine_seconds(folder.glob("runs/*/manifest.json"))
     name = f"1,000 points of two cycles in {decks} decks, {_WORKERS} at once"
     print(f"| {name} | {real.seconds:.2f} | {real.megabytes:.0f} |")
     overhead = (real.seconds - engine / _WORKERS) / 1000

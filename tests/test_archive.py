@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import requests
@@ -173,7 +174,7 @@ def _with(name: str) -> Callable[[dict[str, Any]], None]:
             lambda manifest: manifest.pop("files"),
             "manifest.json (it, or what it names, cannot be read: expected the key files)",
         ),
-        (lambda manifest: manifest.update(shared_deck=[]), "  doubtful   manifest.json (it, or what it names, cannot"),
+        (lambda manifest: manifest.update(files=[]), "  doubtful   manifest.json (it, or what it names, cannot"),
         (_with("../stranger"), "expected paths below it, found '../stranger'"),
         (_with("/etc/hostname"), "expected paths below it, found '/etc/hostname'"),
         (_with("\x1b[2J"), r"  missing    '\x1b[2J'"),
@@ -344,23 +345,28 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     before, after = (load(folder / "angles").drop(columns="run") for folder in (shared, unpacked / "runs"))
     assert list(after["status"]) == ["finished"] * 2
     assert before.equals(after)
-    assert len(list(unpacked.glob("runs/ensembles/*/walker.lig"))) == 1
+    told = pd.read_csv(unpacked / "runs" / "angles" / "table.csv")["run"]
+    assert [Path(place).name for place in told] == [Path(place).name for place in load(shared / "angles")["run"]]
+    assert all((unpacked / place / "shared_deck" / "walker.lig").is_file() for place in told)
     for number, angle in enumerate(("0 deg", "10 deg")):
         name = Path(load(shared / "angles")["run"][number]).name
-        (given,) = unpacked.glob(f"runs/ensembles/*/{name}/base.toml")
+        (given,) = unpacked.glob(f"runs/{name}/base.toml")
         assert load_case(given) == resolve_case(document(run=SHORT, dimers={"angle": angle}), name="base")
     assert (unpacked / "runs" / "angles" / "angles.toml").read_text().startswith('case = "base.toml"\n')
     crate = ROCrate(unpacked)
     assert [action["name"].split()[0] for action in crate.root_dataset["mentions"]] == [
-        *("Deck", "Engine's", "Tables", "Tables", "Table")
+        *("Deck", "Engine's", "Tables"),
+        *("Deck", "Engine's", "Tables"),
+        "Table",
     ]
 
     assert call("verify", str(unpacked / "runs" / "angles"), check=True).stdout.startswith("angles: 2 points have")
-    (deck,) = unpacked.glob("runs/ensembles/*/walker.lig")
-    deck.write_text(deck.read_text().replace("gravity", "levity"))
-    told = call("verify", str(unpacked / "runs" / "angles"))
-    assert (told.returncode, "  changed    walker.lig" in told.stdout) == (1, True)
-    shutil.rmtree(deck.parent)
+    decks = list(unpacked.glob("runs/*/shared_deck/walker.lig"))
+    decks[0].write_text(decks[0].read_text().replace("gravity", "levity"))
+    changed = call("verify", str(unpacked / "runs" / "angles"))
+    assert (changed.returncode, changed.stdout.count("  changed    shared_deck/walker.lig")) == (1, 1)
+    for deck in decks:
+        shutil.rmtree(deck.parent.parent)
     gone = call("verify", str(unpacked / "runs" / "angles"))
     assert (gone.returncode, gone.stdout.splitlines()[0]) == (1, "angles: 0 points have their run")
     assert gone.stdout.count("(missing: point ") == 2
@@ -662,8 +668,7 @@ def test_what_an_unpacked_archive_does_not_list(whole: Path, shared: Path, tmp_p
     call("plot", str(sweep), check=True)
     assert "  made since velocity.png\n" in call("verify", str(sweep), check=True).stdout
     (sweep / "sweep.old.json").write_text("{}")
-    (deck,) = sweep.parent.glob("ensembles/*/manifest.json")
-    deck.write_text("{")
+    next(sweep.parent.glob("*/manifest.json")).write_text("{")
     told = call("verify", str(sweep))
     assert told.returncode == 1
     assert "  not listed sweep.old.json\n" in told.stdout

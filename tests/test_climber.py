@@ -18,8 +18,7 @@ from walkers.postprocess.motion import read_motion
 from walkers.postprocess.posture import postures, turned_over_at
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import run_place
-from walkers.runner.ensemble import finished_places
+from walkers.runner.directory import finished_places, run_place
 from walkers.sweeps.shared_deck import make_runs
 from walkers.theory.prediction import motion_of, predict
 

@@ -10,16 +10,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 
 import walkers
 from tests.conftest import call, document, mounted, to_toml
 from walkers.inputs.readable import differing, flattened
-from walkers.runner.directory import MANIFEST_NAME
-from walkers.runner.ensemble import finished_places
+from walkers.runner.directory import MANIFEST_NAME, finished_places
 from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import locked
 from walkers.sweeps.listing import bytes_text
+from walkers.sweeps.matching import _matched
 
 STEP = ["run.time_step", "run.steps_per_cycle"]
 SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
@@ -69,7 +70,6 @@ def test_list_has_all_runs_and_sweeps_with_what_they_gave(out: Path) -> None:
     runs = {entry["name"]: entry for entry in entries if entry["kind"] == "run"}
     places = finished_places(out)
     assert runs.keys() == places.keys() | {path.name.removesuffix(".incomplete") for path in (failed, interrupted)}
-    assert any("ensembles" in entry["directory"] for entry in runs.values())
     table = walkers.load(out / "three")
     for run, velocity, error in zip(table["run"], table["velocity"], table["standard_error"], strict=True):
         entry = runs[Path(run).name]
@@ -100,7 +100,7 @@ def test_list_filters_and_sorts(out: Path) -> None:
     for days, run in ((30, runs[0]), (2, runs[1])):
         os.utime(run / MANIFEST_NAME, (time.time() - days * 86400.0,) * 2)
     then = time.time() - 3600.0
-    for number, run in enumerate(runs[2:]):  # of an ensemble the manifests are microseconds apart
+    for number, run in enumerate(runs[2:]):  # of a shared deck the manifests are microseconds apart
         os.utime(run / MANIFEST_NAME, (then + 1e-6 * number,) * 2)
     assert {entry["name"] for entry in _listed("--older-than", "7d")} == {runs[0].name}
     assert {entry["name"] for entry in _listed("--older-than", "24 h")} == {run.name for run in runs[:2]}
@@ -216,6 +216,13 @@ def test_compare_matches_the_points_of_two_sweeps(out: Path) -> None:
         assert (done.returncode, told in done.stderr) == (2, True)
 
 
+def test_points_of_sweeps_match_by_what_their_numbers_are() -> None:
+    first = pd.DataFrame({"key": [0, 1.0, "auto"], "point": range(3)})
+    second = pd.DataFrame({"key": ["auto", 0.0, 2], "point": range(3)})
+    found = _matched([first, second], ["key"])
+    assert list(zip(found["point_first"], found["point_second"], strict=True)) == [(0, 1), (2, 0)]
+
+
 def test_clean_removes_leftovers_alone(out: Path) -> None:
     failed, interrupted, held = _fail("slow"), _interrupt("killed"), _interrupt("held")
     stale, theirs = out / "gone-0123456789ab.lock", out / "poetry.lock"
@@ -258,8 +265,6 @@ def test_clean_keeps_what_sweeps_need_unless_it_is_named(out: Path) -> None:
     gone = before.keys() - finished_places(out).keys() - {own}
     assert gone == runs["beads"] - runs["three"], "all runs of the grid are those of another sweep too"
     assert not (out / "grid").exists()
-    ensembles = {path.parent for path in before.values() if path.parent.parent.name == "ensembles"}
-    assert all(path.exists() == any(path in one.parents for one in finished_places(out).values()) for path in ensembles)
     one = sorted(runs["three"])[0]
     told = call("clean", str(finished_places(out)[one]), "--yes", check=True).stdout
     assert "needed by the sweep three, which would make them again: 1" in told
@@ -275,19 +280,30 @@ def test_clean_takes_no_run_while_a_sweep_cannot_be_read(out: Path) -> None:
     assert (done.returncode, "sweep.json cannot be read" in done.stderr) == (2, True)
 
 
-def test_an_unfinished_ensemble_goes_as_a_whole(out: Path) -> None:
-    """It is kept while any of its runs is made."""
+def test_what_is_left_of_a_shared_deck_is_an_unfinished_run(out: Path) -> None:
+    """It lies in the directory of the first of its runs, and is kept while that is locked."""
     before = finished_places(out)
-    ensemble = next(path.parent for path in before.values() if path.parent.parent.name == "ensembles")
-    names = [path.name for path in ensemble.iterdir() if path.is_dir()]
-    unfinished = ensemble.rename(ensemble.with_name(f"{ensemble.name}.incomplete"))
-    with locked([out / names[0]]):
-        done = call("clean", "--yes")
-        assert (done.returncode, unfinished.exists()) == (1, True)
-        assert f"{unfinished}: a process has begun to make it" in done.stderr
-    call("clean", "--yes", check=True)
-    assert not unfinished.exists()
-    assert before.keys() - finished_places(out).keys() == set(names)
+    runs = [path for path in before.values() if (path / "shared_deck").is_dir()]
+    left = out / f"{runs[0].name}.incomplete"
+    left.mkdir()
+    for run in runs:
+        shutil.copytree(run, left / run.name)
+        shutil.rmtree(run)
+    shutil.copy(left / runs[0].name / "case.json", left)
+    shutil.copytree(left / runs[0].name / "shared_deck", left / "shared_deck")
+    with locked([runs[0]]):
+        assert "stays: 1 running" in call("clean", "--yes", check=True).stdout
+    assert "1 interrupted run" in call("clean", "--yes", check=True).stdout
+    assert not left.exists()
+    assert before.keys() - finished_places(out).keys() == {run.name for run in runs}
+
+
+def test_clean_keeps_the_runs_of_a_sweep_whose_directory_was_renamed(out: Path) -> None:
+    shutil.copytree(out / "grid", out / "old")
+    before = finished_places(out)
+    call("clean", "grid", "rough", "three", "--yes", check=True)
+    runs = {Path(run).name for run in walkers.load(out / "old")["run"]}
+    assert runs <= finished_places(out).keys() < before.keys()
 
 
 def test_clean_removes_nothing_behind_a_symbolic_link(out: Path, tmp_path: Path) -> None:
@@ -307,7 +323,7 @@ def test_clean_removes_nothing_behind_a_symbolic_link(out: Path, tmp_path: Path)
 
 def test_clean_reports_what_the_system_does_not_let_it_remove(out: Path) -> None:
     places = finished_places(out)
-    name, directory = next((name, path) for name, path in places.items() if path.parent.parent.name == "ensembles")
+    name, directory = next(iter(places.items()))
     with mounted(directory / "busy", "64k"):
         done = call("clean", name, "--yes")
         assert (done.returncode, directory.exists()) == (1, True)
@@ -318,13 +334,12 @@ def test_clean_reports_what_the_system_does_not_let_it_remove(out: Path) -> None
 def test_clean_takes_no_folder_of_somebody_elses(out: Path) -> None:
     """Unless it has a run's name and nothing in it but what an unfinished run has."""
     shipped = next(iter(finished_places(out).values()))
-    theirs = ["thesis.incomplete", "data.replaced", "notes-0123456789ab.incomplete", "mine", "ensembles/old.incomplete"]
+    theirs = ["thesis.incomplete", "data.replaced", "notes-0123456789ab.incomplete", "mine"]
     for name in theirs:
         (out / name).mkdir()
         (out / name / "chapter.txt").write_text("mine")
     shutil.copy(shipped / "case.json", out / "mine")
     shutil.copy(shipped / "case.json", out / "thesis.incomplete")
-    shutil.copytree(shipped, out / "ensembles" / "old.incomplete" / shipped.name)
     begun = out / "killed-0123456789ab.incomplete"
     (begun / "segments").mkdir(parents=True)
     told = call("clean", "--yes", check=True).stdout

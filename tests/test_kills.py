@@ -166,7 +166,7 @@ def test_a_crash_between_renaming_and_removing_leaves_no_trace(tmp_path: Path) -
 
 
 def test_what_a_replacement_left_is_no_run(tmp_path: Path) -> None:
-    from walkers.runner.ensemble import finished_places
+    from walkers.runner.directory import finished_places
 
     place, _ = _replaced(make_case(run=BRIEF), tmp_path)
     assert finished_places(tmp_path) == {place.name: place}

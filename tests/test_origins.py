@@ -20,6 +20,7 @@ from walkers.inputs.origins import Origin
 from walkers.inputs.reading import read_toml, resolve_case
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.walking import SEPARATED
+from walkers.runner.files import read_json
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.spread import describe, run_spread, spread_sweep
 
@@ -297,7 +298,10 @@ def test_what_a_spread_draws_is_told_apart() -> None:
 
 def test_spread_on_the_command_line(in_folder: Path) -> None:
     (in_folder / "glass.toml").write_text(to_toml(GLASS))
-    told = call("run", "glass.toml", "--spread", "--points", "2", check=True).stdout
+    setting = ("--set", "run.cycles=24")
+    told = call("run", "glass.toml", "--spread", "--points", "2", *setting, check=True).stdout
+    (record,) = in_folder.glob("runs/*-spread/sweep.json")
+    assert read_json(record)["file"]["set"]["run.cycles"] == 24
     assert "  guessed    " in told
     assert "(5 to 95 %)" in told
     assert read_toml(in_folder / "glass.toml") == GLASS

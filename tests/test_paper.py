@@ -30,7 +30,6 @@ from walkers.paper.sources import NothingFinishedError, Sources
 from walkers.postprocess.drawing import save_figure
 from walkers.postprocess.gait import gait
 from walkers.postprocess.steady_state import steady_walkers
-from walkers.runner.ensemble import finished_place
 from walkers.sweeps.record import read_record
 from walkers.sweeps.scheduler import Options
 from walkers.theory.mathieu import turning
@@ -208,11 +207,10 @@ def test_figures_and_comparison_do_without_what_failed(sources: Sources, tmp_pat
     """A copy of the sweeps of which one has lost its first run, and then all."""
     out = tmp_path / "runs"
     shutil.copytree(sources.out, out)
-    runs = [finished_place(out, run) for run in read_record(out / sweep).runs]
+    runs = [out / run for run in read_record(out / sweep).runs]
     for lost in (1, None):
         for run in runs[:lost]:
-            if run is not None:
-                shutil.rmtree(run, ignore_errors=True)
+            shutil.rmtree(run, ignore_errors=True)
         left = Sources(out)
         for drawing in FIGURES.values():
             if sweep in drawing.sweeps and lost:

@@ -599,16 +599,22 @@ def test_none_or_all_that_climbed_have_an_interval_too() -> None:
 
 
 def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unless another engine, or another version of the decks, made them."""
     cases = {}
-    for name, seed, cycles in (("a-1", 1, 40), ("b-2", 1, 80), ("c-3", 2, 40), ("d-4", 2, 20)):
+    runs = [("a-1", 1, 40, 7), ("b-2", 1, 80, 7), ("c-3", 2, 40, 7), ("d-4", 2, 20, 7), ("e-5", 1, 80, 6)]
+    for name, seed, cycles, version in runs:
         (tmp_path / name).mkdir()
         told = {"seed": seed, "run": {"cycles": cycles, "cycles_per_segment": 20}, "gravity": 9.81}
         (tmp_path / name / "manifest.json").write_text("{}")
         case = SimpleNamespace(determinants=lambda told=told: told)
-        cases[tmp_path / name] = SimpleNamespace(directory=tmp_path / name, case=case)
+        manifest = {"deck_version": version, "engine": {"sha256": "0" * 64}}
+        cases[tmp_path / name] = SimpleNamespace(directory=tmp_path / name, case=case, manifest=manifest)
     monkeypatch.setattr("walkers.sweeps.climbing.finished_run", cases.get)
     monkeypatch.setattr(Pile, "applies", lambda self, case: True)
-    assert piles_in(tmp_path) == {"": [tmp_path / "b-2", tmp_path / "c-3"]}
+    assert piles_in(tmp_path) == {
+        "deck version = 7": [tmp_path / "b-2", tmp_path / "c-3"],
+        "deck version = 6": [tmp_path / "e-5"],
+    }
 
 
 def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tmp_path: Path) -> None:

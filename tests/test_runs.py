@@ -29,7 +29,6 @@ from walkers import run as run_case
 from walkers.inputs import InputError
 from walkers.runner import FinishedRun, Progress, find_engine, finished_run, open_run, run_name
 from walkers.runner.directory import FIRST_SEGMENT
-from walkers.runner.ensemble import finished_place
 from walkers.runner.failures import RunBusy
 from walkers.templates import render_deck
 
@@ -256,9 +255,7 @@ def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, mo
     stamp = _manifest(run_case(case, tmp_path).directory)["finished"]
     # It is not there at the first look, but at the second, after the run has been locked.
     answers = iter([None])
-    monkeypatch.setattr(
-        "walkers.runner.ensemble.finished_place", lambda out, name: next(answers, finished_place(out, name))
-    )
+    monkeypatch.setattr("walkers.runner.directory.finished_run", lambda place: next(answers, finished_run(place)))
     outcome = run_case(case, tmp_path)
     assert outcome.cached
     assert not list(answers)  # the first look has been

@@ -114,19 +114,25 @@ def test_samples_have_a_panel_for_each_key(looked_through: Path) -> None:
 def test_keys_that_go_together_are_one_factor() -> None:
     """A zip of equal numbers, one of texts, and one that only together tell its points apart."""
 
-    def factors(units: dict[str, str | None], values: list[list[Any]]) -> list[tuple[tuple[str, ...], list[Any], bool]]:
-        record = SweepRecord(Path("x"), "x", "", units, values, [[]] * len(values), [""] * len(values), None, [], {})
+    def factors(
+        units: dict[str, str | None], values: list[list[Any]], **file: Any
+    ) -> list[tuple[tuple[str, ...], list[Any], bool]]:
+        record = SweepRecord(Path("x"), "x", "", units, values, [[]] * len(values), [""] * len(values), None, [], file)
         return [(one.keys, one.levels, one.is_sample) for one in factors_of(record)]
 
     both = {"contact.friction.bead_wall": None, "contact.friction.bead_bead": None}
-    assert factors(both, [[0.1, 0.2], [0.2, 0.4], [0.3, 0.6]]) == [(tuple(both), [0.1, 0.2, 0.3], False)]
-    assert factors(both, [[0.1, 0.4], [0.2, 0.2], [0.3, 0.6]]) == [
-        (("contact.friction.bead_wall",), [0.1, 0.2, 0.3], True),
-        (("contact.friction.bead_bead",), [0.2, 0.4, 0.6], True),
-    ]
+    zipped = [{"contact": {"friction": {"bead_wall": [], "bead_bead": []}}}]
+    assert factors(both, [[0.1, 0.2], [0.2, 0.4], [0.3, 0.6]], zip=zipped) == [(tuple(both), [0.1, 0.2, 0.3], False)]
+    sampled = [{"ranges": {key: {"uniform": [0, 1]} for key in both}}]
+    for file in ({"zip": zipped}, {"sample": sampled}):
+        assert factors(both, [[0.1, 0.4], [0.2, 0.2], [0.3, 0.6]], **file) == [
+            (("contact.friction.bead_wall",), [0.1, 0.2, 0.3], True),
+            (("contact.friction.bead_bead",), [0.2, 0.4, 0.6], True),
+        ]
     named = {"liquid.name": None, "drive.peak_acceleration": "g"}
-    assert factors(named, [["a", 2.0], ["b", 10.0]]) == [(tuple(named), ["a", "b"], False)]
-    assert factors(named, [["a", 2.0], ["a", 10.0], ["b", 2.0]]) == [
+    zipped = [dict.fromkeys(named)]
+    assert factors(named, [["a", 2.0], ["b", 10.0]], zip=zipped) == [(tuple(named), ["a", "b"], False)]
+    assert factors(named, [["a", 2.0], ["a", 10.0], ["b", 2.0]], zip=zipped) == [
         (tuple(named), ["a, 2 g", "a, 10 g", "b, 2 g"], False)
     ]
     assert len(factors(named, [["a", 2.0], ["a", 10.0], ["b", 2.0], ["b", 10.0]])) == 2

@@ -4,6 +4,7 @@ import io
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import time
@@ -23,7 +24,6 @@ import walkers
 from tests.conftest import (
     PATIENCE,
     PROGRAM,
-    SHORT,
     call,
     document,
     engines_in,
@@ -37,7 +37,6 @@ from walkers.inputs.sweep import load_sweep
 from walkers.postprocess import read_motion, read_table
 from walkers.runner import find_engine, finished_run
 from walkers.runner.directory import FIRST_SEGMENT
-from walkers.runner.ensemble import finished_place
 from walkers.runner.failures import WalkersMet
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
@@ -75,15 +74,14 @@ def _start(*arguments: str) -> subprocess.Popen[str]:
 
 def contents_of(out: Path) -> dict[str, dict[str, bytes]]:
     """What each finished run computed: tables, result and dumps, by the names of runs and files."""
-    manifests = [*out.glob("*/manifest.json"), *out.glob("ensembles/*/*/manifest.json")]
-    manifests = [path for path in manifests if not any(folder.suffix == ".incomplete" for folder in path.parents)]
+    manifests = [path for path in out.glob("*/manifest.json") if path.parent.suffix != ".incomplete"]
     dumps = [str(FIRST_SEGMENT / name) for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt")]
     kept = (*dumps, "trajectory.parquet", "walkers.parquet", "result.json")
     return {path.parent.name: {name: (path.parent / name).read_bytes() for name in kept} for path in manifests}
 
 
 def made_in(place: str) -> str:
-    """Name of the run, or of the ensemble, that an engine was launched for in a folder."""
+    """Name of the run, the first of a shared deck, that an engine was launched for in a folder."""
     (folder,) = (part for part in Path(place).parts if part.endswith(".incomplete"))
     return folder.removesuffix(".incomplete")
 
@@ -112,7 +110,7 @@ def test_points_of_a_shared_deck_are_what_they_are_alone(tmp_path: Path) -> None
     ]
     engine = find_engine()
     together = make_runs(cases, tmp_path / "together", engine)
-    assert len({run.directory.parent for run in together.runs.values()}) == 1
+    assert len({run.manifest["shared_deck"]["first"] for run in together.runs.values()}) == 1
     for case, (name, run_there) in zip(cases, together.runs.items(), strict=True):
         alone = make_runs([case], tmp_path / "alone", engine).runs[name]
         motion, motion_alone = read_motion(run_there.directory), read_motion(alone.directory)
@@ -129,7 +127,7 @@ def test_points_of_a_shared_deck_are_what_they_are_alone(tmp_path: Path) -> None
         np.testing.assert_allclose(left["normal_force"], right["normal_force"], atol=1e-10)
         assert run_there.manifest["shared_deck"]["walkers"] == 10
         assert {path.name for path in run_there.directory.iterdir()} == {
-            *("case.json", "manifest.json", "result.json", "segments"),
+            *("case.json", "manifest.json", "result.json", "segments", "shared_deck"),
             *("trajectory.parquet", "walkers.parquet", "bridges.parquet"),
         }
         assert {str(path.relative_to(run_there.directory)) for path in run_there.directory.glob("segments/*/*")} == {
@@ -142,7 +140,8 @@ def test_a_run_of_a_shared_deck_is_an_ordinary_one(sweep_file: Callable[..., str
     name = sweep_file(text='[axes]\ndimers.angle = ["0 deg", "10 deg", "20 deg", "30 deg"]')
     assert _sweep(name, "-j", "1").returncode == 0
     directory = in_folder / load(in_folder / "runs" / "test")["run"][0]
-    assert directory.parent.parent.name == "ensembles"
+    assert (directory / "shared_deck" / "walker.lig").is_file()
+    assert finished_run(directory).manifest["shared_deck"]["runs"] == 4
     found = call("run", "base.toml", "--json", check=True)
     assert json.loads(found.stdout)["cached"] is True
     for command in ("result", "plot", "vtk", "render"):
@@ -157,7 +156,7 @@ def test_walkers_that_meet_are_taken_apart(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr("walkers.postprocess.splitting.NEAR", 1e3)
     with pytest.raises(WalkersMet):
         make_runs([make_case(run={**TINY, "seed": seed}) for seed in (1, 2)], tmp_path, find_engine())
-    assert not list(tmp_path.glob("ensembles/*"))
+    assert not list(tmp_path.glob("*"))
 
 
 def test_walkers_that_are_to_stand_close_keep_their_neighbours(sweep_file: Callable[..., str]) -> None:
@@ -169,7 +168,7 @@ def test_walkers_that_are_to_stand_close_keep_their_neighbours(sweep_file: Calla
     assert _sweep(name, "-j", "1").returncode == 0
     frame = load("runs/test")
     assert list(frame["walkers_met"]) == [True, False, False]
-    assert ["ensembles" in run for run in frame["run"]] == [False, True, True]
+    assert [(Path(run) / "shared_deck").exists() for run in frame["run"]] == [False, True, True]
     call("run", "base.toml", check=True)
 
 
@@ -395,8 +394,7 @@ def test_two_sweeps_over_the_same_points_share_them(
     for frame, each in zip(frames, points.values(), strict=True):
         for point, run in zip(each, frame["run"], strict=True):
             runs.setdefault(point, set()).add(run)
-    # A point that was made twice would be there in two places.
-    made = [*in_folder.glob("runs/base-*/case.json"), *in_folder.glob("runs/ensembles/*/base-*/case.json")]
+    made = list(in_folder.glob("runs/base-*/case.json"))
     assert {path.parent for path in made} == {Path(run).absolute() for (run,) in runs.values()}
     assert len(made) == len(runs) == 7
     assert len(set(launches())) == len(launches()) <= 7
@@ -491,8 +489,11 @@ def test_a_folder_of_the_name_of_a_shipped_sweep(in_folder: Path) -> None:
 def test_a_column_of_numbers_and_words(sweep_file: Callable[..., str]) -> None:
     name = sweep_file(text='[axes]\nrun.time_step = ["auto", "1 us"]')
     _sweep(name)
+    shutil.rmtree(load("runs/test")["run"][1])
     told = subprocess.run([PROGRAM, "table", "runs/test", "--parquet"], capture_output=True, check=True).stdout
-    assert pq.read_table(io.BytesIO(told)).column("run.time_step").to_pylist() == ["auto", "1.0"]
+    table = pq.read_table(io.BytesIO(told))
+    assert table.column("run.time_step").to_pylist() == ["auto", "1.0"]
+    assert table.column("walkers_met").to_pylist() == [False, None], "truths stay truths where a point is missing"
 
 
 def test_two_sweeps_of_one_process_do_not_stop_each_other(sweep_file: Callable[..., str], in_folder: Path) -> None:
@@ -568,12 +569,3 @@ def test_a_sweep_that_is_killed_eight_times(
     assert not again & finished
     assert not list(in_folder.glob("runs/**/*.incomplete"))
     assert not list(in_folder.glob("runs/**/*.lock"))
-
-
-def test_runs_in_ensembles_are_found_by_their_names(tmp_path: Path) -> None:
-    cases = [make_case(run=SHORT), make_case(run={**SHORT, "seed": 2}, dimers={"angle_spread": "1 deg"})]
-    made = make_runs(cases, tmp_path, find_engine())
-    for name, run in made.runs.items():
-        assert finished_place(tmp_path, name) == run.directory
-    again = make_runs(cases, tmp_path, find_engine())
-    assert again.found == frozenset(made.runs)

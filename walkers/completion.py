@@ -14,7 +14,7 @@ import typer
 from walkers.pipeline import DEFAULT_OUT
 
 _RUN = re.compile(r".+-[0-9a-f]{12}")
-_ENSEMBLES, _RECORD, _MANIFEST = "ensembles", "sweep.json", "manifest.json"
+_RECORD, _MANIFEST = "sweep.json", "manifest.json"
 
 
 def cases(incomplete: str) -> list[str]:
@@ -70,14 +70,10 @@ def _entries(folder: Path) -> list[str]:
 
 
 def _named(out: Path, kind: str) -> Iterator[str]:
-    """Names of what has such a file in a folder of runs, in its ensembles too."""
+    """Names of what has such a file in a folder of runs."""
     for name in _entries(out):
         if (out / name / kind).is_file() and (kind == _RECORD or _RUN.fullmatch(name)):
             yield name
-    if kind == _MANIFEST:
-        for ensemble in _entries(out / _ENSEMBLES):
-            if _RUN.fullmatch(ensemble):
-                yield from (name for name in _entries(out / _ENSEMBLES / ensemble) if _RUN.fullmatch(name))
 
 
 def _folders(incomplete: str, kind: str) -> list[str]:

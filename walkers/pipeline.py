@@ -217,8 +217,7 @@ def run(
     from walkers.inputs.reading import load_case
     from walkers.progress import progress_of, shown_if
     from walkers.runner.binary import find_engine
-    from walkers.runner.directory import run_place, unfinished
-    from walkers.runner.ensemble import finished_place
+    from walkers.runner.directory import finished_run, run_place, unfinished
     from walkers.runner.failures import RunBusy
     from walkers.sweeps.shared_deck import check_audit, make_runs
 
@@ -228,11 +227,10 @@ def run(
     _check_changed(case)
     binary = find_engine(engine)
     place = run_place(case, binary, out)
-    there = finished_place(out, place.name)
-    if there is not None and not force:
-        _check_described(there)
-        _check_result(there)
-        return Run(there, origins=case.origins)
+    if finished_run(place) is not None and not force:
+        _check_described(place)
+        _check_result(place)
+        return Run(place, origins=case.origins)
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
     threading.Thread(target=_load_postprocess, daemon=True).start()
@@ -266,7 +264,7 @@ def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     Parameters
     ----------
     run
-        A run directory, or its name in ``out``, alone or in an ensemble; or a case (resolved, file or shipped name),
+        A run directory, or its name in ``out``; or a case (resolved, file or shipped name),
         whose run with the installed engine is looked up there.
     out
         Folder of the run directories.
@@ -384,19 +382,19 @@ def _with_record(record: str, name: str | Path, out: Path) -> Path | None:
 
 
 def _named(run: str | Path, out: Path) -> Path | None:
-    """The directory of the finished run of this name in a folder, alone or in an ensemble."""
-    from walkers.runner.ensemble import finished_place
+    """The directory of the finished run of this name in a folder."""
+    from walkers.runner.directory import finished_run
 
-    return finished_place(out, str(run)) if Path(run).name == str(run) else None
+    return out / run if Path(run).name == str(run) and finished_run(out / run) else None
 
 
 def _run_of(case: Case, out: Path) -> Path | None:
     """The directory of a case's finished run with the installed engine."""
     from walkers.runner.binary import find_engine
-    from walkers.runner.directory import run_place
-    from walkers.runner.ensemble import finished_place
+    from walkers.runner.directory import finished_run, run_place
 
-    return finished_place(out, run_place(case, find_engine(), out).name)
+    place = run_place(case, find_engine(), out)
+    return place if finished_run(place) else None
 
 
 def _readable(directory: Path) -> Run:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.runner.directory import CASE_NAME, FinishedRun, name_of
-from walkers.runner.ensemble import FOLDER
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_record, states
 
@@ -109,8 +108,8 @@ def _told(name: str) -> tuple[str, str]:
 
 
 @dataclass(frozen=True)
-class PackedFolder:
-    """A run, or an ensemble without its runs, as it goes into an archive.
+class PackedRun:
+    """A run as it goes into an archive.
 
     Attributes
     ----------
@@ -122,15 +121,12 @@ class PackedFolder:
         As in the archive: it names what was left out.
     items
         Its files.
-    shares
-        Place of the ensemble whose deck made the run; None where it has its own.
     """
 
     directory: Path
     place: str
     manifest: dict[str, Any]
     items: Sequence[Item]
-    shares: str | None = None
 
     @property
     def name(self) -> str:
@@ -152,8 +148,8 @@ class Contents:
         Of the run or sweep.
     title
         For people.
-    runs, ensembles
-        Its run directories, and those of the decks that some of them shared.
+    runs
+        Its run directories.
     sweep
         Files of the sweep itself.
     record
@@ -162,20 +158,14 @@ class Contents:
 
     name: str
     title: str
-    runs: Sequence[PackedFolder]
-    ensembles: Sequence[PackedFolder] = ()
+    runs: Sequence[PackedRun]
     sweep: Sequence[Item] = field(default=())
     record: SweepRecord | None = None
 
     @property
-    def folders(self) -> list[PackedFolder]:
-        """Ensembles and runs."""
-        return [*self.ensembles, *self.runs]
-
-    @property
     def items(self) -> list[Item]:
         """All files."""
-        return [*self.sweep, *(item for folder in self.folders for item in folder.items)]
+        return [*self.sweep, *(item for run in self.runs for item in run.items)]
 
     @property
     def finished(self) -> str:
@@ -187,7 +177,7 @@ def contents_of_run(directory: Path, *, dumps: bool = True) -> Contents:
     """What the archive of a finished run holds; with ``dumps`` false not what its tables were made from."""
     run = _run(directory, dumps)
     title = FinishedRun(directory).case.title
-    return Contents(run.name, title, [run], _ensembles([directory], dumps))
+    return Contents(run.name, title, [run])
 
 
 def contents_of_sweep(directory: Path, *, dumps: bool = True) -> Contents:
@@ -209,7 +199,6 @@ def contents_of_sweep(directory: Path, *, dumps: bool = True) -> Contents:
         name_of(record.directory.name),
         record.title,
         [_run(place, dumps) for place in places],
-        _ensembles(places, dumps),
         _sweep_items(record),
         record,
     )
@@ -229,32 +218,12 @@ def _sweep_items(record: SweepRecord) -> list[Item]:
     return items
 
 
-def _in_ensemble(directory: Path) -> bool:
-    return directory.resolve().parent.parent.name == FOLDER
-
-
-def _run(directory: Path, dumps: bool) -> PackedFolder:
-    """A run with its case file, if it is known as it was given."""
-    shares = f"{RUNS}/{FOLDER}/{directory.resolve().parent.name}" if _in_ensemble(directory) else None
-    folder = _folder(directory, f"{shares or RUNS}/{directory.resolve().name}", dumps, shares=shares)
-    case = FinishedRun(directory).case
-    given = (
-        [Item(f"{folder.place}/{name_of(case.name)}.toml", _toml(case.document), told=_GIVEN)] if case.document else []
-    )
-    return PackedFolder(folder.directory, folder.place, folder.manifest, [*given, *folder.items], shares)
-
-
-def _ensembles(runs: Iterable[Path], dumps: bool) -> list[PackedFolder]:
-    """The ensembles of runs, without their runs: the decks and what the engine said."""
-    places = dict.fromkeys(run.resolve().parent for run in runs if _in_ensemble(run))
-    return [_folder(place, f"{RUNS}/{FOLDER}/{place.name}", dumps, own=True) for place in places]
-
-
-def _folder(directory: Path, place: str, dumps: bool, *, own: bool = False, shares: str | None = None) -> PackedFolder:
-    """The files that a manifest names, and the manifest."""
-    manifest = FinishedRun(directory).manifest
+def _run(directory: Path, dumps: bool) -> PackedRun:
+    """The files that a manifest names, the manifest, and the case as it was given, if that is known."""
+    run = FinishedRun(directory)
+    manifest, case, place = run.manifest, run.case, f"{RUNS}/{directory.resolve().name}"
     before, sums = set(manifest.get("left_out", ())), manifest.get("sha256", {})
-    names = [name for name in manifest["files"] if name not in before and not (own and "/" in name)]
+    names = [name for name in manifest["files"] if name not in before]
     items = [Item(f"{place}/{name}", directory / name, sums.get(name)) for name in names]
     left_out = [name for name, item in zip(names, items, strict=True) if item.role == "dump" and not dumps]
     said: Path | bytes = directory / MANIFEST_NAME
@@ -262,7 +231,8 @@ def _folder(directory: Path, place: str, dumps: bool, *, own: bool = False, shar
         manifest["left_out"] = sorted(before.union(left_out))
         said = (json.dumps(manifest, indent=2, ensure_ascii=False) + "\n").encode("utf-8")
         items = [item for item in items if item.role != "dump"]
-    return PackedFolder(directory.resolve(), place, manifest, [Item(f"{place}/{MANIFEST_NAME}", said), *items], shares)
+    given = [Item(f"{place}/{name_of(case.name)}.toml", _toml(case.document), told=_GIVEN)] if case.document else []
+    return PackedRun(directory.resolve(), place, manifest, [*given, Item(f"{place}/{MANIFEST_NAME}", said), *items])
 
 
 def _toml(tables: Any) -> bytes:

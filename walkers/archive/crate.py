@@ -2,7 +2,6 @@
 
 What made what is told in three actions a run, each with its program, what it read and what it gave: from the case to
 the deck (this program), from the deck to the dumps (the engine), from the dumps to tables and result (this program).
-Runs that shared a deck share the first two.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from walkers.archive.citation import LICENCES, PAPER, PAPER_PROPERTIES, Author
-from walkers.archive.contents import Contents, Item, PackedFolder
+from walkers.archive.contents import Contents, Item, PackedRun
 from walkers.runner.provenance import PROJECT
 
 if TYPE_CHECKING:
@@ -72,9 +71,9 @@ def describe_crate(
     described = _Described(crate, sums, people)
     for item in contents.sweep:
         described.file(item)
-    for folder in contents.folders:
-        described.folder(folder)
-    actions = [action for folder in contents.folders for action in described.actions(folder, contents.runs)]
+    for run in contents.runs:
+        described.run(run)
+    actions = [action for run in contents.runs for action in described.actions(run)]
     if contents.record is not None:
         last = contents.runs[-1].manifest
         results = [item for run in contents.runs for item in run.with_role("result")]
@@ -169,59 +168,47 @@ class _Described:
             entities.append(_entity(self.crate, f"#{quote(f'{table}.{field.name}')}", properties))
         return entities
 
-    def folder(self, folder: PackedFolder) -> None:
+    def run(self, run: PackedRun) -> None:
         """A run's folder, and its files."""
-        parts = [self.file(item) for item in folder.items]
-        shared = "shared_deck" in folder.manifest and folder.shares is None
-        told = "A deck that several cases shared" if shared else f"Run directory of the case {folder.manifest['name']}"
-        properties = {"name": folder.name, "description": f"{told}, finished {folder.manifest['finished']}"}
-        entity = self.crate.add_dataset(None, f"{folder.place}/", properties=properties)
-        entity["hasPart"] = parts
+        told = f"Run directory of the case {run.manifest['name']}, finished {run.manifest['finished']}"
+        entity = self.crate.add_dataset(None, f"{run.place}/", properties={"name": run.name, "description": told})
+        entity["hasPart"] = [self.file(item) for item in run.items]
 
-    def actions(self, folder: PackedFolder, runs: Sequence[PackedFolder]) -> list[Entity]:
-        """What made the files of a run, or those that the runs of an ensemble share."""
-        manifest, name = folder.manifest, folder.name
+    def actions(self, run: PackedRun) -> list[Entity]:
+        """What made the files of a run."""
+        manifest, name = run.manifest, run.name
         began, ended = str(manifest["started"]), str(manifest["finished"])
         program = self.program(manifest)
-        made: list[Entity] = []
-        if folder.shares is None:
-            within = [folder, *(run for run in runs if run.shares == folder.place)]
-            cases = [item for one in within for item in one.with_role("case")]
-            deck = folder.with_role("deck")
-            outputs = [item for one in within for item in one.with_role("dump", "output")]
-            made = [
-                self.action(
-                    f"#{name}-deck",
-                    f"Deck of {name}",
-                    "The case resolved, and the deck of it rendered.",
-                    program,
-                    (cases, deck),
-                    (None, began),
-                ),
-                self.action(
-                    f"#{name}-engine",
-                    f"Engine's run of {name}",
-                    "The engine's run of the deck: the motion of the beads, step by step.",
-                    self.engine(manifest),
-                    (deck, outputs),
-                    (began, ended),
-                ),
-            ]
-        tables = folder.with_role("table", "result")
-        if tables:
-            again = manifest.get("tabulated")
-            read = [*folder.with_role("dump"), *(item for item in folder.items if item.name == "layout.json")]
-            made.append(
-                self.action(
-                    f"#{name}-tables",
-                    f"Tables of {name}",
-                    "The dumps analysed: tables and result.",
-                    self.program(again) if again else program,
-                    ([*folder.with_role("case"), *read], tables),
-                    (None, str(again["date"]) if again else ended),
-                )
-            )
-        return made
+        cases, decks = run.with_role("case"), run.with_role("deck")
+        others = int(manifest.get("shared_deck", {}).get("runs", 1)) - 1
+        company = f", together with {others} other cases" if others else ""
+        deck = self.action(
+            f"#{name}-deck",
+            f"Deck of {name}",
+            f"The case resolved, and the deck of it rendered{company}.",
+            program,
+            (cases, decks),
+            (None, began),
+        )
+        engine = self.action(
+            f"#{name}-engine",
+            f"Engine's run of {name}",
+            "The engine's run of the deck: the motion of the beads, step by step.",
+            self.engine(manifest),
+            (decks, run.with_role("dump", "output")),
+            (began, ended),
+        )
+        again = manifest.get("tabulated")
+        read = [*cases, *run.with_role("dump"), *(item for item in run.items if item.name == "layout.json")]
+        tables = self.action(
+            f"#{name}-tables",
+            f"Tables of {name}",
+            "The dumps analysed: tables and result.",
+            self.program(again) if again else program,
+            (read, run.with_role("table", "result")),
+            (None, str(again["date"]) if again else ended),
+        )
+        return [deck, engine, tables]
 
     def action(
         self,

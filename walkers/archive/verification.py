@@ -23,12 +23,10 @@ from urllib.parse import unquote
 
 from walkers.archive.crate import METADATA_NAME, PREVIEW_NAME
 from walkers.inputs.errors import InputError, Problem
-from walkers.runner.ensemble import FOLDER
 from walkers.runner.files import LARGEST_TEXT, json_object, read_text
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runner.verification import Listed, Verification, files_below, is_within, listed_by, made_since, verify_run
-from walkers.sweeps.belongings import PARSL
-from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_record, states
+from walkers.sweeps.record import PARSL, RECORD_NAME, SweepRecord, read_record, states
 
 SUMS_NAME = "sha256sums.txt"
 """In an archive: as ``sha256sum -c`` reads it."""
@@ -67,8 +65,7 @@ def verify(path: Path) -> list[Verification]:
     Returns
     -------
     list of Verification
-        One a run or archive; of a sweep that of its points, those of its finished runs and of the decks that they
-        shared.
+        One a run or archive; of a sweep that of its points and those of its finished runs.
 
     Raises
     ------
@@ -112,8 +109,7 @@ def _verify_sweep(directory: Path) -> list[Verification]:
         of_points=True,
     )
     runs = list(dict.fromkeys(state.directory for state in found if state.directory and state.status == "finished"))
-    decks = dict.fromkeys(run.parent for run in runs if run.parent.parent.name == FOLDER)
-    return [points, *(verify_run(deck) for deck in decks), *(verify_run(run) for run in runs)]
+    return [points, *map(verify_run, runs)]
 
 
 def _beside_record(record: SweepRecord) -> tuple[str, str]:
@@ -281,7 +277,7 @@ def _said_by_manifest(folder: str, listed: Listed) -> dict[str, tuple[object, ob
 
 def _is_beside(name: str, listed: Listed) -> bool:
     """Whether an archive has a file in the folder of a run that is none of its manifest's."""
-    return name in (MANIFEST_NAME, listed.case_file) or name.partition("/")[0] in listed.elsewhere
+    return name in (MANIFEST_NAME, listed.case_file)
 
 
 def _said_by_crate(metadata: Mapping[str, Any]) -> dict[str, tuple[object, object]]:

@@ -59,12 +59,12 @@ def name_of(case_name: str) -> str:
 
 
 def is_run_name(name: str) -> bool:
-    """Whether a directory may be a run's, or an ensemble's, by its name: twelve hex digits at the end."""
+    """Whether a directory may be a run's by its name: twelve hex digits at the end."""
     return re.fullmatch(r".+-[0-9a-f]{12}", name) is not None
 
 
 def run_place(case: Case, engine: Engine, out: Path) -> Path:
-    """Where the run of a case belongs; one that shared a deck is within an ensemble."""
+    """Where the run of a case belongs."""
     return out / run_name(case, engine)
 
 
@@ -137,9 +137,16 @@ def finished_run(directory: Path) -> FinishedRun | None:
     return FinishedRun(directory) if (directory / MANIFEST_NAME).is_file() else None
 
 
-def move_into_place(made: Path, place: Path) -> None:
+def finished_places(out: Path) -> dict[str, Path]:
+    """All finished runs of a folder: from their names to their directories."""
+    places = [path.parent for path in sorted(out.glob(f"*/{MANIFEST_NAME}"))]
+    return {place.name: place for place in places if not place.name.endswith((UNFINISHED, REPLACED))}
+
+
+def move_into_place(made: Path, place: Path, *, settled: bool = False) -> None:
     """Give a directory that has been made its name, safe on disk, in exchange for one that has it already."""
-    settle(made)
+    if not settled:
+        settle(made)
     recover(place)
     replaced = _aside(place)
     if place.exists():

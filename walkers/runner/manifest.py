@@ -19,6 +19,7 @@ from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import EngineReport
 from walkers.runner.plugin import plugin_of
 from walkers.runner.provenance import software
+from walkers.templates.deck import CONTENT_VERSION
 
 MANIFEST_NAME = "manifest.json"
 FORMAT = 2
@@ -28,16 +29,9 @@ _MOST_THREADS = 4
 
 
 def manifest(
-    case: Case,
-    name: str,
-    engine: Engine,
-    report: EngineReport,
-    *,
-    started: float,
-    directory: Path,
-    described: Collection[str] = (),
+    case: Case, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path
 ) -> dict[str, Any]:
-    """What the manifest of a run, or of an ensemble, says.
+    """What the manifest of a run says.
 
     Parameters
     ----------
@@ -47,8 +41,6 @@ def manifest(
         Seconds since the epoch.
     directory
         The run directory, all of its files written but this one.
-    described
-        Names of folders in it that have manifests of their own: checksums of their files are there.
     """
     finished = time.time()
     audit, plugin = read_audit(engine.sha256), plugin_of(engine)
@@ -68,6 +60,7 @@ def manifest(
             "sha256": engine.sha256,
             "audit": audit.summary() if audit else None,
         },
+        "deck_version": CONTENT_VERSION,
         "contact_model": {"path": str(plugin), "sha256": checksums(plugin.parent, [plugin.name])[plugin.name]},
         **_made_by(),
         "host": platform.node(),
@@ -82,7 +75,7 @@ def manifest(
         "steps": report.steps,
         "steps_per_second": report.steps / report.loop_seconds if report.loop_seconds else None,
         "files": files,
-        "sha256": checksums(directory, [file for file in files if file.partition("/")[0] not in described]),
+        "sha256": checksums(directory, files),
     }
 
 

@@ -12,7 +12,6 @@ from typing import Any, NoReturn
 from walkers.runner.directory import CASE_NAME, SEGMENTS
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
-from walkers.templates.deck import DECK_NAME
 
 _SHOWN = (
     *(".png", ".pdf", ".svg", ".gif", ".mp4", ".html", ".htm"),
@@ -31,7 +30,7 @@ class Verification:
     Attributes
     ----------
     name
-        Of the run, the ensemble or the archive.
+        Of the run or the archive.
     intact
         How many files are what they were.
     changed, missing
@@ -180,8 +179,6 @@ class Listed:
         Their SHA-256; None in manifests that are older than checksums.
     left_out
         Those that an archive was made without.
-    elsewhere
-        Names of folders with manifests of their own: the runs of an ensemble.
     case_file
         What an archive calls the case as it was given, beside the manifest.
     """
@@ -189,7 +186,6 @@ class Listed:
     sizes: Mapping[str, Any]
     sums: Mapping[str, Any] | None
     left_out: frozenset[str]
-    elsewhere: frozenset[str]
     case_file: str
 
     @property
@@ -213,17 +209,11 @@ def listed_by(manifest: Mapping[str, Any]) -> Listed:
     lacking = [key for key in ("name", "files") if key not in manifest]
     if lacking:
         raise ValueError(f"expected the key {lacking[0]}")
-    elsewhere = frozenset(manifest.get("shared_deck", {}).get("names", ()))
-
-    def own(table: Mapping[str, Any]) -> dict[str, Any]:
-        return {name: one for name, one in table.items() if name.partition("/")[0] not in elsewhere}
-
     sums = manifest.get("sha256")
     listed = Listed(
-        own(manifest["files"]),
-        None if sums is None else own(sums),
+        {**manifest["files"]},
+        None if sums is None else {**sums},
         frozenset(manifest.get("left_out", ())),
-        elsewhere,
         f"{manifest['name']}.toml",
     )
     outside = [name for name in listed.names if not is_within(name)]
@@ -264,11 +254,10 @@ def _verified(run: str, directory: Path, listed: Listed) -> Verification:
     changed = {name for name in there if name not in whole or (name in now and sums and now[name] != sums[name])}
     odd = [name for name in names if listed.is_at_odds(name)]
     gone = [name for name in names if name not in sizes and name not in listed.left_out]
-    needed = DECK_NAME if listed.elsewhere else CASE_NAME
-    if needed not in names and not (directory / needed).is_file():
-        gone.append(needed)
+    if CASE_NAME not in names and not (directory / CASE_NAME).is_file():
+        gone.append(CASE_NAME)
     known = {*names, MANIFEST_NAME}
-    others = [name for name in files_below(directory, listed.elsewhere) if name not in known]
+    others = [name for name in files_below(directory) if name not in known]
     since = [name for name in others if made_since(name) or name == listed.case_file]
     return Verification(
         name=run,

@@ -7,22 +7,25 @@ removal be interrupted, what is left is no run, and goes the next time.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from walkers.inputs.errors import InputError, Problem
-from walkers.runner.directory import REPLACED, UNFINISHED, is_run_name, recover
-from walkers.runner.ensemble import FOLDER
+from walkers.runner.directory import REPLACED, is_run_name, recover
 from walkers.runner.locks import is_locked, locked
 from walkers.runner.manifest import MANIFEST_NAME
-from walkers.sweeps.belongings import bytes_of, others, own_files
-from walkers.sweeps.inventory import Entry, inventory, select
+from walkers.sweeps.columns import derived_columns, result_columns
+from walkers.sweeps.inventory import Entry, inventory, select, weigh
 from walkers.sweeps.listing import age_text, aligned, bytes_text
-from walkers.sweeps.record import RECORD_NAME, read_record
+from walkers.sweeps.record import PARSL, RECORD_NAME, read_record
 
 LEFTOVERS = ("interrupted", "failed")
 _MOST_LINES = 40
+_REPORT = "report.html"
+_MARK = b"granular-walkers"
+"""In every report and figure that the project writes."""
 
 
 @dataclass(frozen=True)
@@ -31,78 +34,72 @@ class Cleaning:
 
     Attributes
     ----------
-    out
-        The folder.
     remove
         Runs and sweeps.
     locks
         Lock files that lock nothing.
-    sweeps_of
-        From the name of a run to those of the sweeps that have it.
+    needed
+        From the names of sweeps that stay to how many of their runs go.
     kept
         Why something that was asked for stays, and how much of it.
     """
 
-    out: Path
     remove: Sequence[Entry]
     locks: Sequence[Path]
-    sweeps_of: Mapping[str, Sequence[str]]
+    needed: Mapping[str, int]
     kept: Mapping[str, int]
-
-    @property
-    def size(self) -> int:
-        """Bytes that it frees."""
-        return sum(_bytes(entry) for entry in self.remove)
 
     def as_text(self) -> str:
         """What goes, what of sweeps, what stays, and how much it is."""
         rows = [
-            [
-                entry.name,
-                entry.status if not entry.is_sweep else "sweep",
-                age_text(entry.age),
-                _size(entry),
-                _why(entry),
-            ]
+            [entry.name, _kind(entry), age_text(entry.age), bytes_text(_bytes(entry)), _why(entry)]
             for entry in self.remove[:_MOST_LINES]
         ]
         lines = [aligned(rows)] if rows else []
         if len(self.remove) > _MOST_LINES:
             lines.append(f"and {len(self.remove) - _MOST_LINES} more")
-        lines += [
-            f"needed by the sweep {sweep}, which would make them again: {n}" for sweep, n in self._needed().items()
-        ]
+        lines += [f"needed by the sweep {sweep}, which would make them again: {n}" for sweep, n in self.needed.items()]
         lines += [f"stays: {number} {reason}" for reason, number in self.kept.items()]
         for sweep in self.remove:
-            if sweep.is_sweep and not sweep.directory.is_symlink() and (theirs := others(sweep.directory)):
+            if sweep.is_sweep and not sweep.directory.is_symlink():
+                theirs = sorted(set(sweep.directory.iterdir()) - set(_own_files(sweep.directory)))
                 names = ", ".join(path.name for path in theirs)
-                lines.append(f"stays, for walkers did not write it: {names} (in {sweep.directory})")
-        lines.append(f"{self._counted() or 'nothing'} to remove, {bytes_text(self.size)}")
-        return "\n".join(lines)
-
-    def _needed(self) -> dict[str, int]:
-        """Runs that go, by the sweeps that have them and stay."""
-        going = {entry.name for entry in self.remove if entry.is_sweep}
-        runs = [entry for entry in self.remove if not entry.is_sweep]
-        names = [name for entry in runs for name in self.sweeps_of.get(entry.name, ()) if name not in going]
-        return {name: names.count(name) for name in dict.fromkeys(names)}
-
-    def _counted(self) -> str:
-        kinds = ["sweep" if entry.is_sweep else f"{entry.status} run" for entry in self.remove]
-        kinds += ["stale lock"] * len(self.locks)
-        count = {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
-        return ", ".join(f"{number} {kind}{'s' if number > 1 else ''}" for kind, number in count.items())
+                lines += [f"stays, for walkers did not write it: {names} (in {sweep.directory})"] if theirs else []
+        kinds = Counter("sweep" if entry.is_sweep else f"{entry.status} run" for entry in self.remove)
+        kinds.update(["stale lock"] * len(self.locks))
+        told = ", ".join(f"{number} {kind}{'s' if number > 1 else ''}" for kind, number in kinds.items())
+        return "\n".join([*lines, f"{told or 'nothing'} to remove, {bytes_text(sum(map(_bytes, self.remove)))}"])
 
 
-def _size(entry: Entry) -> str:
-    return bytes_text(_bytes(entry))
+def _kind(entry: Entry) -> str:
+    return "sweep" if entry.is_sweep else entry.status
 
 
 def _bytes(entry: Entry) -> int:
     """What its removal frees: nothing behind a symbolic link, and of a sweep none of its runs."""
     if entry.directory.is_symlink():
         return 0
-    return sum(map(bytes_of, own_files(entry.directory))) if entry.is_sweep else entry.size
+    return sum(map(_bytes_of, _own_files(entry.directory))) if entry.is_sweep else entry.size
+
+
+def _bytes_of(path: Path) -> int:
+    if path.is_symlink():
+        return 0
+    return weigh(path)[0] if path.is_dir() else path.stat().st_size
+
+
+def _own_files(directory: Path) -> list[Path]:
+    """What the project wrote into a sweep's directory: record, Parsl's logs, report and figures of default names."""
+    record = read_record(directory)
+    columns = {*record.units, *derived_columns(record.analyses), *result_columns(record.analyses)}
+    names = {_REPORT, *(f"{column}.png" for column in columns)}
+    pages = [path for path in sorted(directory.iterdir()) if path.name in names and _is_marked(path)]
+    found = [directory / RECORD_NAME, directory / PARSL, *pages]
+    return [path for path in found if path.exists() or path.is_symlink()]
+
+
+def _is_marked(path: Path) -> bool:
+    return path.is_file() and not path.is_symlink() and _MARK in path.read_bytes()
 
 
 def _why(entry: Entry) -> str:
@@ -146,56 +143,56 @@ def plan_cleaning(
             read_record(sweep_file.parent)  # of one that cannot be read nobody knows which runs it has
     sweeps_of: dict[str, list[str]] = {}
     for sweep in entries:
-        for run in sweep.runs if sweep.is_sweep else ():
+        for run in sweep.runs:
             sweeps_of.setdefault(run, []).append(sweep.name)
-    statuses = (*LEFTOVERS, "finished") if finished else LEFTOVERS
-    wanted = _given(given, entries, sweeps_of) if given else [one for one in entries if not one.is_sweep]
-    wanted = select(
-        [one for one in wanted if given or one.status in (*statuses, "running")], case=case, older_than=older_than
+    statuses = {*LEFTOVERS, "running", *(["finished"] if finished else [])}
+    wanted = [one for one in entries if not one.is_sweep and one.status in statuses]
+    wanted = select(_given(given, entries, sweeps_of) if given else wanted, case=case, older_than=older_than)
+    reasons = {
+        entry.directory: _reason_to_stay(entry, [] if given else sweeps_of.get(entry.name, [])) for entry in wanted
+    }
+    remove = [entry for entry in wanted if reasons[entry.directory] is None]
+    going = {entry.name for entry in remove if entry.is_sweep}
+    needing = [name for entry in remove if not entry.is_sweep for name in sweeps_of.get(entry.name, ())]
+    return Cleaning(
+        remove,
+        [] if given or case or older_than else _stale_locks(out),
+        Counter(name for name in needing if name not in going),
+        Counter(reason for reason in reasons.values() if reason is not None),
     )
-    kept: dict[str, int] = {}
 
-    def stays(entry: Entry) -> bool:
-        reason = None
-        if entry.status == "running":
-            reason = "running"
-        elif not given and entry.status == "finished" and entry.name in sweeps_of:
-            reason = f"finished, of the sweep {sweeps_of[entry.name][0]} (give its name to remove it)"
-        elif entry.directory.name.endswith(REPLACED) and not entry.place.exists():
-            reason = "about to be put back in its place"
-        elif entry.directory.parent.parent.name == FOLDER and entry.directory.parent.is_symlink():
-            reason = "in an ensemble behind a symbolic link"
-        if reason is not None:
-            kept[reason] = kept.get(reason, 0) + 1
-        return reason is not None
 
-    remove = [entry for entry in wanted if not stays(entry)]
-    locks = [] if given or case or older_than else [path for path in _locks(out) if not is_locked(_place(path))]
-    return Cleaning(out, remove, locks, sweeps_of, kept)
+def _reason_to_stay(entry: Entry, sweeps: Sequence[str]) -> str | None:
+    """Why a run or a sweep stays, which of these sweeps have; None if it goes."""
+    if entry.status == "running":
+        return "running"
+    if entry.status == "finished" and sweeps:
+        return f"finished, of the sweep {sweeps[0]} (give its name to remove it)"
+    if entry.directory.name.endswith(REPLACED) and not entry.place.exists():
+        return "about to be put back in its place"
+    return None
 
 
 def _given(given: Sequence[str], entries: Sequence[Entry], sweeps_of: Mapping[str, Sequence[str]]) -> list[Entry]:
     """The entries of these names or directories, and the runs that go with sweeps."""
     found: dict[Path, Entry] = {}
-    sweeps = []
     for name in given:
         path = Path(name).resolve()
-        matches = [one for one in entries if name == one.directory.name or path == one.directory.resolve()]
-        matches = matches or [one for one in entries if name == one.name]
+        matches = [one for one in entries if name in (one.name, one.directory.name) or path == one.directory.resolve()]
         if not matches:
             told = "no run or sweep in the folder of runs (see walkers list; another folder is given by --out)"
             raise InputError(name, [Problem("", None, told)])
-        found |= {one.directory: one for one in matches}
-        sweeps += [one for one in matches if one.is_sweep]
-    going = {sweep.name for sweep in sweeps}
+        exact = [one for one in matches if name == one.directory.name]
+        found |= {one.directory: one for one in exact or matches}
+    going = {one.name for one in found.values() if one.is_sweep}
     for one in entries:
         if not one.is_sweep and one.name in sweeps_of and going.issuperset(sweeps_of[one.name]):
             found[one.directory] = one
     return list(found.values())
 
 
-def _locks(out: Path) -> list[Path]:
-    return [path for path in sorted(out.glob("*.lock")) if is_run_name(path.stem)]
+def _stale_locks(out: Path) -> list[Path]:
+    return [path for path in sorted(out.glob("*.lock")) if is_run_name(path.stem) and not is_locked(_place(path))]
 
 
 def _place(lock: Path) -> Path:
@@ -216,44 +213,22 @@ def clean(cleaning: Cleaning) -> dict[Path, str]:
         What is still there, and why: a process has begun to make it meanwhile, or the system refused.
     """
     left = {}
-    for directory, places in _units(cleaning.remove).items():
-        with locked(places) as ours:
-            if len(ours) < len(places):
-                left[directory] = "a process has begun to make it, it stays"
+    for entry in cleaning.remove:
+        with locked([] if entry.is_sweep else [entry.place]) as ours:
+            if not (ours or entry.is_sweep):
+                left[entry.directory] = "a process has begun to make it, it stays"
                 continue
             try:
-                for place in places:
-                    recover(place)
-                _remove(directory)
+                if entry.is_sweep:
+                    _remove_sweep(entry.directory)
+                else:
+                    recover(entry.place)
+                    _remove(entry.directory)
             except OSError as error:
-                left[directory] = _refused(error)
-    for sweep in cleaning.remove:
-        if sweep.is_sweep:
-            try:
-                _remove_sweep(sweep.directory)
-            except OSError as error:
-                left[sweep.directory] = _refused(error)
+                left[entry.directory] = f"cannot be removed whole: {error.strerror or error} ({error.filename})"
     with locked(_place(lock) for lock in cleaning.locks if lock.exists()):
         pass  # a lock file goes with its lock
     return left
-
-
-def _units(remove: Iterable[Entry]) -> dict[Path, list[Path]]:
-    """What is removed at once, and the places that are locked for it: an unfinished ensemble with all of its runs."""
-    units: dict[Path, list[Path]] = {}
-    for entry in remove:
-        if entry.is_sweep:
-            continue
-        ensemble = entry.directory.parent
-        if ensemble.parent.name == FOLDER and ensemble.name.endswith((UNFINISHED, REPLACED)):
-            units[ensemble] = [entry.place.with_name(run.name) for run in ensemble.iterdir() if run.is_dir()]
-        else:
-            units[entry.directory] = [entry.place]
-    return units
-
-
-def _refused(error: OSError) -> str:
-    return f"cannot be removed whole: {error.strerror or error} ({error.filename})"
 
 
 def _remove_sweep(directory: Path) -> None:
@@ -261,7 +236,7 @@ def _remove_sweep(directory: Path) -> None:
     if directory.is_symlink():
         directory.unlink()
         return
-    for path in reversed(own_files(directory)):
+    for path in reversed(_own_files(directory)):
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
         else:
@@ -277,6 +252,3 @@ def _remove(directory: Path) -> None:
     elif directory.exists():
         (directory / MANIFEST_NAME).unlink(missing_ok=True)
         shutil.rmtree(directory)
-    ensemble = directory.parent
-    if ensemble.parent.name == FOLDER and not any(path.is_dir() for path in ensemble.iterdir()):
-        shutil.rmtree(ensemble)  # nothing but the deck and the log of runs that are gone

@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,9 @@ import numpy.typing as npt
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.readable import dotted
-from walkers.postprocess.clusters import Climb, ClimbCriteria
+from walkers.postprocess.clusters import ClimbCriteria
 from walkers.postprocess.piles import Pile, analyse, classified
-from walkers.runner.directory import CASE_NAME, finished_run
-from walkers.runner.manifest import MANIFEST_NAME
+from walkers.runner.directory import CASE_NAME, FinishedRun, finished_places, finished_run
 from walkers.sweeps.record import RECORD_NAME, read_record, result_in, states
 
 FloatArray = npt.NDArray[np.float64]
@@ -53,11 +53,11 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
     elif (directory / CASE_NAME).exists():
         found = [directory]
     else:
-        found = sorted(path.parent for path in directory.glob(f"*/{MANIFEST_NAME}"))
+        found = list(finished_places(directory).values())
     runs = [run for path in found if (run := finished_run(path)) is not None]
     try:
         piles = {run.directory.name.rpartition("-")[2]: run for run in runs if Pile().applies(run.case)}
-        cases = {run.directory: dict(dotted(run.case.determinants())) for run in piles.values()}
+        cases = {run.directory: _determinants(run) for run in piles.values()}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(str(directory), [Problem("", None, f"a case cannot be read ({error})")]) from error
     if not cases:
@@ -71,6 +71,13 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
         if case.get("run.cycles", 0) > cases[before].get("run.cycles", 0):
             starts[case.get("seed")] = path
     return {label: list(starts.values()) for label, starts in groups.items()}
+
+
+def _determinants(run: FinishedRun) -> dict[str, Any]:
+    """What determines a run, by dotted keys. Runs of other decks or engines are no repetitions of each other."""
+    manifest = run.manifest
+    made_by = {"deck version": manifest.get("deck_version"), "engine": manifest["engine"]["sha256"][:8]}
+    return dict(dotted(run.case.determinants())) | made_by
 
 
 def _short(value: Any) -> str:
@@ -203,32 +210,27 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
         ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s).
     """
     usual = ClimbCriteria()
-    tried: list[tuple[str, float | None, ClimbCriteria]] = [("", None, usual)]
-    for name, values in VARIATIONS.items():
-        tried += [(name, value, replace(usual, **{name: value})) for value in values if value != getattr(usual, name)]
-    counted: list[list[list[Climb]]] = [[] for _ in tried]
-    larges: list[npt.NDArray[np.bool_]] = []
+    others = [(name, value) for name, values in VARIATIONS.items() for value in values if value != getattr(usual, name)]
+    tried: dict[tuple[str, float | None], ClimbCriteria] = {("", None): usual}
+    tried |= {(name, value): replace(usual, **{name: value}) for name, value in others}
+    climbs: dict[tuple[str, float | None], list[list[tuple[float, bool]]]] = {one: [] for one in tried}
     for run in runs:
         found = analyse(run)
-        larges.append(found.motion.large)
-        for climbs, (_, _, definition) in zip(counted, tried, strict=True):
-            climbs.append([climb for climb in classified(found, definition).climbs if climb.climbed])
-    rows = []
-    for climbs, (name, value, _) in zip(counted, tried, strict=True):
-        speeds = [climb.speed for one in climbs for climb in one]
-        led = sum(bool(large[climb.leader]) for one, large in zip(climbs, larges, strict=True) for climb in one)
-        rows.append(
-            {
-                "threshold": name,
-                "value": value,
-                "runs": len(runs),
-                "climbed": sum(bool(one) for one in climbs),
-                "climbs": len(speeds),
-                "led_by_large": led,
-                "median_speed": float(np.median(speeds)) if speeds else None,
-            }
-        )
-    return rows
+        for one, definition in tried.items():
+            climbed = [climb for climb in classified(found, definition).climbs if climb.climbed]
+            climbs[one].append([(climb.speed, bool(found.motion.large[climb.leader])) for climb in climbed])
+    return [
+        {
+            "threshold": name,
+            "value": value,
+            "runs": len(runs),
+            "climbed": sum(map(bool, of_runs)),
+            "climbs": sum(map(len, of_runs)),
+            "led_by_large": sum(large for of_run in of_runs for _, large in of_run),
+            "median_speed": median([speed for of_run in of_runs for speed, _ in of_run]) if any(of_runs) else None,
+        }
+        for (name, value), of_runs in climbs.items()
+    ]
 
 
 def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:

@@ -1,27 +1,19 @@
-"""What the points of a sweep differ by: numbers, categories and samples, as figures want them.
-
-A sweep's directory lists its points, not the axes that they were made from. Keys that were varied independently have
-all combinations of their values; keys of which combinations are missing went together, in a ``[[zip]]`` or a
-``[[sample]]``.
-"""
+"""What the points of a sweep differ by: numbers, categories and samples, as figures want them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isnan
 from typing import Any
 
+from walkers.inputs.axes import flatten, is_axis
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
-from walkers.sweeps.columns import derived_columns
 from walkers.sweeps.record import SweepRecord
 
 SEEDS = ("run.seed", "seed")
 _SYMBOLS = {"gamma0": "Γ0", "sin_delta": "sin δ", "mass_asymmetry": "μ"}
-_LEAST_ASYMMETRIES = 3
-"""Different radii are shown by sin δ from so many on."""
 
 
 @dataclass(frozen=True)
@@ -69,82 +61,74 @@ class Factor:
 def factors_of(record: SweepRecord) -> list[Factor]:
     """What a sweep's points differ by, in the order of its keys; what has one value is left out.
 
-    Keys whose numbers rise or fall together, and keys with texts or lists that go together, are one factor. Numbers
-    that go together otherwise are samples, one factor each.
+    Keys of a ``[[zip]]`` whose numbers rise or fall together, or that have texts or lists, are one factor. Numbers that
+    go together otherwise, as those of a ``[[sample]]``, are one factor each.
     """
     columns = {key: [row[number] for row in record.values] for number, key in enumerate(record.units)}
-    columns = {key: values for key, values in columns.items() if _count([values]) > 1}
     factors = []
-    for keys in _together(columns):
-        factors += _factors({key: columns[key] for key in keys}, record)
+    for keys in _axes(record):
+        varied = {key: columns[key] for key in keys if _count(columns[key]) > 1}
+        if varied:
+            factors += _factors(varied, record.units)
     return factors
 
 
-def _count(columns: Iterable[Sequence[Any]]) -> int:
-    """How many different combinations columns have."""
-    return len({repr(row) for row in zip(*columns, strict=True)})
+def _axes(record: SweepRecord) -> list[tuple[str, ...]]:
+    """The keys of a sweep, those together that go together by its file."""
+    together = [tuple(flatten(table, is_axis)) for table in record.file.get("zip", ())]
+    together += [tuple(flatten(table["ranges"], is_axis)) for table in record.file.get("sample", ())]
+    axis_of = {key: keys for keys in together for key in keys}
+    return list(dict.fromkeys(axis_of.get(key, (key,)) for key in record.units))
 
 
-def _together(columns: dict[str, list[Any]]) -> list[list[str]]:
-    """Keys in groups: those of a group do not have all combinations of their values."""
-    groups: list[list[str]] = []
-    for key, values in columns.items():
-        count = _count([values])
-        joined = [
-            group
-            for group in groups
-            if any(_count([values, columns[other]]) < count * _count([columns[other]]) for other in group)
-        ]
-        groups = [group for group in groups if group not in joined] + [
-            [*(one for group in joined for one in group), key]
-        ]
-    return groups
+def _count(values: Iterable[Any]) -> int:
+    return len(set(map(repr, values)))
 
 
-def _factors(columns: dict[str, list[Any]], record: SweepRecord) -> list[Factor]:
-    keys = tuple(columns)
-    numeric = all(isinstance(value, (int, float)) and type(value) is not bool for v in columns.values() for value in v)
-    if not numeric:
-        return [_category(columns, record)]
-    if len(keys) > 1 and not all(_monotone(columns[keys[0]], columns[key]) for key in keys[1:]):
-        return [_number(key, columns[key], record, sample=True) for key in keys]
-    first = _number(keys[0], columns[keys[0]], record)
-    return [Factor(keys, first.label + _with(keys[1:]), first.values, True, unit=first.unit)]
+def _factors(columns: Mapping[str, list[Any]], units: Mapping[str, str | None]) -> list[Factor]:
+    """The factors of keys that go together."""
+    first, *others = columns
+    if not all(
+        isinstance(one, (int, float)) and type(one) is not bool for column in columns.values() for one in column
+    ):
+        return [_category(columns, units)]
+    if all(_monotone(columns[first], columns[key]) for key in others):
+        unit = units[first] or ""
+        label = with_unit(readable_key(first), unit) + _with(others)
+        return [Factor(tuple(columns), label, [float(value) for value in columns[first]], True, unit=unit)]
+    return [
+        Factor(
+            (key,),
+            with_unit(readable_key(key), units[key] or ""),
+            list(map(float, values)),
+            True,
+            True,
+            units[key] or "",
+        )
+        for key, values in columns.items()
+    ]
 
 
 def _monotone(first: Sequence[float], second: Sequence[float]) -> bool:
     """Whether of two columns one rises or falls strictly with the other."""
-    pairs = sorted(set(zip(first, second, strict=True)))
-    steps = [(b[0] > a[0], b[1] - a[1]) for a, b in pairwise(pairs)]
-    return all(rises and (step > 0) == (steps[0][1] > 0) and step != 0 for rises, step in steps)
+    steps = [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(sorted(set(zip(first, second, strict=True))))]
+    return all(along > 0 for along, _ in steps) and (all(up > 0 for _, up in steps) or all(up < 0 for _, up in steps))
 
 
-def _number(key: str, values: Sequence[float], record: SweepRecord, *, sample: bool = False) -> Factor:
-    unit = record.units[key] or ""
-    return Factor((key,), with_unit(readable_key(key), unit), [float(value) for value in values], True, sample, unit)
+def _category(columns: Mapping[str, list[Any]], units: Mapping[str, str | None]) -> Factor:
+    """A factor of texts: of the key that tells its levels apart, or of all together."""
+    whole = _count(zip(*columns.values(), strict=True))
+    shown = next(([key] for key, values in columns.items() if _count(values) == whole), list(columns))
+    told = [[f"{value_text(value)} {units[key] or ''}".strip() for value in columns[key]] for key in shown]
+    rest = [key for key in columns if key not in shown]
+    label = ", ".join(map(readable_key, shown)) + _with(rest)
+    return Factor((*shown, *rest), label, [", ".join(row) for row in zip(*told, strict=True)], False)
 
 
-def _category(columns: dict[str, list[Any]], record: SweepRecord) -> Factor:
-    """A factor of texts: of as few of the keys as tell its levels apart."""
-    whole = _count(columns.values())
-    shown: list[str] = []
-    for key in columns:
-        if _count([columns[one] for one in shown]) < whole if shown else True:
-            shown.append(key)
-    for key in [one for one in shown if len(shown) > 1]:
-        others = [one for one in shown if one != key]
-        if others and _count([columns[one] for one in others]) == whole:
-            shown = others
-    told = [[f"{_text(value)} {record.units[key] or ''}".strip() for value in columns[key]] for key in shown]
-    texts = [", ".join(row) for row in zip(*told, strict=True)]
-    label = ", ".join(readable_key(key) for key in shown)
-    rest = tuple(key for key in columns if key not in shown)
-    return Factor((*shown, *rest), label + _with(rest), texts, False)
-
-
-def _text(value: Any) -> str:
+def value_text(value: Any) -> str:
+    """A value of a key as text, several with strokes between them."""
     if isinstance(value, list):
-        return "/".join(_text(part) for part in value)
+        return "/".join(map(value_text, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
@@ -166,22 +150,6 @@ def readable_key(key: str) -> str:
 def with_unit(words: str, unit: str) -> str:
     """A label with its unit, if there is one."""
     return f"{words} ({unit})" if unit else words
-
-
-def by_asymmetry(factor: Factor, record: SweepRecord, points: Sequence[int]) -> Factor | None:
-    """A factor of these points that is one of several pairs of radii as numbers, by sin δ; None if it is none."""
-    names = list(derived_columns(record.analyses))
-    if factor.is_number or not any(key.endswith("radii") for key in factor.keys) or "sin_delta" not in names:
-        return None
-    place = names.index("sin_delta")
-    sines = [record.derived[point][place] for point in points]
-    if any(sine is None or isnan(sine) for sine in sines):  # of clusters
-        return None
-    levels = {(text, round(sine, 12)) for text, sine in zip(factor.values, sines, strict=True)}
-    one_each = len(levels) == len({sine for _, sine in levels}) == len(factor.levels)
-    if not one_each or len(levels) < _LEAST_ASYMMETRIES:
-        return None
-    return Factor(factor.keys, "asymmetry sin δ", [float(sine) for sine in sines], True)
 
 
 def find_name(option: str, wanted: str, names: Iterable[str]) -> str:

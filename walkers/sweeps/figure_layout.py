@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.readable import readable_unit
-from walkers.sweeps.factors import SEEDS, Factor, by_asymmetry, factors_of, find_name, readable_key, with_unit
+from walkers.sweeps.factors import SEEDS, Factor, factors_of, find_name, readable_key, with_unit
 from walkers.sweeps.record import SweepRecord
 
 if TYPE_CHECKING:
@@ -25,6 +25,8 @@ DEFAULTS = ("velocity", "climbs")
 """What is drawn if nothing else is asked for, the first that the table has."""
 ERRORS = {"velocity": "standard_error"}
 """Columns with the standard errors of others."""
+_LEAST_ASYMMETRIES = 3
+"""Different radii are shown by sin δ from so many on."""
 _MOST_PANELS = 12
 """More combinations of what is left are not told apart by panels."""
 
@@ -128,7 +130,7 @@ def layout_of(
         If there is no such key or column.
     """
     points = table["point"].to_numpy()
-    factors = [_at(factor, points) for factor in factors_of(record)]
+    factors = [replace(factor, values=[factor.values[point] for point in points]) for factor in factors_of(record)]
 
     def named(option: str, name: str) -> Factor:
         found = find_name(option, name, [*(key for factor in factors for key in factor.keys), *table.columns])
@@ -139,50 +141,53 @@ def layout_of(
         for option, name in (("x", x), ("hue", hue), ("panels", panels))
         if name is not None and not (name == NONE and option != "x")
     }
-    taken = {key for factor in asked.values() for key in factor.keys}
-    left = [factor for factor in factors if not taken.intersection(factor.keys)]
-    left = [factor for factor in left if not any(_same(factor, other) for other in asked.values())]
+    left = [one for one in factors if not any(_same(one, other) for other in asked.values())]
     samples = [factor for factor in left if factor.is_sample]
     left = [factor for factor in left if not factor.is_sample]
+    untold = [one.name for one in samples] if "x" in asked else []
     if "x" in asked:
         along = [asked["x"]]
     elif samples:
         along = samples
     else:
-        along = [_along(left, record, points) or _of_column(table, "point", "--x")]
+        along = [_along(left, table) or _of_column(table, "point", "--x")]
         left = [factor for factor in left if factor.keys != along[0].keys]
-    untold = [one.name for one in samples] if "x" in asked else []
     left = sorted((one for one in left if one.keys[0] not in SEEDS), key=lambda one: -len(one.levels))
     colours = asked.get("hue") or (left.pop(0) if left and hue is None else None)
-    many = len(along) > 1
     apart = asked.get("panels")
-    if apart is None and panels is None and left and not many:
+    if apart is None and panels is None and left and len(along) == 1:
         while prod(len(one.levels) for one in left) > _MOST_PANELS:
             untold.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
         apart, left = _joined(left) if left else None, []
-    if many and apart is not None:
+    if len(along) > 1 and apart is not None:
         raise InputError("--panels", [Problem("", None, "expected --x too: the samples have a panel for each key")])
     return Layout(along, colours, apart, [*untold, *(one.name for one in left)])
-
-
-def _at(factor: Factor, points: npt.NDArray[Any]) -> Factor:
-    """A factor of all points, of some of them."""
-    return replace(factor, values=[factor.values[point] for point in points])
 
 
 def _same(one: Factor, other: Factor) -> bool:
     """Whether two factors tell the same points apart, such as Γ0 and the acceleration that it follows from."""
     pairs = len(set(zip(one.values, other.values, strict=True)))
-    return pairs == len(one.levels) == len(other.levels)
+    return one.keys == other.keys or pairs == len(one.levels) == len(other.levels)
 
 
-def _along(factors: Sequence[Factor], record: SweepRecord, points: npt.NDArray[Any]) -> Factor | None:
+def _along(factors: Sequence[Factor], table: pd.DataFrame) -> Factor | None:
     """What is best along x: most values, of equally many the last; categories and seeds if there is nothing else."""
-    order: list[tuple[bool, bool, int, int, Factor]] = []
-    for number, factor in enumerate(factors):
-        shown = by_asymmetry(factor, record, points.tolist()) or factor
-        order.append((shown.keys[0] not in SEEDS, shown.is_number, len(shown.levels), number, shown))
-    return max(order, key=lambda entry: entry[:4])[4] if order else None
+    shown = [_by_asymmetry(factor, table) or factor for factor in factors]
+    ranks = [(one.keys[0] not in SEEDS, one.is_number, len(one.levels), place) for place, one in enumerate(shown)]
+    return shown[max(ranks)[-1]] if ranks else None
+
+
+def _by_asymmetry(factor: Factor, table: pd.DataFrame) -> Factor | None:
+    """A factor that is one of three or more pairs of radii as numbers, by sin δ; None if it is none."""
+    if factor.is_number or "sin_delta" not in table or not any(key.endswith("radii") for key in factor.keys):
+        return None
+    sines = table["sin_delta"].astype(float)
+    if sines.isna().any():  # of clusters
+        return None
+    shown = Factor(factor.keys, "asymmetry sin δ", sines.tolist(), True)
+    pairs = set(zip(factor.values, sines.round(12), strict=True))
+    one_each = len(pairs) == sines.round(12).nunique() == len(factor.levels)
+    return shown if one_each and len(pairs) >= _LEAST_ASYMMETRIES else None
 
 
 def _of_column(table: pd.DataFrame, name: str, option: str) -> Factor:
@@ -190,8 +195,7 @@ def _of_column(table: pd.DataFrame, name: str, option: str) -> Factor:
     label = with_unit(readable_key(name), unit)
     if table[name].map(lambda value: isinstance(value, str)).all() and len(table):
         return Factor((name,), label, list(table[name]), False)
-    values = [float(value) for value in _numbers(table, name, option) / size]
-    return Factor((name,), label, values, True, unit=unit)
+    return Factor((name,), label, (_numbers(table, name, option) / size).tolist(), True, unit=unit)
 
 
 def _joined(factors: Sequence[Factor]) -> Factor:
@@ -203,7 +207,7 @@ def _joined(factors: Sequence[Factor]) -> Factor:
         bare = factor.is_number and not factor.unit
         return f"{factor.name} = {factor.told(level)}" if bare else factor.told(level)
 
-    rows = zip(*(factor.values for factor in factors), strict=True)
-    texts = [", ".join(told(factor, level) for factor, level in zip(factors, row, strict=True)) for row in rows]
+    columns = [[told(factor, level) for level in factor.values] for factor in factors]
     keys = tuple(key for factor in factors for key in factor.keys)
+    texts = [", ".join(row) for row in zip(*columns, strict=True)]
     return Factor(keys, ", ".join(factor.name for factor in factors), texts, False)

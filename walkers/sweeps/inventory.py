@@ -1,4 +1,4 @@
-"""What is in a folder of runs: runs alone and in ensembles, finished or not, and sweeps, as their files say.
+"""What is in a folder of runs: runs, finished or not, and sweeps, as their files say.
 
 Nothing is tabulated, no dump is opened and no table: a folder of ten thousand runs takes seconds.
 """
@@ -9,7 +9,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,6 @@ from walkers.runner.directory import (
     holds_unfinished,
     is_run_name,
 )
-from walkers.runner.ensemble import FOLDER
 from walkers.runner.files import read_json
 from walkers.runner.locks import is_locked
 from walkers.runner.manifest import MANIFEST_NAME, check_unchanged
@@ -45,7 +44,7 @@ class Entry:
     Attributes
     ----------
     name
-        Of the run (``case-hash``) or the sweep.
+        Of the run (``case-hash``) or of the sweep's directory.
     case
         Name of the (base) case.
     status
@@ -53,12 +52,8 @@ class Entry:
         where it was; of a sweep points are missing.
     directory
         Where its files are.
-    place
-        Of a run: beside it is the lock, whether the run is alone or in an ensemble.
-    modified
-        When it was finished, or something was last written to it; seconds since the epoch.
-    seen
-        When the folder was looked through, the same for all that is in it; seconds since the epoch.
+    age
+        Since it was finished, or something was last written to it, s.
     size
         Of its files, of a sweep those of its runs, bytes.
     parameters
@@ -79,8 +74,7 @@ class Entry:
     case: str
     status: str
     directory: Path
-    place: Path
-    modified: float
+    age: float
     size: int
     parameters: Mapping[str, Any] = field(default_factory=dict)
     reason: str | None = None
@@ -90,7 +84,6 @@ class Entry:
     climbs: int | None = None
     points: Mapping[str, int] | None = None
     runs: Sequence[str] = ()
-    seen: float = field(default_factory=time.time)
 
     @property
     def is_sweep(self) -> bool:
@@ -98,9 +91,9 @@ class Entry:
         return self.points is not None
 
     @property
-    def age(self) -> float:
-        """Since it was modified, s."""
-        return max(self.seen - self.modified, 0.0)
+    def place(self) -> Path:
+        """Where a run belongs; beside it is its lock."""
+        return self.directory.with_name(_place_name(self.directory))
 
 
 def inventory(out: Path) -> list[Entry]:
@@ -118,11 +111,10 @@ def inventory(out: Path) -> list[Entry]:
     """
     if out.exists() and not out.is_dir():
         raise InputError(str(out), [Problem("", None, "expected a folder of runs, this is a file")])
-    runs = list(_runs(out))
-    sweeps = [sweep for path in _folders(out) if (sweep := _sweep(path, runs)) is not None]
-    found = [*sweeps, *sorted(runs, key=lambda run: (run.name, run.status != "finished"))]
     now = time.time()
-    return [replace(entry, seen=now) for entry in found]
+    runs = list(_runs(out, now))
+    sweeps = [sweep for path in _folders(out) if (sweep := _sweep(path, runs, now)) is not None]
+    return [*sweeps, *sorted(runs, key=lambda run: (run.name, run.status != "finished"))]
 
 
 def _folders(out: Path) -> list[Path]:
@@ -133,32 +125,26 @@ def _folders(out: Path) -> list[Path]:
         return []
 
 
-def _runs(out: Path) -> Iterator[Entry]:
+def _runs(out: Path, now: float) -> Iterator[Entry]:
     seen = set()
     for path in _folders(out):
-        if path.name != FOLDER and (run := _run(path, out)) is not None:
+        if (run := _run(path, now)) is not None:
             seen.add(run.place)
             yield run
-    for ensemble in _folders(out / FOLDER):
-        name = _place_name(ensemble)
-        for path in _folders(ensemble) if name == ensemble.name or is_run_name(name) else ():
-            if (run := _run(path, out, whole=name == ensemble.name)) is not None:
-                seen.add(run.place)
-                yield run
-    for lock in out.glob(f"*{_LOCK}"):  # a run whose directory is about to be made
+    for lock in out.glob(f"*{_LOCK}"):  # a run whose directory is about to be made, or that is made with others
         place = lock.with_name(lock.name.removesuffix(_LOCK))
         if place not in seen and is_locked(place):
-            yield Entry(place.name, place.name.rpartition("-")[0], "running", place, place, time.time(), 0)
+            yield Entry(place.name, place.name.rpartition("-")[0], "running", place, 0.0, 0)
 
 
 def _place_name(path: Path) -> str:
     return path.name.removesuffix(UNFINISHED).removesuffix(REPLACED)
 
 
-def _run(path: Path, out: Path, *, whole: bool = True) -> Entry | None:
+def _run(path: Path, now: float) -> Entry | None:
     """The run in a directory; None if there is none."""
     name = _place_name(path)
-    finished = whole and name == path.name and (path / MANIFEST_NAME).is_file()
+    finished = name == path.name and (path / MANIFEST_NAME).is_file()
     if not (finished or is_run_name(name)):  # a folder of somebody's, whatever is in it
         return None
     parameters: Mapping[str, Any]
@@ -170,12 +156,15 @@ def _run(path: Path, out: Path, *, whole: bool = True) -> Entry | None:
             return None
         parameters, case_name = {}, name.rpartition("-")[0]
     size, newest = weigh(path)
-    place = out / name
     if finished:
-        modified = (path / MANIFEST_NAME).stat().st_mtime
-        return Entry(name, case_name, "finished", path, place, modified, size, parameters, **_outcome(path))
-    status, failure = ("running", {}) if is_locked(place) else _failure(path)
-    return Entry(name, case_name, status, path, place, newest, size, parameters, **failure)
+        age = _age(path / MANIFEST_NAME, now)
+        return Entry(name, case_name, "finished", path, age, size, parameters, **_outcome(path))
+    status, failure = ("running", {}) if is_locked(path.with_name(name)) else _failure(path)
+    return Entry(name, case_name, status, path, max(now - newest, 0.0), size, parameters, **failure)
+
+
+def _age(path: Path, now: float) -> float:
+    return max(now - path.stat().st_mtime, 0.0)
 
 
 def _failure(path: Path) -> tuple[str, dict[str, Any]]:
@@ -218,24 +207,22 @@ def weigh(path: Path) -> tuple[int, float]:
     return size, newest
 
 
-def _sweep(path: Path, runs: Sequence[Entry]) -> Entry | None:
+def _sweep(path: Path, runs: Sequence[Entry], now: float) -> Entry | None:
     if not (path / RECORD_NAME).is_file():
         return None
     try:
         record = read_record(path)
     except InputError:
         return None
-    finished = {run.name: run.directory for run in runs if run.status == "finished"}
-    points = Counter(state.status for state in states(record, finished, _velocity))
+    points = Counter(state.status for state in states(record, _velocity))
     named = set(record.runs)
     values = {key: {str(row[number]) for row in record.values} for number, key in enumerate(record.units)}
     return Entry(
-        name=record.name,
+        name=path.name,
         case=record.runs[0].rpartition("-")[0] if record.runs else "",
         status=_status_of(points),
         directory=path,
-        place=path,
-        modified=(path / RECORD_NAME).stat().st_mtime,
+        age=_age(path / RECORD_NAME, now),
         size=sum(run.size for run in runs if run.name in named),
         parameters={key: len(different) for key, different in values.items()},
         points=points,

@@ -18,7 +18,7 @@ def ordered(entries: Sequence[Entry], order: Order, *, reverse: bool = False) ->
         "name": lambda entry: entry.name,
         "status": lambda entry: entry.status,
         "velocity": lambda entry: float("inf") if entry.velocity is None else -entry.velocity,
-        "age": lambda entry: -entry.modified,
+        "age": lambda entry: entry.age,
         "size": lambda entry: -entry.size,
     }
     return sorted(entries, key=keys[order], reverse=reverse)

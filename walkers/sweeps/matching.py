@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +11,16 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.readable import readable_unit
 from walkers.runner.directory import case_of
 from walkers.sweeps.comparison import Pair, different_parameters, number_of, parameters_text
+from walkers.sweeps.factors import value_text
 from walkers.sweeps.listing import aligned
-from walkers.sweeps.record import SweepRecord, read_record
+from walkers.sweeps.record import read_record
 from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_SIDES = ("first", "second")
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ class SweepComparison:
         quantity = self.points[0][1].cells()[0]
         keys = [f"{key} ({unit})" if unit else key for key, unit in self.keys.items()]
         head = [*keys, *(f"{name}: {quantity}" for name in self.names), "difference", "in standard errors"]
-        told = [[*map(_told, at), *pair.cells()[1:]] for at, pair in self.points]
+        told = [[*map(value_text, at), *pair.cells()[1:]] for at, pair in self.points]
         text.append(aligned([head, *told]))
         text.append(self._summary())
         return "\n\n".join(text)
@@ -75,12 +78,6 @@ class SweepComparison:
         if any(self.unmatched):
             line += f"; left out: {self.unmatched[0]} of {self.names[0]}, {self.unmatched[1]} of {self.names[1]}"
         return line
-
-
-def _told(value: Any) -> str:
-    if isinstance(value, (list, tuple)):
-        return "/".join(map(_told, value))
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def compare_sweeps(first: Path, second: Path, column: str | None = None) -> SweepComparison:
@@ -102,7 +99,8 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Swee
     from walkers.sweeps.figure_layout import default_column
 
     records, source = (read_record(first), read_record(second)), f"{first}, {second}"
-    if dict(records[0].units) != dict(records[1].units):
+    units = dict(records[0].units)
+    if units != dict(records[1].units):
         told = " and ".join(_keys_text(record.units) for record in records)
         raise InputError(
             source, [Problem("", None, f"expected sweeps that vary the same keys in the same units: {told}")]
@@ -110,19 +108,18 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Swee
     tables = [load(directory) for directory in (first, second)]
     numbers = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
     column = find_name("--y", column, numbers) if column else default_column(tables[0])
-    rows = [_finished(record, table, list(records[0].units)) for record, table in zip(records, tables, strict=True)]
-    common = [values for values in rows[0] if values in rows[1]]
-    if not common:
+    both = _matched([table[table["status"] == "finished"] for table in tables], list(units))
+    if both.empty:
         raise InputError(source, [Problem("", None, "have no finished point in common")])
     unit = tables[0].attrs["units"][column]
-    points = [(rows[0][at][0], _pair(column, unit, rows[0][at][1], rows[1][at][1])) for at in common]
-    runs = [Path(of_sweep[common[0]][1]["run"]) for of_sweep in rows]
+    rows = [{str(name): value for name, value in row.items()} for row in both.to_dict("records")]
+    parameters = different_parameters(*(case_of(Path(rows[0][f"run_{side}"])) for side in _SIDES))
     return SweepComparison(
         names=(str(first), str(second)) if records[0].name == records[1].name else (records[0].name, records[1].name),
-        keys=dict(records[0].units),
-        points=points,
-        unmatched=(len(tables[0]) - len(common), len(tables[1]) - len(common)),
-        parameters=different_parameters(case_of(runs[0]), case_of(runs[1])),
+        keys=units,
+        points=[(tuple(records[0].values[row["point_first"]]), _pair(column, unit, row)) for row in rows],
+        unmatched=(len(tables[0]) - len(both), len(tables[1]) - len(both)),
+        parameters=parameters,
     )
 
 
@@ -130,20 +127,17 @@ def _keys_text(units: Mapping[str, str | None]) -> str:
     return ", ".join(f"{key} ({unit})" if unit else key for key, unit in units.items()) or "nothing"
 
 
-def _finished(
-    record: SweepRecord, table: pd.DataFrame, keys: Sequence[str]
-) -> dict[str, tuple[tuple[Any, ...], Mapping[str, Any]]]:
-    """The finished points of a sweep by the text of their values: the values, in the order of the keys, and the row."""
-    order = [list(record.units).index(key) for key in keys]
-    found: dict[str, tuple[tuple[Any, ...], Mapping[str, Any]]] = {}
-    for row in table[table["status"] == "finished"].to_dict("records"):
-        values = tuple(record.values[row["point"]][place] for place in order)
-        found[repr(values)] = (values, {str(name): value for name, value in row.items()})
-    return found
+def _matched(tables: Sequence[pd.DataFrame], units: Sequence[str]) -> pd.DataFrame:
+    """The rows of two tables whose keys have the same values, the columns of both beside each other."""
+    keys = [name for name in tables[0].columns if name.partition("[")[0] in units]
+    first, second = (table.astype(dict.fromkeys(keys, object)) for table in tables)
+    how = {"on": keys} if keys else {"how": "cross"}
+    return first.merge(second, suffixes=[f"_{side}" for side in _SIDES], **how)
 
 
-def _pair(column: str, unit: str, first: Mapping[str, Any], second: Mapping[str, Any]) -> Pair:
-    def error(row: Mapping[str, Any]) -> float:
-        return number_of(row["standard_error"]) if column == "velocity" else nan
-
-    return Pair(column, unit, (number_of(first[column]), number_of(second[column])), (error(first), error(second)))
+def _pair(column: str, unit: str, row: Mapping[str, Any]) -> Pair:
+    values, errors = (
+        tuple(number_of(row.get(f"{name}_{side}")) for side in _SIDES)
+        for name in (column, "standard_error" if column == "velocity" else "")
+    )
+    return Pair(column, unit, (values[0], values[1]), (errors[0], errors[1]))

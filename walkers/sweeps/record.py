@@ -16,8 +16,7 @@ from walkers.inputs.axes import plain
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.runner.binary import Engine
-from walkers.runner.directory import FAILURE_NAME, run_place, unfinished
-from walkers.runner.ensemble import FOLDER, finished_places
+from walkers.runner.directory import FAILURE_NAME, finished_run, run_place, unfinished
 from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import is_locked
 from walkers.sweeps.columns import analyses_of_all, derived_columns, derived_of, result_columns, velocity_in
@@ -26,6 +25,8 @@ if TYPE_CHECKING:
     from walkers.inputs.sweep import Descent, Sweep
 
 RECORD_NAME = "sweep.json"
+PARSL = "parsl"
+"""Folder of Parsl's scripts and logs in a sweep's directory."""
 _FORMAT = 2
 
 
@@ -78,13 +79,11 @@ def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Pat
     Raises
     ------
     InputError
-        If a sweep cannot have that name, or piles are to descend.
+        If piles are to descend.
     """
     names = analyses_of_all(cases)
     if sweep.descent is not None and "velocity" not in result_columns(names):
         raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
-    if sweep.name == FOLDER:
-        raise InputError(sweep.source, [Problem("", None, f"a sweep cannot be called {FOLDER}: rename the file")])
     return SweepRecord(
         directory=out / sweep.name,
         name=sweep.name,
@@ -186,24 +185,17 @@ class PointState:
     lost: int = 0
 
 
-def states(
-    record: SweepRecord,
-    finished: Mapping[str, Path] | None = None,
-    velocity: Callable[[Path], float] | None = None,
-) -> list[PointState]:
+def states(record: SweepRecord, velocity: Callable[[Path], float] | None = None) -> list[PointState]:
     """What has become of each point, as the run directories say.
 
     Parameters
     ----------
     record
         The sweep.
-    finished
-        From the names of the finished runs of its folder to their directories, for who knows them already.
     velocity
         What gives the mean velocity (m/s) of a finished run, by which descents end; `velocity_of` if left out.
     """
-    finished = finished_places(record.out) if finished is None else finished
-    found = [_state(record.out / run, finished.get(run)) for run in record.runs]
+    found = [_state(record.out / run) for run in record.runs]
     if record.descent is None:
         return found
     for chain in chains(record):
@@ -217,9 +209,9 @@ def states(
     return found
 
 
-def _state(place: Path, finished: Path | None) -> PointState:
-    if finished is not None:
-        return PointState("finished", finished)
+def _state(place: Path) -> PointState:
+    if finished_run(place) is not None:
+        return PointState("finished", place)
     if is_locked(place):
         return PointState("running")
     incomplete = unfinished(place)

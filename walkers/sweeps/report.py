@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from itertools import cycle
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,15 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from walkers.inputs.readable import readable_unit
 from walkers.postprocess.gait import distance_walked
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.quantities import Number, rounded
+from walkers.postprocess.quantities import rounded
 from walkers.postprocess.report.page import LARGEST, NAME, check_report, fill, overhead, packed_plots, write_page
 from walkers.postprocess.report.plots import COLOURS, error_bars, new_plot, with_legend
 from walkers.postprocess.report.run import RunReport
 from walkers.postprocess.tables import read_table
+from walkers.sweeps.factors import value_text, with_unit
 from walkers.sweeps.figure_layout import DEFAULTS, ERRORS
-from walkers.sweeps.record import SweepRecord, read_record, states
+from walkers.sweeps.record import SweepRecord, read_record
 from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
@@ -40,6 +43,8 @@ _MOST_MULTIPLES = 60
 """Small pictures; of more points some are left out, and the page says so."""
 _WIDE, _TALL, _EDGE = 200.0, 120.0, 8.0
 """Of a small picture, in its own units."""
+_MOST_CORNERS = 80
+"""Of a line in it."""
 
 
 @dataclass(frozen=True)
@@ -90,55 +95,44 @@ def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARG
     record, frame = read_record(directory), load(directory)
     path = to or directory / NAME
     check_report(path)
-    whole = set(frame["point"][frame["status"] == "finished"])  # what was damaged since is not
-    finished = {
-        number: state.directory
-        for number, state in enumerate(states(record))
-        if number in whole and state.directory is not None
-    }
+    rows = zip(frame["point"], frame["run"], frame["status"], strict=True)
+    finished = {int(number): Path(run) for number, run, status in rows if status == "finished"}
+    in_order = _spread_out(list(finished))
     plot = _overview(frame, record)
     carried = {} if plot is None else {"plots-sweep": packed_plots(plot)}
-    curves = {number: _curves(finished[number]) for number in _spread_out(list(finished))[:_MOST_MULTIPLES]}
-    head, rows = _table(frame, record)
+    pictures = _Pictures({number: _curves(finished[number]) for number in in_order[:_MOST_MULTIPLES]}, frame, record)
+    head, cells = _table(frame, record)
     values: dict[str, Any] = {
         "title": record.title or record.name,
         "name": record.name,
         "head": head,
-        "rows": rows,
-        "points": [int(number) for number in frame["point"]],
+        "rows": cells,
+        "points": frame["point"].tolist(),
         "has_plot": plot is not None,
     }
-    bare = fill("sweep.html.j2", "walkers.sweeps", runs={}, multiples=_multiples(curves, {}, frame, record), **values)
+    bare = fill("sweep.html.j2", "walkers.sweeps", runs={}, multiples=pictures.told({}), **values)
     room = largest - overhead() - len(bare.encode()) - sum(map(len, carried.values()))
     runs: dict[int, RunReport] = {}
-    for number in _spread_out(list(finished)):
+    for number in in_order:
         run = RunReport(finished[number], f"point-{number}", _PLACES)
         needed = sum(map(len, run.carried.values())) + len(fill("run.html.j2", run=run).encode()) + 1000
         if needed > room:
             break
         room -= needed
         runs[number] = run
-    carried |= {key: value for run in runs.values() for key, value in run.carried.items()}
-    body = fill(
-        "sweep.html.j2",
-        "walkers.sweeps",
-        runs=dict(sorted(runs.items())),
-        multiples=_multiples(curves, runs, frame, record),
-        **values,
-    )
-    return write_page(path, record.title or record.name, body, carried)
+        carried |= run.carried
+    told = {"runs": dict(sorted(runs.items())), "multiples": pictures.told(runs)}
+    return write_page(path, values["title"], fill("sweep.html.j2", "walkers.sweeps", **told, **values), carried)
 
 
 def _spread_out(numbers: list[int]) -> list[int]:
     """Numbers in an order of which any begin is spread over all: both ends, the middle, and so on."""
-    order: list[int] = []
-    count = len(numbers)
+    order: dict[int, None] = {}
     parts = 1
-    while len(order) < count:
-        places = (round(part * (count - 1) / parts) for part in range(parts + 1))
-        order += [numbers[place] for place in dict.fromkeys(places) if numbers[place] not in order]
+    while len(order) < len(numbers):
+        order |= dict.fromkeys(numbers[round(part * (len(numbers) - 1) / parts)] for part in range(parts + 1))
         parts *= 2
-    return order
+    return list(order)
 
 
 def _varied(record: SweepRecord, frame: pd.DataFrame) -> list[str]:
@@ -146,137 +140,107 @@ def _varied(record: SweepRecord, frame: pd.DataFrame) -> list[str]:
     return [name for name in frame.columns if name.partition("[")[0] in record.units]
 
 
-def _label(name: str, units: Mapping[str, str]) -> tuple[str, float]:
-    """What a column is called, with its unit, and by what its numbers are multiplied."""
-    unit = units.get(name, "")
-    known = {"m/s": ("mm/s", 1e3), "m": ("mm", 1e3)}
-    shown, factor = known.get(unit, (unit, 1.0))
-    return f"{name.replace('_', ' ')} ({shown})" if shown else name.replace("_", " "), factor
-
-
 def _table(frame: pd.DataFrame, record: SweepRecord) -> tuple[list[str], list[list[Cell]]]:
-    """Heads and rows of what varied and what came out."""
-    varied = _varied(record, frame)
-    columns = varied + [name for name in _SHOWN if name in frame and name not in varied]
-    columns = [name for name in columns if name in varied or name == "status" or frame[name].notna().any()]
-    units = frame.attrs["units"]
-    # What is varied is in the file's unit already.
-    labels = [
-        (f"{name} ({units[name]})" if units[name] else name, 1.0) if name in varied else _label(name, units)
-        for name in columns
+    """Heads and rows of what varied, in the file's units, and what came out, in the usual ones."""
+    varied, units = _varied(record, frame), frame.attrs["units"]
+    results = [name for name in _SHOWN if name in frame and name not in varied]
+    results = [name for name in results if name == "status" or frame[name].notna().any()]
+    shown = {name: (units[name], 1.0) for name in varied} | {name: readable_unit(units[name]) for name in results}
+    heads = [with_unit(name if name in varied else name.replace("_", " "), unit) for name, (unit, _) in shown.items()]
+    rows = [
+        [_cell(row[name], size, row.get(ERRORS.get(name, ""))) for name, (_, size) in shown.items()]
+        for _, row in frame.iterrows()
     ]
-    rows = []
-    for _, row in frame.iterrows():
-        cells = []
-        for name, (_, factor) in zip(columns, labels, strict=True):
-            error = row.get(ERRORS.get(name, ""))
-            cells.append(_cell(row[name], factor, error))
-        rows.append(cells)
-    return [label for label, _ in labels], rows
+    return heads, rows
 
 
-def _cell(value: Any, factor: float, error: Any) -> Cell:
-    if value is None or isinstance(value, (bool, np.bool_, str)):
-        return Cell("–" if value is None else str(value))
-    number = float(value)
-    if not isfinite(number):
+def _cell(value: Any, size: float, error: Any) -> Cell:
+    if isinstance(value, (bool, np.bool_, str)):
+        return Cell(str(value))
+    if value is None or not isfinite(value):
         return Cell("–")
-    doubt = float(error) if error is not None and isfinite(float(error)) else None
-    if number.is_integer() and factor == 1.0:
+    number = float(value)
+    if number.is_integer() and size == 1.0:
         return Cell(f"{number:g}", number)
-    shown = Number("", number, "", factor, doubt).text
-    if doubt is None:
-        return Cell(shown, number)
-    return Cell(shown, number, rounded(doubt * factor, doubt * factor), doubt)
+    if error is None or not isfinite(error):
+        return Cell(rounded(number / size), number)
+    return Cell(rounded(number / size, error / size), number, rounded(error / size, error / size), float(error))
 
 
 def _overview(frame: pd.DataFrame, record: SweepRecord) -> Model | None:
     """What came out against the first number that varies; a colour for each value of what varies besides."""
     result = next((name for name in DEFAULTS if name in frame and frame[name].notna().any()), None)
-    numeric = [name for name in _varied(record, frame) if frame[name].map(type).isin((int, float)).all()]
+    varied, units = _varied(record, frame), frame.attrs["units"]
+    numeric = [name for name in varied if frame[name].map(type).isin((int, float)).all()]
     if result is None or not numeric:
         return None
     x = max(numeric, key=lambda name: frame[name].nunique())
-    others = [name for name in _varied(record, frame) if name != x]
-    units = frame.attrs["units"]
-    label, factor = _label(result, units)
-    plot = new_plot(
-        f"{label} against {x}, with the standard error", f"{x} ({units[x]})" if units[x] else x, label, height=380
-    )
-    known = frame[frame[result].notna()]
-    groups: list[tuple[Any, pd.DataFrame]] = [((), known)]
-    if others:
-        groups = list(known.groupby([known[name].astype(str) for name in others], sort=False))
-    for number, (key, part) in enumerate(groups):
-        ordered = part.sort_values(x)
-        along, values = ordered[x].to_numpy(float), ordered[result].to_numpy(float) * factor
-        legend: dict[str, Any] = (
-            {"legend_label": ", ".join(map(str, key))} if key and len(groups) <= _MOST_LEGENDS else {}
-        )
-        colour = COLOURS[number % len(COLOURS)]
+    others = [name for name in varied if name != x]
+    unit, size = readable_unit(units[result])
+    label = with_unit(result, unit)
+    plot = new_plot(f"{label} against {x}, with the standard error", with_unit(x, units[x]), label, height=380)
+    known = frame[frame[result].notna()].sort_values(x, kind="stable")
+    apart = known[others].astype(str).agg(", ".join, axis=1) if others else known["point"].map(lambda _: "")
+    names = list(dict.fromkeys(apart.sort_index()))
+    for name, colour in zip(names, cycle(COLOURS), strict=False):
+        part = known[apart == name]
+        along, values = part[x].to_numpy(float), part[result].to_numpy(float) / size
+        legend: dict[str, Any] = {"legend_label": name} if name and len(names) <= _MOST_LEGENDS else {}
         plot.line(along, values, color=colour, line_alpha=0.4, **legend)
         plot.scatter(along, values, color=colour, size=7, **legend)
         if result in ERRORS:
-            error_bars(plot, along, values, ordered[ERRORS[result]].to_numpy(float) * factor)
+            error_bars(plot, along, values, part[ERRORS[result]].to_numpy(float) / size)
     if plot.legend:
-        plot.legend.title = ", ".join(f"{name} ({units[name]})" if units[name] else name for name in others)
+        plot.legend.title = ", ".join(with_unit(name, units[name]) for name in others)
     return with_legend(plot)
 
 
-def _curves(directory: Path) -> list[tuple[FloatArray, FloatArray]]:
-    """Distances walked, or heights of a pile's surface and of the highest bead: time in s, mm."""
+def _curves(directory: Path) -> list[FloatArray]:
+    """Distances walked, or heights of a pile's surface and of the highest bead: time in s and mm, shape (2, N)."""
     try:
         bed = read_table(directory, "bed")
     except FileNotFoundError:
-        motion = read_motion(directory)
-        return [(time, 1e3 * one) for group in motion.groups for time, way in [distance_walked(group)] for one in way.T]
-    return [(bed["time"].to_numpy(), 1e3 * bed[name].to_numpy()) for name in ("surface", "highest")]
+        ways = [distance_walked(group) for group in read_motion(directory).groups]
+        return [np.stack([time, 1e3 * one]) for time, way in ways for one in way.T]
+    return [np.stack([bed["time"], 1e3 * bed[name]]) for name in ("surface", "highest")]
 
 
-def _multiples(
-    curves: Mapping[int, list[tuple[FloatArray, FloatArray]]],
-    runs: Mapping[int, RunReport],
-    frame: pd.DataFrame,
-    record: SweepRecord,
-) -> dict[str, Any]:
+class _Pictures:
     """The small pictures, on one scale."""
-    every = [curve for one in curves.values() for curve in one]
-    if not every:
-        return {"pictures": []}
-    time, height = (np.concatenate(values) for values in zip(*every, strict=True))
-    low = np.array([min(time.min(), 0.0), min(height.min(), 0.0)])
-    high = np.array([time.max(), height.max()])
-    span = np.where(high > low, high - low, 1.0)
 
-    def drawn(time: FloatArray, values: FloatArray) -> str:
-        x = _EDGE + (time - low[0]) / span[0] * (_WIDE - 2.0 * _EDGE)
-        y = _TALL - _EDGE - (values - low[1]) / span[1] * (_TALL - 2.0 * _EDGE)
-        thin = slice(None, None, -(-len(x) // 80))
-        return " ".join(f"{one:.1f},{other:.1f}" for one, other in zip(x[thin], y[thin], strict=True))
+    def __init__(self, curves: Mapping[int, list[FloatArray]], frame: pd.DataFrame, record: SweepRecord) -> None:
+        self.curves, self.names = curves, _names(frame, record)
+        self.what = "height of the surface and of the highest bead" if "pile" in record.analyses else "distance walked"
 
-    names = dict(_names(frame, record))
-    pictures = [
-        Multiple(
-            number,
-            names[number],
-            [(drawn(*curve), COLOURS[place % len(COLOURS)]) for place, curve in enumerate(curves[number])],
-            number in runs,
-        )
-        for number in sorted(curves)
-    ]
-    what = "height of the surface and of the highest bead" if "pile" in record.analyses else "distance walked"
-    scale = f"{what}, {low[1]:.3g} to {high[1]:.3g} mm, against time, {low[0]:.3g} to {high[0]:.3g} s"
-    zero = _TALL - _EDGE + low[1] / span[1] * (_TALL - 2.0 * _EDGE)
-    return {"pictures": pictures, "scale": scale, "zero": f"{zero:.1f}", "wide": _WIDE, "tall": _TALL}
+    def told(self, runs: Collection[int]) -> dict[str, Any]:
+        """What the page needs to draw them; those of whole runs that it holds open these."""
+        every = [curve for one in self.curves.values() for curve in one]
+        if not every:
+            return {"pictures": []}
+        values = np.concatenate(every, axis=1)
+        low, high = np.minimum(values.min(axis=1), 0.0), values.max(axis=1)
+        inner = np.array([_WIDE, -_TALL]) - 2.0 * np.array([_EDGE, -_EDGE])
+        size = inner / np.where(high > low, high - low, 1.0)
+        begin = np.array([_EDGE, _TALL - _EDGE])
 
+        def drawn(curve: FloatArray) -> str:
+            places = begin + (curve.T[:: -(-curve.shape[1] // _MOST_CORNERS)] - low) * size
+            return " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
 
-def _names(frame: pd.DataFrame, record: SweepRecord) -> Iterator[tuple[int, str]]:
-    """What each point is, in words: the values that vary."""
-    units = frame.attrs["units"]
-    for _, row in frame.iterrows():
-        values = [
-            f"{row[name]:g}" if isinstance(row[name], (int, float)) else str(row[name])
-            for name in _varied(record, frame)
+        pictures = [
+            Multiple(number, self.names[number], list(zip(map(drawn, ones), cycle(COLOURS))), number in runs)
+            for number, ones in sorted(self.curves.items())
         ]
-        told = [f"{value} {units[name]}".strip() for value, name in zip(values, _varied(record, frame), strict=True)]
-        yield int(row["point"]), f"point {row['point']}: {', '.join(told)}"
+        scale = f"{self.what}, {low[1]:.3g} to {high[1]:.3g} mm, against time, {low[0]:.3g} to {high[0]:.3g} s"
+        zero = f"{(begin - low * size)[1]:.1f}"
+        return {"pictures": pictures, "scale": scale, "zero": zero, "wide": _WIDE, "tall": _TALL}
+
+
+def _names(frame: pd.DataFrame, record: SweepRecord) -> dict[int, str]:
+    """What each point is, in words: the values that vary."""
+    units, varied = frame.attrs["units"], _varied(record, frame)
+    return {
+        int(row["point"]): f"point {row['point']}: "
+        + ", ".join(f"{value_text(row[name])} {units[name]}".strip() for name in varied)
+        for _, row in frame.iterrows()
+    }

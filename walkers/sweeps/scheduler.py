@@ -6,10 +6,9 @@ import resource
 import shutil
 import threading
 import time
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
-from math import nan
+from dataclasses import dataclass, replace
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
@@ -18,11 +17,9 @@ from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.runner.binary import Engine
 from walkers.runner.cost import pairs_of_beads
-from walkers.runner.ensemble import remove_remains
 from walkers.runner.locks import is_locked
-from walkers.sweeps.belongings import PARSL
 from walkers.sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, PlannedDeck, halves, pack, unfinished_parts
-from walkers.sweeps.record import PointState, SweepRecord, chains, states, velocity_of
+from walkers.sweeps.record import PARSL, PointState, SweepRecord, chains, states, velocity_of
 from walkers.sweeps.site import Site, pilots, threads
 from walkers.sweeps.worker import STOPS, Report, SweepStopped, Task, work
 from walkers.templates.sharing import sharing_key
@@ -122,20 +119,12 @@ def _severity(failure: Failure) -> int:
     return _WORST_FIRST.index(failure.reason if failure.reason in _WORST_FIRST else "")
 
 
-@dataclass(eq=False)
-class _Chain:
-    """Batches of points of which each waits for the one before."""
-
-    batches: Generator[list[int], None, None]
-    unsettled: set[int] = field(default_factory=set)
-
-
 @dataclass(frozen=True, eq=False)
 class _Job:
-    """A deck on its way: how often it failed and how often its worker was lost."""
+    """A deck on its way, of which group of points: how often it failed and how often its worker was lost."""
 
     deck: PlannedDeck
-    chain: _Chain
+    group: int
     failures: int = 0
     losses: int = 0
 
@@ -172,32 +161,20 @@ def schedule(
     ClusterFailed
         If the cluster's jobs end without having worked.
     """
-    _raise_file_limit()
-    out = record.out
-    out.mkdir(parents=True, exist_ok=True)
-    remove_remains(out)
-    with _workers(options, record) as workers:
-        return _Scheduler(record, cases, engine, options, workers, on_progress).run()
-
-
-def _raise_file_limit() -> None:
-    """Each point of a running deck keeps a lock open."""
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with suppress(ValueError, OSError):
+    with suppress(ValueError, OSError):  # each point of a running deck keeps a lock open
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-
-
-@dataclass(frozen=True)
-class _Workers:
-    """Where tasks are handed in, and what the sweep is called there."""
-
-    submit: Callable[[Task], Future[Report]]
-    sweep: str
+    record.out.mkdir(parents=True, exist_ok=True)
+    with _workers(options, record) as (sweep, submit):
+        return _Scheduler(record, cases, engine, options, sweep, submit, on_progress or (lambda _: None)).run()
 
 
 @contextmanager
-def _workers(options: Options, record: SweepRecord) -> Iterator[_Workers]:
-    """Start Parsl; at the end its workers and their engines have ended, however the block is left."""
+def _workers(options: Options, record: SweepRecord) -> Iterator[tuple[str, Callable[[Task], Future[Report]]]]:
+    """Start Parsl; yield what the sweep is called there, and what takes tasks.
+
+    At the end the workers and their engines have ended, however the block is left.
+    """
     import parsl
 
     folder = record.directory / PARSL
@@ -213,7 +190,7 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[_Workers]:
             f"Parsl cannot start ({told}); see {folder}, and [executor] address in the site file"
         ) from error
     try:
-        yield _Workers(parsl.python_app(work, data_flow_kernel=kernel), sweep)
+        yield sweep, parsl.python_app(work, data_flow_kernel=kernel)
     finally:
         stop.set()
         kernel.cleanup()
@@ -224,47 +201,12 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[_Workers]:
                 folder.rmdir()
 
 
-def batches(
-    record: SweepRecord, cases: Sequence[Case], stopped: Callable[[int], bool]
-) -> list[Generator[list[int], None, None]]:
-    """The order in which points may be made.
-
-    Parameters
-    ----------
-    record, cases
-        The sweep.
-    stopped
-        Whether the walkers of a settled point were at rest.
-
-    Returns
-    -------
-    list of generators
-        Each yields batches of points; the next is to be asked for when the last is settled. A sweep without a descent
-        is one batch. Descents go down side by side where their points can share a deck, and so many steps at once as
-        fill one: those below where a descent ends are made in vain, but cost less than decks that are nearly empty.
-    """
-    if record.descent is None:
-        return [(numbers for numbers in [list(range(len(cases)))])]
+def _groups(record: SweepRecord, cases: Sequence[Case]) -> list[list[list[int]]]:
+    """The points in groups that are made side by side: all points, or descents that may share decks."""
     together: dict[Any, list[list[int]]] = {}
     for chain in chains(record):
-        together.setdefault(sharing_key(cases[chain[0]]), []).append(chain)
-
-    def descend(descents: list[list[int]]) -> Generator[list[int], None, None]:
-        step = 0
-        while descents and step < len(descents[0]):
-            after = step + _steps_at_once([[cases[point] for point in chain[step:]] for chain in descents])
-            yield [point for chain in descents for point in chain[step:after]]
-            descents = [chain for chain in descents if not any(map(stopped, chain[step:after]))]
-            step = after
-
-    return [descend(group) for group in together.values()]
-
-
-def _steps_at_once(descents: Sequence[Sequence[Case]]) -> int:
-    """How many steps of descents can share a deck."""
-    if len({sharing_key(case) for chain in descents for case in chain}) > 1:
-        return 1
-    return max(1, MOST_WALKERS // sum(pairs_of_beads(chain[0]) for chain in descents))
+        together.setdefault(sharing_key(cases[chain[0]]) if record.descent else None, []).append(chain)
+    return list(together.values())
 
 
 def final_failures(record: SweepRecord, found: Sequence[PointState], options: Options) -> list[Failure]:
@@ -285,17 +227,15 @@ class _Scheduler:
         cases: Sequence[Case],
         engine: Engine,
         options: Options,
-        workers: _Workers,
-        on_progress: Callable[[SweepProgress], None] | None,
+        sweep: str,
+        submit: Callable[[Task], Future[Report]],
+        on_progress: Callable[[SweepProgress], None],
     ) -> None:
-        self.record, self.options, self.parsl, self.engine = record, options, workers, engine
-        self.cases: Mapping[int, Case] = dict(enumerate(cases))
-        self.on_progress = on_progress or (lambda _: None)
+        self.record, self.cases, self.engine, self.options = record, cases, engine, options
+        self.sweep, self.submit, self.on_progress = sweep, submit, on_progress
+        self.groups = _groups(record, cases)
         found = states(record)
-        known = zip(record.runs, found, strict=True)
-        finished = [(run, state.directory) for run, state in known if state.status == "finished"]
-        self.places = {run: directory for run, directory in finished if directory is not None}
-        self.finished = set(self.places)
+        self.finished = {run for run, state in zip(record.runs, found, strict=True) if state.status == "finished"}
         self.velocities: dict[str, float] = {}
         self.failures = final_failures(record, found, options)
         self.given_up = {failure.run for failure in self.failures}
@@ -304,53 +244,76 @@ class _Scheduler:
         self.later: list[tuple[float, _Job]] = []
         self.begin = time.perf_counter()
         self.seconds_done = 0.0
-        self.found = len(finished)
+        self.found = sum(state.status == "finished" for state in found)
         self.done = 0
         self.told = 0.0
 
     def run(self) -> list[Failure]:
-        for batch in batches(self.record, list(self.cases.values()), self._stopped):
-            self._advance(_Chain(batch))
+        self._advance(range(len(self.groups)))
         while self.out_there or self.later:
             now = time.perf_counter()
             for due, job in [entry for entry in self.later if entry[0] <= now]:
                 self.later.remove((due, job))
                 self._hand_out(job)
             with suppress(Empty):
-                self._take_in(*self.ended.get(timeout=_LOOK_SECONDS))
-            self._tell(now)
+                job, future = self.ended.get(timeout=_LOOK_SECONDS)
+                self._take_in(job, future)
+                self._advance([job.group])
+            if now - self.told > _LOOK_SECONDS:
+                self.told = now
+                self.on_progress(self._progress())
         self.on_progress(self._progress())
         return sorted(self.failures, key=lambda failure: failure.point)
-
-    def _stopped(self, point: int) -> bool:
-        run = self.record.runs[point]
-        if run in self.places and run not in self.velocities:
-            self.velocities[run] = velocity_of(self.places[run])
-        return self.record.descent is not None and self.record.descent.at_rest(self.velocities.get(run, nan))
 
     def _is_settled(self, point: int) -> bool:
         run = self.record.runs[point]
         return run in self.finished or run in self.given_up
 
-    def _advance(self, chain: _Chain) -> None:
-        """Hand out the next batch of which anything is missing."""
-        while not chain.unsettled:
-            batch = next(chain.batches, None)
-            if batch is None:
-                return
-            chain.unsettled = {point for point in batch if not self._is_settled(point)}
-            if chain.unsettled:
-                for deck in pack(
-                    {point: self.cases[point] for point in batch},
-                    self.options.decks_at_once,
-                    self.options.longest_seconds,
-                ):
-                    for part in unfinished_parts(deck.points, self.cases, self._is_settled):
-                        self._hand_out(_Job(part, chain))
+    def _advance(self, groups: Iterable[int]) -> None:
+        """Hand out what may be made next of the groups of which nothing is on its way."""
+        busy = {job.group for job in (*self.out_there, *(job for _, job in self.later))}
+        for group in groups:
+            numbered = {} if group in busy else {point: self.cases[point] for point in self._batch(self.groups[group])}
+            for deck in pack(numbered, self.options.decks_at_once, self.options.longest_seconds) if numbered else ():
+                for part in unfinished_parts(deck.points, numbered, self._is_settled):
+                    self._hand_out(_Job(part, group))
+
+    def _batch(self, descents: Sequence[list[int]]) -> list[int]:
+        """The first points of a group of which some are not settled; none if all that are needed are.
+
+        Descents go down side by side, so many steps at once as fill a deck: those below where a descent ends are made
+        in vain, but cost less than decks that are nearly empty.
+        """
+        step = 0
+        while descents and step < len(descents[0]):
+            after = step + self._steps_at_once([chain[step:] for chain in descents])
+            batch = [point for chain in descents for point in chain[step:after]]
+            if not all(map(self._is_settled, batch)):
+                return batch
+            descents = [chain for chain in descents if not any(map(self._stopped, chain[step:after]))]
+            step = after
+        return []
+
+    def _steps_at_once(self, descents: Sequence[Sequence[int]]) -> int:
+        """How many steps of descents can share a deck; all points of a sweep without descents go at once."""
+        if self.record.descent is None:
+            return len(descents[0])
+        if len({sharing_key(self.cases[point]) for chain in descents for point in chain}) > 1:
+            return 1
+        return max(1, MOST_WALKERS // sum(pairs_of_beads(self.cases[chain[0]]) for chain in descents))
+
+    def _stopped(self, point: int) -> bool:
+        """Whether the walkers of a settled point were at rest."""
+        run, descent = self.record.runs[point], self.record.descent
+        if descent is None or run not in self.finished:
+            return False
+        if run not in self.velocities:
+            self.velocities[run] = velocity_of(self.record.out / run)
+        return descent.at_rest(self.velocities[run])
 
     def _hand_out(self, job: _Job) -> None:
         task = Task(
-            sweep=self.parsl.sweep,
+            sweep=self.sweep,
             runs=tuple(self.record.runs[point] for point in job.deck.points),
             cases=tuple(self.cases[point] for point in job.deck.points),
             out=self.record.out,
@@ -359,7 +322,7 @@ class _Scheduler:
             time_limit=self.options.time_limit,
         )
         self.out_there[job] = None
-        self.parsl.submit(task).add_done_callback(lambda future: self.ended.put((job, future)))
+        self.submit(task).add_done_callback(lambda future: self.ended.put((job, future)))
 
     def _take_in(self, job: _Job, future: Future[Report]) -> None:
         del self.out_there[job]
@@ -368,38 +331,31 @@ class _Scheduler:
         if report is None:
             return
         self.finished |= set(report.finished)
-        self.velocities |= {run: velocity for run, (_, velocity) in report.finished.items()}
-        settled = [point for point in job.deck.points if self._is_settled(point)]
+        self.velocities |= report.finished
         left = [point for point in job.deck.points if not self._is_settled(point)]
-        self.seconds_done += job.deck.seconds * len(settled) / len(job.deck.points)
-        if report.failure:
+        settled = len(job.deck.points) - len(left)
+        self.seconds_done += job.deck.seconds * settled / len(job.deck.points)
+        self.done += settled
+        if left and report.failure:
             self._failed(job, report, left)
         elif left:
-            self.later.append((time.perf_counter() + _BUSY_SECONDS, replace(job, deck=self._deck_of(left, job))))
-        self.done += len(settled)
-        job.chain.unsettled -= set(settled)
-        self._advance(job.chain)
-
-    def _deck_of(self, points: Sequence[int], job: _Job) -> PlannedDeck:
-        return PlannedDeck(tuple(points), job.deck.seconds * len(points) / len(job.deck.points))
+            self.later.append((time.perf_counter() + _BUSY_SECONDS, _part(job, left)))
 
     def _failed(self, job: _Job, report: Report, left: Sequence[int]) -> None:
         """Try the points of a deck apart, a point by itself as often as told."""
-        if not left or (report.failure == SweepStopped.__name__ and STOPS[self.parsl.sweep].is_set()):
+        if report.failure == SweepStopped.__name__ and STOPS[self.sweep].is_set():
             return
         if len(left) > 1:
             for half in halves(left):
-                self._hand_out(replace(job, deck=self._deck_of(half, job)))
+                self._hand_out(_part(job, half))
         elif job.failures < self.options.retries:
             self._hand_out(replace(job, failures=job.failures + 1))
         else:
             (point,) = left
             run = self.record.runs[point]
-            failure = Failure(point, run, report.failure or "", report.message, report.directory)
-            self.failures.append(failure)
+            self.failures.append(Failure(point, run, report.failure or "", report.message, report.directory))
+            self.given_up.add(run)
             self.seconds_done += job.deck.seconds
-            job.chain.unsettled -= {point}
-            self._advance(job.chain)
 
     def _lost(self, job: _Job, error: BaseException) -> Report | None:
         """An exception out of a worker: lost with its job or node, or something that nobody foresaw."""
@@ -413,11 +369,6 @@ class _Scheduler:
             self._hand_out(replace(job, losses=job.losses + 1))
             return None
         return Report(failure=type(error).__name__, message=str(error) or repr(error))
-
-    def _tell(self, now: float) -> None:
-        if now - self.told > _LOOK_SECONDS:
-            self.told = now
-            self.on_progress(self._progress())
 
     def _progress(self) -> SweepProgress:
         running = sum(
@@ -437,3 +388,8 @@ class _Scheduler:
             left=waiting / self.seconds_done * elapsed if self.seconds_done else None,
             worst_failure=min(self.failures, key=_severity, default=None),
         )
+
+
+def _part(job: _Job, points: Sequence[int]) -> _Job:
+    """Some of a deck's points as a job of their own."""
+    return replace(job, deck=PlannedDeck(tuple(points), job.deck.seconds * len(points) / len(job.deck.points)))

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.axes import sampled, unit_cube, unit_of
+from walkers.inputs.axes import flatten, sampled, unit_cube, unit_of
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin
 from walkers.inputs.readable import readable_unit
 from walkers.inputs.sweep import Sweep
+from walkers.postprocess.analysis import analyses
 from walkers.postprocess.walking import SEPARATED
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_name
@@ -82,12 +83,8 @@ class Spread:
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types, SI units."""
         return {
+            **{key: value for key, value in asdict(self).items() if key != "failures"},
             "directory": str(self.directory),
-            "varied": [asdict(one) for one in self.varied],
-            "held": [asdict(one) for one in self.held],
-            "bands": {key: asdict(band) for key, band in self.bands.items()},
-            "depends": {key: dict(ranks) for key, ranks in self.depends.items()},
-            "counts": dict(self.counts),
             "failed": len(self.failures),
         }
 
@@ -128,6 +125,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         descent=None,
         file={
             "case": case.name,
+            "set": flatten(case.document, lambda _: False),
             "sample": [{"method": "sobol", "points": points, "seed": seed, "ranges": ranges}],
         },
     )
@@ -236,41 +234,31 @@ _DIGITS = 5
 def describe(spread: Spread, result: Mapping[str, Any] | None = None) -> str:
     """A spread in a few lines: mm, mm/s; with the result of the case itself, whether that lies outside the band."""
     own = row_of(result) if result else {}
-    units = {key: unit for key, (unit, _) in _all_columns().items()}
     points = max((band.points for band in spread.bands.values()), default=0)
     lines = [f"  spread     over {points} points, each of these drawn from its range by itself:"]
     lines += [f"             {one.key} {one.range[0]} to {one.range[1]}" for one in spread.varied if one.range]
     if spread.held:
         told = ", ".join(f"{one.key} {one.text}" for one in spread.held)
         lines.append(f"    as given {told}: to be drawn too, they need ranges in [uncertain]")
-    for name, band in spread.bands.items():
-        unit, size = readable_unit(units[name])
-        shown = {key: f"{round(value / size, _DIGITS):.3g}" for key, value in asdict(band).items()}
-        lines.append(
-            f"    {name:9}{shown['low']} to {shown['high']} {unit} (5 to 95 %), median {shown['median']}; "
-            f"smallest {shown['smallest']}, largest {shown['largest']}"
-        )
-        if name in own and not band.low <= own[name] <= band.high:
-            side = "above" if own[name] > band.high else "below"
-            lines.append(
-                f"             the case's own lies {side} that: some of its values stand at the end of their ranges"
-            )
-        if band.points < _LEAST_PER_VALUE * len(spread.varied):
-            lines.append("             too few points to say on what it depends, and for more than a rough band")
-            continue
-        ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
-        lines.append(
-            f"             depends most on {ranks} (rank correlation)"
-            if ranks
-            else "             on none of them clearly"
-        )
+    for name in spread.bands:
+        lines += _lines_of_band(spread, name, own.get(name))
     found = [f"{count} {_WORDS[name]}" for name, count in spread.counts.items() if count]
     found += [f"{len(spread.failures)} failed"] if spread.failures else []
     lines += [f"    of these {', '.join(found)}"] if found else []
     return "\n".join([*lines, f"    table    {spread.directory}"])
 
 
-def _all_columns() -> Mapping[str, tuple[str, str]]:
-    from walkers.postprocess.analysis import analyses
-
-    return result_columns([one.name for one in analyses()])
+def _lines_of_band(spread: Spread, name: str, own: float | None) -> list[str]:
+    band = spread.bands[name]
+    unit, size = readable_unit(result_columns([one.name for one in analyses()])[name][0])
+    low, median, high, smallest, largest = (f"{round(value / size, _DIGITS):.3g}" for value in astuple(band)[:5])
+    lines = [f"{low} to {high} {unit} (5 to 95 %), median {median}; smallest {smallest}, largest {largest}"]
+    if own is not None and not band.low <= own <= band.high:
+        side = "above" if own > band.high else "below"
+        lines.append(f"the case's own lies {side} that: some of its values stand at the end of their ranges")
+    ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
+    if band.points < _LEAST_PER_VALUE * len(spread.varied):
+        lines.append("too few points to say on what it depends, and for more than a rough band")
+    else:
+        lines.append(f"depends most on {ranks} (rank correlation)" if ranks else "on none of them clearly")
+    return [f"{begin:13}{line}" for begin, line in zip([f"    {name}", *[""] * len(lines)], lines, strict=False)]

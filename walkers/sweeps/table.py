@@ -148,9 +148,7 @@ def _parquet(frame: pd.DataFrame) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    # A column of numbers and words ("auto") becomes one of words.
-    mixed = [name for name in frame.columns if frame[name].dtype == object and frame[name].map(type).nunique() > 1]
-    table = pa.Table.from_pandas(frame.astype(dict.fromkeys(mixed, str)), preserve_index=False)
+    table = pa.Table.from_pandas(frame.astype(_types(frame)), preserve_index=False)
     units, meanings = frame.attrs["units"], frame.attrs["meanings"]
     fields = [
         field.with_metadata({"unit": units[field.name], "meaning": meanings[field.name]}) for field in table.schema
@@ -158,6 +156,13 @@ def _parquet(frame: pd.DataFrame) -> bytes:
     buffer = io.BytesIO()
     pq.write_table(table.cast(pa.schema(fields, metadata=table.schema.metadata)), buffer, compression="zstd")
     return buffer.getvalue()
+
+
+def _types(frame: pd.DataFrame) -> dict[str, str]:
+    """Types of columns of several: of numbers and words ("auto") words, of booleans and NaN (not finished) booleans."""
+    mixed = {name: set(frame[name].map(type)) for name in frame.columns if frame[name].dtype == object}
+    words = {name: "str" for name, kinds in mixed.items() if str in kinds and len(kinds) > 1}
+    return words | {name: "boolean" for name, kinds in mixed.items() if bool in kinds and str not in kinds}
 
 
 def thresholds(directory: str | Path) -> pd.DataFrame:

@@ -56,22 +56,19 @@ class Task:
 
 @dataclass(frozen=True)
 class Report:
-    """What became of a task: runs that are finished, or busy elsewhere, or the failure of the deck.
+    """What became of a task: runs that are finished (others are busy elsewhere), or the failure of the deck.
 
     Attributes
     ----------
     finished
-        From names of runs to their directories and mean velocities (m/s).
-    busy
-        Names of runs that somebody else is making.
+        From names of runs to their mean velocities (m/s).
     failure
         Name of the failure's class, None if there was none.
     message, directory
         What it says and where its remains are.
     """
 
-    finished: Mapping[str, tuple[str, float]] = field(default_factory=dict)
-    busy: tuple[str, ...] = ()
+    finished: Mapping[str, float] = field(default_factory=dict)
     failure: str | None = None
     message: str = ""
     directory: str | None = None
@@ -108,7 +105,4 @@ def _made(task: Task, look: Callable[[object], None]) -> Report:
     if task.runs != tuple(run_place(case, engine, task.out).name for case in task.cases):
         raise ProgramDiffers
     made = make_runs(task.cases, task.out, engine, on_progress=look, time_limit=task.time_limit)
-    finished = {
-        name: (str(run.directory), velocity_in(current_result(run.directory))) for name, run in made.runs.items()
-    }
-    return Report(finished=finished, busy=tuple(sorted(made.busy)))
+    return Report({name: velocity_in(current_result(run.directory)) for name, run in made.runs.items()})
