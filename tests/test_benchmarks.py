@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 from tests.printed import spoilt
-from walkers.audit import Verdict
-from walkers.audit.bench import Bench, bench_recording, bench_scene
-from walkers.audit.impacts import Launch, onto_floor, stiff_case
+from walkers.check import Verdict, chung_ooi
+from walkers.check.bench import Bench, bench_recording, bench_scene
+from walkers.check.benchmarks import ALLOY, GLASS, OXIDE, STEEL, chapter, farthest_point, table
+from walkers.check.impacts import Launch, onto_floor, stiff_case
 from walkers.physics.impact import Motion, after_impact, sliding_loss
 from walkers.runner.binary import find_engine
-from walkers.studies import chung_ooi
-from walkers.studies.benchmarks import ALLOY, GLASS, OXIDE, STEEL, chapter, farthest_point, table
 from walkers.templates.deck import Plan, compose
 from walkers.templates.scene import Bead
 

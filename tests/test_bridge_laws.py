@@ -12,6 +12,7 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
+from walkers.check.bridge_laws import willett_simple
 from walkers.physics import reynolds, van_der_waals, willett, young_laplace
 from walkers.physics import soulie as soulie_law
 from walkers.physics.bridge import FloatArray, Surfaces
@@ -20,7 +21,6 @@ from walkers.physics.laplace import bridge, force_curve
 from walkers.physics.laws import LAWS, by_name
 from walkers.physics.lubrication import normal_drag, tangential_drag
 from walkers.physics.matter import Liquid
-from walkers.studies.bridge_laws import willett_simple
 
 PAIRS = [(1.0, inf), (1.0, 1.0), (0.5, 1.0), (0.2, 1.0)]
 N = np.array([0.0, 0.0, 1.0])

@@ -12,7 +12,12 @@ import pytest
 
 from tests.conftest import call
 from walkers import run
-from walkers.audit.scenes import SCENES, full_case, second_engine
+from walkers.check import kernels
+from walkers.check.comparison import Quantity, compare, shortened, simulate
+from walkers.check.crosscheck import full_cases
+from walkers.check.engine import Beads, Matter, SecondEngine, Surroundings
+from walkers.check.laws import TERMS, Laws, laws_from
+from walkers.check.scenes import SCENES, full_case, second_engine
 from walkers.inputs import resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case, read_toml, shipped_cases
@@ -20,11 +25,6 @@ from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import law_of
 from walkers.physics.matter import Contact, Liquid
 from walkers.postprocess.motion import Motion
-from walkers.studies.crosscheck import kernels
-from walkers.studies.crosscheck.comparison import Quantity, compare, shortened, simulate
-from walkers.studies.crosscheck.engine import Beads, Matter, SecondEngine, Surroundings
-from walkers.studies.crosscheck.laws import TERMS, Laws, laws_from
-from walkers.studies.crosscheck.report import full_cases
 
 RADIUS = 3e-4
 LIQUID = Liquid(0.02, 0.0, None, 0.01, 0.0, None)

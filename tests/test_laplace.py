@@ -8,6 +8,7 @@ from math import acos, asin, atan2, cbrt, cos, cosh, hypot, inf, pi, radians, si
 import numpy as np
 import pytest
 
+from walkers.check.bridge_laws import LAWS, rupture_of_lian
 from walkers.physics.laplace import (
     POINTS,
     NoBridgeError,
@@ -16,7 +17,6 @@ from walkers.physics.laplace import (
     rupture_distance,
 )
 from walkers.physics.willett import rupture as rupture_of_willett
-from walkers.studies.bridge_laws import LAWS, rupture_of_lian
 
 # Radii, volume, contact angle: the paper's bridges between beads and at walls in units of a bead's radius, and others.
 BRIDGES = [

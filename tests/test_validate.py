@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import call
+from walkers.check import bridges
+from walkers.check.chapter import Chapter
+from walkers.check.validate import CHAPTERS, PAGE, validate
 from walkers.runner.failures import EngineFailure
-from walkers.studies import bridges
-from walkers.studies.chapter import Chapter
-from walkers.studies.validate import CHAPTERS, PAGE, validate
 
 
 def test_a_quick_chapter_has_a_page_of_its_own(in_folder: Path) -> None:

@@ -13,8 +13,8 @@ from walkers.commands.arguments import AllowFailedAudit, Case, EngineName, Json,
 from walkers.pipeline import DEFAULT_OUT, Run, run
 
 if TYPE_CHECKING:
+    from walkers.check.comparison import Comparison, PileComparison
     from walkers.inputs.case import Case as Resolved
-    from walkers.studies.crosscheck.comparison import Comparison, PileComparison
 
 Cycles = Annotated[int | None, typer.Option("--cycles", help="Of the drive, in place of the case's own.")]
 Without = Annotated[
@@ -35,12 +35,12 @@ def command(
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Compare a case's run with an engine of our own, written from the published formulas; exit 1 if they differ."""
+    from walkers.check.checking import crosscheck
+    from walkers.check.comparison import shortened
+    from walkers.check.laws import laws_from
+    from walkers.check.setup import surroundings_of
     from walkers.inputs.errors import InputError, Problem
     from walkers.progress import progress_of
-    from walkers.studies.crosscheck.checking import crosscheck
-    from walkers.studies.crosscheck.comparison import shortened
-    from walkers.studies.crosscheck.laws import laws_from
-    from walkers.studies.crosscheck.setup import surroundings_of
 
     loaded = load(case, settings)
     check_out(out)
@@ -74,6 +74,6 @@ def command(
 
 
 def _described(found: Comparison | PileComparison) -> str:
-    from walkers.studies.crosscheck.comparison import PileComparison, describe, describe_piles
+    from walkers.check.comparison import PileComparison, describe, describe_piles
 
     return describe_piles(found) if isinstance(found, PileComparison) else describe(found)

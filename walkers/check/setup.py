@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from walkers.check.engine import Beads, Matter, SecondEngine, Surroundings
+from walkers.check.laws import Laws
 from walkers.inputs.boundary import Flat, Wall
 from walkers.inputs.case import Case
 from walkers.postprocess.motion import Motion
-from walkers.studies.crosscheck.engine import Beads, Matter, SecondEngine, Surroundings
-from walkers.studies.crosscheck.laws import Laws
 
 
 def matter_of(case: Case) -> Matter:

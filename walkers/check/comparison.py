@@ -14,13 +14,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.stats import ks_2samp
 
+from walkers.check.engine import SecondEngine
+from walkers.check.kernels import FloatArray
+from walkers.check.laws import Laws
+from walkers.check.setup import engine_of
 from walkers.inputs.case import Case, settling_of
 from walkers.postprocess.gait import Averages, averages, gait, walk
 from walkers.postprocess.motion import Group, Motion
-from walkers.studies.crosscheck.engine import SecondEngine
-from walkers.studies.crosscheck.kernels import FloatArray
-from walkers.studies.crosscheck.laws import Laws
-from walkers.studies.crosscheck.setup import engine_of
 
 SPEED_FLOOR = 2e-6
 """m/s, of walkers that hardly move: differences that are always allowed."""
@@ -478,7 +478,7 @@ def _touching(motion: Motion) -> float:
         near = cKDTree(place).query_pairs(reach, output_type="ndarray")
         apart = np.linalg.norm(place[near[:, 0]] - place[near[:, 1]], axis=1)
         found += int(np.sum(apart < radius[near].sum(axis=1)))
-    return found / motion.position.shape[0] / len(radius)
+    return found / len(motion.position) / len(radius)
 
 
 def describe(found: Comparison) -> str:

@@ -23,9 +23,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkers.audit.bench import Bench
-from walkers.audit.check import Line, Verdict
-from walkers.audit.impacts import (
+from walkers.check import chung_ooi as published
+from walkers.check.bench import Bench
+from walkers.check.chapter import Chapter
+from walkers.check.impacts import (
     Course,
     Launch,
     Rebound,
@@ -35,13 +36,12 @@ from walkers.audit.impacts import (
     course_on_floor,
     onto_floor,
 )
+from walkers.check.lines import Line, Verdict
 from walkers.inputs.text import rendered
 from walkers.physics.impact import SURFACE_OVER_CENTRE, Impact, Motion, after_impact
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.runner.binary import find_engine
-from walkers.studies import chung_ooi as published
-from walkers.studies.chapter import Chapter
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -354,7 +354,7 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
     judged = [line for line in lines if line.tolerance < inf]
     failed = tuple(line.what for line in judged if line.verdict is not Verdict.PASS)
     text = rendered(
-        "walkers.studies",
+        "walkers.check",
         "benchmarks.md.j2",
         judged=len(judged),
         failed=len(failed),

@@ -10,6 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkers.check.chapter import Chapter
+from walkers.check.checking import crosscheck
+from walkers.check.comparison import FEWEST_SEEDS, Comparison, PileComparison, shortened, simulate
+from walkers.check.laws import Laws, laws_from
 from walkers.inputs import resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case, read_toml, shipped_cases
@@ -18,10 +22,6 @@ from walkers.pipeline import run
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, series_look, styled
 from walkers.postprocess.gait import gait, walk
 from walkers.postprocess.motion import Motion
-from walkers.studies.chapter import Chapter
-from walkers.studies.crosscheck.checking import crosscheck
-from walkers.studies.crosscheck.comparison import FEWEST_SEEDS, Comparison, PileComparison, shortened, simulate
-from walkers.studies.crosscheck.laws import Laws, laws_from
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,7 +70,7 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
     whatif = [] if quick else suppose(out)
     sampled = [(name, row) for name, one in single.items() if name in _SAMPLED for row in one.rows]
     text = rendered(
-        "walkers.studies",
+        "walkers.check",
         "crosscheck.md.j2",
         single=single,
         piles=piles,

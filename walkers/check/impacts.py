@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from walkers.audit.bench import DRY, Bench, Measured, bench_case, bench_recording, bench_scene, dry, free_run
+from walkers.check.bench import DRY, Bench, Measured, bench_case, bench_recording, bench_scene, dry, free_run
 from walkers.inputs.case import Case
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import reduced_modulus, reduced_shear_modulus

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from walkers.check.comparison import Comparison, PileComparison, compare, compare_piles
+from walkers.check.laws import Laws
 from walkers.inputs.case import Case
 from walkers.pipeline import Run, run
 from walkers.runner.directory import FinishedRun
-from walkers.studies.crosscheck.comparison import Comparison, PileComparison, compare, compare_piles
-from walkers.studies.crosscheck.laws import Laws
 
 DECKS = Laws()
 

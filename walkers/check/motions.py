@@ -20,9 +20,9 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 
-from walkers.audit.bench import DRY, Bench, Measured, bench_case, bench_recording, bench_scene, farthest, free_run
-from walkers.audit.check import Check, Line
-from walkers.audit.impacts import Course, Launch, Sphere, course_of_pair, course_on_floor, onto_floor
+from walkers.check.bench import DRY, Bench, Measured, bench_case, bench_recording, bench_scene, farthest, free_run
+from walkers.check.impacts import Course, Launch, Sphere, course_of_pair, course_on_floor, onto_floor
+from walkers.check.lines import Check, Line
 from walkers.inputs.boundary import Round
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkers.check.bridge_laws import LAWS, Law
+from walkers.check.chapter import Chapter
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
@@ -20,8 +22,6 @@ from walkers.physics.laplace import Bridge, ForceCurve, bridge, force_curve
 from walkers.physics.laws import by_name
 from walkers.pipeline import run
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, series_look, styled
-from walkers.studies.bridge_laws import LAWS, Law
-from walkers.studies.chapter import Chapter
 from walkers.templates.bridge_tables import TOLERANCE, tabulated
 
 if TYPE_CHECKING:
@@ -225,7 +225,7 @@ def _text_of(numbers: dict[str, Any], compared: dict[str, Surfaces]) -> str:
     """The chapter's Markdown."""
     fits = [row for row in numbers["laws"] if row["name"] in {LAWS[1].name, LAWS[-1].name}]
     return rendered(
-        "walkers.studies",
+        "walkers.check",
         "bridges.md.j2",
         degrees=degrees,
         compared=compared,

@@ -10,12 +10,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
+from walkers.check import kernels
+from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, Pairs, State
+from walkers.check.laws import Laws
 from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.physics.laws import law_of
 from walkers.physics.matter import Contact, Liquid
-from walkers.studies.crosscheck import kernels
-from walkers.studies.crosscheck.kernels import CELLS, Bridges, Constants, FloatArray, Pairs, State
-from walkers.studies.crosscheck.laws import Laws
 
 _SKIN = 0.4
 """Of the smallest radius: neighbours are listed anew when a bead has gone nearly half as far."""
