@@ -29,9 +29,9 @@ from tests.conftest import (
 )
 from walkers import Run
 from walkers import run as run_case
-from walkers.check import AuditReport, Check, Line, Verdict, run_audit
-from walkers.check.audit import CHECKS, record, selected
+from walkers.check.audit import CHECKS, AuditReport, record, run_audit, selected
 from walkers.check.bench import Bench
+from walkers.check.lines import Check, Line, Verdict
 from walkers.check.scenes import SCENES, law, prescribed, second_engine
 from walkers.check.table import as_dict, as_text
 from walkers.inputs import InputError

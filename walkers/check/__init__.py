@@ -4,8 +4,3 @@
 exact solutions. The second engine is `engine` and its formulas, `kernels`: of the bridges it takes the law
 (`walkers.physics.laws`), which it interpolates in its own way, and nothing of the decks.
 """
-
-from walkers.check.audit import AuditReport, run_audit
-from walkers.check.lines import Check, Line, Verdict
-
-__all__ = ["AuditReport", "Check", "Line", "Verdict", "run_audit"]
