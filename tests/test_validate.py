@@ -16,7 +16,7 @@ def test_a_quick_chapter_has_a_page_of_its_own(in_folder: Path) -> None:
     page = Path("runs/validation/validation-quick-benchmarks.md")
     assert str(page) in done.stdout
     assert "## Published benchmarks of impacts" in page.read_text()
-    assert (page.parent / "figures" / "validation-benchmarks-spin.png").exists()
+    assert (page.parent / "figures" / "validation-benchmarks.png").exists()
     assert not (page.parent / PAGE).exists()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from walkers.check.engine import Beads, Matter, SecondEngine, Surroundings
 from walkers.check.kernels import FloatArray
-from walkers.check.laws import laws_from
+from walkers.inputs.boundary import BOTTOM
 from walkers.physics.contact import reduced_modulus
 from walkers.physics.impact import Impact
 from walkers.physics.matter import Contact, Liquid
@@ -18,8 +18,7 @@ _STEPS = 1000
 """Time steps of the shortest contact."""
 _LONGEST = 1.5
 """How long impacts are followed, over the longest elastic contact; damped ones last longer."""
-_PLANE = Surroundings(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
-_LAWS = laws_from(["capillary", "lubrication", "gravity", "drive"])
+_PLANE = Surroundings([BOTTOM])
 _DRY = Liquid(0.0, 0.0, None, 0.01, 0.0, None, law="walkers.check.bench:dry")
 
 
@@ -78,7 +77,7 @@ def onto_plane(sphere: Sphere, before: Speeds, restitution: float = 1.0, frictio
     spins = np.stack([zeros, before.rolling / radius, zeros], axis=-1)
     step, steps = _steps(sphere.on_plane(), before.normal)
     matter = sphere.matter(2.0, restitution, friction)
-    engine = SecondEngine(Beads(zeros + radius, places, velocities, spins), matter, _PLANE, _LAWS, step)
+    engine = SecondEngine(Beads(zeros + radius, places, velocities, spins), matter, _PLANE, step)
     frame = engine.run(steps, steps)[0]
     return Speeds(frame[:, 5], frame[:, 3], radius * frame[:, 7])
 
@@ -124,7 +123,7 @@ def course_of_pair(
 
 def _course(sphere: Sphere, impact: Impact, beads: Beads, matter: Matter, closing: float) -> Course:
     step, steps = _steps(impact, np.array([closing]))
-    engine = SecondEngine(beads, matter, _PLANE, _LAWS, step)
+    engine = SecondEngine(beads, matter, _PLANE, step)
     rows = [(engine.run(1, 1)[0], engine.state.force[0, 2]) for _ in range(steps)]
     frames = np.stack([frame for frame, _ in rows])
     low = frames[:, 1, 2] + sphere.radius if len(beads.radius) > 1 else 0.0

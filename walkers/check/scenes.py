@@ -15,10 +15,8 @@ from math import cos, degrees, nan, pi, sin, sqrt
 import numpy as np
 
 from walkers.check.bench import FLOOR, Bench, Measured, bench_case, bench_recording, bench_scene, farthest
-from walkers.check.engine import Beads, SecondEngine
-from walkers.check.laws import Laws
+from walkers.check.engine import Beads, SecondEngine, engine_at
 from walkers.check.lines import Check, Line, Verdict
-from walkers.check.setup import engine_at
 from walkers.inputs.boundary import Flat, Round
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
@@ -70,8 +68,8 @@ def full_case(**changes: dict[str, object]) -> Case:
 def second_engine(case: Case, scene: Scene) -> SecondEngine:
     """The second engine with the beads of a scene."""
     start = [[getattr(bead, name) for bead in scene.beads] for name in ("radius", "centre", "velocity", "spin")]
-    laws = Laws(drive=case.drive.frame == "container")
-    return engine_at(case, Beads(*map(np.array, start)), laws, walls=scene.walls)
+    without = () if case.drive.frame == "container" else ("drive",)
+    return engine_at(case, Beads(*map(np.array, start)), walls=scene.walls, without=without)
 
 
 def deviation(case: Case, scene: Scene, series: Measured) -> tuple[float, float]:
