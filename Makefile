@@ -74,7 +74,7 @@ validate: setup ## Check it against published benchmarks, exact solutions and a 
 
 .PHONY: docs-pictures
 docs-pictures: setup ## Make what docs/ shows and is not of today's parameters: pictures, tables, outputs, numbers (ONLY=fig2: that)
-	@.venv/bin/python -m walkers.studies.illustrations $(OUT) docs $(ONLY)
+	@.venv/bin/python -m docs.illustrations $(OUT) docs $(ONLY)
 
 .PHONY: docs-notebooks
 docs-notebooks: setup ## Execute the tutorial's notebooks and store what they show

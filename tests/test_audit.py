@@ -29,11 +29,11 @@ from tests.conftest import (
 )
 from walkers import Run
 from walkers import run as run_case
-from walkers.audit import AuditReport, Check, Line, Verdict, run_audit
-from walkers.audit.bench import Bench
-from walkers.audit.run import CHECKS, record, selected
-from walkers.audit.scenes import SCENES, law, prescribed, second_engine
-from walkers.audit.table import as_dict, as_text
+from walkers.check.audit import CHECKS, AuditReport, record, run_audit, selected
+from walkers.check.bench import Bench
+from walkers.check.lines import Check, Line, Verdict
+from walkers.check.scenes import SCENES, law, prescribed, second_engine
+from walkers.check.table import as_dict, as_text
 from walkers.inputs import InputError
 from walkers.physics.bridge import Surfaces
 from walkers.runner import binary, plugin
@@ -239,7 +239,7 @@ def test_a_damaged_record_is_no_record(own_cache: Path) -> None:
 
 def test_without_mpirun_the_ranks_are_skipped_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     which = shutil.which
-    monkeypatch.setattr("walkers.audit.scenes.shutil.which", lambda name: None if name == "mpirun" else which(name))
+    monkeypatch.setattr("walkers.check.scenes.shutil.which", lambda name: None if name == "mpirun" else which(name))
     report = run_audit(selected(["ranks"]))
     assert report.count(Verdict.SKIPPED) == 1
     assert "1 skipped" in as_text(report)
@@ -249,8 +249,8 @@ def test_an_audit_whose_outcome_cannot_be_kept_is_printed(monkeypatch: pytest.Mo
     def full(_: AuditRecord) -> None:
         raise OSError("no room")
 
-    monkeypatch.setattr("walkers.audit.run.write_audit", full)
-    monkeypatch.setattr("walkers.audit.run.CHECKS", selected(["flight"]))  # as if it were all: a part is not to be kept
+    monkeypatch.setattr("walkers.check.audit.write_audit", full)
+    monkeypatch.setattr("walkers.check.audit.CHECKS", selected(["flight"]))  # as if it were all
     done = call("audit", "--quick", "--json", check=True)
     assert json.loads(done.stdout)["passed"]
     assert "cannot be kept" in done.stderr

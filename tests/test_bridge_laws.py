@@ -12,15 +12,15 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
+from walkers.check.bridge_laws import willett_simple
 from walkers.physics import reynolds, van_der_waals, willett, young_laplace
 from walkers.physics import soulie as soulie_law
 from walkers.physics.bridge import FloatArray, Surfaces
 from walkers.physics.capillary import bridge_volume_at_wall, capillary_force, capillary_force_at_wall, rupture_distance
-from walkers.physics.laplace import bridge, force_curve
+from walkers.physics.laplace import force_curve
 from walkers.physics.laws import LAWS, by_name
 from walkers.physics.lubrication import normal_drag, tangential_drag
 from walkers.physics.matter import Liquid
-from walkers.studies.bridge_laws import willett_simple
 
 PAIRS = [(1.0, inf), (1.0, 1.0), (0.5, 1.0), (0.2, 1.0)]
 N = np.array([0.0, 0.0, 1.0])
@@ -67,14 +67,6 @@ def test_the_polynomial_is_the_equation(given: tuple[float, float, float, float]
     assert curve.rupture == pytest.approx(exact.rupture, rel=1e-13)
     assert curve.formation == 0.0
     assert curve.forces(gaps).pull == pytest.approx(exact.forces, abs=1e-7 * exact.forces[0])
-
-
-def test_collocation_agrees() -> None:
-    given = (1.0, inf, 0.0873, 0.7)
-    curve = young_laplace.law(surfaces(*given))
-    for share in (0.0, 0.5):
-        gap = share * curve.rupture
-        assert curve.forces(np.array([gap])).pull[0] == pytest.approx(bridge(*given, gap).force, rel=1e-7)
 
 
 def test_a_small_bridge_to_a_plane() -> None:

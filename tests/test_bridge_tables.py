@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tests.conftest import make_case
+from walkers.check.bridges import interpolated
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 from walkers.physics.laws import LAWS, by_name
-from walkers.studies.bridges import interpolated
 from walkers.templates.bridge_tables import TOLERANCE, UnusableLawError, tabulated
 
 CASE = make_case(liquid={"contact_angle": "20 deg"})

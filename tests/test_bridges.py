@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from tests.printed import spoilt
+from walkers.check import bridges
+from walkers.check.bridge_laws import LAWS, Law
+from walkers.check.bridges import chapter, deviation, reference, shape_of
 from walkers.inputs.reading import load_case
 from walkers.physics import willett
 from walkers.physics.bridge import FloatArray, Surfaces
 from walkers.physics.capillary import derjaguin_radius
 from walkers.physics.laplace import force_curve
-from walkers.studies import bridges
-from walkers.studies.bridge_laws import LAWS, Law
-from walkers.studies.bridges import chapter, deviation, reference, shape_of
 
 BY_NAME = {law.name.split()[0]: law for law in LAWS}
 

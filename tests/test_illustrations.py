@@ -9,9 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from walkers.inputs import load_case
-from walkers.runner.files import read_json, write_json
-from walkers.studies.illustrations import (
+from docs.illustrations import (
     ILLUSTRATIONS,
     RECORD,
     digest,
@@ -24,6 +22,8 @@ from walkers.studies.illustrations import (
     stale,
     without_hashes,
 )
+from walkers.inputs import load_case
+from walkers.runner.files import read_json, write_json
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PAGES = [page for page in pages_of(DOCS) if outputs_in(page)]

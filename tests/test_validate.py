@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import call
+from walkers.check import bridges
+from walkers.check.chapter import Chapter
+from walkers.check.validate import CHAPTERS, PAGE, validate
 from walkers.runner.failures import EngineFailure
-from walkers.studies import bridges
-from walkers.studies.chapter import Chapter
-from walkers.studies.validate import CHAPTERS, PAGE, validate
 
 
 def test_a_quick_chapter_has_a_page_of_its_own(in_folder: Path) -> None:
@@ -16,7 +16,7 @@ def test_a_quick_chapter_has_a_page_of_its_own(in_folder: Path) -> None:
     page = Path("runs/validation/validation-quick-benchmarks.md")
     assert str(page) in done.stdout
     assert "## Published benchmarks of impacts" in page.read_text()
-    assert (page.parent / "figures" / "validation-benchmarks-spin.png").exists()
+    assert (page.parent / "figures" / "validation-benchmarks.png").exists()
     assert not (page.parent / PAGE).exists()
 
 

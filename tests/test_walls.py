@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkers.audit.bench import DRY, FLOOR, Bench, bench_case, bench_recording, bench_scene
-from walkers.audit.scenes import over, prescribed
+from walkers.check.bench import DRY, FLOOR, Bench, bench_case, bench_recording, bench_scene
+from walkers.check.scenes import over, prescribed
 from walkers.inputs.boundary import Flat, Round, Wall
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.postprocess.dump import FloatArray

@@ -22,8 +22,8 @@ def command(
     engine: EngineName = None,
 ) -> int:
     """Measure forces of engine and contact model beside a second engine and closed forms; exit 1 if a line fails."""
-    from walkers.audit.run import CheckedLines, record, run_audit, selected
-    from walkers.audit.table import as_dict, as_text
+    from walkers.check.audit import CheckedLines, record, run_audit, selected
+    from walkers.check.table import as_dict, as_text
     from walkers.inputs.errors import InputError, Problem
     from walkers.runner.binary import find_engine
     from walkers.runner.failures import EngineMissing

@@ -27,7 +27,7 @@ def command(
     as_json: Json = False,
 ) -> int:
     """Check the decks against published benchmarks, exact solutions and a second engine, and write a page of it."""
-    from walkers.studies.validate import validate
+    from walkers.check.validate import validate
     from walkers.sweeps.site import cores_here
 
     check_out(out)

@@ -12,8 +12,7 @@ p the liquid's excess pressure over the surface tension; it meets the solids, wh
 
 is the same everywhere, and is the pull on either solid.
 
-The equation is solved twice. `bridge` solves it as a boundary-value problem, by collocation. `force_curve` and
-`rupture_distance` take its solutions in closed form, those of Delaunay,
+`force_curve` and `rupture_distance` take its solutions in closed form, those of Delaunay,
 
     r² = r0² + 2 (1 - p r0 sin φ0) (1 - cos ps) / p² + 2 r0 cos φ0 sin(ps) / p,
 
@@ -35,7 +34,6 @@ against gap by numerical integration; filling angles that are not monotonic).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from math import cbrt, cos, inf, pi, sin, sqrt
@@ -43,7 +41,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import cumulative_simpson, solve_bvp
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
@@ -63,50 +60,11 @@ _ARC_STEP, _MOST_STEPS, _LARGEST_TURN = 0.05, 2000, 0.2
 _SHARES = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
 _GROWTH = 1.2
 _SAME_GAP, _NEAR = 1e-9, 1e-3
-_PROFILE = 301
 _TURNING = 1e-9
 
 
 class NoBridgeError(ValueError):
     """There is no bridge as asked for, or none was found."""
-
-
-@dataclass(frozen=True)
-class Bridge:
-    """A capillary bridge; lengths in the unit of the radii that were given.
-
-    Attributes
-    ----------
-    force
-        Its pull over the surface tension, F/γ: positive if it attracts.
-    force_at_contact_lines
-        The same from the wetting line at either solid, -p π b² + 2π b sin φ.
-    pressure
-        Excess pressure of the liquid over the surface tension, 1/length; negative in a bridge that sucks.
-    neck
-        Smallest radius.
-    filling_angles
-        Angle of each solid's axis to its wetting line, rad; 0 at a plane.
-    contact_radii
-        Radii of the wetting lines.
-    volume
-        Of the liquid, from the profile.
-    energy
-        Surface energy over the surface tension, length²: of the free surface, less cos θ times each wetted one.
-    radius, height : ndarray, shape (n,)
-        The profile, from the first solid to the second; heights above the first one's apex.
-    """
-
-    force: float
-    force_at_contact_lines: tuple[float, float]
-    pressure: float
-    neck: float
-    filling_angles: tuple[float, float]
-    contact_radii: tuple[float, float]
-    volume: float
-    energy: float
-    radius: FloatArray
-    height: FloatArray
 
 
 @dataclass(frozen=True)
@@ -118,9 +76,13 @@ class ForceCurve:
     gaps, forces : ndarray, shape (n,)
         Rising gaps from 0 to `rupture`, and F/γ there, in the unit of length that was given.
     energies : ndarray, shape (n,)
-        Surface energies over the surface tension (`Bridge.energy`): their slope is the force.
-    necks : ndarray, shape (n,)
-        Smallest radii.
+        Surface energies over the surface tension, of the free surface less cos θ times each wetted one: their slope is
+        the force.
+    arcs : ndarray, shape (n, 2)
+        From the apex of either solid to its wetting line, along the solid; at a sphere the filling angle times its
+        radius.
+    pressures, lengths : ndarray, shape (n,)
+        Excess pressures over the surface tension, 1/length, and lengths of the profile.
     rupture
         The largest gap.
     """
@@ -128,7 +90,9 @@ class ForceCurve:
     gaps: FloatArray
     forces: FloatArray
     energies: FloatArray
-    necks: FloatArray
+    arcs: FloatArray
+    pressures: FloatArray
+    lengths: FloatArray
     rupture: float
 
     @property
@@ -233,18 +197,6 @@ class _Family:
             for solid, arc in ((self.first, x[0]), (self.second, x[1]))
         ]
         return float(free - sum(wetted))
-
-    def neck(self, x: FloatArray) -> float:
-        """Smallest radius: where the profile is upright, if it is anywhere."""
-        fractions = np.linspace(0.0, 1.0, _PROFILE)
-        radius = self.profile(x, fractions)[0]
-        least = int(np.argmin(radius))
-        if least in {0, _PROFILE - 1}:
-            return float(radius[least])
-        around = radius[least - 1 : least + 2]
-        # The vertex of the parabola through the three.
-        bend = around[0] - 2.0 * around[1] + around[2]
-        return float(around[1] - (around[2] - around[0]) ** 2 / (8.0 * bend)) if bend > 0.0 else float(around[1])
 
     def solve(self, x: FloatArray, row: FloatArray, value: float) -> FloatArray | None:
         """Newton's method from x for a bridge with row · x = value; None where it fails."""
@@ -432,7 +384,9 @@ def force_curve(
         gaps=unit * np.minimum(wanted, largest),
         forces=unit * np.array([family.force(x) for x in bridges]),
         energies=unit**2 * np.array([family.energy(x) for x in bridges]),
-        necks=unit * np.array([family.neck(x) for x in bridges]),
+        arcs=unit * np.array([x[:2] for x in bridges]),
+        pressures=np.array([x[2] for x in bridges]) / unit,
+        lengths=unit * np.array([x[3] for x in bridges]),
         rupture=unit * largest,
     )
 
@@ -475,146 +429,3 @@ def rupture_distance(
     """Largest gap at which a bridge of this volume exists; parameters and errors as for `force_curve`."""
     family = _family_of((radius_1, radius_2), volume, _pair(contact_angle))
     return cbrt(volume) * float(_branch(family).bridges[-1, 4])
-
-
-_MESH = 41
-_ROUGH, _FINE = 1e-4, 1e-10
-_FEWEST_STEPS, _SMALLEST_STEP = 8, 1e-3
-_MOST_NODES = {_ROUGH: 600, _FINE: 20000}
-_LARGEST_CHANGE = 0.15
-
-
-def _collocate(family: _Family, gap: float, guess: Any, tolerance: float) -> Any:
-    """The boundary-value problem of a bridge at a gap, from a guess (mesh, r z φ volume, parameters)."""
-
-    def slopes(_: FloatArray, y: FloatArray, unknown: FloatArray) -> FloatArray:
-        upright = np.sin(y[2])
-        turning = unknown[2] - upright / y[0]
-        return unknown[3] * np.stack([np.cos(y[2]), upright, turning, pi * y[0] ** 2 * upright])  # type: ignore[no-any-return]
-
-    def ends(start: FloatArray, end: FloatArray, unknown: FloatArray) -> FloatArray:
-        first, second = family.first, family.second
-        one, other = unknown[0], unknown[1]
-        return np.array(
-            [
-                start[0] - first.radius(one),
-                start[1] + first.rise(one),
-                start[2] - (pi - first.contact_angle - first.slope(one)),
-                start[3],
-                end[0] - second.radius(other),
-                end[1] - gap - second.rise(other),
-                end[2] - (second.contact_angle + second.slope(other)),
-                end[3] - 1.0 - first.cap_volume(one) - second.cap_volume(other),
-            ]
-        )
-
-    mesh, profile, unknown = guess
-    with np.errstate(all="ignore"):  # guesses from too far overflow before they are given up
-        return solve_bvp(slopes, ends, mesh, profile, unknown, tol=tolerance, max_nodes=_MOST_NODES[tolerance])
-
-
-def _arc_of_circle(family: _Family) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The profile of `_toroid` at contact as a guess for `_collocate`."""
-    x, mesh = _toroid(family, 0.0), np.linspace(0.0, 1.0, _MESH)
-    start = pi - family.first.contact_angle - float(family.first.slope(x[:1])[0])
-    end = family.second.contact_angle + float(family.second.slope(x[1:2])[0])
-    angle = start + (end - start) * mesh
-    step = x[3] / (_MESH - 1)
-    radius = float(family.first.radius(x[:1])[0]) + cumulative_simpson(np.cos(angle), dx=step, initial=0.0)
-    height = -float(family.first.rise(x[:1])[0]) + cumulative_simpson(np.sin(angle), dx=step, initial=0.0)
-    inside = cumulative_simpson(pi * radius**2 * np.sin(angle), dx=step, initial=0.0)
-    return mesh, np.stack([radius, height, angle, inside]), x[:4]
-
-
-def bridge(
-    radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float], gap: float
-) -> Bridge:
-    """The stable bridge at a gap, by `scipy.integrate.solve_bvp`.
-
-    The profile of a thin ring between flat solids is the first guess; the solids are curved and then parted in steps,
-    each solved from the one before.
-
-    Parameters
-    ----------
-    radius_1, radius_2, volume, contact_angle
-        As for `force_curve`.
-    gap
-        Distance of the surfaces, 0 or more.
-
-    Returns
-    -------
-    Bridge
-
-    Raises
-    ------
-    ValueError
-        If the gap is negative, or radii and volume are not positive.
-    NoBridgeError
-        If there is no bridge at this gap, or none was found.
-    """
-    if gap < 0.0:
-        raise ValueError(f"gap {gap}: expected 0 or more")
-    family, unit = _family_of((radius_1, radius_2), volume, _pair(contact_angle)), cbrt(volume)
-    guess = _arc_of_circle(_shrunk(family, _SHARES[-1]))
-    guess = _march(lambda share, near: _collocate(_shrunk(family, share), 0.0, near, _ROUGH), guess, _SHARES[-1], 1.0)
-    if gap > 0.0:
-        guess = _march(lambda at, near: _collocate(family, at, near, _ROUGH), guess, 0.0, gap / unit)
-    found = _collocate(family, gap / unit, guess, _FINE)
-    if not found.success:
-        raise NoBridgeError(f"gap {gap:.6g}: {found.message}")
-    return _bridge_of(family, found, unit)
-
-
-def _march(solve: Callable[[float, Any], Any], guess: Any, start: float, end: float) -> Any:
-    """Solve a problem of one parameter from its start to its end in steps, each from the one before.
-
-    Raises
-    ------
-    NoBridgeError
-        If it cannot be gone on with.
-    """
-    at, step = start, (end - start) / _FEWEST_STEPS
-    found = solve(at, guess)
-    if not found.success:
-        raise NoBridgeError(found.message)
-    while at < end:
-        further = min(end, at + step)
-        result = solve(further, (found.x, found.y, found.p))
-        # A bridge that is not close to the last one is on another branch.
-        if result.success and np.max(np.abs(result.p - found.p) / np.maximum(1.0, np.abs(found.p))) < _LARGEST_CHANGE:
-            at, found, step = further, result, 1.5 * step
-        elif (step := 0.5 * step) < _SMALLEST_STEP * (end - start):
-            raise NoBridgeError(f"no bridge beyond {at:.6g} of the volume's cube root")
-    return found.x, found.y, found.p
-
-
-def _bridge_of(family: _Family, found: Any, unit: float) -> Bridge:
-    """A solution of the boundary-value problem in the unit of the user."""
-    one, other, pressure, length = (float(value) for value in found.p)
-    solids = ((family.first, one), (family.second, other))
-    radius, height = found.sol(np.linspace(0.0, 1.0, _PROFILE))[:2]
-    nodes = found.sol(_NODES)
-    upright = found.y[0] * np.sin(found.y[2])
-    pull = pi * (2.0 * upright - pressure * found.y[0] ** 2)
-    contacts = [float(solid.radius(np.array(arc))) for solid, arc in solids]
-    slopes = [float(solid.slope(np.array(arc))) for solid, arc in solids]
-    lines = [
-        pi * (2.0 * line * sin(slope + solid.contact_angle) - pressure * line**2)
-        for (solid, _), line, slope in zip(solids, contacts, slopes, strict=True)
-    ]
-    wetted = sum(cos(solid.contact_angle) * float(solid.wetted_area(np.array(arc))) for solid, arc in solids)
-    caps = sum(float(solid.cap_volume(np.array(arc))) for solid, arc in solids)
-    inside = pi * length * float(np.sum(_WEIGHTS * nodes[0] ** 2 * np.sin(nodes[2])))
-    neck = int(np.argmin(found.y[0]))
-    return Bridge(
-        force=unit * float(pull[neck]),
-        force_at_contact_lines=(unit * lines[0], unit * lines[1]),
-        pressure=pressure / unit,
-        neck=unit * float(radius.min()),
-        filling_angles=(slopes[0], slopes[1]),
-        contact_radii=(unit * contacts[0], unit * contacts[1]),
-        volume=unit**3 * (inside - caps),
-        energy=unit**2 * (2.0 * pi * length * float(np.sum(_WEIGHTS * nodes[0])) - wetted),
-        radius=unit * radius,
-        height=unit * height,
-    )

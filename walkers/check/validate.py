@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
+from walkers.check.chapter import Chapter
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.library import suggestion
 from walkers.inputs.text import rendered
 from walkers.postprocess.drawing import save_figure
 from walkers.runner.files import write_text
-from walkers.studies.chapter import Chapter
 
 CHAPTERS = ("benchmarks", "bridges", "crosscheck")
-"""In the order of the page; each the function ``chapter`` of a module of `walkers.studies`."""
+"""In the order of the page; each the function ``chapter`` of a module of `walkers.check`."""
 PAGE = "validation.md"
 
 
@@ -96,7 +96,7 @@ def validate(
 
 def _chapter(name: str, out: Path, quick: bool) -> Chapter:
     """A chapter, or what kept it from being made: the others are made all the same."""
-    module = import_module(f"walkers.studies.{name.replace('-', '_')}")
+    module = import_module(f"walkers.check.{name.replace('-', '_')}")
     try:
         chapter: Chapter = module.chapter(out, quick=quick)
     except WalkersError as error:
@@ -110,5 +110,5 @@ def _written(chapters: Sequence[Chapter], page: Path) -> list[Path]:
         for name, figure in chapter.figures.items():
             place = page.parent / "figures" / f"validation-{name}.png"
             files += save_figure(figure, place, (), title=chapter.title)
-    write_text(page, rendered("walkers.studies", "validation.md.j2", chapters=chapters))
+    write_text(page, rendered("walkers.check", "validation.md.j2", chapters=chapters))
     return [page, *files]

@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkers.check.bridge_laws import LAWS, Law
+from walkers.check.chapter import Chapter
+from walkers.check.collocation import collocated
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics.bridge import FloatArray, Surfaces
-from walkers.physics.laplace import Bridge, ForceCurve, bridge, force_curve
+from walkers.physics.laplace import ForceCurve, force_curve
 from walkers.physics.laws import by_name
 from walkers.pipeline import run
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, series_look, styled
-from walkers.studies.bridge_laws import LAWS, Law
-from walkers.studies.chapter import Chapter
 from walkers.templates.bridge_tables import TOLERANCE, tabulated
 
 if TYPE_CHECKING:
@@ -68,12 +69,6 @@ def reference(shape: Shape) -> ForceCurve:
     return force_curve(*shape)
 
 
-@cache
-def collocated(shape: Shape, gap: float) -> Bridge:
-    """The bridge at a gap, m, solved apart from `reference`."""
-    return bridge(*shape, gap)
-
-
 @dataclass(frozen=True)
 class Deviation:
     """A law over Young–Laplace: pull at contact, work from contact to rupture, each to its own, and largest gap."""
@@ -97,19 +92,9 @@ def deviation(law: Law, surfaces: Surfaces) -> Deviation:
 
 
 def interpolated(text: str, gaps: FloatArray) -> FloatArray:
-    """What walkers/engine/table.h makes of a table, written down once more from the format alone.
+    """Pull and resistances, shape (n, 5), at gaps (m), of a table after its first line.
 
-    Parameters
-    ----------
-    text
-        A table after its first line.
-    gaps
-        m, shape (n,).
-
-    Returns
-    -------
-    ndarray, shape (n, 5)
-        Pull and resistances, in the order of `walkers.physics.bridge.Forces`.
+    It is what walkers/engine/table.h makes of it, written down once more from the format alone.
     """
     head, *lines = text.splitlines()
     rupture, scale = (float(word) for word in head.split()[2:4])
@@ -127,7 +112,7 @@ def interpolated(text: str, gaps: FloatArray) -> FloatArray:
 
 
 def chapter(out: Path, *, quick: bool = False) -> Chapter:
-    """Checks of the engine's bridges, published laws beside them, and walkers by other laws.
+    """Checks of the bridges' tables, published laws beside them, and walkers by other laws.
 
     Parameters
     ----------
@@ -135,11 +120,6 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
         Folder of the run directories.
     quick
         Checks of one case's bridges, and no walkers.
-
-    Raises
-    ------
-    runner.EngineFailure
-        If the engine fails in one of the known ways.
     """
     checked = CASES[:1] if quick else CASES
     checks = _checks(checked)
@@ -172,7 +152,7 @@ def _checks(names: tuple[str, ...]) -> list[dict[str, Any]]:
         shape, liquid = shape_of(surfaces), surfaces.liquid
         exact = reference(shape)
         gaps = exact.rupture * np.array(_SHARES)
-        solved = np.array([collocated(shape, gap).force for gap in gaps.tolist()])
+        solved = np.array([collocated(*shape, gap).force for gap in gaps.tolist()])
         table = interpolated(tabulated(by_name(liquid.law), surfaces).text(), gaps)[:, 0] / liquid.surface_tension
         tabled.append(float(np.abs(table - solved).max() / exact.forces[0]))
         closed.append(float(np.abs(force_curve(*shape, gaps).forces - solved).max() / exact.forces[0]))
@@ -215,9 +195,9 @@ def _bond_number(case: Case) -> dict[str, float]:
 def _coverage(name: str) -> dict[str, float]:
     """How far bridges at contact reach around the beads of a dimer, rad, and the room between wall and other bead."""
     beads, wall = shapes((name,)).values()
-    small, large = collocated(shape_of(beads), 0.0).filling_angles
+    small, large = collocated(*shape_of(beads), 0.0).filling_angles
     apart = acos((beads.other_radius - beads.radius) / (beads.other_radius + beads.radius))
-    at_wall = collocated(shape_of(wall), 0.0).filling_angles[0]
+    at_wall = collocated(*shape_of(wall), 0.0).filling_angles[0]
     return {"wall": at_wall, "large": large, "large_room": apart, "small": small, "small_room": pi - apart}
 
 
@@ -225,7 +205,7 @@ def _text_of(numbers: dict[str, Any], compared: dict[str, Surfaces]) -> str:
     """The chapter's Markdown."""
     fits = [row for row in numbers["laws"] if row["name"] in {LAWS[1].name, LAWS[-1].name}]
     return rendered(
-        "walkers.studies",
+        "walkers.check",
         "bridges.md.j2",
         degrees=degrees,
         compared=compared,

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 
-from walkers.audit import forms, scenes
-from walkers.audit.bench import Bench
-from walkers.audit.check import Check, Line, Verdict
+from walkers.check import motions, scenes
+from walkers.check.bench import Bench
+from walkers.check.lines import Check, Line, Verdict
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.runner.audits import AuditRecord, write_audit
 from walkers.runner.binary import Engine, find_engine
 
-CHECKS: tuple[Check, ...] = (*scenes.CHECKS, *forms.CHECKS)
+CHECKS: tuple[Check, ...] = (*scenes.CHECKS, *motions.CHECKS)
 
 
 @dataclass(frozen=True)

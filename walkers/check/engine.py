@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, log, pi, sqrt
@@ -10,13 +11,18 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
+from walkers.check import kernels
+from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, Pairs, State
+from walkers.inputs.boundary import Flat, Wall
+from walkers.inputs.case import Case
+from walkers.inputs.drive import Vector
 from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.physics.laws import law_of
 from walkers.physics.matter import Contact, Liquid
-from walkers.studies.crosscheck import kernels
-from walkers.studies.crosscheck.kernels import CELLS, Bridges, Constants, FloatArray, Pairs, State
-from walkers.studies.crosscheck.laws import Laws
 
+TERMS = ("capillary", "lubrication", "damping", "friction", "rolling-friction", "gravity", "drive")
+"""What may be left out: pull and resistances of the bridges, damping of Hertz's contact and of the spring along the
+surfaces, all of the tangential contact force, the torque against rolling, weight, the inertial force of the frame."""
 _SKIN = 0.4
 """Of the smallest radius: neighbours are listed anew when a bead has gone nearly half as far."""
 
@@ -32,25 +38,15 @@ class Matter:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """Walls, weight and drive in the frame of the walls.
+    """Walls, weight (m/s²) and drive in the frame of the walls.
 
-    Attributes
-    ----------
-    point, normal : ndarray, shape (W, 3)
-        Of the walls: a point of each, m, and its unit normal toward the beads.
-    radius : ndarray, shape (W,)
-        Of upright cylinders about their points, which have beads within, m; 0 of what is flat; left out, all are.
-    gravity : tuple of float
-        m/s².
-    harmonics : ndarray, shape (H, 6)
-        Of the inertial acceleration a sin(ωt + φ): direction, ω (rad/s), a (m/s²), φ (rad); from t = 0 on.
+    ``harmonics`` are those of the inertial acceleration a sin(ωt + φ) from t = 0 on, each a direction, ω (rad/s), a
+    (m/s²) and φ (rad).
     """
 
-    point: FloatArray
-    normal: FloatArray
-    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    harmonics: FloatArray | None = None
-    radius: FloatArray | None = None
+    walls: Sequence[Wall]
+    gravity: Vector = (0.0, 0.0, 0.0)
+    harmonics: Sequence[tuple[float, ...]] = ()
 
 
 @dataclass(frozen=True)
@@ -70,12 +66,14 @@ class SecondEngine:
     ----------
     beads
         Where they are at first. What touches has a bridge; springs are unstretched.
-    matter, surroundings, laws
+    matter, surroundings
         What acts on them.
     time_step
         s.
     clock
         Step that it is; the drive begins with step 0.
+    without
+        Those of the `TERMS` that do not act.
     """
 
     def __init__(
@@ -83,13 +81,15 @@ class SecondEngine:
         beads: Beads,
         matter: Matter,
         surroundings: Surroundings,
-        laws: Laws,
         time_step: float,
         clock: int = 0,
+        without: Collection[str] = (),
     ) -> None:
+        if unknown := set(without) - set(TERMS):
+            raise ValueError(f"without {unknown}: expected some of {', '.join(TERMS)}")
         self.clock = clock
         self.radius = np.ascontiguousarray(beads.radius, dtype=np.float64)
-        self.constants = _constants(self.radius, matter, surroundings, laws, time_step)
+        self.constants = _constants(self.radius, matter, surroundings, time_step, without)
         self.state = _state(beads, len(self.constants.point))
         self._skin = _SKIN * float(self.radius.min())
         self._reach = self.radius + (self.constants.bridges.spans[:, kernels.RUPTURE].max() + self._skin) / 2.0
@@ -176,7 +176,7 @@ def _splined(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray
     return np.array([curve.formation, scale, middle, end]), np.stack(splines)
 
 
-def _bridges(radius: FloatArray, matter: Matter, laws: Laws) -> Bridges:
+def _bridges(radius: FloatArray, matter: Matter, without: Collection[str]) -> Bridges:
     liquid = matter.liquid
     sizes, kind = np.unique(radius, return_inverse=True)
     others = [*sizes.tolist(), inf]
@@ -190,31 +190,35 @@ def _bridges(radius: FloatArray, matter: Matter, laws: Laws) -> Bridges:
             between[row, column] = len(made)
             surfaces = Surfaces.of(one, other, liquid, matter.contact.minimum_separation_ratio)
             made.append(_splined(law_of(liquid), surfaces))
-    acts = np.array([laws.capillary, *[laws.lubrication] * 4], dtype=np.float64)
+    acts = np.array(["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64)
     spans, splines = np.stack([one for one, _ in made]), np.stack([one for _, one in made]) * acts
     return Bridges(spans, splines, kind.astype(np.int64), between)
 
 
-def _constants(radius: FloatArray, matter: Matter, around: Surroundings, laws: Laws, time_step: float) -> Constants:
+def _constants(
+    radius: FloatArray, matter: Matter, around: Surroundings, time_step: float, without: Collection[str]
+) -> Constants:
     contact = matter.contact
     modulus, ratio, loss = contact.youngs_modulus, contact.poissons_ratio, log(contact.restitution)
-    harmonics = around.harmonics if around.harmonics is not None and laws.drive else np.zeros((0, 6))
+    damping, friction, rolling, gravity, drive = (term not in without for term in TERMS[2:])
+    flat = [wall if isinstance(wall, Flat) else None for wall in around.walls]
+    none = (0.0, 0.0, 0.0)
     return Constants(
         step=time_step,
         radius=radius,
         mass=4.0 / 3.0 * pi * radius**3 * matter.density,
-        point=np.array(around.point, dtype=np.float64, order="C"),
-        normal=np.array(around.normal, dtype=np.float64, order="C"),
-        hollow=np.zeros(len(around.point)) if around.radius is None else np.array(around.radius, dtype=np.float64),
-        gravity=np.array(around.gravity) * laws.gravity,
-        harmonics=np.ascontiguousarray(harmonics, dtype=np.float64),
+        point=np.array([wall.point if wall else none for wall in flat]).reshape(-1, 3),
+        normal=np.array([wall.normal if wall else none for wall in flat]).reshape(-1, 3),
+        hollow=np.array([0.0 if isinstance(wall, Flat) else wall.radius for wall in around.walls]),
+        gravity=np.array(around.gravity) * gravity,
+        harmonics=np.array(around.harmonics if drive else (), dtype=np.float64).reshape(-1, 6),
         modulus=modulus / (2.0 * (1.0 - ratio**2)),
         shear_modulus=modulus / (4.0 * (1.0 + ratio) * (2.0 - ratio)),
-        damping=-loss / sqrt(loss**2 + pi**2) * laws.damping,
-        friction_beads=contact.friction_bead_bead * laws.friction,
-        friction_walls=contact.friction_bead_wall * laws.friction,
-        rolling=contact.rolling_friction * laws.rolling_friction,
-        bridges=_bridges(radius, matter, laws),
+        damping=-loss / sqrt(loss**2 + pi**2) * damping,
+        friction_beads=contact.friction_bead_bead * friction,
+        friction_walls=contact.friction_bead_wall * friction,
+        rolling=contact.rolling_friction * rolling,
+        bridges=_bridges(radius, matter, without),
     )
 
 
@@ -229,3 +233,15 @@ def _state(beads: Beads, walls: int) -> State:
         wall_spring=np.zeros((count, walls, 3)),
         wall_bridged=np.zeros((count, walls), dtype=np.bool_),
     )
+
+
+def engine_at(
+    case: Case, beads: Beads, clock: int = 0, walls: Sequence[Wall] = (), without: Collection[str] = ()
+) -> SecondEngine:
+    """The second engine with a case's matter, walls (or some others) and drive, and some beads, at a step."""
+    harmonics = [
+        (*one.direction, one.angular_frequency, one.peak_acceleration, one.phase) for one in case.drive.harmonics
+    ]
+    around = Surroundings(walls or case.boundary.walls, case.gravity_vector, harmonics)
+    matter = Matter(case.density, case.contact, case.liquid)
+    return SecondEngine(beads, matter, around, case.run.time_step, clock, without)

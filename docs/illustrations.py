@@ -25,6 +25,7 @@ from typing import Any
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.figures import draw
 from walkers.calibration.report import rows_of, write_tables
+from walkers.check.validate import validate
 from walkers.inputs.axes import flatten
 from walkers.inputs.calibration import load_calibration
 from walkers.inputs.case import Case
@@ -39,7 +40,6 @@ from walkers.postprocess.analysis import analyses
 from walkers.postprocess.films import FilmOptions
 from walkers.postprocess.series import render_run, render_series
 from walkers.runner.files import read_json, write_json, write_text
-from walkers.studies.validate import validate
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import cores_here
 from walkers.templates.deck import CONTENT_VERSION
@@ -297,7 +297,7 @@ def output_of(command: str, out: Path) -> str:
 
 
 def main() -> None:
-    """``python -m walkers.studies.illustrations RUNS DOCS [NAME...]``."""
+    """``python -m docs.illustrations RUNS DOCS [NAME...]``."""
     out, docs, *only = sys.argv[1:]
     for path in make_illustrations(Path(out), Path(docs), only):
         print(path)

@@ -14,8 +14,9 @@ from math import cos, degrees, nan, pi, sin, sqrt
 
 import numpy as np
 
-from walkers.audit.bench import FLOOR, Bench, Measured, bench_case, bench_recording, bench_scene, farthest
-from walkers.audit.check import Check, Line, Verdict
+from walkers.check.bench import FLOOR, Bench, Measured, bench_case, bench_recording, bench_scene, farthest
+from walkers.check.engine import Beads, SecondEngine, engine_at
+from walkers.check.lines import Check, Line, Verdict
 from walkers.inputs.boundary import Flat, Round
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
@@ -23,9 +24,6 @@ from walkers.inputs.text import rendered
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 from walkers.physics.laws import LAWS, law_of
 from walkers.postprocess.motion import prescribed_motion
-from walkers.studies.crosscheck.engine import Beads, SecondEngine
-from walkers.studies.crosscheck.laws import Laws
-from walkers.studies.crosscheck.setup import engine_at
 from walkers.templates.bridge_tables import tabulated
 from walkers.templates.deck import BRIDGES_NAME, Checkpoint, Plan, compose
 from walkers.templates.scene import Bead, Scene
@@ -70,8 +68,8 @@ def full_case(**changes: dict[str, object]) -> Case:
 def second_engine(case: Case, scene: Scene) -> SecondEngine:
     """The second engine with the beads of a scene."""
     start = [[getattr(bead, name) for bead in scene.beads] for name in ("radius", "centre", "velocity", "spin")]
-    laws = Laws(drive=case.drive.frame == "container")
-    return engine_at(case, Beads(*map(np.array, start)), laws, walls=scene.walls)
+    without = () if case.drive.frame == "container" else ("drive",)
+    return engine_at(case, Beads(*map(np.array, start)), walls=scene.walls, without=without)
 
 
 def deviation(case: Case, scene: Scene, series: Measured) -> tuple[float, float]:
@@ -252,7 +250,7 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     tables = [f"1 1 {S!r} {R!r}\n{fine}" if one.startswith(f"1 1 {S!r} {R!r}") else one for one in tables]
     ours = bench.run(replace(deck, files={**deck.files, BRIDGES_NAME: "bridge ".join(tables)}))
     angle = degrees(sqrt(2.0 * bare.liquid.contact_angle))
-    text = rendered("walkers.audit", "stock.lig.j2", case=bare, scene=scene, layout=deck.layout, angle=angle)
+    text = rendered("walkers.check", "stock.lig.j2", case=bare, scene=scene, layout=deck.layout, angle=angle)
     theirs = bench.run(replace(deck, text=text))
     error = farthest(ours.force, theirs.force)
     yield Line("two beads part: force beside that of Debian's model of bridges", 0.0, error, 1e-9)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
-from walkers.audit.bench import Bench
+from walkers.check.bench import Bench
 
 
 class Verdict(StrEnum):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from walkers.audit.check import Verdict
-from walkers.audit.run import AuditReport
+from walkers.check.audit import AuditReport
+from walkers.check.lines import Verdict
 
 
 def _number(value: float) -> str:
