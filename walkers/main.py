@@ -16,13 +16,14 @@ from typing import Annotated, Any, BinaryIO, NoReturn, TextIO
 
 import typer
 
-COMMANDS = (
-    *("show", "deck", "run", "result", "plot", "render", "film", "vtk", "paraview", "export", "theory"),
-    *("sweep", "status", "table", "climb", "compare", "list", "clean", "report", "verify", "archive"),
-    *("figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"),
-)
-"""Each the function ``command`` of a module of `walkers.commands`, in the order of ``walkers --help``."""
-
+COMMANDS = {
+    **{"show": "look", "deck": "make", "run": "make"},
+    **dict.fromkeys(("result", "plot", "render", "film", "vtk", "paraview", "export", "theory"), "look"),
+    **{"sweep": "make", "status": "look", "table": "look", "climb": "look", "compare": "look"},
+    **dict.fromkeys(("list", "clean", "report", "verify", "archive"), "keep"),
+    **dict.fromkeys(("figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"), "make"),
+}
+"""Modules of `walkers.commands` in which the commands are functions, in the order of ``walkers --help``."""
 
 INTERRUPTED = 130
 _STDOUT = "standard output"
@@ -182,7 +183,8 @@ def _program(arguments: list[str]) -> typer.Typer:
     )
     program.callback()(_options)
     for name in set(arguments[:1]).intersection(COMMANDS) or COMMANDS:
-        command = import_module(f"walkers.commands.{name.replace('-', '_')}").command
+        module = import_module(f"walkers.commands.{COMMANDS[name]}")
+        command = getattr(module, "list_" if name == "list" else name.replace("-", "_"))
         program.command(name=name, short_help=command.__doc__)(command)
     return program
 
