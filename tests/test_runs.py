@@ -192,7 +192,7 @@ def test_two_at_once_do_not_share_a_directory(tmp_path: Path) -> None:
 def test_an_engine_that_outlives_its_launcher_keeps_others_away(
     in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 1.0)  # of ten: this engine does not end by itself
+    monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 0.5)
     long = {"cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
     (in_folder / "test.toml").write_text(to_toml(document(run=long)))
     # The kernel ends an engine whose launcher dies, but not the engine's own children.
