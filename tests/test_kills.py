@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import time
@@ -11,14 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import PROGRAM, document, engines_in, make_case, to_toml, wait_for
+from tests.conftest import BRIEF, LONG, PROGRAM, document, engines_in, make_case, to_toml, wait_for
 from walkers import run as run_case
-from walkers.inputs.case import Case
 from walkers.runner import find_engine, finished_run, open_run
+from walkers.runner.ensemble import finished_places
 from walkers.runner.locks import is_locked, locked
-
-BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cycle": 2}
-LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
 
 
 def _forked(work: Callable[[], object]) -> int:
@@ -76,18 +74,6 @@ def test_a_lock_that_somebody_has_is_refused(tmp_path: Path, monkeypatch: pytest
     assert not list(tmp_path.iterdir())
 
 
-def test_a_closed_terminal_ends_the_engine_and_the_lock(in_folder: Path) -> None:
-    (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
-    program = subprocess.Popen([PROGRAM, "run", "long.toml"], stderr=subprocess.PIPE, text=True)
-    wait_for(lambda: engines_in(in_folder))
-    program.send_signal(signal.SIGHUP)
-    _, errors = program.communicate()
-    assert program.returncode == 129
-    assert errors.splitlines()[-1] == "walkers: the terminal was closed"
-    assert not engines_in(in_folder)
-    assert not list(in_folder.glob("runs/*.lock"))
-
-
 def test_nohup_outlives_a_closed_terminal(in_folder: Path) -> None:
     (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
     program = subprocess.Popen(
@@ -102,28 +88,16 @@ def test_nohup_outlives_a_closed_terminal(in_folder: Path) -> None:
     assert not engines_in(in_folder)
 
 
-def _replaced(case: Case, out: Path) -> tuple[Path, Path]:
-    """A finished run, and beside it what a crash within a replacement leaves of the one before."""
-    place = run_case(case, out).directory
-    left = place.with_name(place.name + ".replaced")
-    left.mkdir()
-    (left / "manifest.json").write_text((place / "manifest.json").read_text())
-    return place, left
-
-
-def test_a_crash_between_renaming_and_removing_leaves_no_trace(tmp_path: Path) -> None:
+def test_a_crash_within_a_replacement_leaves_no_trace(tmp_path: Path) -> None:
+    """Between its two renames the old run is put back; after them it goes, and is no run meanwhile."""
     case = make_case(run=BRIEF)
-    place, left = _replaced(case, tmp_path)
+    place = run_case(case, tmp_path).directory
+    left = place.with_name(place.name + ".replaced")
+    place.rename(left)
+    with open_run(case, find_engine(), tmp_path):
+        assert finished_run(place) is not None
+    shutil.copytree(place, left)
+    assert finished_places(tmp_path) == {place.name: place}
+    assert run_case(case, tmp_path).cached
     assert run_case(case, tmp_path, force=True).directory == place
     assert not left.exists()
-    place, left = _replaced(case, tmp_path)
-    assert run_case(case, tmp_path).cached
-    with open_run(case, find_engine(), tmp_path):
-        assert not left.exists()
-
-
-def test_what_a_replacement_left_is_no_run(tmp_path: Path) -> None:
-    from walkers.runner.ensemble import finished_places
-
-    place, _ = _replaced(make_case(run=BRIEF), tmp_path)
-    assert finished_places(tmp_path) == {place.name: place}

@@ -30,9 +30,12 @@ def _completed(monkeypatch: pytest.MonkeyPatch, line: str) -> list[str]:
         return call(check=True).stdout.split()
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_short_help_is_the_long_one(command: str) -> None:
-    assert call(command, "-h", check=True).stdout == call(command, "--help", check=True).stdout
+def test_help_names_every_command() -> None:
+    shown = call("--help", check=True).stdout
+    assert not set(shown) & set("╭│╰─"), "boxes are for terminals"
+    for command in COMMANDS:
+        assert f"\n  {command} " in shown
+        assert call(command, "-h", check=True).stdout == call(command, "--help", check=True).stdout
 
 
 def test_version_names_package_commit_and_engine(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -55,8 +58,9 @@ def test_version_of_a_wheel_names_the_commit_that_it_was_built_from(tmp_path: Pa
     assert told.startswith(f"granular-walkers {software().version} (commit 0123abc)\n")
 
 
-def test_the_package_is_the_program() -> None:
-    done = subprocess.run([sys.executable, "-m", "walkers", "-h"], capture_output=True, text=True, check=True)
+@pytest.mark.parametrize("module", ["walkers", "walkers.main"])
+def test_the_package_is_the_program(module: str) -> None:
+    done = subprocess.run([sys.executable, "-m", module, "-h"], capture_output=True, text=True, check=True)
     assert done.stdout == call("--help", check=True).stdout
     assert done.stdout.startswith("Usage: walkers ")
 
