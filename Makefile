@@ -28,7 +28,7 @@ walker: setup ## Run the walker of Fig. 1b (or CASE=...): velocity, pictures, a 
 .PHONY: sweep
 sweep: setup ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.toml: on that cluster), print its table
 	@$(WALKERS) sweep $(SWEEP) --out $(OUT) $(if $(SITE),--site $(SITE)) $(if $(JOBS),--jobs $(JOBS)); status=$$?; \
-	  [ $$status -gt 1 ] || $(WALKERS) table $(OUT)/$(basename $(notdir $(SWEEP))); exit $$status
+	  [ $$status -gt 1 ] || $(WALKERS) table $(basename $(notdir $(SWEEP))) --out $(OUT); exit $$status
 
 .PHONY: pile
 pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures, a film; goes on where it was interrupted

@@ -73,6 +73,8 @@ user_cache_path("granular-walkers", ensure_exists=True).joinpath("young-laplace"
 T = TypeVar("T")
 PROGRAM = str(Path(sys.executable).with_name("walkers"))
 SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
+BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cycle": 2}
+LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
 
 
 def document(**changes: Any) -> dict[str, Any]:
@@ -238,6 +240,19 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     yield tmp_path
 
 
+@pytest.fixture
+def front(tmp_path: Path) -> Callable[[str], str]:
+    """An engine that is a shell script, most often around the real one."""
+
+    def made(script: str) -> str:
+        path = tmp_path / "front"
+        path.write_text(f"#!/bin/sh\n{script}\n")
+        path.chmod(0o755)
+        return str(path)
+
+    return made
+
+
 def engines_in(directory: Path) -> list[int]:
     """Process ids of the engines that work in a directory or below."""
     return processes_in(directory, b"liggghts", b"\0-in\0")  # not ldd, which asks what the engine is linked to
@@ -333,3 +348,11 @@ def mounted(place: Path, size: str) -> Iterator[Path]:
         yield place
     finally:
         subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+def fill(place: Path) -> Path:
+    """Leave no byte on a file system; the file that takes them."""
+    with suppress(OSError), (place / "ballast").open("ab", buffering=0) as file:
+        while file.write(b"\0" * 4096):
+            pass
+    return place / "ballast"

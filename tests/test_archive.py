@@ -29,7 +29,6 @@ from walkers.archive.citation import PAPER
 from walkers.archive.writing import ArchiveOptions, ArchiveRefused, write_archive
 from walkers.inputs.reading import resolve_case
 from walkers.runner.directory import FinishedRun
-from walkers.runner.manifest import record_tables
 from walkers.runner.provenance import commit_of, software
 from walkers.sweeps.table import load
 
@@ -252,23 +251,6 @@ def test_tables_made_anew_are_what_the_manifest_says(run: Path) -> None:
     again = FinishedRun(run).manifest["tabulated"]
     assert again["commit"] == software().commit
     assert set(again["files"]) == {"result.json", "walkers.parquet", "trajectory.parquet", "bridges.parquet"}
-
-
-def test_manifests_of_older_runs(run: Path, tmp_path: Path) -> None:
-    """Those without checksums and versions are read, verified by sizes and archived all the same."""
-    path = run / "manifest.json"
-    older = {key: one for key, one in json.loads(path.read_text()).items() if key not in _YOUNGER}
-    path.write_text(json.dumps(older))
-    call("result", str(run), check=True)
-    assert "by their sizes" in call("verify", str(run)).stdout
-    record_tables(run, ["result.json"])
-    assert "sha256" not in FinishedRun(run).manifest
-    assert call("verify", str(Run(run).archive(tmp_path / "older.zip"))).returncode == 0
-    (run / "result.json").write_text("{}")
-    assert "  changed    result.json" in call("verify", str(run)).stdout
-
-
-_YOUNGER = ("sha256", "commit", "python", "packages")
 
 
 def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:

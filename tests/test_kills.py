@@ -2,25 +2,21 @@
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import time
-import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
-from tests.conftest import PROGRAM, document, engines_in, make_case, to_toml, wait_for
+from tests.conftest import BRIEF, LONG, PROGRAM, document, engines_in, make_case, to_toml, wait_for
 from walkers import run as run_case
-from walkers.inputs.case import Case
 from walkers.runner import find_engine, finished_run, open_run
-from walkers.runner.failures import RunBusy
-from walkers.runner.locks import OrphanLockWarning, is_locked, locked
-
-BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cycle": 2}
-LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
+from walkers.runner.directory import finished_places
+from walkers.runner.locks import is_locked, locked
 
 
 def _forked(work: Callable[[], object]) -> int:
@@ -69,66 +65,13 @@ def test_no_engine_is_orphaned_by_a_kill_at_its_birth(tmp_path: Path) -> None:
     assert not engines_in(tmp_path)
 
 
-def test_a_lock_whose_owner_lives_is_refused_at_once(tmp_path: Path) -> None:
-    case = make_case(run=BRIEF)
-    with locked([tmp_path / "x"]) as ours, warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert ours
-        with locked([tmp_path / "x"]) as theirs:
-            assert not theirs
+def test_a_lock_that_somebody_has_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 0.1)
+    with locked([tmp_path / "x"]) as ours, locked([tmp_path / "x", tmp_path / "y"]) as theirs:
+        assert (list(ours), list(theirs)) == ([tmp_path / "x"], [tmp_path / "y"])
+        assert is_locked(tmp_path / "x")
+    assert not is_locked(tmp_path / "x")
     assert not list(tmp_path.iterdir())
-    assert case
-
-
-def test_a_dying_engine_is_waited_for_with_a_line(tmp_path: Path) -> None:
-    """A child that outlives its dead owner for a second keeps the lock; the next call says that it waits, and runs."""
-    case = make_case(run=BRIEF)
-    front = _front_that_lingers(tmp_path, seconds=2)
-    _kill_once_it_lingers(case, tmp_path, front)
-    with pytest.warns(OrphanLockWarning, match="waiting for what is left of a run that was killed"):
-        outcome = run_case(case, tmp_path / "runs", engine=front)
-    assert not outcome.cached
-
-
-def _kill_once_it_lingers(case: Case, folder: Path, front: str) -> None:
-    child = _forked(lambda: run_case(case, folder / "runs", engine=front))
-    wait_for((folder / "lingering").exists)
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-
-
-def _front_that_lingers(folder: Path, seconds: int) -> str:
-    """An engine that first starts, once, a child which the kernel does not end and which keeps all that is open."""
-    front = folder / "front"
-    mark = folder / "lingering"
-    once = f'sleep {seconds} & echo $! > "{mark}.new"; mv "{mark}.new" "{mark}"; exec sleep 60'
-    front.write_text(f'#!/bin/sh\n[ -e "{mark}" ] || {{ {once}; }}\nexec liggghts "$@"\n')
-    front.chmod(0o755)
-    return str(front)
-
-
-def test_what_keeps_a_lock_for_long_is_refused_in_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 1.0)
-    case = make_case(run=BRIEF)
-    front = _front_that_lingers(tmp_path, seconds=600)
-    _kill_once_it_lingers(case, tmp_path, front)
-    try:
-        with pytest.warns(OrphanLockWarning), pytest.raises(RunBusy):
-            run_case(case, tmp_path / "runs", engine=front)
-    finally:
-        os.kill(int((tmp_path / "lingering").read_text()), signal.SIGKILL)
-
-
-def test_a_closed_terminal_ends_the_engine_and_the_lock(in_folder: Path) -> None:
-    (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
-    program = subprocess.Popen([PROGRAM, "run", "long.toml"], stderr=subprocess.PIPE, text=True)
-    wait_for(lambda: engines_in(in_folder))
-    program.send_signal(signal.SIGHUP)
-    _, errors = program.communicate()
-    assert program.returncode == 129
-    assert errors.splitlines()[-1] == "walkers: the terminal was closed"
-    assert not engines_in(in_folder)
-    assert not list(in_folder.glob("runs/*.lock"))
 
 
 def test_nohup_outlives_a_closed_terminal(in_folder: Path) -> None:
@@ -145,28 +88,16 @@ def test_nohup_outlives_a_closed_terminal(in_folder: Path) -> None:
     assert not engines_in(in_folder)
 
 
-def _replaced(case: Case, out: Path) -> tuple[Path, Path]:
-    """A finished run, and beside it what a crash within a replacement leaves of the one before."""
-    place = run_case(case, out).directory
-    left = place.with_name(place.name + ".replaced")
-    left.mkdir()
-    (left / "manifest.json").write_text((place / "manifest.json").read_text())
-    return place, left
-
-
-def test_a_crash_between_renaming_and_removing_leaves_no_trace(tmp_path: Path) -> None:
+def test_a_crash_within_a_replacement_leaves_no_trace(tmp_path: Path) -> None:
+    """Between its two renames the old run is put back; after them it goes, and is no run meanwhile."""
     case = make_case(run=BRIEF)
-    place, left = _replaced(case, tmp_path)
+    place = run_case(case, tmp_path).directory
+    left = place.with_name(place.name + ".replaced")
+    place.rename(left)
+    with open_run(case, find_engine(), tmp_path):
+        assert finished_run(place) is not None
+    shutil.copytree(place, left)
+    assert finished_places(tmp_path) == {place.name: place}
+    assert run_case(case, tmp_path).cached
     assert run_case(case, tmp_path, force=True).directory == place
     assert not left.exists()
-    place, left = _replaced(case, tmp_path)
-    assert run_case(case, tmp_path).cached
-    with open_run(case, find_engine(), tmp_path):
-        assert not left.exists()
-
-
-def test_what_a_replacement_left_is_no_run(tmp_path: Path) -> None:
-    from walkers.runner.directory import finished_places
-
-    place, _ = _replaced(make_case(run=BRIEF), tmp_path)
-    assert finished_places(tmp_path) == {place.name: place}

@@ -25,13 +25,13 @@ def test_a_notebook_gives_what_it_gave(path: Path, tmp_path: Path) -> None:
     assert re.search(r"(fig1b|fig3\S*): done", json.dumps(now.cells[1]))
 
 
-@pytest.mark.parametrize("path", notebooks(), ids=lambda path: path.stem)
-def test_a_stored_notebook_is_small_and_of_no_machine(path: Path) -> None:
-    text = path.read_text("utf-8")
-    assert len(text) < MOST_BYTES
-    words = re.sub(r"[A-Za-z0-9+/=\\n]{200,}", "", text)  # pictures
-    assert not re.search(r"(?<![\w.)\]])/(tmp|home|root|work|usr|var)/", words)
-    assert all(cell.get("execution_count") for cell in json.loads(text)["cells"] if cell["cell_type"] == "code")
+def test_stored_notebooks_are_small_and_of_no_machine() -> None:
+    for path in notebooks():
+        text = path.read_text("utf-8")
+        assert len(text) < MOST_BYTES
+        words = re.sub(r"[A-Za-z0-9+/=\\n]{200,}", "", text)  # pictures
+        assert not re.search(r"(?<![\w.)\]])/(tmp|home|root|work|usr|var)/", words)
+        assert all(cell.get("execution_count") for cell in json.loads(text)["cells"] if cell["cell_type"] == "code")
 
 
 def test_the_program_needs_no_notebook() -> None:

@@ -22,26 +22,9 @@ def _walkers(*arguments: str) -> str:
     return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, check=True).stdout
 
 
-def test_help_names_every_command() -> None:
-    shown = _walkers("--help")
-    for command in ("show", "deck", "run", "result", "plot", "vtk", "render", "film", "paraview", "export", "audit"):
-        assert command in shown
-        assert call(command, "--help", check=True).stdout.strip()
-    assert not set(shown) & set("╭│╰─"), "boxes are for terminals"
-
-
 def test_show_tells_what_follows_from_a_case() -> None:
     shown = call("show", "fig1b", check=True).stdout
-    for part in (
-        "Γ0 = 0.3811",
-        "sin δ = 0.2",
-        "μ = 0.5429",
-        "4πγR limit",
-        "rayleigh",
-        "hertz",
-        "viscous",
-        " a cycle",
-    ):
+    for part in ("Γ0 = 0.3811", "sin δ = 0.2", "μ = 0.5429", "4πγR limit", "rayleigh", "viscous", " a cycle"):
         assert part in shown
     summary = json.loads(call("show", "fig1b", "--json", check=True).stdout)
     assert summary["dimer"]["gamma0"] == pytest.approx(0.3811, abs=1e-4)
@@ -86,9 +69,8 @@ def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch
 
 
 def test_make_help_lists_the_targets() -> None:
-    shown = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    shown = subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert all(f"make {target}" in shown for target in ("walker", "test", "help", "clean"))
-    assert shown == subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")

@@ -6,14 +6,14 @@ import json
 import os
 import signal
 import subprocess
-from contextlib import suppress
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from tests.conftest import (
+    LONG,
     PROGRAM,
     SHORT,
     call,
@@ -37,25 +37,18 @@ def _name(**changes: object) -> str:
     return run_name(make_case(**changes), find_engine())
 
 
-def test_a_finished_run_is_not_run_again(tmp_path: Path) -> None:
+def test_a_finished_run_is_run_again_by_force_only(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
     first = run_case(case, tmp_path)
-    stamp, result = (first.directory / "manifest.json").stat().st_mtime_ns, first.result
     again = run_case(case, tmp_path)
     assert (first.cached, again.cached) == (False, True)
-    assert again.result == result
-    assert (first.directory / "manifest.json").stat().st_mtime_ns == stamp
-
-
-def test_force_runs_again(tmp_path: Path) -> None:
-    case = make_case(run=SHORT)
-    dump = run_case(case, tmp_path).directory / FIRST_SEGMENT / "beads.bin"
-    node = dump.stat().st_ino
-    with dump.open("rb"):  # as long as it is open no other file gets its number
-        again = run_case(case, tmp_path, force=True)
-    assert not again.cached
-    assert (again.directory / FIRST_SEGMENT / "beads.bin").stat().st_ino != node
-    assert [path.name for path in tmp_path.iterdir()] == [again.directory.name]
+    assert again.result == first.result
+    dump = first.directory / FIRST_SEGMENT / "beads.bin"
+    with dump.open("rb") as before:  # as long as it is open no other file gets its number
+        assert os.path.samestat(os.fstat(before.fileno()), dump.stat())
+        assert not run_case(case, tmp_path, force=True).cached
+        assert not os.path.samestat(os.fstat(before.fileno()), dump.stat())
+    assert [path.name for path in tmp_path.iterdir()] == [first.directory.name]
 
 
 def test_a_forced_run_that_fails_leaves_the_old_one(tmp_path: Path) -> None:
@@ -115,14 +108,6 @@ def test_an_interrupted_run_goes_on_after_its_last_whole_segment(tmp_path: Path)
     assert outcome.result == straight.result
 
 
-def test_a_replacement_cut_short_is_put_back(tmp_path: Path) -> None:
-    case = make_case(run=SHORT)
-    place = run_case(case, tmp_path).directory
-    place.rename(place.with_name(place.name + ".replaced"))
-    with open_run(case, find_engine(), tmp_path):
-        assert finished_run(place) is not None
-
-
 def test_the_name_depends_on_what_determines_the_run() -> None:
     names = {
         _name(),
@@ -134,12 +119,11 @@ def test_the_name_depends_on_what_determines_the_run() -> None:
     }
     assert len(names) == 6
     assert _name(title="another title") == _name()
-
-
-def test_the_name_depends_on_the_engine() -> None:
-    case = make_case()
-    engine = find_engine()
-    assert run_name(case, engine) != run_name(case, replace(engine, sha256="0" * 64))
+    other = replace(find_engine(), sha256="0" * 64)
+    assert run_name(make_case(), other) != _name()
+    long = run_name(make_case().renamed("a b/" * 100), other)
+    assert len(long) < 100
+    assert "/" not in long
 
 
 def test_contents_of_a_run_directory(tmp_path: Path) -> None:
@@ -180,49 +164,32 @@ def _toml(folder: Path) -> str:
     return str(file)
 
 
-def test_two_at_once_do_not_share_a_directory(tmp_path: Path) -> None:
-    case = make_case(run=SHORT)
-    engine = find_engine()
-    with open_run(case, engine, tmp_path), pytest.raises(RunBusy), open_run(case, engine, tmp_path):
-        pass
-    assert not list(tmp_path.glob("*.lock"))
-
-
 def test_an_engine_that_outlives_its_launcher_keeps_others_away(
-    in_folder: Path, monkeypatch: pytest.MonkeyPatch
+    front: Callable[[str], str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 1.0)  # of ten: this engine does not end by itself
-    long = {"cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
-    (in_folder / "test.toml").write_text(to_toml(document(run=long)))
-    # The kernel ends an engine whose launcher dies, but not the engine's own children.
-    front = in_folder / "front"
-    front.write_text('#!/bin/sh\nliggghts "$@"\nexit 0\n')
-    front.chmod(0o755)
-    program = subprocess.Popen([PROGRAM, "run", "test.toml", "--engine", str(front)], stderr=subprocess.DEVNULL)
-    wait_for(
-        lambda: program.poll() is not None or list(in_folder.glob("runs/*.incomplete/segments/0000.new/beads.bin"))
-    )
+    """The kernel ends an engine whose launcher dies, but not the engine's own children."""
+    monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 0.5)
+    (in_folder / "test.toml").write_text(to_toml(document(run=LONG)))
+    engine = front('liggghts "$@"\nexit 0')
+    program = subprocess.Popen([PROGRAM, "run", "test.toml", "--engine", engine], stderr=subprocess.DEVNULL)
+    begun = "runs/*.incomplete/segments/0000.new/beads.bin"
+    wait_for(lambda: program.poll() is not None or list(in_folder.glob(begun)))
     assert program.poll() is None
     program.kill()
     program.wait()
-    case = make_case(run=long).renamed("test")
+    case = make_case(run=LONG).renamed("test")
     try:
         with pytest.raises(RunBusy):
-            run_case(case, in_folder / "runs", engine=str(front))
+            run_case(case, in_folder / "runs", engine=engine)
     finally:
-        for engine in engines_in(in_folder):
-            os.kill(engine, signal.SIGKILL)
-
-    def is_free() -> bool:
-        with suppress(RunBusy), open_run(case, find_engine(str(front)), in_folder / "runs"):
-            return True
-        return False
-
-    wait_for(is_free)  # a dying process lets go of its files a moment after it has left the process table
+        for orphan in engines_in(in_folder):
+            os.kill(orphan, signal.SIGKILL)
+    with open_run(case, find_engine(engine), in_folder / "runs"):
+        pass
 
 
 def test_an_engine_dies_with_its_launcher(in_folder: Path) -> None:
-    (in_folder / "test.toml").write_text(to_toml(document(run={"cycles": 4000, "samples_per_cycle": 1})))
+    (in_folder / "test.toml").write_text(to_toml(document(run=LONG)))
     program = subprocess.Popen([PROGRAM, "run", "test.toml"], stderr=subprocess.DEVNULL)
     wait_for_engines(in_folder, program)
     program.kill()
@@ -246,37 +213,31 @@ def test_json_result_of_the_program(in_folder: Path) -> None:
     assert f"{first['velocity']['mean'] * 1e3:.3f}" in shown
 
 
-def _manifest(directory: Path) -> dict[str, Any]:
-    return FinishedRun(directory).manifest
-
-
 def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     case = make_case(run=SHORT)
-    stamp = _manifest(run_case(case, tmp_path).directory)["finished"]
+    stamp = FinishedRun(run_case(case, tmp_path).directory).manifest["finished"]
     # It is not there at the first look, but at the second, after the run has been locked.
     answers = iter([None])
     monkeypatch.setattr("walkers.runner.directory.finished_run", lambda place: next(answers, finished_run(place)))
     outcome = run_case(case, tmp_path)
     assert outcome.cached
     assert not list(answers)  # the first look has been
-    assert _manifest(outcome.directory)["finished"] == stamp
+    assert FinishedRun(outcome.directory).manifest["finished"] == stamp
     assert not list(tmp_path.glob("*.incomplete"))
 
 
 @pytest.mark.parametrize("damage", ["result.json", "walkers.parquet", "bridges.parquet", "trajectory.parquet"])
-@pytest.mark.parametrize("contents", [None, b"", b"{", b"[]"])
-def test_damaged_tables_are_made_anew(tmp_path: Path, damage: str, contents: bytes | None) -> None:
+def test_damaged_tables_are_made_anew(tmp_path: Path, damage: str) -> None:
     case = make_case(run=SHORT)
     outcome = run_case(case, tmp_path)
-    result = outcome.result
-    path = outcome.directory / damage
-    if contents is None:
+    result, path = outcome.result, outcome.directory / damage
+    for contents in (None, b"", b"{", b"[]"):
         path.unlink()
-    else:
-        path.write_bytes(contents)
-    assert run_case(case, tmp_path).result == result
-    find_run(outcome.directory)
-    assert path.stat().st_size > 100
+        if contents is not None:
+            path.write_bytes(contents)
+        assert run_case(case, tmp_path).result == result
+        find_run(outcome.directory)
+        assert path.stat().st_size > 100
 
 
 @pytest.mark.parametrize("name", ["manifest.json", "case.json", "segments/0000/layout.json", "segments/0000/beads.bin"])
@@ -312,10 +273,3 @@ def test_places_that_cannot_be_written(in_folder: Path, arguments: list[str]) ->
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert done.stderr.startswith("walkers: ")
-
-
-def test_a_long_name_is_cut() -> None:
-    case = make_case().renamed("a b/" * 100)
-    name = run_name(case, find_engine())
-    assert len(name) < 100
-    assert "/" not in name

@@ -10,9 +10,12 @@ import pytest
 
 import walkers
 from tests.conftest import call
+from walkers import find_run, load_case
+from walkers import run as run_case
 from walkers.inputs.reading import shipped_cases
 from walkers.main import COMMANDS
 from walkers.runner import find_engine
+from walkers.runner.directory import run_place
 from walkers.runner.provenance import COMMIT_NAME, software
 
 
@@ -27,9 +30,12 @@ def _completed(monkeypatch: pytest.MonkeyPatch, line: str) -> list[str]:
         return call(check=True).stdout.split()
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_short_help_is_the_long_one(command: str) -> None:
-    assert call(command, "-h", check=True).stdout == call(command, "--help", check=True).stdout
+def test_help_names_every_command() -> None:
+    shown = call("--help", check=True).stdout
+    assert not set(shown) & set("╭│╰─"), "boxes are for terminals"
+    for command in COMMANDS:
+        assert f"\n  {command} " in shown
+        assert call(command, "-h", check=True).stdout == call(command, "--help", check=True).stdout
 
 
 def test_version_names_package_commit_and_engine(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -52,8 +58,9 @@ def test_version_of_a_wheel_names_the_commit_that_it_was_built_from(tmp_path: Pa
     assert told.startswith(f"granular-walkers {software().version} (commit 0123abc)\n")
 
 
-def test_the_package_is_the_program() -> None:
-    done = subprocess.run([sys.executable, "-m", "walkers", "-h"], capture_output=True, text=True, check=True)
+@pytest.mark.parametrize("module", ["walkers", "walkers.main"])
+def test_the_package_is_the_program(module: str) -> None:
+    done = subprocess.run([sys.executable, "-m", module, "-h"], capture_output=True, text=True, check=True)
     assert done.stdout == call("--help", check=True).stdout
     assert done.stdout.startswith("Usage: walkers ")
 
@@ -102,3 +109,22 @@ def test_an_input_of_another_kind_is_told_with_its_command(looked_through: Path,
         assert done.returncode == 2
         assert told in done.stderr
     assert json.loads(call("show", str(case), "--json", check=True).stdout)
+
+
+def test_sweeps_are_found_in_another_folder_of_runs(looked_through: Path, in_folder: Path) -> None:
+    out = ("--out", str(looked_through))
+    assert call("status", "grid", *out, check=True).stdout.startswith("grid: 6 points, 6 finished")
+    assert call("table", "grid", *out, "--csv", check=True).stdout.count("\n") == 7
+    done = call("climb", "grid", *out)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert f"{looked_through / 'grid'}: expected a finished run of a pile" in done.stderr
+
+
+def test_a_folder_does_not_shadow_the_run_of_the_case_that_it_is_named_like(in_folder: Path) -> None:
+    call("deck", "fig1b", "--to", "fig1b", check=True)
+    place = run_case(load_case("fig1b", {"run.cycles": 6, "run.settling_cycles": 2}), in_folder / "short").directory
+    told = call("result", "fig1b")
+    assert "no finished run in runs; first do: walkers run fig1b" in told.stderr
+    engine, case = find_engine(), load_case("fig1b")
+    shutil.copytree(place, run_place(case, engine, Path("runs")))
+    assert find_run("fig1b").directory == run_place(case, engine, Path("runs"))

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import typer
 
-from walkers.pipeline import DEFAULT_OUT
+from walkers.pipeline import DEFAULT_OUT, RECORDS
 
 _RUN = re.compile(r".+-[0-9a-f]{12}")
-_RECORD, _MANIFEST = "sweep.json", "manifest.json"
+_RECORD, _MANIFEST = RECORDS["sweep"], RECORDS["run"]
 
 
 def cases(incomplete: str) -> list[str]:

@@ -16,53 +16,29 @@ from typing import Annotated, Any, BinaryIO, NoReturn, TextIO
 
 import typer
 
-COMMANDS = (
-    *("show", "deck", "run", "result", "plot", "render", "film", "vtk", "paraview", "export", "theory"),
-    *("sweep", "status", "table", "climb", "compare", "list", "clean", "report", "verify", "archive"),
-    *("figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"),
-)
-"""Each the function ``command`` of a module of `walkers.commands`, in the order of ``walkers --help``."""
-
+COMMANDS = {
+    **{"show": "look", "deck": "make", "run": "make"},
+    **dict.fromkeys(("result", "plot", "render", "film", "vtk", "paraview", "export", "theory"), "look"),
+    **{"sweep": "make", "status": "look", "table": "look", "climb": "look", "compare": "look"},
+    **dict.fromkeys(("list", "clean", "report", "verify", "archive"), "keep"),
+    **dict.fromkeys(("figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"), "make"),
+}
+"""Modules of `walkers.commands` in which the commands are functions, in the order of ``walkers --help``."""
 
 INTERRUPTED = 130
 _STDOUT = "standard output"
-_COMPLETION = "_WALKERS_COMPLETE"
-"""Variable in which a shell's completion script says what it wants."""
 
 
-class Forgiving(TextIOBase):
-    """A stream whose reader may go: what is written to it from then on goes nowhere, and nothing stops for it."""
+class _Stream(TextIOBase):
+    """Standard output or error: what the one cannot take is told by its name, what the other cannot goes nowhere."""
 
-    def __init__(self, stream: TextIO) -> None:
-        self.stream = stream
-
-    def write(self, text: str) -> int:
-        """Write a text."""
-        with suppress(OSError, ValueError):
-            return self.stream.write(text)
-        return len(text)
-
-    def flush(self) -> None:
-        """Flush the stream."""
-        with suppress(OSError, ValueError):
-            self.stream.flush()
-
-    def isatty(self) -> bool:
-        """Whether the stream is a terminal."""
-        return self.stream.isatty()
-
-    def fileno(self) -> int:
-        """Number of the stream's file."""
-        return self.stream.fileno()
+    def __init__(self, stream: TextIO, *, is_output: bool) -> None:
+        self.stream, self.is_output = stream, is_output
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
         """Of the stream."""
         return self.stream.encoding
-
-
-class Named(Forgiving):
-    """Standard output: what cannot be written there is told by its name."""
 
     @property
     def buffer(self) -> BinaryIO:
@@ -73,21 +49,30 @@ class Named(Forgiving):
         """Write a text."""
         with self._told():
             return self.stream.write(text)
+        return len(text)
 
     def flush(self) -> None:
         """Flush the stream."""
         with self._told():
             self.stream.flush()
 
+    def isatty(self) -> bool:
+        """Whether the stream is a terminal."""
+        return self.stream.isatty()
+
+    def fileno(self) -> int:
+        """Number of the stream's file."""
+        return self.stream.fileno()
+
     @contextmanager
     def _told(self) -> Iterator[None]:
         try:
             yield
-        except BrokenPipeError:
-            raise
-        except OSError as error:
-            error.filename = _STDOUT
-            raise
+        except (OSError, ValueError) as error:
+            if isinstance(error, OSError) and not isinstance(error, BrokenPipeError):
+                error.filename = _STDOUT
+            if self.is_output:
+                raise
 
 
 class _Terminated(BaseException):
@@ -128,18 +113,10 @@ def _open_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    sys.stdout, sys.stderr = Named(sys.stdout), Forgiving(sys.stderr)
+    sys.stdout, sys.stderr = _Stream(sys.stdout, is_output=True), _Stream(sys.stderr, is_output=False)
 
 
-def _show_warning(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
-    del category, filename, lineno, file, line
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
     print(f"walkers: warning: {message}", file=sys.stderr)
 
 
@@ -147,9 +124,7 @@ def _status(arguments: list[str] | None) -> int:
     """Run the program: its exit status. What is not known to happen is raised."""
     try:
         _check_words(sys.argv[1:] if arguments is None else arguments)
-        outcome: Any = _program(_words() if arguments is None else arguments)(
-            arguments, standalone_mode=False, prog_name="walkers"
-        )
+        outcome: Any = _program()(arguments, standalone_mode=False, prog_name="walkers")
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
         return _told(stop)
@@ -169,8 +144,7 @@ def _check_words(words: list[str]) -> None:
             check_utf8(word)
 
 
-def _program(arguments: list[str]) -> typer.Typer:
-    """The program with the command that is asked for, which need not wait for the others; else with all of them."""
+def _program() -> typer.Typer:
     program = typer.Typer(
         name="walkers",
         help="Wet granular walkers, simulated with LIGGGHTS.",
@@ -181,16 +155,11 @@ def _program(arguments: list[str]) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     program.callback()(_options)
-    for name in set(arguments[:1]).intersection(COMMANDS) or COMMANDS:
-        command = import_module(f"walkers.commands.{name.replace('-', '_')}").command
+    for name, module in COMMANDS.items():
+        function = "list_" if name == "list" else name.replace("-", "_")
+        command = getattr(import_module(f"walkers.commands.{module}"), function)
         program.command(name=name, short_help=command.__doc__)(command)
     return program
-
-
-def _words() -> list[str]:
-    """What was typed after the program's name, also where a shell asks how it may go on."""
-    typed = os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS")
-    return typed.split()[1:] if typed and _COMPLETION in os.environ else sys.argv[1:]
 
 
 def _show_version(wanted: bool) -> None:

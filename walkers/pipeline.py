@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import threading
 import warnings
-from collections.abc import Callable, Sequence
-from contextlib import nullcontext, suppress
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from walkers.inputs.errors import InputError, Problem, WalkersError, check_utf8
 from walkers.notebook import Pictures
@@ -25,7 +25,10 @@ if TYPE_CHECKING:
     from walkers.runner.launch import Progress
     from walkers.sweeps.comparison import Side
 
+Kind = Literal["run", "sweep", "calibration", "archive", "folder"]
 DEFAULT_OUT = Path("runs")
+RECORDS: dict[Kind, str] = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}
+"""Files by which directories are known, without the imports of those that write them."""
 
 
 @dataclass(frozen=True)
@@ -228,8 +231,7 @@ def run(
     binary = find_engine(engine)
     place = run_place(case, binary, out)
     if finished_run(place) is not None and not force:
-        _check_described(place)
-        _check_result(place)
+        _check(place, dumps=False)
         return Run(place, origins=case.origins)
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
@@ -258,6 +260,72 @@ def _load_postprocess() -> None:
     import walkers.postprocess.walking  # noqa: F401
 
 
+_NO_RUN = {
+    "folder": "not a finished run: expected a folder with a manifest.json",
+    "calibration": "a calibration's outcome: walkers report takes it",
+    "sweep": "a sweep's directory: walkers plot, table and status take it, this takes one of its runs",
+    "archive": "an archive: unpack it and give a run or a sweep in it; walkers verify takes it as it is",
+}
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where something is that a user named, what it is, and the case by which it was found, if it was by one."""
+
+    path: Path
+    kind: Kind
+    case: Case | None = None
+
+
+def locate(what: Case | str | Path, out: Path = DEFAULT_OUT) -> Place:
+    """Find what a user names; nothing in it is read or made anew.
+
+    Parameters
+    ----------
+    what
+        A directory, or its name in ``out`` (of a run alone or in an ensemble); a zip file; or a case (resolved, file or
+        shipped name), whose finished run with the installed engine is looked up there.
+    out
+        Folder of the run directories.
+
+    Raises
+    ------
+    InputError
+        If there is no such thing, or a case has no finished run.
+    runner.EngineFailure
+        If a case is given and there is no engine to look its run up for.
+    """
+    from walkers.inputs.reading import load_case
+
+    if isinstance(what, (str, Path)):
+        if (there := _placed(what, out)) is not None:
+            return there
+        case = load_case(what)
+    else:
+        case = what
+    run = _run_of(case, out)
+    if run is None:
+        name = what if isinstance(what, (str, Path)) else case.name
+        raise InputError(str(name), [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
+    return Place(run, "run", case)
+
+
+def _placed(name: str | Path, out: Path) -> Place | None:
+    """What there is of a name, but for the runs of cases: a folder shadows no shipped case by its name alone."""
+    from walkers.inputs.reading import shipped_cases
+
+    path = Path(name)
+    for place in (path, out / path):
+        for kind, file in RECORDS.items():
+            if (place / file).is_file():
+                return Place(place, kind)
+    if (run := _named(name, out)) is not None:
+        return Place(run, "run")
+    if path.suffix == ".zip" and path.is_file():
+        return Place(path, "archive")
+    return Place(path, "folder") if path.is_dir() and str(name) not in shipped_cases() else None
+
+
 def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     """Find a finished run.
 
@@ -276,59 +344,11 @@ def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     runner.EngineFailure
         If a case is given and there is no engine to look it up for.
     """
-    from walkers.runner.directory import finished_run
-
-    place, case = _found(run, out)
-    if finished_run(place) is None:
-        told = "not a finished run: expected a folder with a manifest.json"
-        if find_sweep(place) is not None:
-            told = "a sweep's directory: walkers plot, table and status take it, this takes one of its runs"
-        raise InputError(str(run), [Problem("", None, told)])
-    return replace(_readable(place), origins=None if case is None else case.origins)
-
-
-def place_of(run: Case | str | Path, out: Path = DEFAULT_OUT, *, archives: bool = False) -> Path:
-    """Where something is: a directory as it is, for a case that of its finished run with the installed engine.
-
-    Nothing in it is read or made anew.
-
-    Parameters
-    ----------
-    run, out
-        As for `find_run`; a sweep's name too.
-    archives
-        Take a zip file for what it is, not for a case.
-
-    Raises
-    ------
-    InputError
-        If a case is given and has no finished run.
-    """
-    if archives and isinstance(run, (str, Path)) and Path(run).suffix == ".zip" and Path(run).is_file():
-        return Path(run)
-    return _found(run, out)[0]
-
-
-def _found(run: Case | str | Path, out: Path) -> tuple[Path, Case | None]:
-    """Where something is (`place_of`), and the case by which it was found; None of what was found by its place."""
-    from walkers.inputs.reading import load_case
-
-    name = str(run) if isinstance(run, (str, Path)) else run.name
-    if isinstance(run, (str, Path)):
-        path = Path(run)
-        if path.is_dir():
-            return path, None
-        if path.suffix == ".zip" and path.is_file():
-            told = "an archive: unpack it and give a run or a sweep in it; walkers verify takes it as it is"
-            raise InputError(name, [Problem("", None, told)])
-        named = _named(run, out) or (find_sweep(run, out) if not path.is_file() else None)
-        if named is not None:
-            return named, None
-        run = load_case(run)
-    there = _run_of(run, out)
-    if there is None:
-        raise InputError(name, [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
-    return there, run
+    place = locate(run, out)
+    if place.kind != "run":
+        raise InputError(str(run), [Problem("", None, _NO_RUN[place.kind])])
+    _check(place.path)
+    return Run(place.path, origins=None if place.case is None else place.case.origins)
 
 
 def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:
@@ -365,20 +385,7 @@ def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:
 
 def find_sweep(sweep: str | Path, out: Path = DEFAULT_OUT) -> Path | None:
     """The directory of a sweep, given itself or its name in the folder ``out``; None if there is none."""
-    from walkers.sweeps.record import RECORD_NAME
-
-    return _with_record(RECORD_NAME, sweep, out)
-
-
-def find_calibration(calibration: str | Path, out: Path = DEFAULT_OUT) -> Path | None:
-    """As `find_sweep`, of the directory of a calibration's outcome."""
-    from walkers.calibration.report import RECORD_NAME
-
-    return _with_record(RECORD_NAME, calibration, out)
-
-
-def _with_record(record: str, name: str | Path, out: Path) -> Path | None:
-    return next((path for path in (Path(name), out / name) if (path / record).is_file()), None)
+    return next((path for path in (Path(sweep), out / sweep) if (path / RECORDS["sweep"]).is_file()), None)
 
 
 def _named(run: str | Path, out: Path) -> Path | None:
@@ -391,54 +398,50 @@ def _named(run: str | Path, out: Path) -> Path | None:
 def _run_of(case: Case, out: Path) -> Path | None:
     """The directory of a case's finished run with the installed engine."""
     from walkers.runner.binary import find_engine
-    from walkers.runner.directory import finished_run, run_place
+    from walkers.runner.directory import run_name
 
-    place = run_place(case, find_engine(), out)
-    return place if finished_run(place) else None
-
-
-def _readable(directory: Path) -> Run:
-    """The run, if its description can be read; its tables are made anew if need be."""
-    from walkers.runner.directory import layout_of
-
-    run = _check_described(directory)
-    left_out = run.manifest.get("left_out", ())  # of an archive
-    for segment in run.segments:
-        layout = layout_of(segment)
-        dump = segment / layout.bead_dump
-        if dump.relative_to(directory).as_posix() in left_out:
-            continue
-        if not dump.is_file():
-            raise InputError(str(directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
-        if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
-            told = f"{dump} is incomplete: what is drawn or written ends early"
-            warnings.warn(told, IncompleteRunWarning, stacklevel=3)
-    _check_result(directory)
-    return Run(directory)
+    return _named(run_name(case, find_engine()), out)
 
 
-def _check_described(directory: Path) -> FinishedRun:
-    """Refuse a finished run whose manifest, case or layout cannot be read."""
+def _check(directory: Path, *, dumps: bool = True) -> None:
+    """Refuse a finished run that cannot be read; its tables are made anew if need be."""
+    from walkers.postprocess.analysis import current_result
     from walkers.runner.directory import FinishedRun
 
     run = FinishedRun(directory)
     for name in ("manifest", "case", "layout"):
-        try:
+        with _told(directory, f"the run's {name}.json cannot be read"):
             getattr(run, name)
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            problem = Problem("", None, f"the run's {name}.json cannot be read ({error})")
-            raise InputError(str(directory), [problem]) from error
-    return run
-
-
-def _check_result(directory: Path) -> None:
-    """Refuse a finished run that has no result, and none can be made."""
-    from walkers.postprocess.analysis import current_result
-
-    try:
+    if dumps:
+        _check_dumps(run)
+    with _told(directory, "the run cannot be read"):
         current_result(directory)
-    except (OSError, ValueError, KeyError, TypeError, IndexError, WalkersError) as error:
-        raise InputError(str(directory), [Problem("", None, f"the run cannot be read ({error})")]) from error
+
+
+@contextmanager
+def _told(directory: Path, message: str) -> Iterator[None]:
+    """Turn what a damaged file leads to into one message of bad input."""
+    try:
+        yield
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, WalkersError) as error:
+        raise InputError(str(directory), [Problem("", None, f"{message} ({error})")]) from error
+
+
+def _check_dumps(run: FinishedRun) -> None:
+    """Refuse a run without a dump that no archive left out; warn of one that was cut."""
+    from walkers.runner.directory import layout_of
+
+    left_out = run.manifest.get("left_out", ())  # of an archive
+    for segment in run.segments:
+        layout = layout_of(segment)
+        dump = segment / layout.bead_dump
+        if dump.relative_to(run.directory).as_posix() in left_out:
+            continue
+        if not dump.is_file():
+            raise InputError(str(run.directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
+        if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
+            told = f"{dump} is incomplete: what is drawn or written ends early"
+            warnings.warn(told, IncompleteRunWarning, stacklevel=4)
 
 
 class IncompleteRunWarning(UserWarning):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from walkers.pipeline import DEFAULT_OUT, find_calibration, find_run, find_sweep
+from walkers.pipeline import DEFAULT_OUT, find_run, locate
 
 
 def report(what: str | Path, to: Path | None = None, out: Path = DEFAULT_OUT) -> Path:
@@ -40,8 +40,9 @@ def report(what: str | Path, to: Path | None = None, out: Path = DEFAULT_OUT) ->
 
     if to is not None:
         check_report(to)
-    if (calibration := find_calibration(what, out)) is not None:
-        return report_calibration(calibration, to)
-    if (sweep := find_sweep(what, out)) is not None:
-        return report_sweep(sweep, to)
+    place = locate(what, out)
+    if place.kind == "calibration":
+        return report_calibration(place.path, to)
+    if place.kind == "sweep":
+        return report_sweep(place.path, to)
     return find_run(what, out).report(to)

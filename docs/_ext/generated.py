@@ -27,7 +27,7 @@ from walkers.sweeps.columns import derived_columns, result_columns
 from walkers.sweeps.table import STATE
 
 INPUTS = Path(walkers.inputs.__file__).parent
-program = _program([])
+program = _program()
 """The program with all of its commands, for the directive ``typer`` of reference/commands.rst."""
 
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}

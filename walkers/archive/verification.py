@@ -263,13 +263,13 @@ class _Archive:
 
     def _agrees(self, place: str, total: object, size: object) -> bool:
         same_size = place not in self.sizes or str(size) == str(self.sizes[place])
-        return place in self.wanted and total in (None, self.wanted[place]) and same_size
+        return place in self.wanted and total == self.wanted[place] and same_size
 
 
 def _said_by_manifest(folder: str, listed: Listed) -> dict[str, tuple[object, object]]:
-    """Checksums (None in older manifests) and sizes of a run's files, by their places in the archive."""
+    """Checksums and sizes of a run's files, by their places in the archive."""
     return {
-        f"{folder}{name}": (None if listed.sums is None else str(listed.sums.get(name)), listed.sizes.get(name))
+        f"{folder}{name}": (str(listed.sums.get(name)), listed.sizes.get(name))
         for name in listed.names
         if name not in listed.left_out
     }

@@ -1,1 +1,1 @@
-"""The commands, one a module: each a few lines around functions that can be called from Python."""
+"""The commands: each a few lines around functions that can be called from Python."""

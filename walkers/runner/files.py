@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -57,29 +56,8 @@ def json_object(name: str, text: str) -> dict[str, Any]:
 
 
 def write_json(path: Path, contents: Mapping[str, Any], *, at_once: bool = True) -> None:
-    """Write a JSON object; not at once if the directory is put on the disk later, as a whole (`settle`)."""
+    """Write a JSON object; not put on the disk at once if all is later (``sync``), in a hundredth of the time."""
     write_bytes(path, (json.dumps(contents, indent=2, ensure_ascii=False) + "\n").encode("utf-8"), at_once=at_once)
-
-
-def settle(directory: Path) -> None:
-    """Put a directory and all that is in it on the disk, so that its new name outlives a loss of power."""
-    if _sync_file_system(directory):  # a hundredth of the time that its files take one by one
-        return
-    for folder, _, names in os.walk(directory):
-        for entry in [Path(folder) / name for name in names] + [Path(folder)]:
-            fsync_path(entry)
-
-
-def _sync_file_system(directory: Path) -> bool:
-    """Put all of a file system on the disk, where the C library can (Linux); whether it has."""
-    sync = getattr(ctypes.CDLL(None), "syncfs", None)
-    if sync is None:
-        return False
-    descriptor = os.open(directory, os.O_RDONLY)
-    try:
-        return bool(sync(descriptor) == 0)
-    finally:
-        os.close(descriptor)
 
 
 def fsync_path(path: Path) -> None:

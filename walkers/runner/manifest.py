@@ -117,7 +117,7 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     Returns
     -------
     bool
-        Whether nothing is left to be said of them; of an unfinished run, or one older than checksums, nothing is said.
+        Whether nothing is left to be said of them; of an unfinished run nothing is said.
 
     Raises
     ------
@@ -127,17 +127,21 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
         If the manifest, or a file, cannot be read.
     """
     try:
-        sums = read_json(directory / MANIFEST_NAME).get("sha256")
+        contents = read_json(directory / MANIFEST_NAME)
     except FileNotFoundError:
         return True
-    if not isinstance(sums, dict):
-        return True
-    wanted = {name: sums[name] for name in names if name in sums}
+    wanted = {name: one for name, one in _sums(contents, directory).items() if name in names}
     for name, now in checksums(directory, wanted).items():
         if now != wanted[name]:
             told = "is not what it was when the run was finished; what else is not: walkers verify"
             raise FileChanged(f"{directory / name} {told} {directory}")
     return len(wanted) == len(names)
+
+
+def _sums(contents: dict[str, Any], directory: Path) -> dict[str, str]:
+    if not isinstance(sums := contents.get("sha256"), dict):
+        raise ValueError(f"{directory / MANIFEST_NAME}: expected a table sha256")
+    return sums
 
 
 def record_tables(directory: Path, names: Iterable[str]) -> None:
@@ -152,32 +156,25 @@ def record_tables(directory: Path, names: Iterable[str]) -> None:
     names
         Of the files.
     """
-    path = directory / MANIFEST_NAME
-    if not path.is_file():
+    if not (directory / MANIFEST_NAME).is_file():
         return
-    contents = read_json(path)
+    contents = read_json(directory / MANIFEST_NAME)
     sums = checksums(directory, names)
     contents.setdefault("files", {}).update({name: (directory / name).stat().st_size for name in sums})
-    if "sha256" in contents:  # else one of a time when there were none: of these files alone they would mislead
-        contents["sha256"].update(sums)
-    contents["tabulated"] = {
-        **_made_by(),
-        "date": _iso(time.time()),
-        "files": list(sums),
-    }
-    write_json(path, contents)
+    _sums(contents, directory).update(sums)
+    contents["tabulated"] = {**_made_by(), "date": _iso(time.time()), "files": list(sums)}
+    write_json(directory / MANIFEST_NAME, contents)
 
 
 def forget_tables(directory: Path, names: Collection[str]) -> None:
     """Say no more in the manifest of a finished run what files are that are about to be made anew."""
-    path = directory / MANIFEST_NAME
-    if not path.is_file():
+    if not (directory / MANIFEST_NAME).is_file():
         return
-    contents = read_json(path)
-    sums = contents.get("sha256")
-    if isinstance(sums, dict) and not sums.keys().isdisjoint(names):
+    contents = read_json(directory / MANIFEST_NAME)
+    sums = _sums(contents, directory)
+    if not sums.keys().isdisjoint(names):
         contents["sha256"] = {name: one for name, one in sums.items() if name not in names}
-        write_json(path, contents)
+        write_json(directory / MANIFEST_NAME, contents)
 
 
 def _made_by() -> dict[str, Any]:

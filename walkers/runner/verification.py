@@ -45,8 +45,6 @@ class Verification:
         Lists that are what they were, and too large to be compared with the others, each with the reason in brackets.
     left_out
         How many were left out of an archive on purpose.
-    by_size
-        Whether only sizes could be compared, the run being older than checksums are.
     of_points
         Whether it is a sweep's: of its points rather than of files.
     """
@@ -60,7 +58,6 @@ class Verification:
     since: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
     left_out: int = 0
-    by_size: bool = False
     of_points: bool = False
 
     @property
@@ -71,19 +68,13 @@ class Verification:
     def describe(self) -> str:
         """The outcome, and a line for each file that is not what it was, or is not listed."""
         told = f"{self.name}: {self.intact} {'points have their run' if self.of_points else 'files are what they were'}"
-        if self.by_size:
-            told += " by their sizes (the run is older than checksums)"
         if self.left_out:
             told += f", {self.left_out} left out of the archive"
-        lines = [
-            *_lines("changed", self.changed),
-            *_lines("missing", self.missing),
-            *_lines("not listed", self.unlisted),
-            *_lines("doubtful", self.doubtful),
-            *_lines("not read", self.unread),
-            *_lines("made since", _by_folder(self.since)),
-        ]
-        return "\n".join([told, *lines])
+        kinds = {
+            **{"changed": self.changed, "missing": self.missing, "not listed": self.unlisted},
+            **{"doubtful": self.doubtful, "not read": self.unread, "made since": _by_folder(self.since)},
+        }
+        return "\n".join([told, *(line for word, names in kinds.items() for line in _lines(word, names))])
 
 
 def _lines(word: str, names: Collection[str]) -> list[str]:
@@ -99,13 +90,9 @@ def _shown(name: str) -> str:
 
 def _by_folder(names: Iterable[str]) -> list[str]:
     """Files of the same folder as one, but those of the topmost: ``vtk`` holds one a frame."""
-    names = list(names)
-    count = Counter(name.rpartition("/")[0] for name in names)
-    told = (
-        f"{folder}/ ({count[folder]} files)" if folder and count[folder] > 1 else name
-        for name in names
-        for folder in [name.rpartition("/")[0]]
-    )
+    folders = {name: name.rpartition("/")[0] for name in names}
+    count = Counter(folders.values())
+    told = (f"{one}/ ({count[one]} files)" if one and count[one] > 1 else name for name, one in folders.items())
     return list(dict.fromkeys(told))
 
 
@@ -152,7 +139,11 @@ def files_below(folder: Path, without: Collection[str] = ()) -> list[str]:
         If a folder cannot be read.
     """
     found: list[str] = []
-    for place, folders, names in os.walk(folder, onerror=_raise):
+
+    def fail(error: OSError) -> NoReturn:
+        raise error
+
+    for place, folders, names in os.walk(folder, onerror=fail):
         here = Path(place)
         if here == folder:
             folders[:] = [name for name in folders if name not in without]
@@ -161,10 +152,6 @@ def files_below(folder: Path, without: Collection[str] = ()) -> list[str]:
         if here != folder and not names and not folders:
             found.append(f"{here.relative_to(folder).as_posix()}/")
     return sorted(found)
-
-
-def _raise(error: OSError) -> NoReturn:
-    raise error
 
 
 @dataclass(frozen=True)
@@ -176,7 +163,7 @@ class Listed:
     sizes
         Of the files, bytes.
     sums
-        Their SHA-256; None in manifests that are older than checksums.
+        Their SHA-256.
     left_out
         Those that an archive was made without.
     case_file
@@ -184,18 +171,14 @@ class Listed:
     """
 
     sizes: Mapping[str, Any]
-    sums: Mapping[str, Any] | None
+    sums: Mapping[str, Any]
     left_out: frozenset[str]
     case_file: str
 
     @property
     def names(self) -> list[str]:
         """Of all files that it lists."""
-        return list(dict.fromkeys([*self.sizes, *(self.sums or ())]))
-
-    def is_at_odds(self, name: str) -> bool:
-        """Whether only one of its two lists has a file."""
-        return self.sums is not None and (name in self.sizes) != (name in self.sums)
+        return list(dict.fromkeys([*self.sizes, *self.sums]))
 
 
 def listed_by(manifest: Mapping[str, Any]) -> Listed:
@@ -206,13 +189,12 @@ def listed_by(manifest: Mapping[str, Any]) -> Listed:
     ValueError, TypeError, AttributeError
         If it is no manifest, or names what is not below its folder.
     """
-    lacking = [key for key in ("name", "files") if key not in manifest]
+    lacking = [key for key in ("name", "files", "sha256") if key not in manifest]
     if lacking:
         raise ValueError(f"expected the key {lacking[0]}")
-    sums = manifest.get("sha256")
     listed = Listed(
         {**manifest["files"]},
-        None if sums is None else {**sums},
+        {**manifest["sha256"]},
         frozenset(manifest.get("left_out", ())),
         f"{manifest['name']}.toml",
     )
@@ -245,15 +227,14 @@ def verify_run(directory: Path) -> Verification:
 
 
 def _verified(run: str, directory: Path, listed: Listed) -> Verification:
-    names, sums = listed.names, listed.sums
-    there = [name for name in names if (directory / name).is_file()]
-    sizes = {name: (directory / name).stat().st_size for name in there}
-    whole = [name for name in there if sizes[name] == listed.sizes.get(name, sizes[name])]
+    names, sizes, sums = listed.names, listed.sizes, listed.sums
+    there = {name: (directory / name).stat().st_size for name in names if (directory / name).is_file()}
     # What has another size is not read: it may be of any size by now.
-    now = {} if sums is None else checksums(directory, [name for name in whole if name in sums])
-    changed = {name for name in there if name not in whole or (name in now and sums and now[name] != sums[name])}
-    odd = [name for name in names if listed.is_at_odds(name)]
-    gone = [name for name in names if name not in sizes and name not in listed.left_out]
+    whole = [name for name, size in there.items() if size == sizes.get(name, size)]
+    now = checksums(directory, [name for name in whole if name in sums])
+    changed = {name for name in there if name not in whole or (name in now and now[name] != sums[name])}
+    odd = [name for name in names if (name in sizes) != (name in sums)]
+    gone = [name for name in names if name not in there and name not in listed.left_out]
     if CASE_NAME not in names and not (directory / CASE_NAME).is_file():
         gone.append(CASE_NAME)
     known = {*names, MANIFEST_NAME}
@@ -261,12 +242,11 @@ def _verified(run: str, directory: Path, listed: Listed) -> Verification:
     since = [name for name in others if made_since(name) or name == listed.case_file]
     return Verification(
         name=run,
-        intact=len(set(there) - changed - set(odd)),
+        intact=len(there.keys() - changed - set(odd)),
         changed=tuple(name for name in there if name in changed),
         missing=tuple(gone),
         unlisted=tuple(name for name in others if name not in since),
         doubtful=tuple(f"{name} ({MANIFEST_NAME} has its size or its checksum, not both)" for name in odd),
         since=tuple(since),
-        left_out=len(listed.left_out.intersection(names) - set(there)),
-        by_size=sums is None,
+        left_out=len(listed.left_out.intersection(names) - there.keys()),
     )
