@@ -179,7 +179,8 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
     cases, engine = _companions(), find_engine()
     assert len({sharing_key(case) for case in cases}) == 1
     together = make_runs(cases, tmp_path / "together", engine)
-    assert len({run.directory.parent for run in together.runs.values()}) == 2  # the second has the one that went on
+    decks = [run.manifest.get("shared_deck") for run in together.runs.values()]
+    assert len({deck["first"] if deck else None for deck in decks}) == 2  # the second has the one that went on
     cycles = {}
     for case in cases:
         alone = make_runs([case], tmp_path / "alone", engine)
@@ -219,7 +220,7 @@ def test_several_drives_have_a_force_each_in_one_deck(tmp_path: Path) -> None:
     engine = find_engine()
     single = next(iter(make_runs([first], tmp_path / "single", engine).runs.values())).directory / FIRST_SEGMENT
     assert "fix             gravity" in (single / "walker.lig").read_text()
-    shared = next(iter(make_runs([first, second], tmp_path / "shared", engine).runs.values())).directory.parent
-    loads = np.loadtxt(shared / "loads.txt")
+    shared = next(iter(make_runs([first, second], tmp_path / "shared", engine).runs.values())).directory
+    loads = np.loadtxt(shared / "shared_deck" / "loads.txt")
     drives = [first.drive.peak_acceleration] * 2 + [20.0] * 2
     np.testing.assert_allclose(loads, [(number, 0, 0, -9.81, a, 0, 0) for number, a in enumerate(drives, 1)])
