@@ -26,20 +26,14 @@ class Origin:
 
     Attributes
     ----------
-    key
-        Dotted, such as ``contact.friction.bead_wall``.
-    text
-        The value as a case file would say it, with its unit.
-    origin
+    key, text
+        Dotted, such as ``contact.friction.bead_wall``, and the value as a case file would say it, with its unit.
+    origin, source
         ``given`` by the case (or beside it), from the ``library``, ``calibrated``, the ``default``, or ``derived``
-        from other values.
-    source
-        The library's, or from what it is derived.
-    range
-        Both ends between which it may lie as well, as a case would write them: of what nobody measures, unless the
-        case gives it, and of what the case calls ``uncertain``.
-    logarithmic
-        Whether the range is one of magnitudes.
+        from other values; the library's source, or from what it is derived.
+    range, logarithmic
+        Both ends between which it may lie as well, as a case would write them, and whether they are of magnitudes: of
+        what nobody measures, unless the case gives it, and of what the case calls ``uncertain``.
     uncertain
         Whether the case calls it so.
     """
