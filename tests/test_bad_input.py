@@ -102,6 +102,9 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"run": {"cycles": 20, "frames_per_second": 4.0}}, "run.frames_per_second"),
     ({"run": {"ranks": 2}}, "run.ranks = 2"),
     # Bodies and boundaries
+    ({"dimers": {"radii": None, "sin_delta": 0.2}}, "dimers.mean_radius: missing"),
+    ({"dimers": {"radii": None, "mean_radius": "0.2 mm"}}, "dimers.sin_delta: missing"),
+    ({"dimers": {"sin_delta": 0.2}}, "dimers.sin_delta = 0.2: expected either the radii or"),
     ({"dimers": {"gap": "1 um"}}, 'dimers.gap = "1 um": expected zero or less'),
     ({"dimers": {"gap": "-50 um"}}, "overlap by more than 2 %"),
     ({"dimers": {"replicates": 2, "spacing": "0.5 mm"}}, 'dimers.spacing = "0.5 mm": neighbouring walkers would touch'),
