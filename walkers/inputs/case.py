@@ -321,8 +321,10 @@ class Case:
             If it is none.
         """
         try:
-            recorded = _origins_adapter().validate_python(values.get("recorded", ()))
-            return _adapter().validate_python(values).read_from(values.get("document", {}), recorded)
+            case = _adapter().validate_python(values)
+            return case.read_from(
+                *_told_adapter().validate_python((values.get("document", {}), values.get("recorded", ())))
+            )
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
@@ -334,5 +336,5 @@ def _adapter() -> TypeAdapter[Case]:
 
 
 @cache
-def _origins_adapter() -> TypeAdapter[tuple[Origin, ...]]:
-    return TypeAdapter(tuple[Origin, ...])
+def _told_adapter() -> TypeAdapter[tuple[dict[str, Any], tuple[Origin, ...]]]:
+    return TypeAdapter(tuple[dict[str, Any], tuple[Origin, ...]])
