@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, inf, pi, prod, sqrt
 
 from walkers.inputs.case import Case
@@ -240,9 +240,9 @@ def compose(plan: Plan) -> Deck:
     """
     from walkers.templates.bridge_tables import UnusableLawError, bridge_tables
 
-    case, scene, walkers = plan.case, plan.scene, plan.walkers
+    case, scene = plan.case, plan.scene
     first = case.drive.harmonics[0]
-    layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
+    layout = _layout(plan)
     surfaces = plan.surfaces or (surface_of(case),)
     contacts = [contact for contact, _ in surfaces]
     largest = max(bead.radius for bead in scene.beads)
@@ -344,7 +344,8 @@ def fastest_of(case: Case, scene: Scene) -> float:
     return (20.0 if case.loose else 10.0) * case.drive.peak_velocity + fall + sqrt(2.0 * work / mass)
 
 
-def _layout(case: Case, scene: Scene, recording: Recording, walkers: tuple[PlacedWalker, ...]) -> Layout:
+def _layout(plan: Plan) -> Layout:
+    recording = plan.recording
     return Layout(
         bead_dump="beads.bin",
         bead_columns=recording.bead_columns,
@@ -356,8 +357,9 @@ def _layout(case: Case, scene: Scene, recording: Recording, walkers: tuple[Place
         wall_bridge_columns=recording.wall_bridge_columns,
         bridge_every=recording.bridge_every,
         bridge_frames=(recording.steps - recording.begin) // recording.bridge_every + 1,
-        atoms=len(scene.beads),
+        atoms=len(plan.scene.beads),
         steps=recording.steps,
-        time_step=case.run.time_step,
-        walkers=walkers,
+        time_step=plan.case.run.time_step,
+        walkers=plan.walkers,
+        ranks=plan.ranks,
     )
