@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import walkers
-from tests.conftest import REFERENCE, call, document, make_case, to_toml
-from walkers.inputs import InputError, resolve_case
+from tests.conftest import REFERENCE, call, make_case, to_toml
+from walkers.inputs import resolve_case
 from walkers.inputs.arrangements import ARRANGEMENTS
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads
@@ -239,16 +239,6 @@ def test_momentum_on_a_tray_is_sane(tray: walkers.Run) -> None:
     assert apart.max() < 1.1 * group.make.length  # they hold on to each other, however they turn
 
 
-def test_without_meet_a_meeting_is_a_warning_and_a_spacing_too_small_refused(tmp_path: Path) -> None:
-    close = document(dimers={"replicates": 4, "spacing": "0.6 mm"})
-    with pytest.raises(InputError, match="neighbouring walkers would touch or overlap"):
-        resolve_case(close)
-    tray = document(dimers={"replicates": 4, "spacing": "1.0 mm", "meet": True})
-    assert resolve_case(tray).meets
-    with pytest.raises(InputError, match=r"expected at least 0\.99 mm"):
-        resolve_case(document(dimers={"replicates": 4, "spacing": "0.9 mm", "meet": True}))
-
-
 def test_a_picture_of_a_tray_shows_all_walkers(tray: walkers.Run) -> None:
     from matplotlib.image import imread
 
@@ -408,80 +398,6 @@ def test_a_bead_may_lie_on_a_plane_beside_walkers_or_alone(tmp_path: Path) -> No
         assert place_of_bead[1:] == pytest.approx([-3e-3, 0.3e-3], abs=1e-6)
         assert "80 Hz" in done.describe()
     assert done.render()
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        (
-            {"clusters": [cluster("star", "Lss")]},
-            'clusters[0].arrangement = "star": expected one of chain, fan, diamond, ring',
-        ),
-        ({"clusters": [cluster("ring", "Ls")]}, "clusters[0].radii"),
-        ({"clusters": [cluster("diamond", "Lss")]}, "expected 4 beads in a diamond"),
-        (
-            {"clusters": [{"arrangement": "chain", "radii": ["0.3 mm", "0.05 mm", "0.3 mm"]}]},
-            "beads 1 and 3 would overlap in a chain",
-        ),
-        (
-            {"clusters": [{"radii": ["0.3 mm", "0.2 mm"], "at": [["0 mm", "0 mm"], ["-1 mm", "0 mm"]]}]},
-            "nothing joins this one to the first",
-        ),
-        (
-            {
-                "dimers": {"radii": ["0.5 mm", "0.2 mm"]},
-                "boundary": {"shape": "groove", "opening": "30 deg", "material": "chromium-coated glass"},
-            },
-            "so unlike beads rest at heights at which they do not touch",
-        ),
-        (
-            {
-                "dimers": {"radii": ["0.3 mm", "0.2 mm"]},
-                "boundary": {"shape": "channel", "width": "0.5 mm", "material": "chromium-coated glass"},
-            },
-            "boundary.width",
-        ),
-        ({"dimers": {"radii": ["0.3 mm", "0.2 mm"]}, "beads": {"material": "rubi"}}, 'beads.material = "rubi"'),
-        (
-            {"dimers": {"radii": ["0.3 mm", "0.2 mm"]}, "run": {"cycles": 20, "frames_per_second": 4.0}},
-            "run.frames_per_second",
-        ),
-        ({"clusters": [{"radii": ["0.3 mm", "0.2 mm"]}]}, "expected either an arrangement"),
-        ({"clusters": [cluster("fan", "L" + 12 * "s")]}, "so many beads do not fit around the first one"),
-        ({"clusters": [{"radii": ["0.3 mm", "0.2 mm"], "at": [["0 mm", "0 mm"]]}]}, "expected a place for each"),
-        (
-            {"clusters": [{"radii": ["0.3 mm", "0.2 mm"], "at": [["0 mm", "0 mm"], ["0.1 mm", "0 mm"]]}]},
-            "clusters[0].at[1]",
-        ),
-        (
-            {"clusters": [{"radii": ["0.3 mm", "0.3 mm"], "at": [["0 mm", "0.3 mm"], ["0 mm", "-0.3 mm"]]}]},
-            "this has no heading",
-        ),
-        ({"boundary": {"shape": "channel", "material": "glass"}}, "boundary.width: missing"),
-        ({"boundary": {"shape": "groove", "material": "glass"}}, "boundary.opening: missing"),
-        ({"boundary": {"width": "1 mm", "material": "glass"}}, 'boundary.width = "1 mm": expected none of a plane'),
-        (
-            {
-                "clusters": [cluster("fan", "Lss")],
-                "boundary": {"shape": "channel", "width": "0.7 mm", "material": "glass"},
-            },
-            "do not fit between the walls",
-        ),
-        ({}, "expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"),
-        ({"clusters": [cluster("chain", "Lss")], "run": {"ranks": 2}}, "run.ranks = 2"),
-    ],
-)
-def test_bodies_that_cannot_be_are_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
-    """One clear message with file, key, value and what was expected; status 2."""
-    tables = {**FIG1B, **changes}
-    clusters = "".join("[[clusters]]\n" + to_toml(table) for table in tables.pop("clusters", []))
-    file = tmp_path / "case.toml"
-    file.write_text(to_toml(tables) + clusters)
-    done = call("show", str(file))
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert "case.toml" in done.stderr
-    assert len(done.stderr.splitlines()) == 1
 
 
 def test_every_arrangement_is_told_of(tmp_path: Path) -> None:

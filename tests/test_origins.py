@@ -153,6 +153,9 @@ def test_a_case_changed_after_it_was_read_tells_nothing_of_its_values(tmp_path: 
     assert case.renamed("other").origins == case.origins
     again = Case.from_dict(json.loads(json.dumps(case.as_dict())))
     assert again.as_read
+    for damaged in ([], {**case.as_dict(), "document": 3}, {**case.as_dict(), "recorded": [{"key": 1}]}):
+        with pytest.raises(ValueError, match=":"):
+            Case.from_dict(damaged)  # type: ignore[arg-type]
     assert [one.text for one in again.origins] == [one.text for one in case.origins]
     assert replace(again, gravity=0.0).origins == ()
     with pytest.raises(InputError, match="changed after it was read"):
@@ -178,30 +181,27 @@ def test_what_is_called_uncertain_keeps_where_it_comes_from() -> None:
     assert {*ranges, "dimers.radii[1]"} < set(spread_sweep(case, 2).keys)
 
 
-def test_what_was_calibrated_with_other_liquids_is_a_guess() -> None:
+def test_what_was_calibrated_with_other_liquids_or_another_law_is_a_guess() -> None:
     oil, glycerol = (origins(load_case("fig1b", {"liquid.name": name})) for name in ("Si AK10", "glycerol 87 %"))
     assert oil["liquid.volume_fraction"].origin == "calibrated"
     fraction = glycerol["liquid.volume_fraction"]
     assert (fraction.origin, fraction.text, fraction.guessed) == ("default", "0.022", True)
     assert "Si AK5 and Si AK10" in fraction.source
     assert fraction.range == library.unmeasured()["liquid.volume_fraction"].range
+    law = origins(load_case("fig1b", {"liquid.law": "willett"}))
+    assert (law["liquid.law"].origin, law["liquid.viscosity_ratio"].origin) == ("given", "default")
+    assert law["liquid.viscosity_ratio"].guessed
 
 
 def test_settings_are_read_as_a_file_would() -> None:
-    words = [
-        "drive.frequency=70Hz",
-        "liquid.name = Si AK10",
-        "run.cycles=8",
-        "dimers.meet=false",
-        "drive.axis=[1, 0, 0]",
-    ]
-    assert settings_of(words) == {
-        "drive.frequency": "70Hz",
-        "liquid.name": "Si AK10",
-        "run.cycles": 8,
-        "dimers.meet": False,
-        "drive.axis": [1, 0, 0],
+    settings = {
+        "drive.frequency=70Hz": "70Hz",
+        "liquid.name = Si AK10": "Si AK10",
+        "run.cycles=8": 8,
+        "dimers.meet=false": False,
+        "drive.axis=[1, 0, 0]": [1, 0, 0],
     }
+    assert list(settings_of(settings).values()) == list(settings.values())
     for words, told in ((["drive.frequency"], "key=value"), (["a=1", "a=2"], "given twice")):
         with pytest.raises(InputError) as caught:
             settings_of(words)
@@ -306,9 +306,3 @@ def test_spread_on_the_command_line(in_folder: Path) -> None:
     assert "(5 to 95 %)" in told
     assert read_toml(in_folder / "glass.toml") == GLASS
     assert call("run", "fig1b", "--points", "2").returncode == 2
-
-
-def test_what_was_calibrated_with_another_law_is_a_guess() -> None:
-    of = origins(load_case("fig1b", {"liquid.law": "willett"}))
-    assert (of["liquid.law"].origin, of["liquid.viscosity_ratio"].origin) == ("given", "default")
-    assert of["liquid.viscosity_ratio"].guessed

@@ -19,10 +19,7 @@ _TOO_SMALL = "a bead is too small to touch two that touch each other"
 
 @dataclass(frozen=True)
 class Arrangement:
-    """Which beads touch, given how many there are, and where they stand, given their radii and `Apart`.
-
-    ``fewest`` and ``most`` bound the number of beads, ``meaning`` is what the documents say of it.
-    """
+    """Which beads touch, of so many (``fewest`` to ``most``), and where they stand, given their radii and `Apart`."""
 
     pairs: Callable[[int], Pairs]
     places: Callable[[Sequence[float], Apart], Places]

@@ -192,12 +192,10 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
 
     Parameters
     ----------
-    method
-        ``sobol``, ``halton`` or ``latin-hypercube``.
+    method, seed
+        ``sobol``, ``halton`` or ``latin-hypercube``, and the seed of its scrambling.
     points
         How many; a power of two suits Sobol's sequence.
-    seed
-        Of the sampler's scrambling.
     ranges
         For each key ``{ uniform = [low, high] }`` or ``{ loguniform = [low, high] }``.
     """
@@ -207,9 +205,8 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
     if not ends:
         raise UnusableKeyError("sample.ranges", "expected keys and their ranges", dict(ranges))
     columns = []
-    for share, (low, high, unit, logarithmic) in zip(
-        unit_cube(method, len(ends), points, seed).T, ends.values(), strict=True
-    ):
+    shares = unit_cube(method, len(ends), points, seed).T
+    for share, (low, high, unit, logarithmic) in zip(shares, ends.values(), strict=True):
         numbers = np.exp(log(low) + share * log(high / low)) if logarithmic else low + share * (high - low)
         columns.append([written(float(number), unit) for number in numbers])
     return Axis(tuple(ends), tuple(zip(*columns, strict=True)))
@@ -250,14 +247,7 @@ def unit_cube(method: str, dimensions: int, points: int, seed: int) -> npt.NDArr
 
 
 def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Value, ...]]]:
-    """All combinations of the axes' points, the last axis running fastest.
-
-    Returns
-    -------
-    keys
-        Of all axes.
-    rows
-        For each combination one value a key.
+    """The keys of all axes, and for each combination of their points, the last axis running fastest, one value a key.
 
     Raises
     ------

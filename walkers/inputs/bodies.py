@@ -37,16 +37,9 @@ class StandingBead:
 
 @dataclass(frozen=True)
 class Standing:
-    """Beads that start together.
+    """Beads that start together, relative to the walker's place, which the deck chooses, or else to the boundary.
 
-    Attributes
-    ----------
-    beads
-        Relative to the walker's place, which the deck chooses; of what is no walker, to the boundary.
-    facing, angle
-        +1 along the drive axis or −1, and the angle to that (rad); 0 and 0 of what is no walker.
-    walks
-        Whether it is a walker.
+    ``facing`` is +1 along the drive axis or −1, and ``angle`` that to it (rad); 0 and 0 of what is no walker.
     """
 
     beads: tuple[StandingBead, ...]
@@ -61,22 +54,16 @@ class Walkers:
 
     Attributes
     ----------
-    radii
-        Of the beads of each, m.
-    arrangement
-        How they stand (`walkers.inputs.arrangements`), or ``given``: at ``places`` (m).
-    replicates
-        How many.
+    radii, arrangement, places
+        Of the beads of each, m; how they stand (`walkers.inputs.arrangements`), or ``given``: at places (m).
+    replicates, spacing, meet
+        How many, how far from one to the next, m; whether they are meant to meet, or are replicates that must not.
     facing
         Where they are to face: along the drive axis (right), against it (left), or every other one (both).
     angle, angle_spread
         From there at the start, and how far each may be off, rad.
     gap, gap_spread
         Of all contacts at the start (m, negative: touching; None: where forces balance), and its relative spread.
-    spacing
-        From one to the next, m.
-    meet
-        Whether they are meant to meet; else they are replicates that must not.
     """
 
     radii: tuple[float, ...]
@@ -162,7 +149,7 @@ class Walkers:
         many = (sum(large), len(large) - sum(large))
         weights = tuple(1.0 / many[0] if is_large else -1.0 / many[1] for is_large in large)
         lever = [
-            sum(weight * place[axis] for weight, place in zip(weights, self.design, strict=True)) for axis in (0, 1)
+            sum(weight * x for weight, x in zip(weights, axis, strict=True)) for axis in zip(*self.design, strict=True)
         ]
         return weights if hypot(*lever) > _LEAST_LEVER * self.length else self.front
 
@@ -221,12 +208,8 @@ def _beside(one: float, other: float) -> list[tuple[float, list[float]]]:
 class Mixture:
     """Beads of two size classes, mixed and poured.
 
-    Attributes
-    ----------
-    small, large
-        Radii of either class, m, each occurring equally often (the engine is given no distributions).
-    counts
-        Number of small and of large beads.
+    ``small`` and ``large`` are the radii of either class, m, each occurring equally often (the engine is given no
+    distributions), ``counts`` the number of small and of large beads.
     """
 
     small: tuple[float, ...]

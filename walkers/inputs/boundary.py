@@ -80,12 +80,8 @@ class Span:
     largest: float
 
 
-@dataclass(frozen=True)
-class Room:
-    """Corners of the simulation box, m."""
-
-    lower: Vector
-    upper: Vector
+Room = tuple[Vector, Vector]
+"""Lower and upper corner of the simulation box, m."""
 
 
 @dataclass(frozen=True)
@@ -105,14 +101,8 @@ class Layer:
 class Boundary:
     """A boundary of a material, leaning or not.
 
-    Attributes
-    ----------
-    material
-        Name.
-    tilt
-        Angle of the floor to the horizontal, rad: 0 level, π/2 a wall.
-    uphill
-        Direction of the steepest way up within the floor, rad from its x axis toward y.
+    ``tilt`` is the angle of the floor to the horizontal (rad: 0 level, π/2 a wall), ``uphill`` the direction of the
+    steepest way up within the floor (rad, from its x axis toward y).
     """
 
     material: str
@@ -190,11 +180,9 @@ class Plane(Boundary):
 
     def room(self, span: Span) -> Room:
         """A box about the ways of all walkers."""
-        half_x, half_y, margin, height = span.half_x, span.half_y, span.margin, span.height
-        return Room(
-            lower=(-half_x - 2.0 * margin, -half_y - 2.0 * margin, -margin),
-            upper=(half_x + 2.0 * margin, half_y + 2.0 * margin, height + 2.0 * margin),
-        )
+        wide = 2.0 * span.margin
+        x, y = span.half_x + wide, span.half_y + wide
+        return (-x, -y, -span.margin), (x, y, span.height + wide)
 
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
         """A square grid about the origin."""
@@ -214,13 +202,7 @@ class _Row(Boundary):
 
 @dataclass(frozen=True, kw_only=True)
 class Channel(_Row):
-    """A floor between two upright walls, without end along x.
-
-    Attributes
-    ----------
-    width
-        Between the walls, m.
-    """
+    """A floor between two upright walls, ``width`` (m) apart, without end along x."""
 
     width: float
     shape: Literal["channel"] = "channel"
@@ -244,13 +226,7 @@ class Channel(_Row):
 
 @dataclass(frozen=True, kw_only=True)
 class Groove(_Row):
-    """A V-shaped channel: two walls that meet in the x axis, without end along it.
-
-    Attributes
-    ----------
-    opening
-        Angle between the walls, rad.
-    """
+    """A V-shaped channel: two walls that meet in the x axis, without end along it; ``opening`` is their angle (rad)."""
 
     opening: float
     shape: Literal["groove"] = "groove"
@@ -278,14 +254,9 @@ class Groove(_Row):
 
 @dataclass(frozen=True, kw_only=True)
 class Container(Boundary):
-    """An upright container, open above, its floor about the origin.
+    """An upright container, open above, its floor about the origin; ``width`` is its inner side or diameter (m).
 
-    Attributes
-    ----------
-    width
-        Inner side or diameter, m.
-    height
-        m; the walls of the simulation go on above it, to twice that height, where beads are lost.
+    The walls of the simulation go on above its ``height`` (m), to twice that height, where beads are lost.
     """
 
     width: float
@@ -326,13 +297,9 @@ class Box(Container):
     def walls(self) -> tuple[Wall, ...]:
         """The floor and four walls."""
         half = self.width / 2.0
-        return (
-            BOTTOM,
-            Flat((-half, 0.0, 0.0), (1.0, 0.0, 0.0), "-x"),
-            Flat((half, 0.0, 0.0), (-1.0, 0.0, 0.0), "+x"),
-            Flat((0.0, -half, 0.0), (0.0, 1.0, 0.0), "-y"),
-            Flat((0.0, half, 0.0), (0.0, -1.0, 0.0), "+y"),
-        )
+        across = Flat((-half, 0.0, 0.0), (1.0, 0.0, 0.0), "-x"), Flat((half, 0.0, 0.0), (-1.0, 0.0, 0.0), "+x")
+        along = Flat((0.0, -half, 0.0), (0.0, 1.0, 0.0), "-y"), Flat((0.0, half, 0.0), (0.0, -1.0, 0.0), "+y")
+        return (BOTTOM, *across, *along)
 
     def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
         """Distance from the nearest wall, m."""
@@ -379,7 +346,7 @@ Shape = Plane | Channel | Groove | Box | Cylinder
 
 def _room_above(half: tuple[float, float], top: float, largest: float) -> Room:
     """A box from below the floor."""
-    return Room((-half[0], -half[1], -4.0 * largest), (half[0], half[1], top))
+    return (-half[0], -half[1], -4.0 * largest), (half[0], half[1], top)
 
 
 def _round(value: float) -> float:

@@ -20,18 +20,12 @@ from walkers.inputs.drive import AXES, Drive, Vector
 from walkers.inputs.origins import Origin, origins_of
 from walkers.physics.matter import Contact, Liquid
 
-_SILENCE = 600.0
-"""s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds."""
-_SLOWEST_STEP = 4e-5
-"""s a bead: thirty times what a step takes of two beads alone, a hundred times what it takes of a bead in a pile."""
-_LOG_BYTES = 64e6
-"""Walkers write some 50 kB, a segment of a pile as much."""
-_LOG_BYTES_PER_CYCLE = 1e4
-"""A cycle has some 500."""
+_SILENCE = 600.0  # s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds
+_SLOWEST_STEP = 4e-5  # s a bead: thirty times what it takes with two beads alone, a hundred times that in a pile
+_LOG_BYTES = 64e6  # walkers write some 50 kB, a segment of a pile as much …
+_LOG_BYTES_PER_CYCLE = 1e4  # … and a cycle some 500 bytes
 FIRST_ATTEMPTS = (12, 24)
 """Cycles after which it is asked whether walkers are steady. After 36 hardly any are that were not after 24."""
-
-
 BOUNDS = ("silence", "log_limit")
 """Of `Run`: upon these depends whether a run ends, not what it gives."""
 
@@ -49,20 +43,14 @@ class Run:
 
     Attributes
     ----------
-    time_step
-        s.
-    steps_per_cycle
-        Of the drive.
-    cycles
-        Driven, or at most so many if the run is driven until its walkers are steady.
-    settling_cycles
-        Of these, before velocities are measured.
-    until_steady
-        Whether fewer cycles do if the walkers are steady after them (`walkers.postprocess.steady_state.are_steady`).
-    samples_per_cycle, cycles_per_sample
-        Beads are recorded this often a cycle, or once in so many cycles; one of them is 1.
-    samples_per_bridge_sample
-        Bridges are recorded with one of so many samples.
+    time_step, steps_per_cycle
+        s; steps in a cycle of the drive.
+    cycles, settling_cycles, until_steady
+        Cycles driven, and of these before velocities are measured; whether fewer do if the walkers are steady after
+        them (`walkers.postprocess.steady_state.are_steady`).
+    samples_per_cycle, cycles_per_sample, samples_per_bridge_sample
+        Beads are recorded this often a cycle, or once in so many cycles (one of them is 1), bridges with one of so
+        many samples.
     cycles_per_segment
         The run is made in segments of so many cycles, each with a restart file at its end if there are several.
     settled_below, longest_settling
@@ -244,8 +232,8 @@ class Case:
             return (max(self.mixture.small) + min(self.mixture.large)) / 2.0
         sizes = sorted(self.radii)
         middle = (sizes[0] + sizes[-1]) / 2.0
-        large = [size for size in sizes if size > middle]
-        return (max(size for size in sizes if size <= middle) + large[0]) / 2.0 if large else inf
+        small, large = ([size for size in sizes if (size > middle) is above] for above in (False, True))
+        return (small[-1] + large[0]) / 2.0 if large else inf
 
     def standing(self) -> Iterator[tuple[int, Standing]]:
         """What stands at the start, each with the number of its body; walkers come first and are numbered through.
@@ -333,8 +321,10 @@ class Case:
             If it is none.
         """
         try:
-            recorded = _origins_adapter().validate_python(values.get("recorded", ()))
-            return _adapter().validate_python(values).read_from(values.get("document", {}), recorded)
+            case = _adapter().validate_python(values)
+            return case.read_from(
+                *_told_adapter().validate_python((values.get("document", {}), values.get("recorded", ())))
+            )
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
@@ -346,5 +336,5 @@ def _adapter() -> TypeAdapter[Case]:
 
 
 @cache
-def _origins_adapter() -> TypeAdapter[tuple[Origin, ...]]:
-    return TypeAdapter(tuple[Origin, ...])
+def _told_adapter() -> TypeAdapter[tuple[dict[str, Any], tuple[Origin, ...]]]:
+    return TypeAdapter(tuple[dict[str, Any], tuple[Origin, ...]])

@@ -112,13 +112,12 @@ class Drive:
 
     def with_peak(self, peak_acceleration: float) -> Drive:
         """The same drive, its largest harmonic with another peak acceleration (m/s²) and the others in proportion."""
-        if len(self.harmonics) == 1:
-            return replace(self, harmonics=(replace(self.harmonics[0], peak_acceleration=peak_acceleration),))
-        share = peak_acceleration / self.peak_acceleration
-        return replace(
-            self,
-            harmonics=tuple(replace(one, peak_acceleration=share * one.peak_acceleration) for one in self.harmonics),
-        )
+        peaks = [peak_acceleration]
+        if len(self.harmonics) > 1:
+            share = peak_acceleration / self.peak_acceleration
+            peaks = [share * one.peak_acceleration for one in self.harmonics]
+        made = [replace(one, peak_acceleration=peak) for one, peak in zip(self.harmonics, peaks, strict=True)]
+        return replace(self, harmonics=tuple(made))
 
     def described(self) -> str:
         """The harmonics in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""

@@ -30,14 +30,8 @@ class Stopped(WalkersError):
 class Problem:
     """One thing that is wrong with an input.
 
-    Attributes
-    ----------
-    key
-        Dotted key, such as ``drive.frequency``; empty for the file as a whole.
-    value
-        The value as the user wrote it, or None where there is none to quote.
-    expected
-        What would have been right, as the end of the sentence "expected …".
+    ``key`` is dotted, such as ``drive.frequency``, and empty for the file as a whole; ``value`` as the user wrote it,
+    None where there is none to quote; ``expected`` says what would have been right.
     """
 
     key: str
@@ -71,15 +65,7 @@ def check_utf8(word: str | Path) -> None:
 
 
 class InputError(WalkersError):
-    """An input that cannot be used: names the file, the key, the value and what was expected.
-
-    Parameters
-    ----------
-    source
-        File (or other origin) of the input.
-    problems
-        Everything that is wrong with it, at least one.
-    """
+    """An input that cannot be used: names the file (or other source), and all that is wrong with it, at least one."""
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         self.source = source

@@ -94,12 +94,8 @@ def contact_loads(case: Case, walkers: Walkers | None = None) -> ContactLoads:
         pair = (radii[one], radii[other])
         bridges.append(bridge_at_rest(case, *pair))
         overlaps.append(hertz_overlap(bridges[-1].pull, pair[0] * pair[1] / sum(pair), modulus))
-    return ContactLoads(
-        tuple(one.volume for one in bridges),
-        tuple(one.pull for one in bridges),
-        tuple(one.rupture for one in bridges),
-        tuple(overlaps),
-    )
+    volumes, pulls, ruptures = zip(*((one.volume, one.pull, one.rupture) for one in bridges), strict=True)
+    return ContactLoads(volumes, pulls, ruptures, tuple(overlaps))
 
 
 def reach(case: Case) -> float:

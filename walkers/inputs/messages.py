@@ -84,16 +84,7 @@ def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[
 
 
 def validated(model: type[File], document: Mapping[str, Any], source: str, whole: str = "a case") -> File:
-    """A document as a kind of file.
-
-    Parameters
-    ----------
-    model
-        The kind of file.
-    document
-        Nested tables.
-    source, whole
-        What messages call this file, and a file of its kind.
+    """Nested tables as a kind of file; ``source`` and ``whole`` are what messages call it, and any of its kind.
 
     Raises
     ------
@@ -118,7 +109,7 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
 
 def _entries(key: str) -> str:
     """What is wrong with a list of places or radii that is too short or too long."""
-    if key.endswith(".at"):
+    if key.startswith("placed"):
         return "expected three places: x, y, z"
     if key.startswith("clusters"):
         return "expected two places: ahead and to the left"

@@ -26,20 +26,14 @@ class Origin:
 
     Attributes
     ----------
-    key
-        Dotted, such as ``contact.friction.bead_wall``.
-    text
-        The value as a case file would say it, with its unit.
-    origin
+    key, text
+        Dotted, such as ``contact.friction.bead_wall``, and the value as a case file would say it, with its unit.
+    origin, source
         ``given`` by the case (or beside it), from the ``library``, ``calibrated``, the ``default``, or ``derived``
-        from other values.
-    source
-        The library's, or from what it is derived.
-    range
-        Both ends between which it may lie as well, as a case would write them: of what nobody measures, unless the
-        case gives it, and of what the case calls ``uncertain``.
-    logarithmic
-        Whether the range is one of magnitudes.
+        from other values; the library's source, or from what it is derived.
+    range, logarithmic
+        Both ends between which it may lie as well, as a case would write them, and whether they are of magnitudes: of
+        what nobody measures, unless the case gives it, and of what the case calls ``uncertain``.
     uncertain
         Whether the case calls it so.
     """
@@ -59,13 +53,7 @@ class Origin:
 
 
 def origins_of(case: Case) -> tuple[Origin, ...]:
-    """Where the values of a case come from, in the order of a case file's tables.
-
-    Returns
-    -------
-    tuple of Origin
-        Empty for a case that was not read from tables.
-    """
+    """Where the values of a case come from, in the order of a case file's tables; none of one not read from tables."""
     if not case.document:
         return ()
     from walkers.inputs.matter_tables import resolve_matter
@@ -73,15 +61,22 @@ def origins_of(case: Case) -> tuple[Origin, ...]:
 
     file = CaseFile.model_validate(case.document)
     known = resolve_matter(file)[-1] | {one.key: one for one in _derived(case, file)}
-    found = [
-        _origin(key, raw, default, known)
-        for key, raw, default in _leaves(file, case.document)
-        if case.run.rests or key != "run.settled_below"
-    ]
-    listed = {one.key: one for one in found if one is not None}
-    # What has no line of its own, such as one of two radii, has one if the case calls it uncertain.
-    alone = {key: Origin(key, _text_at(case.document, key), "given") for key in file.uncertain if key not in listed}
-    return tuple(_uncertain(one, file.uncertain) for one in (listed | alone).values())
+    found: dict[str, Origin] = {}
+    for key, raw, default in _leaves(file, case.document):
+        if key == "run.settled_below" and not case.run.rests:
+            continue
+        if raw is not None and not (isinstance(raw, str) and raw.strip().lower() == "auto"):
+            found[key] = Origin(key, text_of(raw), "given")
+        elif key in known:
+            found[key] = known[key]
+        elif default is not None:
+            found[key] = Origin(key, default, "default")
+    for key, given in file.uncertain.items():
+        ((distribution, (low, high)),) = given.items()
+        # What has no line of its own, such as one of two radii, has one if the case calls it uncertain.
+        one = found.get(key) or Origin(key, _text_at(case.document, key), "given")
+        found[key] = replace(one, range=(low, high), logarithmic=distribution == "loguniform", uncertain=True)
+    return tuple(found.values())
 
 
 def _text_at(document: Mapping[str, Any], key: str) -> str:
@@ -93,24 +88,6 @@ def _text_at(document: Mapping[str, Any], key: str) -> str:
         except (KeyError, IndexError, TypeError, ValueError):
             return "-"
     return text_of(value)
-
-
-def _origin(key: str, raw: Any, default: str | None, known: Mapping[str, Origin]) -> Origin | None:
-    """That of a key; None of one that says nothing in this case."""
-    automatic = isinstance(raw, str) and raw.strip().lower() == "auto"
-    if raw is not None and not automatic:
-        return Origin(key, text_of(raw), "given")
-    if key in known:
-        return known[key]
-    return Origin(key, default, "default") if default is not None else None
-
-
-def _uncertain(one: Origin, ranges: Mapping[str, Any]) -> Origin:
-    """With the range that the case says its value may have."""
-    if one.key not in ranges:
-        return one
-    ((distribution, (low, high)),) = ranges[one.key].items()
-    return replace(one, range=(low, high), logarithmic=distribution == "loguniform", uncertain=True)
 
 
 def text_of(value: Any) -> str:

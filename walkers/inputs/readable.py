@@ -70,10 +70,9 @@ def flattened(case: Mapping[str, Any]) -> FlatCase:
     Returns
     -------
     FlatCase
-        Keys are a case file's where it has the value, such as ``drive.frequency`` and ``contact.friction.bead_wall``;
-        ``walkers.radii`` are those of ``[dimers]`` or ``[[clusters]]``, ``walkers[1].radii`` where there are several.
-        ``liquid.bridge_viscosity`` stands for the liquid's viscosity and the bridges' ratio to it where these were not
-        recorded.
+        By a case file's keys where it has the value; ``walkers.radii`` are those of ``[dimers]`` or ``[[clusters]]``,
+        ``walkers[1].radii`` where there are several. ``liquid.bridge_viscosity`` stands for the liquid's viscosity and
+        the bridges' ratio to it where these were not recorded.
     """
     told = {key: value for key, value in case.items() if key not in _NOT_COMPARED}
     flat = {key: value for key, value in dotted(told) if key not in _NOT_COMPARED}
@@ -188,14 +187,8 @@ def _comparable(value: Any) -> Hashable:
 def agrees(case: Mapping[str, Any], key: str, wanted: str) -> bool:
     """Whether a flattened case has a value, as a user writes both.
 
-    Parameters
-    ----------
-    case
-        From `flattened`.
-    key
-        A key, or its end, such as ``frequency``; ``dimers`` and ``clusters[0]`` are ``walkers``.
-    wanted
-        A number with its unit, a number, a text, or a list as `readable` writes it.
+    The key may be the end of one, such as ``frequency`` (``dimers`` and ``clusters[0]`` are ``walkers``), the value a
+    number, with its unit or without, a text, or a list as `readable` writes it.
     """
     return any(_is(one, value, wanted.strip().strip('"')) for one, value in case.items() if _names(key, one))
 

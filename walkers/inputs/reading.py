@@ -164,10 +164,8 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     ----------
     document
         The tables of a case file, quantities as strings with units.
-    source
-        What an error message calls the input.
-    name
-        Name of the case; its run directory begins with it.
+    source, name
+        What an error message calls the input, and the name of the case, with which its run directory begins.
 
     Raises
     ------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil
+from math import ceil, inf
 
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case, Run, settling_of
@@ -89,18 +89,17 @@ def limits_of(case: Case) -> TimeStepLimits:
 
 def resolve_run(table: RunTable, case: Case) -> Run:
     """The time step, the length and the sampling of a run, given the rest of the case."""
-    frequency = case.drive.frequency
-    largest = largest_time_step(table.time_step, limits_of(case), loose=case.loose, allow_unstable=table.allow_unstable)
+    frequency, loose = case.drive.frequency, case.loose
     samples, cycles_per_sample = _sampling(table, case)
-    time_step, steps = fit_into_cycle(largest, frequency, samples)
+    time_step, steps = fit_into_cycle(_largest_time_step(table, case), frequency, samples)
     cycles = _cycles(table, case, cycles_per_sample)
     until_steady = _until_steady(table, case, cycles_per_sample)
     settling = table.settling_cycles
     if settling is None:
         settling = settling_of(cycles) if case.walkers else 0
+    length = "run.duration" if table.duration is not None else "run.cycles"
     if cycles < 2:
-        key = "run.duration" if table.duration is not None else "run.cycles"
-        raise UnusableKeyError(key, f"expected at least two cycles of the drive, {2.0 / frequency:.4g} s")
+        raise UnusableKeyError(length, f"expected at least two cycles of the drive, {2.0 / frequency:.4g} s")
     if cycles - settling < 2:
         raise UnusableKeyError("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
     if case.walkers and cycles // cycles_per_sample <= -(-settling // cycles_per_sample):
@@ -108,18 +107,14 @@ def resolve_run(table: RunTable, case: Case) -> Run:
         raise UnusableKeyError("run.frames_per_second", told)
     rest = table.longest_settling
     if rest is None:
-        rest = _LONGEST_SETTLING if case.loose else 0.0
-    resting = ceil((rest + 1.0) * frequency) if rest else 0
-    if steps * (cycles + resting) > MOST_STEPS:
-        if table.duration is not None:
-            raise UnusableKeyError("run.duration", "too long: the engine counts steps up to 2^31")
-        most = MOST_STEPS // steps - resting
-        raise UnusableKeyError("run.cycles", f"expected at most {most}: the engine counts steps up to 2^31")
+        rest = _LONGEST_SETTLING if loose else 0.0
+    most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
+    if cycles > most:
+        told = "too long" if table.duration is not None else f"expected at most {most}"
+        raise UnusableKeyError(length, f"{told}: the engine counts steps up to 2^31")
+    segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if loose else inf
     # Segments end with a sample, so that each begins where the last one ended.
-    segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if case.loose else None
-    per_segment = (
-        cycles if segment is None else max(1, round(segment * frequency / cycles_per_sample)) * cycles_per_sample
-    )
+    samples_of_segment = max(1, round(min(segment * frequency, cycles) / cycles_per_sample))
     return Run(
         time_step=time_step,
         steps_per_cycle=steps,
@@ -129,13 +124,25 @@ def resolve_run(table: RunTable, case: Case) -> Run:
         samples_per_cycle=samples,
         cycles_per_sample=cycles_per_sample,
         samples_per_bridge_sample=_bridge_sampling(table, case, samples),
-        cycles_per_segment=min(per_segment, cycles),
+        cycles_per_segment=min(samples_of_segment * cycles_per_sample, cycles),
         settled_below=table.settled_below,
         longest_settling=rest,
         ranks=table.ranks,
         silence=table.silence,
         log_limit=table.log_limit,
     )
+
+
+def _largest_time_step(table: RunTable, case: Case) -> float:
+    """The step that a case gives, which must be within the limits unless it insists, or that of ``"auto"``, s."""
+    limits, given = limits_of(case), table.time_step
+    if given is None:
+        return limits.recommended(loose=case.loose)
+    if (exceeded := limits.exceeded_by(given)) and not table.allow_unstable:
+        allowed = f"{min(limits.as_dict().values()) * 1e6:.3g} us"
+        told = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
+        raise UnusableKeyError("run.time_step", f'{told}"auto", or allow_unstable = true')
+    return given
 
 
 def _sampling(table: RunTable, case: Case) -> tuple[int, int]:
@@ -149,36 +156,30 @@ def _sampling(table: RunTable, case: Case) -> tuple[int, int]:
 
 
 def _bridge_sampling(table: RunTable, case: Case, samples: int) -> int:
-    bridges = table.bridge_samples_per_cycle
-    if case.loose and bridges is not None:
-        raise UnusableKeyError(
-            "run.bridge_samples_per_cycle", "expected none: bridges of loose beads are in every frame"
-        )
+    key, bridges = "run.bridge_samples_per_cycle", table.bridge_samples_per_cycle
     if bridges is None:
         return 1 if case.loose else samples
+    if case.loose:
+        raise UnusableKeyError(key, "expected none: bridges of loose beads are in every frame")
     if samples % bridges:
-        told = f"expected a divisor of samples_per_cycle = {samples}"
-        raise UnusableKeyError("run.bridge_samples_per_cycle", told)
+        raise UnusableKeyError(key, f"expected a divisor of samples_per_cycle = {samples}")
     return samples // bridges
 
 
 def _cycles(table: RunTable, case: Case, cycles_per_sample: int) -> int:
+    """Cycles of a run, whole samples of them."""
     if table.cycles is not None and table.duration is not None:
         raise UnusableKeyError("run.duration", "expected either cycles or a duration")
+    cycles: float = table.cycles or table.most_cycles or _MOST_CYCLES
     if table.duration is not None:
-        return ceil(table.duration * case.drive.frequency / cycles_per_sample * (1.0 - 1e-12)) * cycles_per_sample
-    if table.cycles is None and case.loose:
+        cycles = table.duration * case.drive.frequency * (1.0 - 1e-12)
+    elif table.cycles is None and case.loose:
         raise UnusableKeyError("run.duration", 'missing; expected such as "4 s"')
-    cycles = table.cycles or table.most_cycles or _MOST_CYCLES
     return ceil(cycles / cycles_per_sample) * cycles_per_sample
 
 
-_LENGTHS = ("cycles", "duration", "settling_cycles", "segment")
-"""Keys by which a case says itself how long it is and in which parts: it is run so."""
-
-
 def _until_steady(table: RunTable, case: Case, cycles_per_sample: int) -> bool:
-    """Whether a run may end when its walkers are steady.
+    """Whether a run may end when its walkers are steady: not one that says how long it is, and in which parts.
 
     Raises
     ------
@@ -187,18 +188,13 @@ def _until_steady(table: RunTable, case: Case, cycles_per_sample: int) -> bool:
     """
     asked = ["cycles"] if "cycles" in table.model_fields_set and table.cycles is None else []
     asked += ["most_cycles"] if table.most_cycles is not None else []
-    given = [key for key in _LENGTHS if getattr(table, key) is not None]
-    if given:
-        if asked:
-            raise UnusableKeyError(
-                f"run.{given[0]}", f"expected none where run.{asked[0]} lets walkers run until steady"
-            )
-        return False
-    if not case.apart:
-        if asked:
-            raise UnusableKeyError(f"run.{asked[0]}", "expected run.duration: only walkers apart can be steady")
-        return False
-    return table.ranks == 1 and cycles_per_sample == 1 and all(_settles_soon(walkers) for walkers in case.walkers)
+    given = [key for key in ("cycles", "duration", "settling_cycles", "segment") if getattr(table, key) is not None]
+    if given and asked:
+        raise UnusableKeyError(f"run.{given[0]}", f"expected none where run.{asked[0]} lets walkers run until steady")
+    if asked and not case.apart:
+        raise UnusableKeyError(f"run.{asked[0]}", "expected run.duration: only walkers apart can be steady")
+    alone = case.apart and not given and table.ranks == 1 and cycles_per_sample == 1
+    return alone and all(_settles_soon(walkers) for walkers in case.walkers)
 
 
 def _settles_soon(walkers: Walkers) -> bool:
@@ -208,24 +204,3 @@ def _settles_soon(walkers: Walkers) -> bool:
     first, second = walkers.radii
     asymmetry = abs(first - second) / (first + second)
     return asymmetry >= _NEARLY_SYMMETRIC and abs(walkers.angle) + walkers.angle_spread < _ASLANT
-
-
-def largest_time_step(given: float | None, limits: TimeStepLimits, *, loose: bool, allow_unstable: bool) -> float:
-    """The step that a case gives, or the one that ``"auto"`` takes, s.
-
-    Raises
-    ------
-    UnusableKeyError
-        If a given one is beyond a limit and the case does not insist.
-    """
-    if given is None:
-        return limits.recommended(loose=loose)
-    exceeded = limits.exceeded_by(given)
-    if exceeded and not allow_unstable:
-        allowed = min(limits.as_dict().values())
-        raise UnusableKeyError(
-            "run.time_step",
-            f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed * 1e6:.3g} us, "
-            '"auto", or allow_unstable = true',
-        )
-    return given

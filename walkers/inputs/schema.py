@@ -6,6 +6,7 @@ materials and liquids can supply are optional; `walkers.inputs.reading` fills th
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Annotated, Any, Literal
 
@@ -36,21 +37,19 @@ def _whole_number(value: object) -> object:
     return value
 
 
-ALTERNATIVES: dict[str, tuple[str, ...]] = {
-    "drive.peak_acceleration": ("drive.gamma0",),
-    "drive.gamma0": ("drive.peak_acceleration",),
-    "liquid.kinematic_viscosity": ("liquid.dynamic_viscosity",),
-    "liquid.dynamic_viscosity": ("liquid.kinematic_viscosity",),
-    "dimers.radii": ("dimers.mean_radius", "dimers.sin_delta"),
-    "dimers.mean_radius": ("dimers.radii",),
-    "dimers.sin_delta": ("dimers.radii",),
-    "run.cycles": ("run.duration", "run.most_cycles"),
-    "run.most_cycles": ("run.cycles", "run.duration"),
-    "run.duration": ("run.cycles", "run.most_cycles"),
-    "run.samples_per_cycle": ("run.frames_per_second",),
-    "run.frames_per_second": ("run.samples_per_cycle",),
-    "mixture.count": ("mixture.fill_height",),
-    "mixture.fill_height": ("mixture.count",),
+_SAME: Sequence[Sequence[tuple[str, ...]]] = (
+    (("drive.peak_acceleration",), ("drive.gamma0",)),
+    (("liquid.kinematic_viscosity",), ("liquid.dynamic_viscosity",)),
+    (("dimers.radii",), ("dimers.mean_radius", "dimers.sin_delta")),
+    (("run.cycles",), ("run.duration",), ("run.most_cycles",)),
+    (("run.samples_per_cycle",), ("run.frames_per_second",)),
+    (("mixture.count",), ("mixture.fill_height",)),
+)
+ALTERNATIVES: Mapping[str, tuple[str, ...]] = {
+    key: tuple(other for others in ways if others is not way for other in others)
+    for ways in _SAME
+    for way in ways
+    for key in way
 }
 """Keys that say the same in other words: a change of one puts the others out of force."""
 

@@ -100,20 +100,12 @@ class Sweep:
 
     Attributes
     ----------
-    name
-        Of the sweep: its file's.
-    title
-        For people.
-    source
-        What messages call the file.
-    case_name
-        Of the base case; the runs' directories begin with it.
-    document
-        Tables of the base case, with those of ``[set]``.
-    keys
-        What varies.
-    units
-        Of each key, None where it has none.
+    name, title, source
+        Of the sweep (its file's); for people; what messages call the file.
+    case_name, document
+        Of the base case; the runs' directories begin with its name. Its tables have those of ``[set]``.
+    keys, units
+        What varies, and the unit of each, None where it has none.
     rows
         The points: one value a key.
     descent
@@ -190,11 +182,11 @@ def _name_with(name: str, changes: Mapping[str, Value]) -> str:
     """Name of a sweep with changes: another one, so that its table stands beside that of the sweep without."""
     told = ",".join(f"{key}={value}" for key, value in changes.items())
     full = re.sub(r"[^\w.+=,-]+", "_", f"{name},{told}")
-    if len(full.encode("utf-8", "surrogateescape")) <= _LONGEST_NAME:
+    encoded = full.encode("utf-8", "surrogateescape")
+    if len(encoded) <= _LONGEST_NAME:
         return full
     digest = hashlib.sha256(f"{name},{told}".encode("utf-8", "surrogateescape")).hexdigest()[:12]
-    begin = full.encode("utf-8", "surrogateescape")[: _LONGEST_NAME - 13].decode("utf-8", "ignore")
-    return f"{begin}~{digest}"  # with a hyphen it might be a run's name
+    return f"{encoded[: _LONGEST_NAME - 13].decode('utf-8', 'ignore')}~{digest}"  # with a hyphen it might be a run's
 
 
 def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Sweep:
@@ -202,12 +194,8 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
 
     Parameters
     ----------
-    document
-        The tables of a sweep file.
-    source
-        What messages call the input.
-    name
-        Name of the sweep.
+    document, source, name
+        The tables of a sweep file, what messages call it, and the name of the sweep.
     folder
         Where a base case given as a file is looked up.
 

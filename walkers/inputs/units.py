@@ -111,12 +111,7 @@ def parse_quantity(text: str, kind: Kind) -> float:
     text
         A number with its unit, such as ``"0.3 mm"``. For an acceleration ``g`` means 9.8 m/s².
     kind
-        What the quantity must be.
-
-    Returns
-    -------
-    float
-        The value in ``kind.unit``.
+        What the quantity must be; the value is in its unit.
 
     Raises
     ------

@@ -33,15 +33,8 @@ class UnusableLawError(ValueError):
 class Table:
     """A law for two surfaces, as the engine has it.
 
-    Attributes
-    ----------
-    curve
-        Where the bridge forms and breaks.
-    scale, octaves, cells
-        Of the grid: see the module; ``scale`` in m.
-    rows
-        Forces at the gaps of the grid, shape (3 cells (octaves + 2) + 1, 5), in the order of
-        `walkers.physics.bridge.Forces`.
+    ``curve`` says where the bridge forms and breaks, ``scale`` (m), ``octaves`` and ``cells`` the grid (see above).
+    ``rows`` are the forces at its gaps, shape (3 cells (octaves + 2) + 1, 5), as `walkers.physics.bridge.Forces`.
     """
 
     curve: Curve
@@ -64,12 +57,7 @@ class Table:
 
 @lru_cache(maxsize=4096)
 def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) -> Table:
-    """Tabulate a law as finely as the tolerance asks for.
-
-    Parameters
-    ----------
-    tolerance
-        Of the interpolated forces (`TOLERANCE`).
+    """Tabulate a law as finely as the tolerance of the interpolated forces asks for (`TOLERANCE`).
 
     Raises
     ------
@@ -78,7 +66,7 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
         closer than the formation, or no table is fine enough.
     """
     curve = law(surfaces)
-    if not (np.isfinite(curve.rupture) and curve.rupture > 0.0):
+    if not 0.0 < curve.rupture < inf:
         raise UnusableLawError(f"the bridge breaks at a gap of {curve.rupture:g} m; expected a positive number")
     if not 0.0 <= curve.formation <= curve.rupture:
         raise UnusableLawError(

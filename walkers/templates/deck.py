@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, inf, pi, prod, sqrt
 
 from walkers.inputs.case import Case
@@ -52,16 +52,11 @@ class Deck:
 
     Attributes
     ----------
-    text
-        What LIGGGHTS reads.
-    files
-        The files that it reads in turn, name to text.
-    layout
-        What it will write.
-    box
-        Lower and upper corner of the simulation box, m.
-    fastest
-        A speed that no bead can reach by the drive, gravity and the capillary forces alone, m/s.
+    text, files, layout
+        What LIGGGHTS reads; the files that it reads in turn, name to text; what it will write.
+    box, fastest
+        Corners of the simulation box, m; a speed that no bead can reach by the drive, gravity and the capillary forces
+        alone, m/s.
     silence, log_limit
         How long the engine may write nothing, s, and how large its log may become, bytes.
     beyond_limits
@@ -84,9 +79,6 @@ class Checkpoint:
 
     write: str | None = None
     read: str | None = None
-
-
-NO_CHECKPOINT = Checkpoint()
 
 
 @dataclass(frozen=True)
@@ -120,20 +112,13 @@ class Plan:
 
     Attributes
     ----------
-    case
-        Materials, liquid, contacts, drive, gravity and time step.
-    scene
-        What stands in the box.
-    recording
-        Length and sampling.
-    walkers
-        Which beads are whose.
+    case, scene, recording, walkers
+        Materials, liquid, contacts, drive, gravity and time step; what stands in the box; length and sampling; which
+        beads are whose.
     prescribed
         Beads keep their velocities instead of following the forces.
-    ranks
-        Number of MPI processes.
-    checkpoint
-        Restart file to write or to go on from.
+    ranks, checkpoint
+        Number of MPI processes; restart file to write or to go on from.
     surfaces, loadings
         How the beads' surfaces touch and what loads them, by `walkers.templates.scene.Bead.surface` and
         ``Bead.loading``; the case's own if left out.
@@ -152,7 +137,7 @@ class Plan:
     walkers: tuple[PlacedWalker, ...] = ()
     prescribed: bool = False
     ranks: int = 1
-    checkpoint: Checkpoint = NO_CHECKPOINT
+    checkpoint: Checkpoint = Checkpoint()
     surfaces: tuple[Surface, ...] = ()
     loadings: tuple[Loading, ...] = ()
     fastest: float | None = None
@@ -197,19 +182,9 @@ def settling_steps(case: Case) -> int:
 
 
 def render_deck(case: Case, segment: Segment | None = None) -> Deck:
-    """Render a case.
+    """Render a segment of a case's run, the first one if left out.
 
-    Parameters
-    ----------
-    case
-        A resolved case.
-    segment
-        Of its run; the first one if left out.
-
-    Returns
-    -------
-    Deck
-        Numbers in full precision (the shortest text that reads back as the same double).
+    Numbers are in full precision: the shortest text that reads back as the same double.
     """
     return compose(plan_of(case, segment=segment))
 
@@ -239,16 +214,14 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
         bead_columns=(*BEAD_COLUMNS, *MEAN_SPIN_COLUMNS) if walkers else BEAD_COLUMNS,
         begin=segment.begin,
     )
-    checkpoint = NO_CHECKPOINT
-    if not run.in_one:
-        checkpoint = Checkpoint(RESTART_NAME, PREVIOUS_RESTART_NAME if segment.begin else None)
+    restart = None if run.in_one else RESTART_NAME
     return Plan(
         case=case,
         scene=scene,
         recording=recording,
         walkers=walkers,
         ranks=run.ranks,
-        checkpoint=checkpoint,
+        checkpoint=Checkpoint(restart, PREVIOUS_RESTART_NAME if restart and segment.begin else None),
         surfaces=surfaces_of(cases),
         loadings=loadings_of(cases),
         fastest=max(fastest_of(one, scene) for one in cases),
@@ -267,11 +240,15 @@ def compose(plan: Plan) -> Deck:
     """
     from walkers.templates.bridge_tables import UnusableLawError, bridge_tables
 
-    case, scene, walkers = plan.case, plan.scene, plan.walkers
+    case, scene = plan.case, plan.scene
     first = case.drive.harmonics[0]
-    layout = replace(_layout(case, scene, plan.recording, walkers), ranks=plan.ranks)
+    layout = _layout(plan)
     surfaces = plan.surfaces or (surface_of(case),)
     contacts = [contact for contact, _ in surfaces]
+    largest = max(bead.radius for bead in scene.beads)
+    space = prod(high - low for low, high in zip(scene.lower, scene.upper, strict=True))
+    rolling = " rolling_friction cdt" if case.contact.rolling_friction > 0 else ""
+    pair_columns = " ".join(PAIR_BRIDGES).split()
     moduli = [*(contact.youngs_modulus for contact in contacts), case.contact.youngs_modulus]
     text = rendered(
         "walkers.templates",
@@ -285,7 +262,7 @@ def compose(plan: Plan) -> Deck:
         layout_name=LAYOUT_NAME,
         bridges_name=BRIDGES_NAME,
         run_name=RUN_NAME,
-        contact_model=_contact_model(case),
+        contact_model=f"hertz tangential history cohesion bridge{rolling}",
         types=len(surfaces) + 1,
         moduli=moduli,
         stiff=max(moduli) > _STIFFEST,
@@ -298,13 +275,14 @@ def compose(plan: Plan) -> Deck:
         # Of a drive that moves the walls; it has one harmonic.
         peak_velocity=[first.peak_velocity * component for component in first.direction],
         loads_name=LOADS_NAME,
-        pair_bridge_terms=_terms("c_pair_bridges", layout.pair_bridge_columns, " ".join(PAIR_BRIDGES).split()),
-        wall_bridge_terms=_terms("f_walls", layout.wall_bridge_columns, WALL_BRIDGES),
+        pair_bridge_terms=[f"c_pair_bridges[{pair_columns.index(one) + 1}]" for one in layout.pair_bridge_columns],
+        wall_bridge_terms=[f"f_walls[{WALL_BRIDGES.index(one) + 1}]" for one in layout.wall_bridge_columns],
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
         skin=plan.skin or min(bead.radius for bead in scene.beads),
         most_neighbours=_most_neighbours(scene, plan.skin),
-        bin_size=None if plan.skin else _bin_size(scene),
-        wide=not plan.skin and prod(_extent(scene)) > _MOST_BINS * max(bead.radius for bead in scene.beads) ** 3,
+        # At most some ten thousand bins, none smaller than two beads (m).
+        bin_size=None if plan.skin else max(4.0 * largest, (space / 2e4) ** (1.0 / 3.0)),
+        wide=not plan.skin and space > _MOST_BINS * largest**3,
     )  # fmt: skip
     files = {LOADS_NAME: _loads(plan)} if plan.several else {}
     try:
@@ -324,18 +302,10 @@ def _loads(plan: Plan) -> str:
     return "".join(f"{number} {' '.join(repr(x) for one in of for x in one)}\n" for number, of in vectors)
 
 
-def _terms(source: str, columns: Sequence[str], all_columns: Sequence[str]) -> list[str]:
-    """What a dump writes for some of the columns that a compute or a fix has."""
-    return [f"{source}[{all_columns.index(column) + 1}]" for column in columns]
-
-
 def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
-    """A coefficient for every pair of atom types: the surfaces of beads, then the walls.
+    """A coefficient for every pair of atom types, of each surface's value against itself and against the walls.
 
-    Parameters
-    ----------
-    surfaces
-        Of each surface its value against itself and against the walls. Beads of different surfaces never meet.
+    The walls come last. Beads of different surfaces never meet.
     """
     wall = len(surfaces)
     return [
@@ -345,25 +315,11 @@ def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
     ]
 
 
-def _contact_model(case: Case) -> str:
-    rolling = " rolling_friction cdt" if case.contact.rolling_friction > 0 else ""
-    return f"hertz tangential history cohesion bridge{rolling}"
-
-
 _MOST_BINS = 3e7
 """Of the largest bead's radius, into which atoms are sorted every 1,000 steps.
 
 60 beads in a box of 1.5e9 took 50 times as long with the sorting as without; above 2^31 the engine refuses.
 """
-
-
-def _extent(scene: Scene) -> tuple[float, ...]:
-    return tuple(high - low for low, high in zip(scene.lower, scene.upper, strict=True))
-
-
-def _bin_size(scene: Scene) -> float:
-    """At most some ten thousand bins, none smaller than two beads (m)."""
-    return float(max(4.0 * max(bead.radius for bead in scene.beads), (prod(_extent(scene)) / 2e4) ** (1.0 / 3.0)))
 
 
 _LEAST_NEIGHBOURS = 100
@@ -388,7 +344,8 @@ def fastest_of(case: Case, scene: Scene) -> float:
     return (20.0 if case.loose else 10.0) * case.drive.peak_velocity + fall + sqrt(2.0 * work / mass)
 
 
-def _layout(case: Case, scene: Scene, recording: Recording, walkers: tuple[PlacedWalker, ...]) -> Layout:
+def _layout(plan: Plan) -> Layout:
+    recording = plan.recording
     return Layout(
         bead_dump="beads.bin",
         bead_columns=recording.bead_columns,
@@ -400,8 +357,9 @@ def _layout(case: Case, scene: Scene, recording: Recording, walkers: tuple[Place
         wall_bridge_columns=recording.wall_bridge_columns,
         bridge_every=recording.bridge_every,
         bridge_frames=(recording.steps - recording.begin) // recording.bridge_every + 1,
-        atoms=len(scene.beads),
+        atoms=len(plan.scene.beads),
         steps=recording.steps,
-        time_step=case.run.time_step,
-        walkers=walkers,
+        time_step=plan.case.run.time_step,
+        walkers=plan.walkers,
+        ranks=plan.ranks,
     )

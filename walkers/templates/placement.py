@@ -25,7 +25,6 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
     spacing = max((walkers.spacing for case in cases for walkers in case.walkers), default=0.0)
     boundary = cases[0].boundary
     grid = boundary.grid(walking, spacing) if walking else []
-    room = boundary.room(_span(cases, grid, spacing))
     surfaces, loadings = surfaces_of(cases), loadings_of(cases)
     walkers: list[PlacedWalker] = []
     beads: list[Bead] = []
@@ -39,7 +38,7 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
         if one.walks:
             ids = tuple(range(first, first + len(one.beads)))
             walkers.append(PlacedWalker(len(walkers), make, ids, one.facing, one.angle, origin))
-    return Scene(tuple(beads), boundary.walls, room.lower, room.upper), tuple(walkers)
+    return Scene(tuple(beads), boundary.walls, *boundary.room(_span(cases, grid, spacing))), tuple(walkers)
 
 
 def _span(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> Span:

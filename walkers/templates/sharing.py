@@ -32,14 +32,9 @@ def surfaces_of(cases: Sequence[Case]) -> tuple[Surface, ...]:
 
 @dataclass(frozen=True)
 class Loading:
-    """What acts on a bead besides its contacts, in the frame of the boundary.
+    """What acts on a bead besides its contacts, in the frame of the boundary, m/s².
 
-    Attributes
-    ----------
-    gravity
-        m/s².
-    harmonics
-        Amplitude of the inertial acceleration of each harmonic of the drive, m/s².
+    Gravity, and the amplitude of the inertial acceleration of each harmonic of the drive.
     """
 
     gravity: Vector
