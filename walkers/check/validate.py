@@ -1,4 +1,4 @@
-"""All chapters of docs/explanation/validation.md, from their studies to the files."""
+"""``walkers validate``: all chapters of docs/explanation/validation.md, to the files."""
 
 from __future__ import annotations
 
@@ -30,21 +30,6 @@ class Validation:
     def failed(self) -> list[str]:
         """What was expected to hold and does not, with the chapter's name before it."""
         return [f"{chapter.name}: {statement}" for chapter in self.chapters for statement in chapter.failed]
-
-
-def selected(only: Sequence[str] = ()) -> tuple[str, ...]:
-    """Names of chapters: those given, or all.
-
-    Raises
-    ------
-    InputError
-        If one is none.
-    """
-    for name in only:
-        if name not in CHAPTERS:
-            told = f"no chapter {name!r}; expected one of {', '.join(CHAPTERS)}{suggestion(name, CHAPTERS)}"
-            raise InputError("walkers validate", [Problem("", None, told)])
-    return tuple(name for name in CHAPTERS if name in only or not only)
 
 
 def validate(
@@ -80,7 +65,11 @@ def validate(
     """
     from joblib import Parallel, delayed
 
-    names = selected(only)
+    for name in only:
+        if name not in CHAPTERS:
+            told = f"no chapter {name!r}; expected one of {', '.join(CHAPTERS)}{suggestion(name, CHAPTERS)}"
+            raise InputError("walkers validate", [Problem("", None, told)])
+    names = tuple(name for name in CHAPTERS if name in only or not only)
     made: dict[str, Chapter] = {}
     works = Parallel(jobs, return_as="generator_unordered")
     for chapter in works(delayed(_chapter)(name, out, quick) for name in names):
@@ -91,24 +80,19 @@ def validate(
     # A page of some chapters, or of quick ones, is not to take the place of one that has all.
     some = [*(["quick"] if quick else []), *(names if names != CHAPTERS else [])]
     page = f"validation-{'-'.join(some)}.md" if some else PAGE
-    return Validation(chapters, tuple(_written(chapters, to / page)))
+    files: list[Path] = [to / page]
+    for chapter in chapters:
+        for name, figure in chapter.figures.items():
+            files += save_figure(figure, to / "figures" / f"validation-{name}.png", (), title=chapter.title)
+    write_text(to / page, rendered("walkers.check", "validation.md.j2", chapters=chapters))
+    return Validation(chapters, tuple(files))
 
 
 def _chapter(name: str, out: Path, quick: bool) -> Chapter:
     """A chapter, or what kept it from being made: the others are made all the same."""
-    module = import_module(f"walkers.check.{name.replace('-', '_')}")
+    module = import_module(f"walkers.check.{name}")
     try:
         chapter: Chapter = module.chapter(out, quick=quick)
     except WalkersError as error:
         return Chapter(name, name, "", failed=(f"could not be made: {error}",))
     return chapter
-
-
-def _written(chapters: Sequence[Chapter], page: Path) -> list[Path]:
-    files: list[Path] = []
-    for chapter in chapters:
-        for name, figure in chapter.figures.items():
-            place = page.parent / "figures" / f"validation-{name}.png"
-            files += save_figure(figure, place, (), title=chapter.title)
-    write_text(page, rendered("walkers.check", "validation.md.j2", chapters=chapters))
-    return [page, *files]

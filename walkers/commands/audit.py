@@ -22,14 +22,13 @@ def command(
     engine: EngineName = None,
 ) -> int:
     """Measure forces of engine and contact model beside a second engine and closed forms; exit 1 if a line fails."""
-    from walkers.check.audit import CheckedLines, record, run_audit, selected
-    from walkers.check.table import as_dict, as_text
+    from walkers.check.audit import Checked, record, run_audit, selected
     from walkers.inputs.errors import InputError, Problem
     from walkers.runner.binary import find_engine
     from walkers.runner.failures import EngineMissing
 
-    def tell(checked: CheckedLines) -> None:
-        print(f"walkers: {checked.check.name} ({checked.seconds:.1f} s)", file=sys.stderr, flush=True)
+    def tell(checked: Checked) -> None:
+        print(f"walkers: {checked.name} ({checked.seconds:.1f} s)", file=sys.stderr, flush=True)
 
     checks = selected(only or (), quick=quick)
     try:
@@ -39,7 +38,7 @@ def command(
             raise
         raise InputError("--engine", [Problem("", None, str(missing))]) from missing
     report = run_audit(checks, engine=binary, on_done=tell)
-    print(json.dumps(as_dict(report), indent=2, ensure_ascii=False) if as_json else as_text(report))
+    print(json.dumps(report.as_dict(), indent=2, ensure_ascii=False) if as_json else report.as_text())
     if not only:
         try:
             record(report, quick=quick)
