@@ -135,15 +135,14 @@ _DRIVEN = partial(
     environment={"gravity": "9.81 m/s^2"},
 )
 _LEAVING = [over(FLOOR, -_DEEP, R, _WAY), over(FLOOR, 2e-5, S, _WAY, x=2e-3)]
+_SHAKEN = [over(FLOOR, -_DEEP, R), over(FLOOR, -5e-7, S, spin=_STILL, x=2e-3)]
+_LIFTED = [over(FLOOR, -_DEEP, R), over(FLOOR, 3e-6, S, spin=_ROLL, x=2e-3)]
 _PARTING = pair(-_DEEP, 0.043, (0.02, -0.011, 0.005))
 _ON_ROUND = [within(_ROUND, -_DEEP, size, turn, (-0.05, 0.03, 0.02)) for size, turn in ((R, 0.7), (S, 3.0))]
 _ALONG_ROUND = [within(_ROUND, -_DEEP, R, 0.3, (-0.02, 0.3, 0.0)), within(_ROUND, 1e-5, S, 2.0, (0.0, -0.4, 0.1))]
 
 SCENES: dict[str, tuple[Callable[[], Case], Scene]] = {
-    "a bead leaves the floor": (
-        full_case,
-        bench_scene([over(FLOOR, -_DEEP, R, _WAY), over(FLOOR, 2e-5, S, _WAY, x=2e-3)]),
-    ),
+    "a bead leaves the floor": (full_case, bench_scene(_LEAVING)),
     "a bead comes to the floor": (full_case, bench_scene([over(FLOOR, 9e-5, R, (0.031, 0.023, -0.053))])),
     "a bead slides": (full_case, bench_scene([over(FLOOR, -_DEEP, R, (0.02, 0.013, 0.0), _STILL)])),
     "a bead rolls": (full_case, bench_scene([over(FLOOR, -_DEEP, R, (0.03, 0.0, 0.0), _ROLL)])),
@@ -157,14 +156,8 @@ SCENES: dict[str, tuple[Callable[[], Case], Scene]] = {
     "two beads meet": (full_case, bench_scene(pair(4.1e-5, -0.023, (0.004, -0.003, 0.002)))),
     "two beads roll on each other": (full_case, bench_scene(pair(-_DEEP, 0.0, _STILL))),
     "three beads on the floor": (full_case, bench_scene(_CLIMBING)),
-    "the floor moves to and fro": (
-        _LAB,
-        bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, -5e-7, S, spin=_STILL, x=2e-3)]),
-    ),
-    "the floor moves up and down": (
-        _UPRIGHT,
-        bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, 3e-6, S, spin=_ROLL, x=2e-3)]),
-    ),
+    "the floor moves to and fro": (_LAB, bench_scene(_SHAKEN)),
+    "the floor moves up and down": (_UPRIGHT, bench_scene(_LIFTED)),
     "weight and drive": (_DRIVEN, bench_scene([over(FLOOR, -_DEEP, R), Bead(0, (2e-3, 0.0, 5e-3), S)])),
 }
 """Each with its case."""
@@ -194,13 +187,8 @@ def restart_lines(bench: Bench) -> Iterator[Line]:
     carry = bench.run(first).directory / "half.restart"
     recording = replace(bench_recording(1000), begin=500)
     second = bench.run(replace(first, recording=recording, checkpoint=Checkpoint(read="half.restart")), carry)
-    kept = {
-        0: "a spring at a wall",
-        1: "a spring of a pair",
-        3: "an open bridge to a wall",
-        5: "an open bridge of a pair",
-    }
-    for number, what in kept.items():
+    kept = ("a spring at a wall", 0), ("a spring of a pair", 1), ("an open bridge to a wall", 3), ("one of a pair", 5)
+    for what, number in kept:
         error = farthest(second.force[1:, number], whole.force[501:, number])
         yield Line(f"{what} after a restart beside one without", 0.0, error, EQUAL)
 
