@@ -69,15 +69,6 @@ def test_an_elastic_bounce_keeps_its_energy_to_the_order_of_the_step() -> None:
     assert errors[2] < errors[0] / 8.0
 
 
-def test_a_rebound_has_the_restitution_that_is_given() -> None:
-    """Tsuji's damping of Hertz's contact gives one restitution at all velocities."""
-    for restitution in (0.3, 0.8):
-        matter = touching(restitution=restitution)
-        engine = one_bead(matter, step=2e-7, height=RADIUS + 1e-7, velocity=(0.0, 0.0, -0.05))
-        frame = engine.run(3000, 3000)[0, 0]
-        assert frame[5] / 0.05 == pytest.approx(restitution, rel=0.02)
-
-
 def test_a_sliding_bead_rolls_at_five_sevenths() -> None:
     """Whatever the friction: 2/5 m R² of inertia, and friction at the rim until it rolls."""
     around = replace(FLOOR, gravity=(0.0, 0.0, -9.81))
