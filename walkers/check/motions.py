@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from walkers.check.bench import FLOOR, Bench, bench_case, bench_recording, bench_scene, farthest, free_run
+from walkers.check.bench import FLOOR, Bench, bench_case, bench_recording, bench_scene, farthest
 from walkers.check.lines import Line
 from walkers.check.scenes import R, S, full_case, over, pair, second_engine
 from walkers.inputs.case import Case
@@ -72,7 +72,7 @@ def step_lines(bench: Bench) -> Iterator[Line]:
     case = _walker(4)
     ways = []
     for finer in (1, 2, 4):
-        plan = plan_of(replace(case, run=free_run(case.run, case.run.time_step / finer)))
+        plan = plan_of(replace(case, run=replace(case.run, time_step=case.run.time_step / finer, steps_per_cycle=0)))
         steps = round(4.0 / case.drive.frequency / case.run.time_step) * finer
         series = bench.run(replace(plan, recording=bench_recording(steps, steps)))
         ways.append(series.position[-1] - series.position[0])
