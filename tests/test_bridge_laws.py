@@ -22,7 +22,6 @@ from walkers.physics.lubrication import normal_drag, tangential_drag
 from walkers.physics.matter import Liquid
 
 PAIRS = [(1.0, inf), (1.0, 1.0), (0.5, 1.0), (0.2, 1.0)]
-N = np.array([0.0, 0.0, 1.0])
 
 
 def surfaces(
@@ -114,24 +113,6 @@ def test_limits_between_spheres(ratio: float) -> None:
     assert s + 2.0 * c + q == pytest.approx(8.0 * pi * 2.0 * ratio / (5.0 * whole), rel=1e-6)
     on_2 = ratio * (s + c) - (c + q)
     assert on_2 == pytest.approx(pi * whole**3 * 4.0 * ratio**2 / (5.0 * whole**4), rel=1e-6)
-
-
-def moved(pair: tuple[float, float], gap: float, v: FloatArray, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """s and q of two bodies by the interface's definition; v and omega of shape (2, 3)."""
-    arms = np.array(pair)[:, None] + 0.5 * gap
-    relative = v[0] - v[1]
-    sliding = relative - (relative @ N) * N + np.cross(N, (arms * omega).sum(axis=0))
-    return sliding, np.cross(N, omega[0] - omega[1])
-
-
-def test_a_rigid_pair_feels_nothing() -> None:
-    pair, gap, spin = (1.0, 0.4), 0.03, np.array([0.3, -0.8, 1.1])
-    centres = np.array([(pair[0] + 0.5 * gap) * N, -(pair[1] + 0.5 * gap) * N]) + np.array([0.2, 0.5, -0.1])
-    v = np.array([0.1, 0.4, -0.2]) + np.cross(spin, centres)
-    sliding, rolling = moved(pair, gap, v, np.array([spin, spin]))
-    assert sliding == pytest.approx(np.zeros(3), abs=1e-15)
-    assert rolling == pytest.approx(np.zeros(3), abs=1e-15)
-    assert (v[0] - v[1]) @ N == pytest.approx(0.0, abs=1e-15)
 
 
 @pytest.mark.parametrize("pair", PAIRS)

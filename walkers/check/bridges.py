@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from functools import cache
 from math import acos, degrees, inf, pi, radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -69,8 +69,7 @@ def reference(shape: Shape) -> ForceCurve:
     return force_curve(*shape)
 
 
-@dataclass(frozen=True)
-class Deviation:
+class Deviation(NamedTuple):
     """A law over Young–Laplace: pull at contact, work from contact to rupture, each to its own, and largest gap."""
 
     pull: float
@@ -128,9 +127,9 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
         "checked": checked,
         "checks": checks,
         "laws": [
-            {"name": law.name, **{key: asdict(deviation(law, one)) for key, one in compared.items()}} for law in LAWS
+            {"name": law.name, **{key: deviation(law, one)._asdict() for key, one in compared.items()}} for law in LAWS
         ],
-        "soulie_at_walls": [asdict(deviation(LAWS[0], one)) for one in _walls()],
+        "soulie_at_walls": [deviation(LAWS[0], one)._asdict() for one in _walls()],
         "velocities": {} if quick else _velocities(out),
         "bond_numbers": {name: _bond_number(load_case(name)) for name in CASES},
         "coverage": _coverage(CASES[0]),

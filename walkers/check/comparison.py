@@ -37,18 +37,10 @@ FEWEST_SEEDS = 5
 
 @dataclass(frozen=True)
 class Row:
-    """A number of both engines.
+    """A number of both engines: LIGGGHTS's, and the second engine's at the same samples.
 
-    Attributes
-    ----------
-    name, unit
-        What it is.
-    first, second
-        LIGGGHTS's, and the second engine's at the same samples.
-    tolerance
-        How far the two may differ; infinite where nothing is judged.
-    p
-        How probable such a difference is between starts of one distribution; None of what has no distribution.
+    They may differ by ``tolerance``, which is infinite where nothing is judged; ``p`` says how probable such a
+    difference is between starts of one distribution, None of what has no distribution.
     """
 
     name: str
@@ -101,18 +93,8 @@ class Start:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A case in both engines.
-
-    Attributes
-    ----------
-    case
-        What was run.
-    rows
-        Numbers of both, the one to look at first; of a pile means over the starts.
-    starts
-        The runs; more than one of a pile alone.
-    without
-        Terms that the second engine left out.
+    """A case in both engines: numbers, the one to look at first (of a pile means over the starts), the runs, and the
+    terms that the second engine left out.
     """
 
     case: Case
