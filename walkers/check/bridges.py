@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from walkers.check.bridge_laws import LAWS, Law
-from walkers.check.chapter import Chapter
+from walkers.check.validate import Chapter
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case

@@ -2,21 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from walkers.check.chapter import Chapter
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.library import suggestion
 from walkers.inputs.text import rendered
 from walkers.postprocess.drawing import save_figure
 from walkers.runner.files import write_text
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 CHAPTERS = ("benchmarks", "bridges", "crosscheck")
 """In the order of the page; each the function ``chapter`` of a module of `walkers.check`."""
 PAGE = "validation.md"
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """A chapter of docs/explanation/validation.md.
+
+    Attributes
+    ----------
+    name, title
+        For ``walkers validate``, and its heading.
+    text
+        Markdown below the heading: what was compared, with citations and DOIs, tables, what agrees, and each
+        disagreement explained or left open. A picture is referred to as ``![…](figures/validation-NAME.png)``.
+    figures
+        The pictures by the NAME of their file.
+    numbers
+        What the text states, for ``--json``.
+    failed
+        Statements that were expected to hold and do not; empty where all is as it was expected to be.
+    """
+
+    name: str
+    title: str
+    text: str
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    failed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
