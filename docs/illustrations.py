@@ -45,43 +45,25 @@ from walkers.sweeps.site import cores_here
 from walkers.templates.deck import CONTENT_VERSION
 
 RECORD = Path("figures") / "made-from.json"
-_BLOCK = re.compile(
-    r"(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)",
-    re.MULTILINE | re.DOTALL,
-)
+_BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)")
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
 
 
 @dataclass(frozen=True)
 class Illustration:
-    """Files of the documentation, the cases that they show, and how they are made.
-
-    Attributes
-    ----------
-    files
-        In the documentation's folder.
-    cases
-        All whose runs they show.
-    make
-        Makes the files: folder of the runs, folder of the documentation.
-    """
+    """Files of docs/, the cases whose runs they show, and what makes them: folder of the runs, folder of the docs."""
 
     files: tuple[str, ...]
     cases: Callable[[], Iterable[Case]]
     make: Callable[[Path, Path], None]
 
 
-def _of_figure(name: str) -> Illustration:
-    return Illustration(
-        (f"figures/{name}.png",),
-        lambda: _points(FIGURES[name].sweeps),
-        lambda out, docs: _figures(name, out, docs),
-    )
+def _of_figure(name: str, *files: str, sweeps: Iterable[str]) -> Illustration:
+    def make(out: Path, docs: Path) -> None:
+        make_figures(out, docs / "figures", Options(cores_here()), only=[name], formats=("png",))
 
-
-def _figures(name: str, out: Path, docs: Path) -> None:
-    make_figures(out, docs / "figures", Options(cores_here()), only=[name], formats=("png",))
+    return Illustration(files, lambda: _points(sweeps), make)
 
 
 def _points(sweeps: Iterable[str]) -> Iterator[Case]:
@@ -105,8 +87,7 @@ def _rendered(name: str, case: str, *settings: str, apart: float | None = None) 
     return Illustration((f"pictures/{name}.png",), lambda: [loaded()], make)
 
 
-def _model_terms(out: Path, docs: Path) -> None:
-    del out
+def _model_terms(_: Path, docs: Path) -> None:
     write_model_terms(try_model_terms(), docs / "figures")
 
 
@@ -144,12 +125,8 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "tray": _rendered("tray", "tray"),
     "climber": _rendered("climber", "climber"),
     "pile": _rendered("pile", "pile-small", "run.duration=10 s", apart=2.0),
-    **{name: _of_figure(name) for name in FIGURES},
-    "comparison": Illustration(
-        ("figures/comparison.md", "figures/comparison.json"),
-        lambda: _points(COMPARED),
-        lambda out, docs: _figures("comparison", out, docs),
-    ),
+    **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
+    "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
     "model-terms": Illustration(
         ("figures/model_terms.md", "figures/model_terms.json"),
         lambda: [load_case("fig1b"), load_case("fig4a")],
@@ -194,26 +171,9 @@ def recorded(docs: Path) -> dict[str, str]:
 
 
 def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[Path]:
-    """Make pictures and tables of the documentation, then what its pages print of them.
+    """Make pictures and tables, then what pages print of them: those named, or all that are missing or of other cases.
 
-    Parameters
-    ----------
-    out
-        Folder of the run directories; runs that are missing are made.
-    docs
-        Folder of the documentation.
-    only
-        Names of `ILLUSTRATIONS`; if empty, all of which a file is missing or of other cases than today's.
-
-    Returns
-    -------
-    list of Path
-        What was written.
-
-    Raises
-    ------
-    InputError
-        If there is no such illustration.
+    ``out`` is the folder of the run directories; runs that are missing are made.
     """
     for name in only:
         if name not in ILLUSTRATIONS:
@@ -245,13 +205,7 @@ def facts(docs: Path) -> dict[str, str]:
 
 
 def refresh_pages(pages: Iterable[Path], known: Mapping[str, str], out: Path) -> list[Path]:
-    """Write what today's commands print and today's numbers into pages; those that changed.
-
-    Raises
-    ------
-    KeyError
-        If a page quotes a fact that there is not.
-    """
+    """Write what today's commands print and today's numbers into pages; those that changed."""
     changed = []
     for page in pages:
         old = page.read_text("utf-8")
@@ -280,13 +234,7 @@ def facts_in(page: Path) -> list[tuple[str, str]]:
 
 
 def output_of(command: str, out: Path) -> str:
-    """What a command on a case prints; runs are in ``runs``, wherever that is.
-
-    Raises
-    ------
-    subprocess.CalledProcessError
-        If it fails.
-    """
+    """What a command on a case prints; runs are in ``runs``, wherever that is."""
     _, name, *arguments = shlex.split(command)
     if name == "theory":
         run(load_case(arguments[0]), out)  # which it prints beside the models

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from tests.conftest import make_case
-from walkers.check.bridges import interpolated
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 from walkers.physics.laws import LAWS, by_name
 from walkers.templates.bridge_tables import TOLERANCE, UnusableLawError, tabulated
@@ -26,6 +25,26 @@ def test_the_engine_reads_the_law_out_of_its_table(name: str, surfaces: Surfaces
     expected = law(surfaces).forces(gaps).columns()
     scale = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max(axis=0))
     np.testing.assert_array_less(np.abs(interpolated(table.text(), gaps) - expected), 10 * TOLERANCE * scale + 1e-30)
+
+
+def interpolated(text: str, gaps: FloatArray) -> FloatArray:
+    """Pull and resistances, shape (n, 5), at gaps (m), of a table after its first line.
+
+    It is what walkers/engine/table.h makes of it, written down once more from the format alone.
+    """
+    head, *lines = text.splitlines()
+    rupture, scale = (float(word) for word in head.split()[2:4])
+    octaves, cells = (int(word) for word in head.split()[4:])
+    rows = np.array([[float(word) for word in line.split()] for line in lines])
+    middle = scale * (2.0**octaves - 1.0)
+    mantissa, exponent = np.frexp(1.0 + gaps / scale)
+    near = cells * ((exponent - 1) + 2.0 * mantissa - 1.0)
+    far = cells * (octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle))))
+    place = np.where(gaps < middle, near, far)
+    cell = np.minimum(place.astype(int), (len(rows) - 1) // 3 - 1)
+    fours = [rows[3 * number : 3 * number + 4, 1:] for number in cell]
+    cubics = [np.polynomial.polynomial.polyfit(np.arange(4) / 3.0, four, 3) for four in fours]
+    return np.array([(at ** np.arange(4)) @ cubic for at, cubic in zip(place - cell, cubics, strict=True)])
 
 
 def _law(**changes: object) -> Curve:

@@ -6,8 +6,7 @@ import pytest
 
 from tests.conftest import call
 from walkers.check import bridges
-from walkers.check.chapter import Chapter
-from walkers.check.validate import CHAPTERS, PAGE, validate
+from walkers.check.validate import CHAPTERS, PAGE, Chapter, validate
 from walkers.runner.failures import EngineFailure
 
 

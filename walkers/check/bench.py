@@ -15,7 +15,7 @@ import numpy as np
 
 from walkers.inputs import resolve_case
 from walkers.inputs.boundary import BOTTOM, Wall
-from walkers.inputs.case import Case, Run
+from walkers.inputs.case import Case
 from walkers.inputs.errors import Stopped
 from walkers.physics.bridge import Curve, Forces, Surfaces
 from walkers.postprocess.dump import BinaryDump, FloatArray
@@ -34,11 +34,6 @@ FLOOR = BOTTOM
 def dry(surfaces: Surfaces) -> Curve:
     """The law of no liquid."""
     return Curve(lambda gaps: Forces(*[np.zeros_like(gaps)] * 5), rupture=surfaces.closest)
-
-
-def free_run(run: Run, time_step: float) -> Run:
-    """The same with a time step (s) of which a cycle need not be a multiple: a bench counts steps by itself."""
-    return replace(run, time_step=time_step, steps_per_cycle=0)
 
 
 def bench_case(**changes: dict[str, Any]) -> Case:
@@ -70,24 +65,11 @@ class Measured:
     directory: Path
 
 
-class AuditStopped(Stopped):
-    """Somebody stopped the audit while an engine ran."""
-
-
 @dataclass
 class Bench:
     """Runs decks of an engine in a folder of its own.
 
-    Attributes
-    ----------
-    engine
-        The binary on trial.
-    folder
-        Where decks are run.
-    stop
-        Set to end the engines that run.
-    version
-        That the engine told.
+    ``engine`` is the binary on trial, ``stop`` is set to end the engines that run, ``version`` is what they told.
     """
 
     engine: Engine
@@ -120,7 +102,7 @@ class Bench:
 
     def _look(self, _: Progress) -> None:
         if self.stop.is_set():
-            raise AuditStopped("the audit was stopped")
+            raise Stopped("the audit was stopped")
 
 
 def read_series(deck: Deck, directory: Path) -> Measured:

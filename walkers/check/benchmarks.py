@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.check.chapter import Chapter
 from walkers.check.impacts import Course, Speeds, Sphere, course_of_pair, course_on_plane, onto_plane
 from walkers.check.kernels import FloatArray
 from walkers.check.lines import Line, Verdict
+from walkers.check.validate import Chapter
 from walkers.inputs.text import rendered
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 

@@ -1,44 +1,38 @@
-"""The engine's bridges checked against the Young–Laplace equation, and published laws beside it."""
+"""Published laws of bridges beside the Young–Laplace equation, and walkers by other laws."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from functools import cache
 from math import acos, degrees, inf, pi, radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from walkers.check.bridge_laws import LAWS, Law
-from walkers.check.chapter import Chapter
-from walkers.check.collocation import collocated
+from walkers.check.validate import Chapter
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.physics.bridge import FloatArray, Surfaces
+from walkers.physics.bridge import Surfaces
 from walkers.physics.laplace import ForceCurve, force_curve
-from walkers.physics.laws import by_name
 from walkers.pipeline import run
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, series_look, styled
-from walkers.templates.bridge_tables import TOLERANCE, tabulated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CASES = ("fig1b", "fig4a", "climber-dimer")
-"""Whose bridges are checked."""
+"""Whose Bond numbers are told."""
 COMPARED = ("fig1b", "climber-dimer")
 """With whose bridges published laws are compared: of the walkers' liquid, and of the piles'."""
 WALKED = ("fig1b", "fig4a")
 WALKED_BY = ("young-laplace", "willett", "rabinovich", "soulie")
 """Cases and laws of the velocities."""
 _FRACTIONS, _ANGLES = (0.01, 0.05, 0.25), (0.0, radians(40.0))
-_SHARES = (0.011, 0.37, 0.83)
-"""Of the rupture distance: gaps of the checks, in no table."""
-_COLLOCATED, _TABLED, _ENERGY, _FITTED = 1e-8, 2.0 * TOLERANCE, 2e-3, 0.02
 _GAPS = 280
 
 Shape = tuple[float, float, float, float]
@@ -69,8 +63,7 @@ def reference(shape: Shape) -> ForceCurve:
     return force_curve(*shape)
 
 
-@dataclass(frozen=True)
-class Deviation:
+class Deviation(NamedTuple):
     """A law over Young–Laplace: pull at contact, work from contact to rupture, each to its own, and largest gap."""
 
     pull: float
@@ -91,46 +84,22 @@ def deviation(law: Law, surfaces: Surfaces) -> Deviation:
     )
 
 
-def interpolated(text: str, gaps: FloatArray) -> FloatArray:
-    """Pull and resistances, shape (n, 5), at gaps (m), of a table after its first line.
-
-    It is what walkers/engine/table.h makes of it, written down once more from the format alone.
-    """
-    head, *lines = text.splitlines()
-    rupture, scale = (float(word) for word in head.split()[2:4])
-    octaves, cells = (int(word) for word in head.split()[4:])
-    rows = np.array([[float(word) for word in line.split()] for line in lines])
-    middle = scale * (2.0**octaves - 1.0)
-    mantissa, exponent = np.frexp(1.0 + gaps / scale)
-    near = cells * ((exponent - 1) + 2.0 * mantissa - 1.0)
-    far = cells * (octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle))))
-    place = np.where(gaps < middle, near, far)
-    cell = np.minimum(place.astype(int), (len(rows) - 1) // 3 - 1)
-    fours = [rows[3 * number : 3 * number + 4, 1:] for number in cell]
-    cubics = [np.polynomial.polynomial.polyfit(np.arange(4) / 3.0, four, 3) for four in fours]
-    return np.array([(at ** np.arange(4)) @ cubic for at, cubic in zip(place - cell, cubics, strict=True)])
-
-
 def chapter(out: Path, *, quick: bool = False) -> Chapter:
-    """Checks of the bridges' tables, published laws beside them, and walkers by other laws.
+    """Published laws beside the Young–Laplace equation, and walkers by other laws.
 
     Parameters
     ----------
     out
         Folder of the run directories.
     quick
-        Checks of one case's bridges, and no walkers.
+        No walkers.
     """
-    checked = CASES[:1] if quick else CASES
-    checks = _checks(checked)
     compared = shapes(COMPARED)
     numbers = {
-        "checked": checked,
-        "checks": checks,
         "laws": [
-            {"name": law.name, **{key: asdict(deviation(law, one)) for key, one in compared.items()}} for law in LAWS
+            {"name": law.name, **{key: deviation(law, one)._asdict() for key, one in compared.items()}} for law in LAWS
         ],
-        "soulie_at_walls": [asdict(deviation(LAWS[0], one)) for one in _walls()],
+        "soulie_at_walls": [deviation(LAWS[0], one)._asdict() for one in _walls()],
         "velocities": {} if quick else _velocities(out),
         "bond_numbers": {name: _bond_number(load_case(name)) for name in CASES},
         "coverage": _coverage(CASES[0]),
@@ -141,31 +110,7 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
         text=_text_of(numbers, compared),
         figures={"bridges": figure(compared)},
         numbers=numbers,
-        failed=tuple(check["what"] for check in checks if not check["largest"] <= check["expected"]),
     )
-
-
-def _checks(names: tuple[str, ...]) -> list[dict[str, Any]]:
-    """What must hold, the largest difference that was found, and what was expected; forces over the pull at contact."""
-    tabled, closed, energetic, fitted = [], [], [], []
-    for surfaces in shapes(names).values():
-        shape, liquid = shape_of(surfaces), surfaces.liquid
-        exact = reference(shape)
-        gaps = exact.rupture * np.array(_SHARES)
-        solved = np.array([collocated(*shape, gap).force for gap in gaps.tolist()])
-        table = interpolated(tabulated(by_name(liquid.law), surfaces).text(), gaps)[:, 0] / liquid.surface_tension
-        tabled.append(float(np.abs(table - solved).max() / exact.forces[0]))
-        closed.append(float(np.abs(force_curve(*shape, gaps).forces - solved).max() / exact.forces[0]))
-        energetic.append(abs(float(np.trapezoid(exact.forces, exact.gaps)) / exact.work - 1.0))
-        if not surfaces.at_wall:
-            fitted.append(abs(deviation(LAWS[-1], surfaces).pull - 1.0))
-    told = (
-        ("pull by the decks' tables, as the engine interpolates them, and by collocation", tabled, _TABLED),
-        ("pull in closed form and by collocation", closed, _COLLOCATED),
-        ("work of the pull and fall of surface energy", energetic, _ENERGY),
-        ("pull at contact and Bagheri et al.'s fit to their own solutions", fitted, _FITTED),
-    )
-    return [{"what": what, "largest": max(found), "expected": expected} for what, found, expected in told]
 
 
 def _walls() -> list[Surfaces]:
@@ -195,10 +140,21 @@ def _bond_number(case: Case) -> dict[str, float]:
 def _coverage(name: str) -> dict[str, float]:
     """How far bridges at contact reach around the beads of a dimer, rad, and the room between wall and other bead."""
     beads, wall = shapes((name,)).values()
-    small, large = collocated(*shape_of(beads), 0.0).filling_angles
+    small, large = _filling_angles(beads)
     apart = acos((beads.other_radius - beads.radius) / (beads.other_radius + beads.radius))
-    at_wall = collocated(*shape_of(wall), 0.0).filling_angles[0]
-    return {"wall": at_wall, "large": large, "large_room": apart, "small": small, "small_room": pi - apart}
+    return {
+        "wall": _filling_angles(wall)[0],
+        "large": large,
+        "large_room": apart,
+        "small": small,
+        "small_room": pi - apart,
+    }
+
+
+def _filling_angles(surfaces: Surfaces) -> list[float]:
+    """Angles from the axis to the wetting lines at contact, rad."""
+    arcs = reference(shape_of(surfaces)).arcs[0].tolist()
+    return [arc / radius for arc, radius in zip(arcs, (surfaces.radius, surfaces.other_radius), strict=True)]
 
 
 def _text_of(numbers: dict[str, Any], compared: dict[str, Surfaces]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -22,7 +21,6 @@ from walkers.inputs.case import Case, settling_of
 from walkers.pipeline import Run, run
 from walkers.postprocess.gait import averages, walk
 from walkers.postprocess.motion import Group, Motion
-from walkers.runner.directory import FinishedRun
 
 SPEED, GAIT, ORIENTATION = 1e-4, 1e-3, 0.1
 """How far the second engine may differ: relative, of walkers' velocities; of rotation and sliding, relative to the
@@ -39,18 +37,10 @@ FEWEST_SEEDS = 5
 
 @dataclass(frozen=True)
 class Row:
-    """A number of both engines.
+    """A number of both engines: LIGGGHTS's, and the second engine's at the same samples.
 
-    Attributes
-    ----------
-    name, unit
-        What it is.
-    first, second
-        LIGGGHTS's, and the second engine's at the same samples.
-    tolerance
-        How far the two may differ; infinite where nothing is judged.
-    p
-        How probable such a difference is between starts of one distribution; None of what has no distribution.
+    They may differ by ``tolerance``, which is infinite where nothing is judged; ``p`` says how probable such a
+    difference is between starts of one distribution, None of what has no distribution.
     """
 
     name: str
@@ -78,11 +68,10 @@ class Row:
 
 @dataclass(frozen=True)
 class Start:
-    """Both motions from one start, and the wall time (s) of their steps; None if LIGGGHTS made other runs with them."""
+    """Both motions from one start."""
 
     first: Motion
     second: Motion
-    seconds: tuple[float | None, float]
 
     @cached_property
     def apart(self) -> FloatArray:
@@ -104,18 +93,8 @@ class Start:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A case in both engines.
-
-    Attributes
-    ----------
-    case
-        What was run.
-    rows
-        Numbers of both, the one to look at first; of a pile means over the starts.
-    starts
-        The runs; more than one of a pile alone.
-    without
-        Terms that the second engine left out.
+    """A case in both engines: numbers, the one to look at first (of a pile means over the starts), the runs, and the
+    terms that the second engine left out.
     """
 
     case: Case
@@ -146,7 +125,6 @@ class Comparison:
                     "seed": one.first.case.seed,
                     "cycles_together": one.together,
                     "largest_distance": float(one.apart.max()),
-                    "seconds": {"liggghts": one.seconds[0], "second_engine": one.seconds[1]},
                 }
                 for one in self.starts
             ],
@@ -189,27 +167,21 @@ def crosscheck(
     []
     """
     runs = [make(replace(case, seed=case.seed + number), out) for number in range(seeds)]
-    return compare([(one.motion, _seconds(one)) for one in runs], without)
+    return compare([one.motion for one in runs], without)
 
 
-def _seconds(done: Run) -> float | None:
-    """Wall time that LIGGGHTS took for the steps of a run, s; None if it made other runs with them."""
-    manifest = FinishedRun(done.directory).manifest
-    return None if "shared_deck" in manifest else float(manifest["seconds"]["engine_loop"])
-
-
-def compare(runs: Sequence[tuple[Motion, float | None]], without: Sequence[str] = ()) -> Comparison:
+def compare(motions: Sequence[Motion], without: Sequence[str] = ()) -> Comparison:
     """Compare finished runs of a case with the second engine.
 
     Parameters
     ----------
-    runs
-        Motions and LIGGGHTS's wall time (s) if it is known: one, or of a pile one a start.
+    motions
+        Of the runs: one, or of a pile one a start.
     without
         Terms that the second engine leaves out.
     """
-    starts = tuple(_start(motion, seconds, without) for motion, seconds in runs)
-    case, (first, second) = runs[0][0].case, (starts[0].first, starts[0].second)
+    starts = tuple(Start(motion, simulate(motion, without)) for motion in motions)
+    case, first, second = motions[0].case, starts[0].first, starts[0].second
     if case.mixture is not None:
         rows = _pile_rows(starts)
     else:
@@ -217,12 +189,6 @@ def compare(runs: Sequence[tuple[Motion, float | None]], without: Sequence[str] 
         for number, groups in enumerate(zip(first.groups, second.groups, strict=True)):
             rows += _walker_rows(*groups, f" ({number + 1})" if len(first.groups) > 1 else "")
     return Comparison(case, tuple(rows), starts, tuple(term for term in TERMS if term in without))
-
-
-def _start(motion: Motion, seconds: float | None, without: Collection[str]) -> Start:
-    began = time.perf_counter()
-    made = simulate(motion, without)
-    return Start(motion, made, (seconds, time.perf_counter() - began))
 
 
 def shortened(case: Case, cycles: int) -> Case:
@@ -380,11 +346,4 @@ def describe(found: Comparison) -> str:
     elif len(found.starts) < FEWEST_SEEDS:
         told = f"a Kolmogorov-Smirnov test tells nothing below {SIGNIFICANCE}"
         lines.append(f"  (with fewer than {FEWEST_SEEDS} starts {told})")
-    return "\n".join([*lines, f"  {_told_time(found.starts)}"])
-
-
-def _told_time(starts: Sequence[Start]) -> str:
-    own = sum(one.seconds[1] for one in starts)
-    known = [one.seconds[0] for one in starts if one.seconds[0] is not None]
-    told = f"LIGGGHTS took {sum(known):.2f} s for its steps, the" if len(known) == len(starts) else "the"
-    return f"{told} second engine {'took ' if told == 'the' else ''}{own:.2f} s"
+    return "\n".join(lines)

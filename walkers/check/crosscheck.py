@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from walkers.check.chapter import Chapter
 from walkers.check.comparison import FEWEST_SEEDS, Comparison, crosscheck, shortened, simulate
+from walkers.check.validate import Chapter
 from walkers.inputs import resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case, read_toml, shipped_cases

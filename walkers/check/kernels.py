@@ -40,16 +40,10 @@ class Bridges(NamedTuple):
     """Laws of T bridges as splines in three pieces: even in h up to the scale, in ln h up to the middle, and from there
     to the rupture in √(rupture - h).
 
-    Attributes
-    ----------
-    spans : ndarray, shape (T, 4)
-        Gaps at which a bridge forms, where pieces end, and at which it breaks, m.
-    splines : ndarray, shape (T, 3, CELLS, 4, 5)
-        Coefficients of each cell, the highest power first, of the pull (N) and the resistances.
-    kind : ndarray, shape (N,)
-        Of each bead, by its radius.
-    between : ndarray, shape (K, K + 1)
-        Number of the bridge of two kinds of beads; the last column is that to walls.
+    ``spans``, of shape (T, 4), are the gaps at which a bridge forms, where pieces end, and at which it breaks, m;
+    ``splines`` (T, 3, CELLS, 4, 5) the coefficients of each cell, the highest power first, of pull (N) and resistances;
+    ``kind`` (N,) that of each bead, by its radius; ``between`` (K, K + 1) the bridge of two kinds, in the last column
+    that to walls.
     """
 
     spans: FloatArray
@@ -61,20 +55,8 @@ class Bridges(NamedTuple):
 class Constants(NamedTuple):
     """What does not change: N beads, W walls, H harmonics; SI units.
 
-    Attributes
-    ----------
-    step : float
-    radius, mass : ndarray, shape (N,)
-    point, normal : ndarray, shape (W, 3)
-    hollow : ndarray, shape (W,)
-        Radii of cylinders, 0 of planes.
-    gravity : ndarray, shape (3,)
-    harmonics : ndarray, shape (H, 6)
-        Direction, ω, peak acceleration, phase.
-    modulus, shear_modulus, damping : float
-        E*, G*, β.
-    friction_beads, friction_walls, rolling : float
-        Coefficients of friction between beads and at walls, of rolling friction at both.
+    ``hollow`` has the radii of cylinders, 0 of planes; ``harmonics``, of shape (H, 6), directions, ω, accelerations and
+    phases; moduli are E* and G*, ``damping`` is β; friction is that between beads and at walls, ``rolling`` both's.
     """
 
     step: float
@@ -177,14 +159,7 @@ def bridge_forces(b: Bridges, bridge: int, gap: float) -> tuple[float, float, fl
 def touch(c: Constants, m: Meeting, spring: FloatArray, moves: bool) -> tuple[float, Vector, Vector]:
     """Normal force (N), tangential force (N) and couple (N m) on the first of two surfaces that overlap.
 
-    Parameters
-    ----------
-    c, m
-        Constants, and how they meet.
-    spring
-        Tangential displacement, m; changed.
-    moves
-        Whether time goes on; else forces are those of the state as it is.
+    The ``spring`` (m) changes if time goes on (``moves``); else forces are those of the state as it is.
     """
     root = sqrt(-m.radius * m.gap)
     elastic = -4.0 / 3.0 * c.modulus * root * m.gap
@@ -372,23 +347,9 @@ def advance(
 ) -> int:
     """Move on, until the end or until neighbours are to be listed anew; at the end already, evaluate the forces.
 
-    Parameters
-    ----------
-    c, state, pairs
-        The system; the state changes.
-    listed : ndarray, shape (N, 3)
-        Places at which neighbours were listed, m.
-    skin
-        How far apart surfaces may have been then of beads that can meet or have a bridge now, m.
-    clock
-        Step that it is, at which the record begins, at which to end, and between records.
-    frames : ndarray, shape (F, N, 9)
-        Records of the steps after the one at which they begin.
-
-    Returns
-    -------
-    step
-        That it is now.
+    ``listed`` has the places at which neighbours were listed, ``skin`` (m) how far apart surfaces may have been then of
+    beads that can meet now. The ``clock`` is the step that it is, that at which the records begin, that at which to
+    end, and the steps between records; ``frames``, of shape (F, N, 9), takes those. Returns the step that it is now.
     """
     now, begin, end, every = clock
     if now == end:

@@ -1,12 +1,9 @@
-"""What a check is, and the lines of the table that it gives."""
+"""What a check gives: lines of what is expected and what was measured, each with a verdict."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-
-from walkers.check.bench import Bench
 
 
 class Verdict(StrEnum):
@@ -20,7 +17,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Line:
-    """One line of the audit's table.
+    """One line of a table.
 
     Attributes
     ----------
@@ -52,25 +49,3 @@ class Line:
     def verdict(self) -> Verdict:
         """Pass or fail by the tolerance; an error that is no number fails."""
         return self.unmeasured or (Verdict.PASS if self.error <= self.tolerance else Verdict.FAIL)
-
-
-@dataclass(frozen=True)
-class Check:
-    """A measurement on the engine.
-
-    Attributes
-    ----------
-    name
-        For ``walkers audit --only``.
-    title
-        One line on what it is about.
-    measure
-        Runs decks on a bench and gives the lines.
-    quick
-        Whether it is part of ``--quick``.
-    """
-
-    name: str
-    title: str
-    measure: Callable[[Bench], Iterable[Line]]
-    quick: bool = True

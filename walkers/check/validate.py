@@ -1,22 +1,52 @@
-"""All chapters of docs/explanation/validation.md, from their studies to the files."""
+"""``walkers validate``: all chapters of docs/explanation/validation.md, to the files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from walkers.check.chapter import Chapter
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.library import suggestion
 from walkers.inputs.text import rendered
 from walkers.postprocess.drawing import save_figure
 from walkers.runner.files import write_text
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 CHAPTERS = ("benchmarks", "bridges", "crosscheck")
 """In the order of the page; each the function ``chapter`` of a module of `walkers.check`."""
 PAGE = "validation.md"
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """A chapter of docs/explanation/validation.md.
+
+    Attributes
+    ----------
+    name, title
+        For ``walkers validate``, and its heading.
+    text
+        Markdown below the heading: what was compared, with citations and DOIs, tables, what agrees, and each
+        disagreement explained or left open. A picture is referred to as ``![…](figures/validation-NAME.png)``.
+    figures
+        The pictures by the NAME of their file.
+    numbers
+        What the text states, for ``--json``.
+    failed
+        Statements that were expected to hold and do not; empty where all is as it was expected to be.
+    """
+
+    name: str
+    title: str
+    text: str
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    failed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -30,21 +60,6 @@ class Validation:
     def failed(self) -> list[str]:
         """What was expected to hold and does not, with the chapter's name before it."""
         return [f"{chapter.name}: {statement}" for chapter in self.chapters for statement in chapter.failed]
-
-
-def selected(only: Sequence[str] = ()) -> tuple[str, ...]:
-    """Names of chapters: those given, or all.
-
-    Raises
-    ------
-    InputError
-        If one is none.
-    """
-    for name in only:
-        if name not in CHAPTERS:
-            told = f"no chapter {name!r}; expected one of {', '.join(CHAPTERS)}{suggestion(name, CHAPTERS)}"
-            raise InputError("walkers validate", [Problem("", None, told)])
-    return tuple(name for name in CHAPTERS if name in only or not only)
 
 
 def validate(
@@ -80,7 +95,11 @@ def validate(
     """
     from joblib import Parallel, delayed
 
-    names = selected(only)
+    for name in only:
+        if name not in CHAPTERS:
+            told = f"no chapter {name!r}; expected one of {', '.join(CHAPTERS)}{suggestion(name, CHAPTERS)}"
+            raise InputError("walkers validate", [Problem("", None, told)])
+    names = tuple(name for name in CHAPTERS if name in only or not only)
     made: dict[str, Chapter] = {}
     works = Parallel(jobs, return_as="generator_unordered")
     for chapter in works(delayed(_chapter)(name, out, quick) for name in names):
@@ -91,24 +110,19 @@ def validate(
     # A page of some chapters, or of quick ones, is not to take the place of one that has all.
     some = [*(["quick"] if quick else []), *(names if names != CHAPTERS else [])]
     page = f"validation-{'-'.join(some)}.md" if some else PAGE
-    return Validation(chapters, tuple(_written(chapters, to / page)))
+    files: list[Path] = [to / page]
+    for chapter in chapters:
+        for name, figure in chapter.figures.items():
+            files += save_figure(figure, to / "figures" / f"validation-{name}.png", (), title=chapter.title)
+    write_text(to / page, rendered("walkers.check", "validation.md.j2", chapters=chapters))
+    return Validation(chapters, tuple(files))
 
 
 def _chapter(name: str, out: Path, quick: bool) -> Chapter:
     """A chapter, or what kept it from being made: the others are made all the same."""
-    module = import_module(f"walkers.check.{name.replace('-', '_')}")
+    module = import_module(f"walkers.check.{name}")
     try:
         chapter: Chapter = module.chapter(out, quick=quick)
     except WalkersError as error:
         return Chapter(name, name, "", failed=(f"could not be made: {error}",))
     return chapter
-
-
-def _written(chapters: Sequence[Chapter], page: Path) -> list[Path]:
-    files: list[Path] = []
-    for chapter in chapters:
-        for name, figure in chapter.figures.items():
-            place = page.parent / "figures" / f"validation-{name}.png"
-            files += save_figure(figure, place, (), title=chapter.title)
-    write_text(page, rendered("walkers.check", "validation.md.j2", chapters=chapters))
-    return [page, *files]

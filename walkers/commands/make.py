@@ -30,7 +30,7 @@ from walkers.commands.arguments import (
 from walkers.pipeline import DEFAULT_OUT
 
 if TYPE_CHECKING:
-    from walkers.check.audit import CheckedLines
+    from walkers.check.audit import Checked
     from walkers.inputs.case import Case as Resolved
     from walkers.pipeline import Run
 
@@ -305,13 +305,12 @@ def audit(
 ) -> int:
     """Measure forces of engine and contact model beside a second engine and closed forms; exit 1 if a line fails."""
     from walkers.check.audit import record, run_audit, selected
-    from walkers.check.table import as_dict, as_text
     from walkers.inputs.errors import InputError, Problem
     from walkers.runner.binary import find_engine
     from walkers.runner.failures import EngineMissing
 
-    def told(checked: CheckedLines) -> None:
-        tell(f"{checked.check.name} ({checked.seconds:.1f} s)")
+    def told(checked: Checked) -> None:
+        tell(f"{checked.name} ({checked.seconds:.1f} s)")
 
     checks = selected(only or (), quick=quick)
     try:
@@ -322,9 +321,9 @@ def audit(
         raise InputError("--engine", [Problem("", None, str(missing))]) from missing
     report = run_audit(checks, engine=binary, on_done=told)
     if as_json:
-        print_json(as_dict(report))
+        print_json(report.as_dict())
     else:
-        print(as_text(report))
+        print(report.as_text())
     if not only:
         try:
             record(report, quick=quick)

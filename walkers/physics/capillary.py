@@ -71,13 +71,6 @@ def capillary_force(
     return pi * surface_tension * sqrt(radius_1 * radius_2) * (exp(a * max(gap, 0.0) / larger + b) + c)
 
 
-def capillary_force_at_wall(
-    surface_tension: float, radius: float, volume: float, contact_angle: float, gap: float = 0.0
-) -> float:
-    """Attraction by the bridge between a bead and a plane, N: twice that of two equal spheres."""
-    return 2.0 * capillary_force(surface_tension, radius, radius, volume, contact_angle, gap)
-
-
 def capillary_force_limit_at_wall(surface_tension: float, radius: float) -> float:
     """Attraction of a sphere to a plane by a vanishing bridge that wets perfectly, 4πγR, N (McFarlane, Tabor 1950)."""
     return 4.0 * pi * surface_tension * radius

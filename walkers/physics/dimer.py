@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import asin, cos, pi
+from math import pi
 
 from walkers.physics.capillary import capillary_force_limit_at_wall
 
@@ -55,11 +55,6 @@ class Dimer:
     def reduced_radius(self) -> float:
         """R1 R2/(R1 + R2), m."""
         return self.radii[0] * self.radii[1] / sum(self.radii)
-
-    @property
-    def length(self) -> float:
-        """From the outermost point of one bead to that of the other, seen from above, m."""
-        return sum(self.radii) * cos(asin(self.sin_delta)) + sum(self.radii)
 
     def gamma0(self, peak_acceleration: float) -> float:
         """Γ0 for a peak acceleration in m/s²."""

@@ -33,12 +33,8 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
     -------
     ndarray, shape (n,), m.
     """
-    if radius_2 == inf:
-        return np.array(
-            [capillary.capillary_force_at_wall(1.0, radius_1, volume, contact_angle, float(gap)) for gap in gaps]
-        )
-    pair = (radius_1, radius_2)
-    return np.array([capillary.capillary_force(1.0, *pair, volume, contact_angle, float(gap)) for gap in gaps])
+    pair, times = ((radius_1, radius_1), 2.0) if radius_2 == inf else ((radius_1, radius_2), 1.0)
+    return np.array([times * capillary.capillary_force(1.0, *pair, volume, contact_angle, float(gap)) for gap in gaps])
 
 
 def law(surfaces: Surfaces) -> Curve:

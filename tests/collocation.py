@@ -10,29 +10,19 @@ numbers, the arcs from the solids' apices to the wetting lines, p and L. The clo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import cos, inf, pi, sin
 
 import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
 
 from walkers.physics.bridge import FloatArray
-from walkers.physics.laplace import NoBridgeError, force_curve
-
-
-@dataclass(frozen=True)
-class Collocated:
-    """A bridge: pull and surface energy over the surface tension, and filling angles at its solids, rad."""
-
-    force: float
-    energy: float
-    filling_angles: tuple[float, float]
+from walkers.physics.laplace import force_curve
 
 
 def collocated(
     radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float], gap: float
-) -> Collocated:
-    """The bridge at a gap; parameters and errors as for `walkers.physics.laplace.force_curve`, lengths in any unit."""
+) -> tuple[float, float]:
+    """Pull and energy over the surface tension at a gap; parameters as for `walkers.physics.laplace.force_curve`."""
     radii = (radius_1, radius_2)
     angles = contact_angle if isinstance(contact_angle, tuple) else (contact_angle, contact_angle)
     known = force_curve(*radii, volume, contact_angle, [gap])
@@ -57,8 +47,7 @@ def collocated(
     mesh = np.linspace(0.0, 1.0, 41)
     profile = solve_ivp(lambda s, y: slopes(s, y, guess), (0.0, 1.0), start(guess), t_eval=mesh, rtol=1e-6).y
     found = solve_bvp(slopes, ends, mesh, profile, guess, tol=1e-10, max_nodes=20_000)
-    if not found.success:
-        raise NoBridgeError(f"gap {gap:.6g}: {found.message}")
+    assert found.success, found.message
     caps = [_cap(radius / scale, arc) for radius, arc in zip(radii, found.p[:2], strict=True)]
     wetted = sum(cos(angle) * cap[4] for angle, cap in zip(angles, caps, strict=True))
     nodes, weights = np.polynomial.legendre.leggauss(48)
@@ -66,7 +55,7 @@ def collocated(
     radius, upright = found.y[0], np.sin(found.y[2])
     pulls = pi * (2.0 * radius * upright - found.p[2] * radius**2)
     neck = int(np.argmin(radius))
-    return Collocated(scale * float(pulls[neck]), scale**2 * (free - wetted), (caps[0][0], caps[1][0]))
+    return scale * float(pulls[neck]), scale**2 * (free - wetted)
 
 
 def _cap(radius: float, arc: float) -> tuple[float, float, float, float, float]:
