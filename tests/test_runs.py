@@ -22,7 +22,6 @@ from tests.conftest import (
     make_case,
     to_toml,
     wait_for,
-    wait_for_engines,
 )
 from walkers import find_run
 from walkers import run as run_case
@@ -139,7 +138,6 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     assert {path.name for path in (run.directory / FIRST_SEGMENT).iterdir()} == {
         *("layout.json", "walker.lig", "bridges.txt", "engine.log", "segment.json", "run.sh"),
         *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
-        "bridges.txt",
     }
     assert run.case == case
     assert run.layout == render_deck(case).layout
@@ -189,29 +187,14 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(
         pass
 
 
-def test_an_engine_dies_with_its_launcher(in_folder: Path) -> None:
-    (in_folder / "test.toml").write_text(to_toml(document(run=LONG)))
-    program = subprocess.Popen([PROGRAM, "run", "test.toml"], stderr=subprocess.DEVNULL)
-    wait_for_engines(in_folder, program)
-    program.kill()
-    program.wait()
-    wait_for(lambda: not engines_in(in_folder))
-
-
-def test_a_run_is_found_by_its_directory_or_its_case(tmp_path: Path) -> None:
-    case_file = _toml(tmp_path)
-    outcome = run_case(make_case(run=SHORT), tmp_path / "runs")
-    assert find_run(outcome.directory).directory == outcome.directory
-    assert find_run(case_file, tmp_path / "runs").directory == outcome.directory
-
-
-def test_json_result_of_the_program(in_folder: Path) -> None:
-    _toml(in_folder)
-    first, second = (json.loads(call("run", "test.toml", "--json", check=True).stdout) for _ in range(2))
+def test_a_run_is_found_by_its_directory_or_its_case(in_folder: Path) -> None:
+    case_file = _toml(in_folder)
+    first, second = (json.loads(call("run", case_file, "--json", check=True).stdout) for _ in range(2))
     assert (first["cached"], second["cached"]) == (False, True)
     assert first["velocity"] == second["velocity"]
-    shown = subprocess.run([PROGRAM, "result", first["run"]], capture_output=True, text=True, check=True).stdout
-    assert f"{first['velocity']['mean'] * 1e3:.3f}" in shown
+    for named in (first["run"], Path(first["run"]).name, case_file):
+        assert find_run(named).directory == Path(first["run"])
+        assert f"{first['velocity']['mean'] * 1e3:.3f}" in call("result", str(named), check=True).stdout
 
 
 def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,7 @@ from walkers.commands.arguments import (
     check_folder,
     load,
     on_cores,
-    print_json,
+    print_as,
     print_lines,
     refuse,
     tell,
@@ -133,6 +133,11 @@ def run(
     refuse("--points", points is not None and not spread, "is for --spread")
     loaded = [load(case, settings) for case in cases]  # a mistake in the last file shows before the first run starts
     check_folder("--out", out)
+    if spread:
+        from walkers.sweeps.spread import POINTS, describe, run_spread, spread_sweep
+
+        for case in loaded:  # and so does a range that its key does not take
+            list(spread_sweep(case, points or POINTS, engine).cases())
     failed = False
     for case in loaded:
         try:
@@ -152,8 +157,6 @@ def run(
             continue
         band = None
         if spread:
-            from walkers.sweeps.spread import POINTS, describe, run_spread
-
             with progress_of_sweep(f"{case.name}, spread") as advance_sweep:
                 band = run_spread(
                     case,
@@ -321,10 +324,7 @@ def audit(
             raise
         raise InputError("--engine", [Problem("", None, str(missing))]) from missing
     report = run_audit(checks, engine=binary, on_done=told)
-    if as_json:
-        print_json(as_dict(report))
-    else:
-        print(as_text(report))
+    print_as(as_json, lambda: as_dict(report), lambda: as_text(report))
     if not only:
         try:
             record(report, quick=quick)
@@ -406,9 +406,7 @@ def validate(
         jobs=jobs or cores_here(),
         on_done=lambda chapter: tell(f"{chapter.name} done"),
     )
-    if as_json:
-        print_json({chapter.name: dict(chapter.numbers) for chapter in made.chapters})
-    else:
-        print_lines(made.files)
+    numbers = {chapter.name: dict(chapter.numbers) for chapter in made.chapters}
+    print_as(as_json, lambda: numbers, lambda: "\n".join(map(str, made.files)))
     tell(*(f"not as expected: {statement}" for statement in made.failed))
     return 1 if made.failed else 0
