@@ -208,9 +208,9 @@ def film(
     print(path)
 
 
-def _refuse_as_placed(as_placed: bool, independent: bool) -> None:
+def _refuse_as_placed(as_placed: bool, apart: bool) -> None:
     """Refuse ``--as-placed`` of walkers that are nowhere else."""
-    refuse("--as-placed", as_placed and not independent, "is for independent walkers: these stand where they are")
+    refuse("--as-placed", as_placed and not apart, "is for independent walkers: these stand where they are")
 
 
 def vtk(
@@ -225,7 +225,7 @@ def vtk(
     from walkers.pipeline import find_run
 
     found = find_run(run, out)
-    _refuse_as_placed(as_placed, found.case.independent)
+    _refuse_as_placed(as_placed, found.case.apart)
     print(found.vtk(to, every=every, vtu=vtu, as_placed=as_placed))
 
 
@@ -243,7 +243,7 @@ def paraview(
     from walkers.postprocess.paraview_script import open_paraview
 
     found = find_run(run, out)
-    _refuse_as_placed(as_placed, found.case.independent)
+    _refuse_as_placed(as_placed, found.case.apart)
     script = found.paraview(to, colour=colour, every=every, as_placed=as_placed)
     print(script)
     if start:

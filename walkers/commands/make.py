@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from walkers.audit.run import CheckedLines
     from walkers.inputs.case import Case as Resolved
     from walkers.pipeline import Run
+    from walkers.studies.chapter import Chapter
 
 _MANY = 10_000
 """Points of a sweep that take seconds to be resolved."""
@@ -90,6 +91,13 @@ ChapterJobs = Annotated[
 ]
 
 
+class _By(TypedDict):
+    """What runs cases."""
+
+    engine: str | None
+    allow_failed_audit: bool
+
+
 def deck(case: Case, settings: Set = None, to: DeckFolder = None) -> None:
     """Print the LIGGGHTS deck of a case (of a run in segments, the first), or write it with its files."""
     from walkers.inputs.errors import InputError, Problem
@@ -138,19 +146,11 @@ def run(
 
         for case in loaded:  # and so does a range that its key does not take
             list(spread_sweep(case, points or POINTS, engine).cases())
-    failed = False
+    failed, how = False, _By(engine=engine, allow_failed_audit=allow_failed_audit)
     for case in loaded:
         try:
             with progress_of(case.name) as advance:
-                done = pipeline.run(
-                    case,
-                    out,
-                    engine=engine,
-                    force=force,
-                    progress=advance,
-                    time_limit=limit,
-                    allow_failed_audit=allow_failed_audit,
-                )
+                done = pipeline.run(case, out, force=force, progress=advance, time_limit=limit, **how)
         except EngineFailure as failure:
             tell(f"{case.name}: {failure}")
             failed = True
@@ -158,15 +158,8 @@ def run(
         band = None
         if spread:
             with progress_of_sweep(f"{case.name}, spread") as advance_sweep:
-                band = run_spread(
-                    case,
-                    out,
-                    on_cores(None),
-                    points=points or POINTS,
-                    engine=engine,
-                    allow_failed_audit=allow_failed_audit,
-                    on_progress=advance_sweep,
-                )
+                options = on_cores(None)
+                band = run_spread(case, out, options, points=points or POINTS, on_progress=advance_sweep, **how)
             failed |= bool(band.failures)
         if as_json:
             found = {"spread": band.as_dict()} if band else {}
@@ -209,14 +202,8 @@ def sweep(
         print(plan_sweep(loaded, out, options, engine).as_text())
         return 0
     with progress_of_sweep(loaded.name) as advance:
-        record, failures = run_sweep(
-            loaded,
-            out.resolve() if site else out,
-            options,
-            engine=engine,
-            allow_failed_audit=allow_failed_audit,
-            on_progress=advance,
-        )
+        how = _By(engine=engine, allow_failed_audit=allow_failed_audit)
+        record, failures = run_sweep(loaded, out.resolve() if site else out, options, on_progress=advance, **how)
     tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
     print(describe_status(record.directory))
     same = [one for one in next(loaded.cases()).origins if one.key not in loaded.keys]  # what varies is in the table
@@ -243,14 +230,8 @@ def calibrate(
     check_folder("--out", out)
     folder = to or out / read.name
     check_folder("--to", folder)
-    found = calibrate(
-        read,
-        out,
-        on_cores(jobs),
-        engine=engine,
-        allow_failed_audit=allow_failed_audit,
-        progress_of=progress_of_sweep,
-    )
+    how = _By(engine=engine, allow_failed_audit=allow_failed_audit)
+    found = calibrate(read, out, on_cores(jobs), progress_of=progress_of_sweep, **how)
     tell(*(f"{name}: {len(failures)} points failed" for name, failures in found.failures.items()))
     rows = rows_of(found)
     print_lines([*write_tables(found, rows, folder), *draw(found, rows, folder)])
@@ -270,16 +251,9 @@ def figures(
     from walkers.paper.make import FORMATS, make_figures
     from walkers.progress import progress_of_sweep
 
-    made = make_figures(
-        out,
-        to,
-        on_cores(jobs),
-        only=only or (),
-        formats=formats or FORMATS,
-        engine=engine,
-        allow_failed_audit=allow_failed_audit,
-        progress_of=progress_of_sweep,
-    )
+    how = _By(engine=engine, allow_failed_audit=allow_failed_audit)
+    wanted, shown = only or (), formats or FORMATS
+    made = make_figures(out, to, on_cores(jobs), only=wanted, formats=shown, progress_of=progress_of_sweep, **how)
     for name, failures in made.failures.items():
         tell(*(f"{name}: point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
     tell(*(f"{figure} is left out: {reason}" for figure, reason in made.left_out.items()))
@@ -398,14 +372,11 @@ def validate(
     check_folder("--out", out)
     folder = to or out / "validation"
     check_folder("--to", folder)
-    made = validate(
-        out,
-        folder,
-        only=chapters or (),
-        quick=quick,
-        jobs=jobs or cores_here(),
-        on_done=lambda chapter: tell(f"{chapter.name} done"),
-    )
+
+    def told(chapter: Chapter) -> None:
+        tell(f"{chapter.name} done")
+
+    made = validate(out, folder, only=chapters or (), quick=quick, jobs=jobs or cores_here(), on_done=told)
     numbers = {chapter.name: dict(chapter.numbers) for chapter in made.chapters}
     print_as(as_json, lambda: numbers, lambda: "\n".join(map(str, made.files)))
     tell(*(f"not as expected: {statement}" for statement in made.failed))
