@@ -14,6 +14,7 @@ from walkers import run as run_case
 from walkers.runner import find_engine, launch
 from walkers.runner.directory import write_deck
 from walkers.runner.failures import EngineNeverStarted
+from walkers.runner.plugin import plugin_of
 from walkers.templates.deck import render_deck
 from walkers.templates.engine import ALONE
 
@@ -55,6 +56,7 @@ def test_an_engine_that_never_started_is_tried_twice_again(
 def test_an_engine_starts_where_nothing_temporary_can_be_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    plugin_of(find_engine())  # is there: a compiler needs such files
     monkeypatch.setenv("TMPDIR", "/proc")
     assert not run_case(make_case(run=SHORT), tmp_path).cached
 
