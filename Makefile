@@ -93,10 +93,6 @@ bench: setup ## Measure what docs/explanation/performance.md states
 bench-accuracy: setup ## The comparison's numbers against decks of one point, 2 µs and 60 cycles (a quarter of an hour)
 	.venv/bin/python -m tests.benchmark_accuracy $(OUT)
 
-.PHONY: bench-starts
-bench-starts: setup ## Start 5,000 engines, eight at a time, and count those that never started
-	.venv/bin/python -m tests.benchmark_starts
-
 .PHONY: bench-sweeps
 bench-sweeps: setup ## Measure what docs/explanation/performance.md states of sweeps
 	.venv/bin/python tests/benchmark_sweeps.py

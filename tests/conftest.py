@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import fcntl
 import io
-import json
 import os
 import shutil
 import signal
@@ -21,6 +20,7 @@ from typing import Any, TypeVar
 
 import pytest
 from platformdirs import user_cache_path
+from tomli_w import dumps as to_toml
 
 from walkers import run as run_case
 from walkers.inputs import resolve_case
@@ -91,24 +91,6 @@ def document(**changes: Any) -> dict[str, Any]:
 def make_case(**changes: Any) -> Case:
     """`document`, resolved."""
     return resolve_case(document(**changes), name="test")
-
-
-def to_toml(values: dict[str, Any]) -> str:
-    """A nested document as TOML text; JSON's strings and numbers are TOML's."""
-    plain = {key: value for key, value in values.items() if not isinstance(value, dict)}
-    lines = [f"{key} = {_inline(value)}" for key, value in plain.items()]
-    for key, value in values.items():
-        if isinstance(value, dict):
-            lines += [f"[{key}]", *(f"{name} = {_inline(entry)}" for name, entry in value.items())]
-    return "\n".join(lines) + "\n"
-
-
-def _inline(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_inline(entry)}" for key, entry in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_inline, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)
 
 
 @pytest.fixture(scope="session")

@@ -142,7 +142,7 @@ BAD_DECKS: dict[str, tuple[dict[str, object], Callable[[str], str], type[EngineF
         r"Unknown command: w\\xff\\xfebble",
     ),
     "half of the steps": ({"run": SHORT}, _half, MissingFrames, "31 of 61 frames"),
-    "a narrow box": (FAST, _narrow, BeadsLost, "left the simulation box"),
+    "beads that are lost": (FAST, _narrow, BeadsLost, "left the simulation box"),
     "a large time step": (UNSTABLE, str, BlowUp, "time step"),
     "no numbers": ({"run": SHORT}, lambda text: re.sub("fix +motion", INFINITE, text), BlowUp, "no number"),
 }

@@ -30,13 +30,12 @@ from walkers.postprocess.dump import DumpError
 from walkers.postprocess.local_dump import local_frames, read_local_dump
 from walkers.postprocess.motion import read_motion
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import FIRST_SEGMENT, run_name, write_deck
+from walkers.runner.directory import FIRST_SEGMENT, write_deck
 from walkers.runner.failures import DiskFull, EngineError, EngineFailure
 from walkers.runner.launch import launch
 from walkers.runner.manifest import FileChanged, forget_tables
 from walkers.sweeps.scheduler import Failure, Options, _severity
 from walkers.sweeps.table import load as load_table
-from walkers.sweeps.worker import Task, work
 from walkers.templates import render_deck
 
 # --- what the engine takes --------------------------------------------------------------------------------------------
@@ -382,11 +381,6 @@ def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(full_disk:
     assert not [path for path in full_disk.rglob("*") if ".new" in path.name or path.suffix == ".lock"]
 
 
-def test_a_full_disk_is_a_failure_of_the_run(full_disk: Path) -> None:
-    with pytest.raises(DiskFull, match="disk full"):
-        run_case(make_case(run=SHORT), full_disk / "runs")
-
-
 def test_a_disk_that_is_full_when_the_tables_are_written_is_a_failure_of_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -410,14 +404,6 @@ def test_a_disk_that_is_full_when_the_tables_are_written_is_a_failure_of_the_run
         node = dump.stat().st_ino
         outcome = run_case(case, place / "runs")
         assert (outcome.directory / FIRST_SEGMENT / "beads.bin").stat().st_ino == node
-
-
-def test_a_worker_tells_a_full_disk_by_its_name(full_disk: Path) -> None:
-    case, engine = make_case(run=SHORT), find_engine()
-    task = Task("", (run_name(case, engine),), (case,), full_disk, str(engine.path), engine.sha256, None)
-    report = work(task)
-    assert report.failure == "DiskFull"
-    assert str(full_disk) in report.message
 
 
 # --- calibrations -----------------------------------------------------------------------------------------------------

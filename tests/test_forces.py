@@ -5,8 +5,8 @@ from math import pi
 
 import pytest
 
-from tests.conftest import document, make_case
-from walkers.inputs import load_case, resolve_case
+from tests.conftest import make_case
+from walkers.inputs import load_case
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.run_tables import limits_of
 from walkers.physics.capillary import (
@@ -17,7 +17,6 @@ from walkers.physics.capillary import (
     rupture_distance,
 )
 from walkers.physics.contact import hertz_overlap, reduced_modulus
-from walkers.physics.dimer import Dimer
 from walkers.physics.time_step import AUTO_FRACTIONS, LONGEST_WALKER_STEP, WALKER_FRACTIONS, fit_into_cycle
 
 GAMMA = 0.0192
@@ -61,21 +60,6 @@ def test_published_gamma0() -> None:
     for name, gamma0 in (("fig4a", 0.74), ("fig4b", 3.5)):
         case = load_case(name)
         assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(gamma0, rel=0.01)
-
-
-@pytest.mark.parametrize(
-    ("radii", "sin_delta"),
-    [((0.25, 0.2), 0.111), ((0.4, 0.3), 0.143), ((0.3, 0.2), 0.2), ((0.35, 0.2), 0.273), ((0.4, 0.2), 0.333)],
-)
-def test_asymmetry_of_the_pairs_of_fig_3(radii: tuple[float, float], sin_delta: float) -> None:
-    assert Dimer(radii, 4000.0, GAMMA).sin_delta == pytest.approx(sin_delta, abs=5e-4)
-
-
-def test_drive_given_as_gamma0() -> None:
-    values = document(drive={"gamma0": 0.5})
-    del values["drive"]["peak_acceleration"]
-    case = resolve_case(values)
-    assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(0.5)
 
 
 def test_time_step_limits_of_the_walker() -> None:

@@ -56,6 +56,15 @@ def test_from_a_case_file_to_pictures(in_folder: Path) -> None:
         assert path.exists()
 
 
+def test_a_spread_that_cannot_be_is_refused_before_the_run(in_folder: Path) -> None:
+    uncertain = {"uncertain": {"contact": {"restitution": [0.01, 0.8]}}}
+    (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT, **uncertain)))
+    done = call("run", "mine.toml", "--spread")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "contact.restitution" in done.stderr
+    assert not (in_folder / "runs").exists()
+
+
 def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first one is due after a second; here at once, so that a run need not last that long on a fast machine."""
     monkeypatch.setattr("walkers.progress._FIRST_LINE_SECONDS", 0.0)

@@ -1,23 +1,38 @@
 """Engines are born: many at a time, again where nothing came of it, without a daemon or an open port."""
 
+import shutil
 import subprocess
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import psutil
 import pytest
 
-from tests.benchmark_starts import failed_starts
 from tests.conftest import LONG, PROGRAM, SHORT, document, engines_in, make_case, to_toml, wait_for
 from walkers import run as run_case
+from walkers.runner import find_engine, launch
+from walkers.runner.directory import write_deck
 from walkers.runner.failures import EngineNeverStarted
+from walkers.runner.plugin import plugin_of
+from walkers.templates.deck import render_deck
 from walkers.templates.engine import ALONE
 
 
-@pytest.mark.parametrize("number", [16, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [16, pytest.param(1000, marks=pytest.mark.slow)])
 def test_of_many_engines_eight_at_a_time_all_start(number: int, tmp_path: Path) -> None:
-    """5,000 of them by `make bench-starts`."""
-    assert failed_starts(number, tmp_path) == []
+    run = {"time_step": "2 us", "cycles": 2, "settling_cycles": 0, "samples_per_cycle": 1}
+    deck, engine = render_deck(make_case(run=run, drive={"frequency": "2 kHz"})), find_engine()
+
+    def start(each: int) -> None:
+        directory = tmp_path / str(each)
+        directory.mkdir()
+        write_deck(deck, directory)
+        launch(deck, directory, engine, starts=1)
+        shutil.rmtree(directory)
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(start, range(number)))
 
 
 @pytest.mark.parametrize("times", [2, 99])
@@ -41,6 +56,7 @@ def test_an_engine_that_never_started_is_tried_twice_again(
 def test_an_engine_starts_where_nothing_temporary_can_be_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    plugin_of(find_engine())  # is there: a compiler needs such files
     monkeypatch.setenv("TMPDIR", "/proc")
     assert not run_case(make_case(run=SHORT), tmp_path).cached
 

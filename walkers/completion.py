@@ -6,7 +6,7 @@ Where nothing is offered the shell completes names of files by itself. Nothing i
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import typer
@@ -21,14 +21,14 @@ def cases(incomplete: str) -> list[str]:
     """Shipped cases, and TOML files."""
     from walkers.inputs.reading import shipped_cases
 
-    return _beginning(incomplete, [*shipped_cases(), *_files(incomplete)])
+    return _beginning(incomplete, [*shipped_cases(), *_typed(incomplete, "*.toml")])
 
 
 def sweep_files(incomplete: str) -> list[str]:
     """Shipped sweeps, and TOML files."""
     from walkers.inputs.sweep import shipped_sweeps
 
-    return _beginning(incomplete, [*shipped_sweeps(), *_files(incomplete)])
+    return _beginning(incomplete, [*shipped_sweeps(), *_typed(incomplete, "*.toml")])
 
 
 def runs(ctx: typer.Context, incomplete: str) -> list[str]:
@@ -62,27 +62,19 @@ def _beginning(incomplete: str, names: Iterable[str]) -> list[str]:
     return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
 
-def _entries(folder: Path) -> list[str]:
-    try:
-        return sorted(entry.name for entry in folder.iterdir())
-    except OSError:
-        return []
-
-
-def _named(out: Path, kind: str) -> Iterator[str]:
+def _named(out: Path, kind: str) -> list[str]:
     """Names of what has such a file in a folder of runs."""
-    for name in _entries(out):
-        if (out / name / kind).is_file() and (kind == _RECORD or _RUN.fullmatch(name)):
-            yield name
+    folders = sorted(path.parent.name for path in out.glob(f"*/{kind}"))
+    return [name for name in folders if kind == _RECORD or _RUN.fullmatch(name)]
 
 
 def _folders(incomplete: str, kind: str) -> list[str]:
     """Folders that begin as what was typed and have such a file."""
-    folder = incomplete.rpartition("/")[0] + "/" if "/" in incomplete else ""
-    found = [f"{folder}{name}" for name in _entries(Path(folder or "."))]
-    return [path for path in found if path.startswith(incomplete) and (Path(path) / kind).is_file()]
+    return _typed(incomplete, f"*/{kind}")
 
 
-def _files(incomplete: str) -> list[str]:
+def _typed(incomplete: str, pattern: str) -> list[str]:
+    """What there is of a pattern in the folder that was typed: its first part."""
     folder = incomplete.rpartition("/")[0] + "/" if "/" in incomplete else ""
-    return [f"{folder}{name}" for name in _entries(Path(folder or ".")) if name.endswith(".toml")]
+    found = Path(folder or ".").glob(pattern)
+    return sorted(f"{folder}{path.relative_to(folder).parts[0]}" for path in found)

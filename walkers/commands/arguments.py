@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -97,9 +97,9 @@ def check_folder(option: str, folder: Path) -> None:
     refuse(option, folder.exists() and not folder.is_dir(), f"expected a folder, {folder} is a file")
 
 
-def print_json(value: Any) -> None:
-    """Print a value as JSON for people to read, too."""
-    print(json.dumps(value, indent=2, ensure_ascii=False))
+def print_as(as_json: bool, value: Callable[[], Any], text: Callable[[], str]) -> None:
+    """Print a value as JSON, or its text."""
+    print(json.dumps(value(), indent=2, ensure_ascii=False) if as_json else text())
 
 
 def print_lines(lines: Iterable[object]) -> None:

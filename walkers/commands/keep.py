@@ -16,7 +16,7 @@ from walkers.commands.arguments import (
     OlderThan,
     Out,
     check_folder,
-    print_json,
+    print_as,
     print_lines,
     refuse,
     tell,
@@ -86,10 +86,7 @@ def list_(
 
     found = select(inventory(out), case=case, status=status, older_than=older_than, where=where or ())
     found = listing.ordered(found, sort, reverse=reverse)
-    if as_json:
-        print_json(listing.as_json(found))
-    else:
-        print(listing.as_text(found))
+    print_as(as_json, lambda: listing.as_json(found), lambda: listing.as_text(found))
 
 
 def clean(

@@ -20,7 +20,7 @@ from walkers.commands.arguments import (
     Set,
     SweepColumn,
     load,
-    print_json,
+    print_as,
     print_lines,
     refuse,
 )
@@ -108,10 +108,7 @@ def show(case: Case, settings: Set = None, as_json: Json = False) -> None:
     from walkers.runner.summary import describe, summarise
 
     summary = summarise(loaded)
-    if as_json:
-        print_json(summary)
-    else:
-        print(describe(summary))
+    print_as(as_json, lambda: summary, lambda: describe(summary))
 
 
 def result(run: Run, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
@@ -121,10 +118,7 @@ def result(run: Run, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
     from walkers.pipeline import find_run
 
     found = replace(find_run(run, out), cached=False)
-    if as_json:
-        print_json(found.result)
-    else:
-        print(found.describe())
+    print_as(as_json, lambda: found.result, found.describe)
 
 
 def plot(
@@ -213,9 +207,9 @@ def film(
     print(path)
 
 
-def _refuse_as_placed(as_placed: bool, independent: bool) -> None:
+def _refuse_as_placed(as_placed: bool, apart: bool) -> None:
     """Refuse ``--as-placed`` of walkers that are nowhere else."""
-    refuse("--as-placed", as_placed and not independent, "is for independent walkers: these stand where they are")
+    refuse("--as-placed", as_placed and not apart, "is for independent walkers: these stand where they are")
 
 
 def vtk(
@@ -278,10 +272,7 @@ def theory(case: Case, settings: Set = None, out: Out = DEFAULT_OUT, as_json: Js
     found: dict[str, Any] | None = None
     with suppress(InputError, EngineMissing):  # not run yet, or never to be run here
         found = find_run(loaded, out).result
-    if as_json:
-        print_json({**prediction, "engine": found})
-    else:
-        print(describe(prediction, found))
+    print_as(as_json, lambda: {**prediction, "engine": found}, lambda: describe(prediction, found))
 
 
 def status(directory: SweepOrFolder, out: Out = DEFAULT_OUT) -> None:
@@ -336,21 +327,17 @@ def climb(
     if thresholds:
         refuse("--within", within is not None, "has no meaning with --sensitivity")
         tried = {label: sensitivity(runs) for label, runs in groups.items()}
-        if as_json:
-            print_json(tried)
-        else:
-            texts = {label: describe_sensitivity(rows) for label, rows in tried.items()}
-            print_lines(line for label, text in texts.items() for line in (label, text) if line)
+        lines = [line for label, rows in tried.items() for line in (label, describe_sensitivity(rows)) if line]
+        print_as(as_json, lambda: tried, lambda: "\n".join(lines))
         return
     found = {label: summarise_climbs(runs, within) for label, runs in groups.items()}
-    if as_json:
-        print_json(found)
-        return
+    lines = []
     for label, climbs in found.items():
-        print_lines([*([label] if label else []), describe_climbs(climbs)])
+        lines += [*([label] if label else []), describe_climbs(climbs)]
         if climbs["out_of_pile"]["climbs"] < climbs["climbs"]:
-            print("of clusters that came out of the pile, and did not hang on a wall since the pouring:")
-            print(describe_climbs(climbs["out_of_pile"]))
+            lines.append("of clusters that came out of the pile, and did not hang on a wall since the pouring:")
+            lines.append(describe_climbs(climbs["out_of_pile"]))
+    print_as(as_json, lambda: found, lambda: "\n".join(lines))
 
 
 def compare(
@@ -370,7 +357,4 @@ def compare(
             refuse(one, sweep is not None, "is a sweep, to be compared with another sweep")
         refuse("--y", y is not None, "is for sweeps")
         found = compare_runs(find_side(first, out), find_side(second, out))
-    if as_json:
-        print_json(found.as_dict())
-    else:
-        print(found.as_text())
+    print_as(as_json, found.as_dict, found.as_text)

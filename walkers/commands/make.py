@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
 
@@ -22,7 +22,7 @@ from walkers.commands.arguments import (
     check_folder,
     load,
     on_cores,
-    print_json,
+    print_as,
     print_lines,
     refuse,
     tell,
@@ -31,6 +31,7 @@ from walkers.pipeline import DEFAULT_OUT
 
 if TYPE_CHECKING:
     from walkers.check.audit import Checked
+    from walkers.check.validate import Chapter
     from walkers.inputs.case import Case as Resolved
     from walkers.pipeline import Run
 
@@ -90,6 +91,13 @@ ChapterJobs = Annotated[
 ]
 
 
+class _By(TypedDict):
+    """What runs cases."""
+
+    engine: str | None
+    allow_failed_audit: bool
+
+
 def deck(case: Case, settings: Set = None, to: DeckFolder = None) -> None:
     """Print the LIGGGHTS deck of a case (of a run in segments, the first), or write it with its files."""
     from walkers.inputs.errors import InputError, Problem
@@ -133,37 +141,25 @@ def run(
     refuse("--points", points is not None and not spread, "is for --spread")
     loaded = [load(case, settings) for case in cases]  # a mistake in the last file shows before the first run starts
     check_folder("--out", out)
-    failed = False
+    if spread:
+        from walkers.sweeps.spread import POINTS, describe, run_spread, spread_sweep
+
+        for case in loaded:  # and so does a range that its key does not take
+            list(spread_sweep(case, points or POINTS, engine).cases())
+    failed, how = False, _By(engine=engine, allow_failed_audit=allow_failed_audit)
     for case in loaded:
         try:
             with progress_of(case.name) as advance:
-                done = pipeline.run(
-                    case,
-                    out,
-                    engine=engine,
-                    force=force,
-                    progress=advance,
-                    time_limit=limit,
-                    allow_failed_audit=allow_failed_audit,
-                )
+                done = pipeline.run(case, out, force=force, progress=advance, time_limit=limit, **how)
         except EngineFailure as failure:
             tell(f"{case.name}: {failure}")
             failed = True
             continue
         band = None
         if spread:
-            from walkers.sweeps.spread import POINTS, describe, run_spread
-
             with progress_of_sweep(f"{case.name}, spread") as advance_sweep:
-                band = run_spread(
-                    case,
-                    out,
-                    on_cores(None),
-                    points=points or POINTS,
-                    engine=engine,
-                    allow_failed_audit=allow_failed_audit,
-                    on_progress=advance_sweep,
-                )
+                options = on_cores(None)
+                band = run_spread(case, out, options, points=points or POINTS, on_progress=advance_sweep, **how)
             failed |= bool(band.failures)
         if as_json:
             found = {"spread": band.as_dict()} if band else {}
@@ -206,14 +202,8 @@ def sweep(
         print(plan_sweep(loaded, out, options, engine).as_text())
         return 0
     with progress_of_sweep(loaded.name) as advance:
-        record, failures = run_sweep(
-            loaded,
-            out.resolve() if site else out,
-            options,
-            engine=engine,
-            allow_failed_audit=allow_failed_audit,
-            on_progress=advance,
-        )
+        how = _By(engine=engine, allow_failed_audit=allow_failed_audit)
+        record, failures = run_sweep(loaded, out.resolve() if site else out, options, on_progress=advance, **how)
     tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
     print(describe_status(record.directory))
     same = [one for one in next(loaded.cases()).origins if one.key not in loaded.keys]  # what varies is in the table
@@ -240,14 +230,8 @@ def calibrate(
     check_folder("--out", out)
     folder = to or out / read.name
     check_folder("--to", folder)
-    found = calibrate(
-        read,
-        out,
-        on_cores(jobs),
-        engine=engine,
-        allow_failed_audit=allow_failed_audit,
-        progress_of=progress_of_sweep,
-    )
+    how = _By(engine=engine, allow_failed_audit=allow_failed_audit)
+    found = calibrate(read, out, on_cores(jobs), progress_of=progress_of_sweep, **how)
     tell(*(f"{name}: {len(failures)} points failed" for name, failures in found.failures.items()))
     rows = rows_of(found)
     print_lines([*write_tables(found, rows, folder), *draw(found, rows, folder)])
@@ -267,16 +251,9 @@ def figures(
     from walkers.paper.make import FORMATS, make_figures
     from walkers.progress import progress_of_sweep
 
-    made = make_figures(
-        out,
-        to,
-        on_cores(jobs),
-        only=only or (),
-        formats=formats or FORMATS,
-        engine=engine,
-        allow_failed_audit=allow_failed_audit,
-        progress_of=progress_of_sweep,
-    )
+    how = _By(engine=engine, allow_failed_audit=allow_failed_audit)
+    wanted, shown = only or (), formats or FORMATS
+    made = make_figures(out, to, on_cores(jobs), only=wanted, formats=shown, progress_of=progress_of_sweep, **how)
     for name, failures in made.failures.items():
         tell(*(f"{name}: point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
     tell(*(f"{figure} is left out: {reason}" for figure, reason in made.left_out.items()))
@@ -320,10 +297,7 @@ def audit(
             raise
         raise InputError("--engine", [Problem("", None, str(missing))]) from missing
     report = run_audit(checks, engine=binary, on_done=told)
-    if as_json:
-        print_json(report.as_dict())
-    else:
-        print(report.as_text())
+    print_as(as_json, report.as_dict, report.as_text)
     if not only:
         try:
             record(report, quick=quick)
@@ -389,17 +363,12 @@ def validate(
     check_folder("--out", out)
     folder = to or out / "validation"
     check_folder("--to", folder)
-    made = validate(
-        out,
-        folder,
-        only=chapters or (),
-        quick=quick,
-        jobs=jobs or cores_here(),
-        on_done=lambda chapter: tell(f"{chapter.name} done"),
-    )
-    if as_json:
-        print_json({chapter.name: dict(chapter.numbers) for chapter in made.chapters})
-    else:
-        print_lines(made.files)
+
+    def told(chapter: Chapter) -> None:
+        tell(f"{chapter.name} done")
+
+    made = validate(out, folder, only=chapters or (), quick=quick, jobs=jobs or cores_here(), on_done=told)
+    numbers = {chapter.name: dict(chapter.numbers) for chapter in made.chapters}
+    print_as(as_json, lambda: numbers, lambda: "\n".join(map(str, made.files)))
     tell(*(f"not as expected: {statement}" for statement in made.failed))
     return 1 if made.failed else 0

@@ -47,13 +47,7 @@ class AuditRecord:
 
     def summary(self) -> Mapping[str, Any]:
         """What a run's manifest says of it."""
-        return {
-            "scope": self.scope,
-            "passed": self.passed,
-            "lines": self.lines,
-            "skipped": self.skipped,
-            "date": self.date,
-        }
+        return {name: getattr(self, name) for name in ("scope", "passed", "lines", "skipped", "date")}
 
 
 def _place(engine: str, scope: str) -> Path:

@@ -6,6 +6,7 @@ each failure is recognised by what it leaves behind. `walkers.runner.launch` rai
 
 from __future__ import annotations
 
+import platform
 import signal
 from collections.abc import Sequence
 from math import isfinite
@@ -63,8 +64,6 @@ class EngineDiffers(EngineFailure):
     """A worker of a sweep has another engine than the one that the sweep was started with."""
 
     def __init__(self, found: Path) -> None:
-        import platform
-
         super().__init__(f"the engine on {platform.node()}, {found}, is not the one that this sweep was started with")
 
 
@@ -72,8 +71,6 @@ class ProgramDiffers(EngineFailure):
     """A worker of a sweep names runs otherwise than where it was started: resolved cases or decks differ."""
 
     def __init__(self) -> None:
-        import platform
-
         super().__init__(f"on {platform.node()} this program is another version than where the sweep was started")
 
 

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from walkers.runner.binary import Engine, version_in
@@ -132,31 +132,25 @@ def launch(
         check_room(temporary, _TEMPORARY_BYTES)
     plugin = plugin_of(engine)
     (directory / RUN_NAME).write_text(run_script(plugin, deck.layout.ranks), encoding="utf-8")
-    for left in reversed(range(starts)):
-        try:
-            return _launch_once(deck, directory, engine, plugin, on_progress, time_limit, keep_open)
-        except EngineNeverStarted:
-            if not left:
-                raise
-            time.sleep(_PAUSE_SECONDS)
-    raise ValueError("starts: expected at least 1")
+    start = partial(_start, directory, engine, plugin, deck.layout.ranks, keep_open)
+    for _ in range(starts - 1):
+        with suppress(EngineNeverStarted):
+            return _watched(_Watch(deck, directory, engine.path), start, on_progress, time_limit)
+        time.sleep(_PAUSE_SECONDS)
+    return _watched(_Watch(deck, directory, engine.path), start, on_progress, time_limit)
 
 
-def _launch_once(
-    deck: Deck,
-    directory: Path,
-    engine: Engine,
-    plugin: Path,
+def _watched(
+    watch: _Watch,
+    start: Callable[[], subprocess.Popen[bytes]],
     on_progress: Callable[[Progress], None] | None,
     time_limit: float | None,
-    keep_open: Sequence[int],
 ) -> EngineReport:
-    begin = time.perf_counter()
-    watch = _Watch(deck, directory, engine.path, begin)
+    """Start an engine and watch it to its end."""
     process = None
     try:
         with postponed_interrupts():
-            process = _start(directory, engine, plugin, deck.layout.ranks, keep_open)
+            process = start()
         while process.poll() is None:
             try:
                 process.wait(_POLL_SECONDS)
@@ -169,7 +163,7 @@ def _launch_once(
         if process is not None:
             _end(process)
             watch.cut_log()
-    wall_seconds = time.perf_counter() - begin
+    wall_seconds = time.perf_counter() - watch.begin
     watch.end()
     watch.check(None)
     return _verdict(watch, process.returncode, wall_seconds)
@@ -293,11 +287,11 @@ def complete_local_frames(path: Path) -> int:
 class _Watch:
     """Reads the engine's output as it grows, and keeps of it what is asked for later."""
 
-    def __init__(self, deck: Deck, directory: Path, engine: Path, begin: float) -> None:
+    def __init__(self, deck: Deck, directory: Path, engine: Path) -> None:
         self.deck = deck
         self.directory = directory
         self.engine = engine
-        self.begin = begin
+        self.begin = time.perf_counter()
         self.status: _Status | None = None
         self.failure: BlowUp | BeadsLost | None = None
         self.version: str | None = None
@@ -306,7 +300,7 @@ class _Watch:
         self.last_line = b""
         self._read = 0
         self._rest = b""
-        self._looked = begin
+        self._looked = self.begin
         self._silent = 0.0
         self._grown = 0
 

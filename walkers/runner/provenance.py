@@ -10,6 +10,7 @@ import platform
 import re
 import subprocess
 import threading
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
@@ -98,8 +99,6 @@ def _commit() -> str | None:
 def _versions(names: list[str]) -> dict[str, str]:
     found = {}
     for name in names:
-        try:
+        with suppress(metadata.PackageNotFoundError):
             found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
     return found

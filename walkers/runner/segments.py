@@ -7,7 +7,6 @@ Since the segments are the same whether the run was interrupted or not, so is al
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import time
@@ -36,7 +35,7 @@ from walkers.runner.directory import (
     write_segment_record,
 )
 from walkers.runner.failures import RunBusy
-from walkers.runner.files import fsync_path, read_json, write_json
+from walkers.runner.files import fsync_path, read_json, settle, write_json
 from walkers.runner.launch import EngineReport, Progress, launch
 from walkers.runner.locks import locked
 from walkers.runner.manifest import MANIFEST_NAME, manifest
@@ -168,7 +167,7 @@ class OpenRun:
             if not self.case.run.in_one:
                 _check_restart(new / RESTART_NAME, deck)
             record = write_segment_record(new, segment, report, _rms_velocity(new))
-            os.sync()
+            settle(new)
             new.rename(place)
             fsync_path(place.parent)
         # The restart before the last one is kept, should the last one prove bad.

@@ -32,7 +32,7 @@ from walkers.runner.directory import (
     write_segment_record,
 )
 from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
-from walkers.runner.files import write_json
+from walkers.runner.files import settle, write_json
 from walkers.runner.launch import EngineReport, Progress, check_room, launch
 from walkers.runner.locks import locked
 from walkers.runner.manifest import MANIFEST_NAME, manifest
@@ -162,7 +162,7 @@ def _make_together(
                 _tabulate(incomplete / name)
                 said = manifest(cases[name], name, engine, report, started=started, directory=incomplete / name)
                 write_json(incomplete / name / MANIFEST_NAME, {**said, **own}, at_once=False)
-            os.sync()
+            settle(incomplete)
             for name in done:
                 move_into_place(incomplete / name, out / name, settled=True)
     finally:
