@@ -21,7 +21,7 @@ from walkers.inputs.reading import read_toml
 from walkers.inputs.sweep import shipped_sweeps
 from walkers.paper import dimers, published
 from walkers.paper.alignment import climber, paper_drives
-from walkers.paper.comparison import as_markdown, compare, count
+from walkers.paper.comparison import as_dict, as_markdown, compare, count
 from walkers.paper.make import FIGURES, make_figures
 from walkers.paper.modes import MODES, classify, sliding_share
 from walkers.paper.rotation import model
@@ -119,6 +119,8 @@ def test_every_published_number_is_compared(sources: Sources) -> None:
     agree, of = count(rows, measured=False)
     assert of == 9
     assert agree == 9
+    contents = json.loads(json.dumps(as_dict(rows)))
+    assert (contents["agree"], contents["of"], len(contents["numbers"])) == (agreeing, counted, len(rows))
     told = as_markdown(rows)
     assert all(f"| {row.what} |" in told for row in rows)
     assert all(line.count("|") == 7 for line in told.splitlines() if line.startswith("|"))
@@ -309,15 +311,6 @@ def test_a_run_that_failed_is_left_out_and_told(tmp_path: Path) -> None:
     assert {failure.reason for failure in made.failures["fig3"]} == {"TimeLimitExceeded"}
     assert list(made.left_out) == ["fig3"]
     assert not made.files
-
-
-def test_the_comparison_is_written_for_programs_too(sources: Sources, tmp_path: Path) -> None:
-    from walkers.paper.comparison import as_dict
-
-    rows = compare(sources)
-    contents = json.loads(json.dumps(as_dict(rows)))
-    assert len(contents["numbers"]) == len(rows)
-    assert contents["of"] == sum(row.measured and row.published is not None for row in rows)
 
 
 def test_unknown_figures_are_refused(tmp_path: Path) -> None:

@@ -14,24 +14,25 @@ from functools import cache
 from math import isfinite, nan
 from pathlib import Path
 from statistics import fmean
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from walkers.inputs import library
 from walkers.inputs.case import Case
-from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
-from walkers.paper import dimers, published
+from walkers.paper import dimers
+from walkers.paper.published import Point, Published, fitted
 from walkers.runner.files import write_json, write_text
 from walkers.theory.friction import Friction
 from walkers.theory.motion import Walker, walk
 from walkers.theory.quasistatic import translation
 
 FloatArray = npt.NDArray[np.float64]
-_FREQUENCIES = (60.0, 90.0)
-_PEAKS = (0.5, 2.0, 3.0, 4.0, 5.0, 6.0, 10.0)
 _CYCLES = 40
 _DEVIATION = 0.15
+_DEVIATIONS = {"Fig. 2, plateau": 0.2, "Fig. 2, rest at 0.5 g": 2e-5, "Fig. 4a, sliding": 3e-4}
 _HOPELESS = 30.0
 
 
@@ -87,26 +88,11 @@ NOTHING_ELSE = {
 """What leaves the paper's law alone, F∥ = κ v F, but integrated in time, with inertia."""
 
 
-@dataclass(frozen=True)
-class Target:
-    """A published number: a mean over walkers of `walkers_of_the_paper`, or its ratio to the mean over others.
-
-    Attributes
-    ----------
-    name
-        In words.
-    quantity
-        ``velocity``, ``rotation`` or ``sliding`` (both of the large bead).
-    of, over
-        Names of walkers.
-    value, deviation
-        m/s, or a ratio; `_DEVIATION` of the value where the paper gives no spread.
-    """
+class Target(NamedTuple):
+    """A published number as the theory is fitted to it: m/s or a ratio, and `_DEVIATION` of it if no other is known."""
 
     name: str
-    quantity: str
-    of: tuple[str, ...]
-    over: tuple[str, ...]
+    number: Published
     value: float
     deviation: float
 
@@ -139,27 +125,26 @@ class Fit:
     misfit: float
 
 
+_FREQUENCIES = (60.0, 90.0)
+
+
+def _fitted(points: Sequence[Point]) -> list[Point]:
+    """Those of the lowest and the highest frequency, where there are several."""
+    return [one for one in points if one.frequency in _FREQUENCIES or len(points) == 1]
+
+
 @cache
-def walkers_of_the_paper() -> dict[str, Case]:
-    """The walkers of Figs. 2, 3 and 4a by name, as one would take them without a calibration (see `_bare`)."""
-    base = dimers.shipped()
-    found = {
-        f"{f:g} Hz, {peak:g} g": dimers.driven(base, f, [peak * published.GRAVITY])[0]
-        for f in _FREQUENCIES
-        for peak in _PEAKS
-    }
-    found |= {
-        f"{one:g}/{other:g} mm": dimers.of_radii(base, (one * 1e-3, other * 1e-3), 0.5)
-        for one, other in published.FIG3_FIT
-    }
-    found["4a"] = load_case("fig4a")  # in Fig. 4b contacts open in every cycle: that is beyond the theory
-    return {name: _bare(case) for name, case in found.items()}
+def walkers_of_the_paper() -> dict[Point, Case]:
+    """The walkers that the numbers are of, as one would take them without a calibration.
+
+    Of Fig. 4b there are none: there contacts open in every cycle, and that is beyond the theory.
+    """
+    points = [point for one in fitted().values() for point in _fitted(one.of) + _fitted(one.over)]
+    return {point: _bare(dimers.of_point(point)) for point in points}
 
 
 def _bare(case: Case) -> Case:
     """With perfectly wetting bridges of 1 % liquid, of its own viscosity."""
-    from walkers.inputs import library
-
     known = library.liquid(case.liquid.name or "")
     liquid = replace(
         case.liquid,
@@ -172,36 +157,15 @@ def _bare(case: Case) -> Case:
 
 def targets() -> list[Target]:
     """The published numbers that tell of walkers on the axis."""
-
-    def speed(name: str, quantity: str, of: Sequence[str], value: float, deviation: float | None = None) -> Target:
-        return Target(name, quantity, tuple(of), (), value, deviation or _DEVIATION * abs(value))
-
-    def ratio(name: str, of: Sequence[str], over: Sequence[str], deviation: float) -> Target:
-        return Target(name, "velocity", tuple(of), tuple(over), 1.0, deviation)
-
-    def at(peak: float) -> list[str]:
-        return [f"{f:g} Hz, {peak:g} g" for f in _FREQUENCIES]
-
-    slow, fast = _FREQUENCIES
-    return [
-        *(speed(f"Fig. 2, {peak:g} g", "velocity", at(peak), value) for peak, value in published.FIT.items()),
-        ratio("Fig. 2, plateau", at(10.0), at(6.0), 0.2),
-        *(
-            ratio(f"Fig. 2, frequency at {peak:g} g", [f"{fast:g} Hz, {peak:g} g"], [f"{slow:g} Hz, {peak:g} g"], 0.15)
-            for peak in (4.0, 6.0)
-        ),
-        speed("Fig. 2, rest at 0.5 g", "velocity", at(0.5), 0.0, 2e-5),
-        *(
-            speed(f"Fig. 3, {one:g}/{other:g} mm", "velocity", [f"{one:g}/{other:g} mm"], value)
-            for (one, other), value in published.FIG3_FIT.items()
-        ),
-        speed("Fig. 4a, velocity", "velocity", ["4a"], published.FIG4_VELOCITY[0]),
-        speed("Fig. 4a, sliding", "sliding", ["4a"], 0.0, 3e-4),
-    ]
+    found = []
+    for name, number in fitted().items():
+        value = (number.value or 0.0) if number.over else float(f"{number.value}e-3")
+        found.append(Target(name, number, value, _DEVIATIONS.get(name, _DEVIATION * abs(value))))
+    return found
 
 
-def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
-    """What walkers of the paper do, m/s, by quantity and name; NaN where the forces have no solution.
+def speeds(parameters: Mapping[str, float]) -> dict[str, dict[Point, float]]:
+    """What walkers of the paper do, m/s, by quantity and point; NaN where the forces have no solution.
 
     Parameters
     ----------
@@ -212,7 +176,7 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
     walkers = _walkers()
     known = {**dict.fromkeys(("wall_bridge_factor", "bead_bridge_factor", "static_ratio"), 1.0), **parameters}
     scale = np.array([[known["wall_bridge_factor"]]] * 2 + [[known["bead_bridge_factor"]]])
-    on_slide = np.array([name.startswith("4") for name in cases])
+    on_slide = np.array([point.sweep == "fig4" for point in cases])
     wall = np.where(on_slide, known["friction_slide"], known["friction_wall"])
     dry = Friction.coulomb(wall, np.full(len(cases), known["friction_bead"]))
     kinetic = np.asarray(dry.kinetic)
@@ -233,7 +197,7 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
     # Contacts that would open for a moment are let be: the engine's walkers hop there and walk on.
     sliding = np.where(motion.solved, motion.sliding, np.nan)
     velocity = translation(sliding)
-    columns = {"velocity": velocity, "rotation": velocity - sliding[0], "sliding": sliding[0]}
+    columns = {"velocity": velocity, "rotation_1": velocity - sliding[0], "sliding_1": sliding[0]}
     return {name: dict(zip(cases, map(float, values), strict=True)) for name, values in columns.items()}
 
 
@@ -248,10 +212,11 @@ def values_of(parameters: Mapping[str, float], wanted: Sequence[Target]) -> dict
     found = speeds(parameters)
     values = {}
     for target in wanted:
-        value = fmean(found[target.quantity][name] for name in target.of)
-        if target.over:
-            below = fmean(found[target.quantity][name] for name in target.over)
-            value = value / below if below else nan
+        number = target.number
+        above, below = ([found[number.quantity][one] for one in _fitted(points)] for points in (number.of, number.over))
+        value = fmean(above)
+        if below:
+            value = value / fmean(below) if fmean(below) else nan
         values[target.name] = value
     return values
 
@@ -335,10 +300,18 @@ def write_model_terms(fits: Sequence[Fit], to: Path) -> list[Path]:
     """Write ``model_terms.json`` and ``model_terms.md``."""
     to.mkdir(parents=True, exist_ok=True)
     write_json(
-        to / "model_terms.json", {"targets": [asdict(one) for one in targets()], "fits": [asdict(one) for one in fits]}
+        to / "model_terms.json", {"targets": [_told(one) for one in targets()], "fits": [asdict(one) for one in fits]}
     )
     write_text(to / "model_terms.md", as_markdown(fits))
     return [to / "model_terms.json", to / "model_terms.md"]
+
+
+def _told(target: Target) -> dict[str, object]:
+    number = target.number
+    of, over = ([point.name for point in _fitted(points)] for points in (number.of, number.over))
+    quantity = number.quantity.removesuffix("_1")
+    told = {"name": target.name, "quantity": quantity, "of": of, "over": over}
+    return told | {"value": target.value, "deviation": target.deviation}
 
 
 def as_markdown(fits: Sequence[Fit]) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 GRAVITY = 9.8
 """The paper's g, m/s²."""
@@ -28,9 +30,36 @@ LARGEST_V, STABLE_V = 0.4, 0.45
 """|V| of all that the paper investigated is below 0.4; small angles stay small up to 0.45."""
 
 
+class Point(NamedTuple):
+    """A walker of the paper's: the sweep that has it, its radii (mm), its frequency (Hz) and peak acceleration (g).
+
+    Where no acceleration is given Γ0 is 0.5.
+    """
+
+    sweep: str
+    radii: tuple[float, float]
+    frequency: float
+    peak: float | None = None
+
+    @property
+    def name(self) -> str:
+        """What the walker differs from others of its figure in."""
+        large, small = self.radii
+        if self.sweep == "fig4":
+            return "4a" if self.peak == FIG4_PEAKS[0] else "4b"
+        return f"{large:g}/{small:g} mm" if self.peak is None else f"{self.frequency:g} Hz, {self.peak:g} g"
+
+
+def _fig2(*peaks: float, frequencies: Sequence[float] = (60.0, 70.0, 80.0, 90.0)) -> tuple[Point, ...]:
+    return tuple(Point("fig2", (0.3, 0.2), frequency, peak) for peak in peaks for frequency in frequencies)
+
+
+FIG4 = {letter: (Point("fig4", (0.6, 0.3), 80.0, peak),) for letter, peak in zip("ab", FIG4_PEAKS, strict=True)}
+
+
 @dataclass(frozen=True)
 class Published:
-    """A published number.
+    """A published number, and of what it is one.
 
     Attributes
     ----------
@@ -50,6 +79,11 @@ class Published:
         docs/explanation/physics.md find.
     measured
         Whether it tests the engine: Γ0 and Mathieu's V follow from beads and drive alone.
+    of, over
+        The number is a mean over walkers, or its ratio to one over others, pair by pair.
+    quantity
+        Of these: ``velocity``, ``rotation_1`` or ``sliding_1`` of those that walk; ``gamma0``; ``velocity_of_all``,
+        whichever way they turn. Empty where `walkers.paper.comparison` has a function for the number.
     """
 
     key: str
@@ -59,11 +93,26 @@ class Published:
     bounds: tuple[float, float] | None = None
     depends_on: str = ""
     measured: bool = True
+    of: tuple[Point, ...] = ()
+    over: tuple[Point, ...] = ()
+    quantity: str = ""
 
 
 def _in_mm(speed: float) -> float:
     """A published speed, m/s, in mm/s with the digits that it was published with."""
     return round(speed * 1e3, 6)
+
+
+def _speed(key: str, what: str, speed: float, depends_on: str, of: tuple[Point, ...], quantity: str) -> Published:
+    return Published(key, what, _in_mm(speed), depends_on=depends_on, of=of, quantity=quantity)
+
+
+def _gamma(key: str, what: str, value: float, half: tuple[float, float], of: tuple[Point, ...]) -> Published:
+    return Published(key, what, value, "", half, measured=False, of=of, quantity="gamma0")
+
+
+def _ratio(key: str, what: str, depends_on: str, of: tuple[Point, ...], over: tuple[Point, ...]) -> Published:
+    return Published(key, what, 1.0, "", depends_on=depends_on, of=of, over=over, quantity="velocity")
 
 
 _SPEED = (
@@ -89,34 +138,40 @@ _TURNED = (
     "friction and viscosity."
 )
 
+_RATIO_OF_FREQUENCIES = (
+    "Where friction alone limits sliding, speeds go as 1/f; in theory a tangential drag ten times the "
+    "bridges' nominal one removes eight tenths of that."
+)
+_LEVELS_OFF = (
+    "It levels off from 7 g on, in the engine and in theory, where the large bead begins to slide. "
+    "More drag or more liquid brings the ratio to 6 g within the bounds, too."
+)
+
+
+def _frequency_ratio(peak: float, told: str = "") -> Published:
+    fast, slow = (_fig2(peak, frequencies=(frequency,)) for frequency in (90.0, 60.0))
+    what = f"Fig. 2, v(90 Hz)/v(60 Hz) at {peak:g} g{told}"
+    return _ratio("fig2_frequency", what, _RATIO_OF_FREQUENCIES, fast, slow)
+
+
 # Bounds of Γ0 are the rounding of the published digits (0.735, of which 0.74 is made, is on its edge), those of angles
 # are ours.
 NUMBERS = (
     *(
-        Published(f"fig2_{g:g}g", f"Fig. 2, fit at {g:g} g, 60 to 90 Hz", _in_mm(v), depends_on=_SPEED)
+        _speed(f"fig2_{g:g}g", f"Fig. 2, fit at {g:g} g, 60 to 90 Hz", v, _SPEED, _fig2(g), "velocity")
         for g, v in FIT.items()
     ),
     *(
-        Published(
-            f"fig2_gamma_{g:g}g", f"Fig. 2, Γ0 at {g:g} g", value, "", (value - 5e-4, value + 5e-4), measured=False
-        )
+        _gamma(f"fig2_gamma_{g:g}g", f"Fig. 2, Γ0 at {g:g} g", value, (value - 5e-4, value + 5e-4), _fig2(g))
         for g, value in ((2.0, 0.191), (3.0, 0.286), (4.0, 0.381), (5.0, 0.476), (6.0, 0.572))
     ),
-    Published(
-        "fig2_frequency",
-        "Fig. 2, v(90 Hz)/v(60 Hz) at 6 g: no significant dependence",
-        1.0,
-        "",
-        depends_on="Where friction alone limits sliding, speeds go as 1/f; in theory a tangential drag ten times the "
-        "bridges' nominal one removes eight tenths of that.",
-    ),
-    Published(
+    _frequency_ratio(PLATEAU, ": no significant dependence"),
+    _ratio(
         "fig2_plateau",
         "Fig. 2, v(10 g)/v(6 g): a plateau from Γ0 ≈ 0.6 on",
-        1.0,
-        "",
-        depends_on="It levels off from 7 g on, in the engine and in theory, where the large bead begins to slide. "
-        "More drag or more liquid brings the ratio to 6 g within the bounds, too.",
+        _LEVELS_OFF,
+        _fig2(10.0),
+        _fig2(PLATEAU),
     ),
     Published(
         "fig2_threshold",
@@ -134,24 +189,33 @@ NUMBERS = (
         depends_on=_THRESHOLD,
     ),
     *(
-        Published(f"fig3_{r1:g}_{r2:g}", f"Fig. 3, fit for R = {r1:g}/{r2:g} mm", _in_mm(v), depends_on=_ASYMMETRY)
-        for (r1, r2), v in FIG3_FIT.items()
+        _speed(
+            f"fig3_{radii[0]:g}_{radii[1]:g}",
+            f"Fig. 3, fit for R = {radii[0]:g}/{radii[1]:g} mm",
+            v,
+            _ASYMMETRY,
+            (Point("fig3", radii, 80.0),),
+            "velocity",
+        )
+        for radii, v in FIG3_FIT.items()
     ),
-    Published("fig3_symmetric", "Fig. 3, a symmetric dimer does not walk", 0.0, depends_on=_TURNED),
-    Published("fig4a_gamma", "Fig. 4a, Γ0", 0.74, "", (0.7345, 0.745), measured=False),
-    Published(
-        "fig4a_velocity",
-        "Fig. 4a, velocity",
-        _in_mm(FIG4_VELOCITY[0]),
-        depends_on=_FIG4A,
+    _speed(
+        "fig3_symmetric",
+        "Fig. 3, a symmetric dimer does not walk",
+        0.0,
+        _TURNED,
+        (Point("fig3", (0.25, 0.25), 80.0),),
+        "velocity_of_all",
     ),
-    Published("fig4a_sliding", "Fig. 4a, large bead's mean sliding: hardly any", 0.0, depends_on=_FIG4A),
-    Published("fig4b_gamma", "Fig. 4b, Γ0", 3.5, "", (3.45, 3.55), measured=False),
-    Published("fig4b_velocity", "Fig. 4b, velocity", _in_mm(FIG4_VELOCITY[1]), depends_on=_FIG4B),
-    Published(
-        "fig4b_rotation", "Fig. 4b, large bead's mean rotation velocity", _in_mm(FIG4B_ROTATION), depends_on=_FIG4B
+    _gamma("fig4a_gamma", "Fig. 4a, Γ0", 0.74, (0.7345, 0.745), FIG4["a"]),
+    _speed("fig4a_velocity", "Fig. 4a, velocity", FIG4_VELOCITY[0], _FIG4A, FIG4["a"], "velocity"),
+    _speed("fig4a_sliding", "Fig. 4a, large bead's mean sliding: hardly any", 0.0, _FIG4A, FIG4["a"], "sliding_1"),
+    _gamma("fig4b_gamma", "Fig. 4b, Γ0", 3.5, (3.45, 3.55), FIG4["b"]),
+    _speed("fig4b_velocity", "Fig. 4b, velocity", FIG4_VELOCITY[1], _FIG4B, FIG4["b"], "velocity"),
+    *(
+        _speed(f"fig4b_{name}", f"Fig. 4b, large bead's mean {name} velocity", value, _FIG4B, FIG4["b"], f"{name}_1")
+        for name, value in (("rotation", FIG4B_ROTATION), ("sliding", FIG4B_SLIDING))
     ),
-    Published("fig4b_sliding", "Fig. 4b, large bead's mean sliding velocity", _in_mm(FIG4B_SLIDING), depends_on=_FIG4B),
     Published(
         "alignment_asymmetric",
         "Asymmetric dimers align with the shaking axis: largest angle to it at the end",
@@ -172,3 +236,22 @@ NUMBERS = (
     Published("mathieu_stable", "V up to which small angles stay small", STABLE_V, "", (0.445, 0.455), measured=False),
 )
 """Every number that the paper publishes of walkers."""
+BY_KEY = {number.key: number for number in NUMBERS}
+
+
+def fitted() -> dict[str, Published]:
+    """The numbers that the theory is fitted to (`walkers.paper.model_terms`) by their names there.
+
+    Of walkers on the axis whose contacts stay closed: all that is published of Figs. 2, 3 and 4a, the frequency at 4 g
+    and rest at 0.5 g besides.
+    """
+    rest = _speed("fig2_rest", "Fig. 2, at rest at 0.5 g", 0.0, _THRESHOLD, _fig2(0.5), "velocity")
+    return {
+        **{f"Fig. 2, {g:g} g": BY_KEY[f"fig2_{g:g}g"] for g in FIT},
+        "Fig. 2, plateau": BY_KEY["fig2_plateau"],
+        **{f"Fig. 2, frequency at {peak:g} g": _frequency_ratio(peak) for peak in (4.0, PLATEAU)},
+        "Fig. 2, rest at 0.5 g": rest,
+        **{f"Fig. 3, {r1:g}/{r2:g} mm": BY_KEY[f"fig3_{r1:g}_{r2:g}"] for r1, r2 in FIG3_FIT},
+        "Fig. 4a, velocity": BY_KEY["fig4a_velocity"],
+        "Fig. 4a, sliding": BY_KEY["fig4a_sliding"],
+    }
