@@ -100,8 +100,8 @@ def test_all_drives_of_the_paper_are_stable() -> None:
 
 def test_every_published_number_is_compared(sources: Sources) -> None:
     rows = compare(sources)
-    assert [row.key for row in rows] == [number.key for number in published.NUMBERS]
-    assert all(number.depends_on for number in published.NUMBERS if number.measured)
+    assert [row.key for row in rows] == [number.key for number in published.COMPARED]
+    assert all(number.depends_on for number in published.COMPARED if number.measured)
     for row in rows:
         assert (row.engine is not None) or not row.measured or row.left_out
         assert bool(row.why) != row.agrees
@@ -111,7 +111,7 @@ def test_every_published_number_is_compared(sources: Sources) -> None:
             assert row.ratio * row.published == pytest.approx(ours)
     in_words = [row for row in rows if row.published is None]
     assert [row.key for row in in_words] == ["fig2_threshold"]
-    assert all(number.bounds is not None for number in published.NUMBERS if number.value is None)
+    assert all(number.bounds is not None for number in published.COMPARED if number.value is None)
     agreeing, counted = count(rows, measured=True)
     assert counted == sum(row.measured for row in rows) - len(in_words)
     either_way = [[replace(row, agrees=agrees) if row in in_words else row for row in rows] for agrees in (True, False)]
@@ -220,7 +220,7 @@ def test_figures_and_comparison_do_without_what_failed(sources: Sources, tmp_pat
                 with pytest.raises(NothingFinishedError):
                     drawing.draw(left)
         rows = compare(left)
-        assert len(rows) == len(published.NUMBERS)
+        assert len(rows) == len(published.COMPARED)
         for row in rows:
             if row.engine is None and not row.key.startswith("mathieu"):
                 assert not row.agrees
@@ -238,7 +238,7 @@ def test_a_descent_of_which_only_its_ends_are_left_is_drawn_without_a_threshold(
     left = Sources(out)
     assert len(left.finished("fig2-threshold"))
     assert FIGURES["fig2"].draw(left).axes
-    assert len(compare(left)) == len(published.NUMBERS)
+    assert len(compare(left)) == len(published.COMPARED)
 
 
 def test_the_theory_of_fig4_goes_through_the_cycle_as_the_engine_does(sources: Sources) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from walkers.inputs.text import rendered
 from walkers.paper import dimers, published
 from walkers.paper.alignment import paper_drives
-from walkers.paper.published import NUMBERS, Point, Published
+from walkers.paper.published import COMPARED, Point, Published
 from walkers.paper.sensitivity import misalignment
 from walkers.paper.sources import NothingFinishedError, Sources
 from walkers.postprocess.steady_state import steady_walkers
@@ -85,7 +85,7 @@ class Row:
 
 def compare(sources: Sources) -> list[Row]:
     """All published numbers, in the order of the paper."""
-    return [_row(number, _found(number, sources)) for number in NUMBERS]
+    return [_row(number, _found(number, sources)) for number in COMPARED]
 
 
 def _row(number: Published, value: Value) -> Row:

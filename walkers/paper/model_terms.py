@@ -23,7 +23,7 @@ from walkers.inputs import library
 from walkers.inputs.case import Case
 from walkers.inputs.text import rendered
 from walkers.paper import dimers
-from walkers.paper.published import Point, Published, fitted
+from walkers.paper.published import FITTED, Point, Published
 from walkers.runner.files import write_json, write_text
 from walkers.theory.friction import Friction
 from walkers.theory.motion import Walker, walk
@@ -32,21 +32,12 @@ from walkers.theory.quasistatic import translation
 FloatArray = npt.NDArray[np.float64]
 _CYCLES = 40
 _DEVIATION = 0.15
-_DEVIATIONS = {"Fig. 2, plateau": 0.2, "Fig. 2, rest at 0.5 g": 2e-5, "Fig. 4a, sliding": 3e-4}
+_FREQUENCIES = (60.0, 90.0)
 _HOPELESS = 30.0
 
 
-@dataclass(frozen=True)
-class Term:
-    """Something that the theory may have: parameters and their ranges.
-
-    Attributes
-    ----------
-    name
-        In words.
-    ranges
-        Parameter to lowest and highest value; ``log10_`` parameters are logarithms.
-    """
+class Term(NamedTuple):
+    """Something that the theory may have: parameters and their ranges; ``log10_`` parameters are logarithms."""
 
     name: str
     ranges: Mapping[str, tuple[float, float]]
@@ -89,12 +80,33 @@ NOTHING_ELSE = {
 
 
 class Target(NamedTuple):
-    """A published number as the theory is fitted to it: m/s or a ratio, and `_DEVIATION` of it if no other is known."""
+    """A published number as the theory is fitted to it: m/s or a ratio, and its error in the same."""
 
-    name: str
     number: Published
     value: float
     deviation: float
+
+    @property
+    def name(self) -> str:
+        """Of the number."""
+        return self.number.fitted
+
+    def points(self) -> tuple[list[Point], list[Point]]:
+        """Walkers that it is a mean over, and those that it is a ratio to: at the ends of the range of frequencies."""
+        of, over = (
+            [one for one in points if one.frequency in _FREQUENCIES or len(points) == 1]
+            for points in (self.number.of, self.number.over)
+        )
+        return of, over
+
+
+def targets() -> list[Target]:
+    """The published numbers that tell of walkers on the axis."""
+    scales = [1.0 if number.over else 1e-3 for number in FITTED]
+    return [
+        Target(number, number.si, _DEVIATION * abs(number.si) if number.deviation is None else number.deviation * scale)
+        for number, scale in zip(FITTED, scales, strict=True)
+    ]
 
 
 @dataclass(frozen=True)
@@ -125,21 +137,13 @@ class Fit:
     misfit: float
 
 
-_FREQUENCIES = (60.0, 90.0)
-
-
-def _fitted(points: Sequence[Point]) -> list[Point]:
-    """Those of the lowest and the highest frequency, where there are several."""
-    return [one for one in points if one.frequency in _FREQUENCIES or len(points) == 1]
-
-
 @cache
 def walkers_of_the_paper() -> dict[Point, Case]:
     """The walkers that the numbers are of, as one would take them without a calibration.
 
     Of Fig. 4b there are none: there contacts open in every cycle, and that is beyond the theory.
     """
-    points = [point for one in fitted().values() for point in _fitted(one.of) + _fitted(one.over)]
+    points = [point for target in targets() for part in target.points() for point in part]
     return {point: _bare(dimers.of_point(point)) for point in points}
 
 
@@ -153,15 +157,6 @@ def _bare(case: Case) -> Case:
         contact_angle=0.0,
     )
     return replace(case, liquid=liquid, contact=replace(case.contact, minimum_separation_ratio=0.01))
-
-
-def targets() -> list[Target]:
-    """The published numbers that tell of walkers on the axis."""
-    found = []
-    for name, number in fitted().items():
-        value = (number.value or 0.0) if number.over else float(f"{number.value}e-3")
-        found.append(Target(name, number, value, _DEVIATIONS.get(name, _DEVIATION * abs(value))))
-    return found
 
 
 def speeds(parameters: Mapping[str, float]) -> dict[str, dict[Point, float]]:
@@ -212,8 +207,7 @@ def values_of(parameters: Mapping[str, float], wanted: Sequence[Target]) -> dict
     found = speeds(parameters)
     values = {}
     for target in wanted:
-        number = target.number
-        above, below = ([found[number.quantity][one] for one in _fitted(points)] for points in (number.of, number.over))
+        above, below = ([found[target.number.quantity][one] for one in points] for points in target.points())
         value = fmean(above)
         if below:
             value = value / fmean(below) if fmean(below) else nan
@@ -307,10 +301,8 @@ def write_model_terms(fits: Sequence[Fit], to: Path) -> list[Path]:
 
 
 def _told(target: Target) -> dict[str, object]:
-    number = target.number
-    of, over = ([point.name for point in _fitted(points)] for points in (number.of, number.over))
-    quantity = number.quantity.removesuffix("_1")
-    told = {"name": target.name, "quantity": quantity, "of": of, "over": over}
+    of, over = ([point.name for point in points] for points in target.points())
+    told = {"name": target.name, "quantity": target.number.quantity.removesuffix("_1"), "of": of, "over": over}
     return told | {"value": target.value, "deviation": target.deviation}
 
 
