@@ -105,7 +105,7 @@ def known() -> tuple[Any, list[Observation]]:
 def test_emulators_know_their_error(known: tuple[Any, list[Observation]]) -> None:
     emulators, _ = known
     fresh = np.random.default_rng(5).random((200, 2)) * [0.85, 1.0]
-    for place, emulator in enumerate(emulators):
+    for place, emulator in enumerate(emulators.each):
         value, error = emulator.value(fresh)
         miss = np.abs(value - _known(fresh)[:, place])
         assert np.median(miss) < 0.05
@@ -121,11 +121,11 @@ def test_errors_are_judged_by_the_later_sets() -> None:
     kink = np.sign(unit.sum(axis=1) - 1.0) * (np.abs(unit - 0.5).max(axis=1) < 0.12)
     outcome = (unit[:, 0] + 0.3 * kink)[:, None]
     everywhere, there, few = (
-        fit_emulators(unit[:count], outcome[:count], [observation("p", 0.5, 0.05)], 1, judged)[0].error_inflation
+        fit_emulators(unit[:count], outcome[:count], [observation("p", 0.5, 0.05)], 1, judged).each[0].error_inflation
         for judged, count in ((0, None), (64, None), (64, 70))
     )
     assert there > 1.2 * everywhere
-    assert few == fit_emulators(unit[:70], outcome[:70], [observation("p", 0.5, 0.05)], 1)[0].error_inflation
+    assert few == fit_emulators(unit[:70], outcome[:70], [observation("p", 0.5, 0.05)], 1).each[0].error_inflation
 
 
 def test_later_waves_look_around_the_best_sets(tmp_path: Path) -> None:
@@ -155,14 +155,14 @@ def test_a_posterior_is_the_known_one(known: tuple[Any, list[Observation]]) -> N
     assert (high > TRUTH[0]).all()
     without = sample_posterior(emulators, SPACE, 4000, 1, {"other"})
     assert without.groups == ("all",)
-    seen, unseen = (emulators[1].value(one.unit)[0].std() for one in (posterior, without))
+    seen, unseen = (emulators.each[1].value(one.unit)[0].std() for one in (posterior, without))
     assert unseen > 1.5 * seen
 
 
 def test_what_is_derived_from_others_weighs_nothing(known: tuple[Any, list[Observation]]) -> None:
     emulators, _ = known
-    derived = replace(emulators[1], observation=emulators[1].observation.model_copy(update={"derived": True}))
-    with_derived = replace(emulators, each=(emulators[0], derived))
+    derived = replace(emulators.each[1], observation=emulators.each[1].observation.model_copy(update={"derived": True}))
+    with_derived = replace(emulators, each=(emulators.each[0], derived))
     alone, both = (sample_posterior(chosen, SPACE, 1000, 1) for chosen in (emulators.of([0]), with_derived))
     assert both.groups == ("all",)
     np.testing.assert_array_equal(both.unit, alone.unit)
@@ -280,11 +280,11 @@ def test_few_feasible_sets_and_few_others_can_be_had(made: int) -> None:
     outcome[:, 1] = design[:, 1]
     observations = [observation("v", 1.5, 0.1), observation("w", 0.5, 0.1)]
     emulators = fit_emulators(design, outcome, observations, 1)
-    assert emulators[0].sets == made
+    assert emulators.each[0].sets == made
     posterior = sample_posterior(emulators, SPACE, 1000, 1)
     assert np.isfinite(posterior.log_density).all()
     assert np.abs(np.median(posterior.unit[:, 1]) - 0.5) < 0.1
-    assert np.isfinite(emulators[0].draw(posterior.unit, np.zeros(len(posterior.unit)))).all()
+    assert np.isfinite(emulators.each[0].draw(posterior.unit, np.zeros(len(posterior.unit)))).all()
     low, high = emulators.feasibility.probability(np.array([[0.02, 0.5], [0.98, 0.5]]))[:, 0]
     assert low > high - 0.02
     if made in {0, 63, 64}:
@@ -427,7 +427,7 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     for name, true in TRUE.items():
         low, middle, high = said["intervals"][name]
         assert low * 0.97 < true < high * 1.03, name
-        # Less friction and less drag give the three speeds nearly as well: the engine tells them apart, so few sets do not.
+        # Less of both gives the three speeds nearly as well: the engine tells them apart, so few sets do not.
         assert middle == pytest.approx(true, rel=0.6), name
         assert said["best"][name] == pytest.approx(true, rel=0.15), name
     assert said["agree"] == 4

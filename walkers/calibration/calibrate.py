@@ -54,19 +54,17 @@ class Outcome:
         All sets of all waves, in the unit cube.
     outcome : ndarray, shape (P, K)
         What the engine made of them; NaN where there was nothing to observe.
-    emulators
-        Fitted to all waves.
-    posterior
-        From all observations.
+    emulators, posterior
+        Of all waves and of all observations.
     held_out
-        From those that each trial of the file leaves.
+        Posteriors of the observations that each trial of the file leaves.
     predictive
         The engine at samples of the posterior, that of the highest density first.
     checks
-        The engine at the best set of all that were run: as in the waves (``best``), with half the time step
-        (``half-step``), and for twice as long (``twice-as-long``).
+        The engine at the best set that was run: as in the waves (``best``), with half the time step (``half-step``),
+        and for twice as long (``twice-as-long``).
     sobol : ndarray, shape (K, D)
-        Total indices of each observation's transformed residual (`walkers.calibration.sensitivity`).
+        `walkers.calibration.sensitivity.sobol_indices`.
     failures
         Points that failed, by sweep.
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -107,15 +107,6 @@ class Emulators:
     each: tuple[Emulator, ...]
     feasibility: Feasibility
     correlation: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.each)
-
-    def __iter__(self) -> Iterator[Emulator]:
-        return iter(self.each)
-
-    def __getitem__(self, place: int) -> Emulator:
-        return self.each[place]
 
     @property
     def observations(self) -> list[Observation]:

@@ -88,7 +88,7 @@ def rows_of(found: Outcome) -> list[Row]:
     feasible = found.emulators.feasibility.probability(found.checks["best"].unit)[0]
     for place, observation in enumerate(found.calibration.observations):
         unit, scale = unit_of(observation)
-        emulated, error = found.emulators[place].value(found.checks["best"].unit)
+        emulated, error = found.emulators.each[place].value(found.checks["best"].unit)
         seen = _seen(found.predictive, place, scale)
         best, finer, longer = (
             next(iter(_seen(found.checks[name], place, scale)), None) for name in ("best", "half-step", "twice-as-long")
@@ -113,7 +113,7 @@ def rows_of(found: Outcome) -> list[Row]:
                 half_step=finer,
                 twice_as_long=longer,
                 held_out={
-                    name: _predicted(found.emulators[place], posterior, scale)
+                    name: _predicted(found.emulators.each[place], posterior, scale)
                     for name, posterior in found.held_out.items()
                     if observation.group in found.calibration.file.held_out[name]
                 },
@@ -239,7 +239,7 @@ def as_dict(found: Outcome, rows: list[Row]) -> dict[str, Any]:
                 "error_inflation": one.error_inflation,
                 "sets": one.sets,
             }
-            for one in found.emulators
+            for one in found.emulators.each
         },
         "emulators_checked": checked,
         "emulators_within_two_errors": _finite(inside),
@@ -249,7 +249,7 @@ def as_dict(found: Outcome, rows: list[Row]) -> dict[str, Any]:
         "observations": [asdict(row) for row in rows],
         "sobol_total": {
             one.observation.name: dict(zip(parameters, map(_finite, total), strict=True))
-            for one, total in zip(found.emulators, found.sobol, strict=True)
+            for one, total in zip(found.emulators.each, found.sobol, strict=True)
         },
     }
 

@@ -33,13 +33,13 @@ def sobol_indices(emulators: Emulators, space: Space, seed: int) -> FloatArray:
     value, feasible = _respond(emulators, points)
     whole = _variance(value, feasible)
     whole[(feasible.sum(axis=0) < _FEW) | (whole == 0.0)] = np.nan
-    total = np.full((len(emulators), space.dimensions), np.nan)
+    total = np.full((len(emulators.each), space.dimensions), np.nan)
     lines, base = np.repeat(points[:_LINES], _ALONG, axis=0), feasible[:_LINES]
     for one in range(space.dimensions):
         along = lines.copy()
         along[:, one] = np.tile((np.arange(_ALONG) + 0.5) / _ALONG, _LINES)
         found, allowed = _respond(emulators, along)
-        shape = (_LINES, _ALONG, len(emulators))
+        shape = (_LINES, _ALONG, len(emulators.each))
         spread = _variance(found.reshape(shape).swapaxes(0, 1), allowed.reshape(shape).swapaxes(0, 1))
         varies = np.where(base, spread, 0.0).sum(axis=0) / np.maximum(base.sum(axis=0), 1)
         total[:, one] = varies / whole

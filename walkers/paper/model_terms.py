@@ -111,20 +111,16 @@ def targets() -> list[Target]:
 
 @dataclass(frozen=True)
 class Fit:
-    """What an term gives at best.
+    """What terms give at best.
 
     Attributes
     ----------
-    name
-        Of the term.
-    parameters
-        The best ones.
+    name, parameters
+        Of the terms; the best parameters.
     values
         Target's name to what comes out (m/s, or a ratio); None where the forces have no solution.
-    met
-        How many of them lie within their deviations.
-    missed
-        The names of the others, the worst first.
+    met, missed
+        How many of them lie within their deviations; the names of the others, the worst first.
     misfit
         Σ ln(1 + r²), r in deviations.
     """
