@@ -15,7 +15,7 @@ from scipy.stats import multivariate_normal, norm
 
 from tests.conftest import call, to_toml
 from tests.printed import spoilt
-from walkers.calibration.calibrate import FINAL, calibrate, first_wave, next_wave, ranking
+from walkers.calibration.calibrate import FINAL, _determinants, _kept, calibrate, first_wave, next_wave, ranking
 from walkers.calibration.emulator import fit_emulators
 from walkers.calibration.feasibility import fit_feasibility
 from walkers.calibration.figures import draw_corners, figures_of
@@ -450,19 +450,20 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
             assert row.name == "ratio"
             ((middle, width),) = row.held_out.values()
             assert middle == pytest.approx(row.value, abs=max(0.05, 2.0 * width))
-    # A design that cannot be one is told, and designs of other ranges are not taken for these.
-    design = out / "reduced" / "wave-1.json"
-    whole = design.read_text()
-    design.write_text(json.dumps({**json.loads(whole), "unit": [[0.5, 3.0]]}))
-    refused = call(*command)
-    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
-    design.write_text(whole)
-    document["parameters"]["drag"]["range"] = [0.5, 10.0]
-    file.write_text(to_toml(document))
-    refused = call(*command)
-    assert refused.returncode == 2
-    assert refused.stderr.count("\n") == 1
-    assert "wave-1.json" in refused.stderr
+
+
+def test_designs_that_cannot_be_ones_or_are_of_other_ranges_are_refused(tmp_path: Path) -> None:
+    found, file = small(tmp_path), tmp_path / "wave-1.json"
+    wide = small(
+        tmp_path, parameters=REDUCED["parameters"] | {"drag": {**REDUCED["parameters"]["drag"], "range": [1, 9]}}
+    )
+    whole = _kept(file, _determinants(found, 1), lambda: np.full((4, 2), 0.5))
+    with pytest.raises(InputError, match=r"wave-1\.json: parameters: was drawn with other parameters"):
+        _kept(file, _determinants(wide, 1), lambda: whole)
+    for unit in ([[0.5, 3.0]], [[0.5]], [0.5, 0.5], "half"):
+        file.write_text(json.dumps({**json.loads(file.read_text()), "unit": unit}))
+        with pytest.raises(InputError, match=r"wave-1\.json: cannot be read"):
+            _kept(file, _determinants(found, 1), lambda: whole)
 
 
 def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
@@ -570,6 +571,10 @@ def _bad(path: str, value: Any) -> dict[str, Any]:
     return document
 
 
+def _sharing(*observations: str, share: float = 0.5) -> dict[str, Any]:
+    return {"observations": list(observations), "share": share}
+
+
 BAD = {
     "range": ("parameters/drag/range", [3.0, 1.0], r"parameters\.drag\.range"),
     "log": ("parameters/drag/range", [0.0, 1.0], r"parameters\.drag\.range"),
@@ -598,26 +603,15 @@ BAD = {
     ),
     "unknown sharer": (
         "shared_errors",
-        {"curve": {"observations": ["slow", "fats"], "share": 0.5}},
+        {"curve": _sharing("slow", "fats")},
         r'shared_errors\.curve\.observations.*"fats".*fast',
     ),
-    "sharer twice": (
-        "shared_errors",
-        {"curve": {"observations": ["slow", "slow"], "share": 0.5}},
-        r"shared_errors\.curve\.observations.*once",
-    ),
-    "no sharer": ("shared_errors", {"curve": {"observations": ["slow"], "share": 0.5}}, r"shared_errors\.curve"),
-    "all shared": (
-        "shared_errors",
-        {"curve": {"observations": ["slow", "fast"], "share": 1.0}},
-        r"shared_errors\.curve\.share",
-    ),
+    "sharer twice": ("shared_errors", {"curve": _sharing("slow", "slow")}, r"shared_errors\.curve\.observations.*once"),
+    "no sharer": ("shared_errors", {"curve": _sharing("slow")}, r"shared_errors\.curve"),
+    "all shared": ("shared_errors", {"curve": _sharing("slow", "fast", share=1.0)}, r"shared_errors\.curve\.share"),
     "more than all shared": (
         "shared_errors",
-        {
-            "curve": {"observations": ["slow", "fast"], "share": 0.5},
-            "scale": {"observations": ["slow", "fast"], "share": 0.6},
-        },
+        {"curve": _sharing("slow", "fast"), "scale": _sharing("slow", "fast", share=0.6)},
         r"shared_errors.*slow to have an error of its own.*curve, scale",
     ),
     "held": ("held_out", {"x": ["w"]}, r"held_out\.x"),

@@ -139,7 +139,7 @@ def _found(number: Published, sources: Sources) -> Value:
         if number.over:
             below = [_speed(point, number.quantity, sources) for point in number.over]
             pairs = zip(tried, below, strict=True)
-            tried = [_quotient(one, other) for one, other in pairs if one is not None and other is not None]
+            tried = [_quotient(one or Value(), other or Value()) for one, other in pairs if one or other]
     except NothingFinishedError:
         return Value()
     return _together([one for one in tried if one is not None])
