@@ -3,7 +3,7 @@
 import copy
 import json
 import tomllib
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +15,19 @@ from scipy.stats import multivariate_normal, norm
 
 from tests.conftest import call, to_toml
 from tests.printed import spoilt
-from walkers.calibration.calibrate import FINAL, calibrate, first_wave, next_wave, ranking
-from walkers.calibration.convergence import effective_samples, rhat
+from walkers.calibration.calibrate import FINAL, _determinants, _kept, calibrate, first_wave, next_wave, ranking
 from walkers.calibration.emulator import fit_emulators
 from walkers.calibration.feasibility import fit_feasibility
 from walkers.calibration.figures import draw_corners, figures_of
 from walkers.calibration.likelihood import log_likelihood, observation_covariance
 from walkers.calibration.posterior import Density, sample_posterior
-from walkers.calibration.report import emulator_checks, intervals, rows_of, words_of
+from walkers.calibration.report import Row, agreeing, emulator_checks, intervals, rows_of, words_of
 from walkers.calibration.sensitivity import sobol_indices
 from walkers.calibration.space import Space, spread_out
 from walkers.calibration.waves import run_wave, wave_sweep
 from walkers.inputs import InputError
 from walkers.inputs.calibration import (
+    Calibration,
     Observation,
     Parameter,
     SharedError,
@@ -105,7 +105,7 @@ def known() -> tuple[Any, list[Observation]]:
 def test_emulators_know_their_error(known: tuple[Any, list[Observation]]) -> None:
     emulators, _ = known
     fresh = np.random.default_rng(5).random((200, 2)) * [0.85, 1.0]
-    for place, emulator in enumerate(emulators):
+    for place, emulator in enumerate(emulators.each):
         value, error = emulator.value(fresh)
         miss = np.abs(value - _known(fresh)[:, place])
         assert np.median(miss) < 0.05
@@ -121,16 +121,15 @@ def test_errors_are_judged_by_the_later_sets() -> None:
     kink = np.sign(unit.sum(axis=1) - 1.0) * (np.abs(unit - 0.5).max(axis=1) < 0.12)
     outcome = (unit[:, 0] + 0.3 * kink)[:, None]
     everywhere, there, few = (
-        fit_emulators(unit[:count], outcome[:count], [observation("p", 0.5, 0.05)], 1, judged)[0].error_inflation
+        fit_emulators(unit[:count], outcome[:count], [observation("p", 0.5, 0.05)], 1, judged).each[0].error_inflation
         for judged, count in ((0, None), (64, None), (64, 70))
     )
     assert there > 1.2 * everywhere
-    assert few == fit_emulators(unit[:70], outcome[:70], [observation("p", 0.5, 0.05)], 1)[0].error_inflation
+    assert few == fit_emulators(unit[:70], outcome[:70], [observation("p", 0.5, 0.05)], 1).each[0].error_inflation
 
 
 def test_later_waves_look_around_the_best_sets(tmp_path: Path) -> None:
-    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
-    found = read_calibration(document, source="waves", name="waves", folder=tmp_path)
+    found = small(tmp_path)
     unit = first_wave(found, Space(found.parameters))
     value = np.array([one.value for one in found.observations])
     miss = np.linalg.norm(unit - [0.2, 0.8], axis=1)[:, None]
@@ -149,29 +148,28 @@ def test_later_waves_look_around_the_best_sets(tmp_path: Path) -> None:
 def test_a_posterior_is_the_known_one(known: tuple[Any, list[Observation]]) -> None:
     """With little discrepancy the truth is found; without a group its observation is predicted wider."""
     emulators, _ = known
-    posterior = sample_posterior(emulators, SPACE, 800, 1)
+    posterior = sample_posterior(emulators, SPACE, 20_000, 1)
     assert np.abs(posterior.best - TRUTH[0]).max() < 0.06
     low, high = np.percentile(posterior.unit, (5.0, 95.0), axis=0)
     assert (low < TRUTH[0]).all()
     assert (high > TRUTH[0]).all()
-    without = sample_posterior(emulators, SPACE, 800, 1, {"other"})
+    without = sample_posterior(emulators, SPACE, 4000, 1, {"other"})
     assert without.groups == ("all",)
-    seen, unseen = (emulators[1].value(one.unit)[0].std() for one in (posterior, without))
+    seen, unseen = (emulators.each[1].value(one.unit)[0].std() for one in (posterior, without))
     assert unseen > 1.5 * seen
 
 
 def test_what_is_derived_from_others_weighs_nothing(known: tuple[Any, list[Observation]]) -> None:
     emulators, _ = known
-    derived = replace(emulators[1], observation=emulators[1].observation.model_copy(update={"derived": True}))
-    with_derived = replace(emulators, each=(emulators[0], derived))
-    alone, both = (sample_posterior(chosen, SPACE, 300, 1) for chosen in (emulators.of([0]), with_derived))
+    derived = replace(emulators.each[1], observation=emulators.each[1].observation.model_copy(update={"derived": True}))
+    with_derived = replace(emulators, each=(emulators.each[0], derived))
+    alone, both = (sample_posterior(chosen, SPACE, 1000, 1) for chosen in (emulators.of([0]), with_derived))
     assert both.groups == ("all",)
     np.testing.assert_array_equal(both.unit, alone.unit)
 
 
 def test_the_best_set_gives_most_observations_and_then_the_least_misfit(tmp_path: Path) -> None:
-    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
-    found = read_calibration(document, source="best", name="best", folder=tmp_path)
+    found = small(tmp_path)
     deviation = np.array([one.deviation for one in found.observations])
     residuals = np.array([[0.0, 0.0, 5.0, 5.0], [0.9, 0.9, 0.9, 3.0], [0.9, 0.2, 0.2, 2.0], [0.2, 0.2, 0.2, np.nan]])
     outcome = np.array([one.value for one in found.observations]) + residuals * deviation
@@ -220,13 +218,9 @@ def test_points_of_one_curve_weigh_less_than_as_many_numbers() -> None:
     observations = [observation(f"o{number}", 0.5, 0.1) for number in range(10)]
     emulators = fit_emulators(design, np.repeat(design[:, :1], 10, axis=1), observations, 1)
     shared = {"curve": SharedError(observations=[one.name for one in observations], share=0.9)}
-    covariance = observation_covariance(observations, shared)
-    np.testing.assert_allclose(covariance, 0.9 + 0.1 * np.eye(10))
-    apart, together = (
-        np.ptp(np.percentile(sample_posterior(emulators, SPACE, 800, 1, shared_errors=one).unit[:, 0], (16, 84)))
-        for one in ({}, shared)
-    )
-    # 0.2/√10 or so beside 0.2 √0.91 or so.
+    np.testing.assert_allclose(observation_covariance(observations, shared), 0.9 + 0.1 * np.eye(10))
+    posteriors = [sample_posterior(emulators, SPACE, 4000, 1, shared_errors=one) for one in ({}, shared)]
+    apart, together = (np.ptp(np.percentile(one.unit[:, 0], (16, 84))) for one in posteriors)
     assert together > 2.0 * apart
     assert together == pytest.approx(0.2 * np.sqrt(0.91), rel=0.25)
 
@@ -253,11 +247,7 @@ def test_sets_at_rest_and_sets_without_a_walker_do_not_make_one_that_walks_betwe
     assert across[np.argmax(likelihood)] < 0.45
     assert likelihood[cliff].max() < likelihood[walks].min()
     assert np.ptp(likelihood[walks]) < 1.0  # all at rest alike
-    # As it was: the missing imputed at thirty deviations, and the emulator finds what is wanted at the cliff.
-    imputed = fit_emulators(design, np.where(np.isnan(outcome), 30.0, outcome), observations, 1)
-    before = Density(imputed, SPACE)(norm.ppf(points)) + 0.5 * np.sum(norm.ppf(points) ** 2, axis=1)
-    assert abs(across[np.argmax(before)] - 0.5) < 0.04
-    posterior = sample_posterior(emulators, SPACE, 800, 1)
+    posterior = sample_posterior(emulators, SPACE, 4000, 1)
     assert np.mean(np.abs(posterior.unit[:, 0] - 0.5) < 0.02) < 0.05
     assert np.mean(posterior.unit[:, 0] < 0.5) > 0.7
 
@@ -269,7 +259,7 @@ def test_where_walkers_are_is_learned() -> None:
     outcome = np.where(np.stack([one, one, other, one & other, np.ones(128, bool)], axis=1), 1.0, np.nan)
     feasibility = fit_feasibility(design, outcome, 1)
     assert feasibility.event[0] == feasibility.event[1]
-    assert len(feasibility.processes) == 4
+    assert len(feasibility.classifiers) == 4
     fresh = np.random.default_rng(2).random((500, 2))
     probability = feasibility.probability(fresh)
     inside = np.linalg.norm(fresh - 0.3, axis=1) < 0.4
@@ -281,22 +271,6 @@ def test_where_walkers_are_is_learned() -> None:
     assert feasibility.needed([3]) == [feasibility.event[3]]
 
 
-def test_the_classifier_is_that_of_the_library() -> None:
-    from sklearn.gaussian_process import GaussianProcessClassifier
-    from sklearn.gaussian_process.kernels import ConstantKernel, Matern
-
-    from walkers.calibration.processes import Processes, of_classifier
-
-    design = SPACE.design(40, 1)
-    kernel = ConstantKernel(3.0) * Matern([0.4, 0.9], nu=2.5) + ConstantKernel(4.0)
-    classifier = GaussianProcessClassifier(kernel, optimizer=None).fit(design, design.sum(axis=1) > 0.7)
-    fresh = np.random.default_rng(3).random((20, 2))
-    mean, deviation = Processes([of_classifier(classifier)]).predict(fresh)
-    expected, variance = classifier.latent_mean_and_variance(fresh)
-    np.testing.assert_allclose(mean[:, 0], expected, rtol=1e-8)
-    np.testing.assert_allclose(deviation[:, 0] ** 2, variance, rtol=1e-6)
-
-
 @pytest.mark.parametrize("made", [0, 1, 3, 4, 63, 64])
 def test_few_feasible_sets_and_few_others_can_be_had(made: int) -> None:
     design = SPACE.design(64, 1)
@@ -306,73 +280,56 @@ def test_few_feasible_sets_and_few_others_can_be_had(made: int) -> None:
     outcome[:, 1] = design[:, 1]
     observations = [observation("v", 1.5, 0.1), observation("w", 0.5, 0.1)]
     emulators = fit_emulators(design, outcome, observations, 1)
-    assert emulators[0].sets == made
-    posterior = sample_posterior(emulators, SPACE, 200, 1)
+    assert emulators.each[0].sets == made
+    posterior = sample_posterior(emulators, SPACE, 1000, 1)
     assert np.isfinite(posterior.log_density).all()
     assert np.abs(np.median(posterior.unit[:, 1]) - 0.5) < 0.1
-    assert np.isfinite(emulators[0].draw(posterior.unit, np.zeros(len(posterior.unit)))).all()
+    assert np.isfinite(emulators.each[0].draw(posterior.unit, np.zeros(len(posterior.unit)))).all()
     low, high = emulators.feasibility.probability(np.array([[0.02, 0.5], [0.98, 0.5]]))[:, 0]
     assert low > high - 0.02
     if made in {0, 63, 64}:
         assert (low > 0.8) == (made > 0)
 
 
-def test_emulators_of_several_observations_are_those_of_each() -> None:
-    """Some know fewer sets than others; errors of two that are the same function go together."""
+def test_errors_of_observations_that_share_runs_go_together() -> None:
     rng, design = np.random.default_rng(4), SPACE.design(64, 1)
     shared = 0.1 * rng.standard_normal(64)
     outcome = np.stack([design[:, 0] + shared, design[:, 0] + shared, design[:, 1] + 0.1 * rng.standard_normal(64)], 1)
     outcome[:20, 2] = np.nan
-    emulators = fit_emulators(design, outcome, [observation(name, 0.5, 0.1) for name in "abc"], 1)
-    fresh = rng.random((30, 2))
-    mean, deviation = emulators.predict(fresh)
-    for place, one in enumerate(emulators):
-        alone, width = one.predict(fresh)
-        np.testing.assert_allclose(mean[:, place], alone, atol=1e-9)
-        np.testing.assert_allclose(deviation[:, place], width * one.error_inflation, rtol=1e-6)
-    assert emulators.correlation[0, 1] > 0.6
-    assert abs(emulators.correlation[0, 2]) < 0.4
-    assert np.linalg.eigvalsh(emulators.correlation).min() > 0.0
+    correlation = fit_emulators(design, outcome, [observation(name, 0.5, 0.1) for name in "abc"], 1).correlation
+    assert correlation[0, 1] > 0.6
+    assert abs(correlation[0, 2]) < 0.4
+    assert np.linalg.eigvalsh(correlation).min() > 0.0
 
 
-# --- chains -----------------------------------------------------------------------------------------------------------
-
-
-def _chains(phi: float, shape: tuple[int, int, int]) -> FloatArray:
-    rng = np.random.default_rng(6)
-    steps = rng.standard_normal(shape)
-    for number in range(1, shape[2]):
-        steps[..., number] = phi * steps[..., number - 1] + np.sqrt(1.0 - phi**2) * steps[..., number]
-    return steps
-
-
-def test_effective_samples_are_as_many_as_theory_says() -> None:
-    """Of an autoregression (1 − φ)/(1 + φ) of all; starts that do not agree are few samples and a large R-hat."""
-    for phi in (0.0, 0.5, 0.9):
-        chains = _chains(phi, (4, 5, 2000))
-        assert effective_samples(chains) == pytest.approx(40_000 * (1.0 - phi) / (1.0 + phi), rel=0.15)
-        assert rhat(chains) < 1.01
-    chains = _chains(0.5, (4, 5, 2000))
-    apart = chains + np.array([0.0, 0.0, 0.0, 1.5])[:, None, None]
-    assert rhat(apart) > 1.1
-    assert effective_samples(apart) < 100.0
-    wider = chains * np.array([1.0, 1.0, 1.0, 4.0])[:, None, None]
-    assert rhat(wider) > 1.05
-
-
-def test_chains_that_are_too_short_are_not_believed(known: tuple[Any, list[Observation]]) -> None:
+def test_few_points_are_not_believed_and_more_are_drawn_where_they_weigh(known: tuple[Any, list[Observation]]) -> None:
     emulators, _ = known
-    short, long = (sample_posterior(emulators, SPACE, steps, 1) for steps in (100, 4000))
-    assert not short.converged
-    assert long.converged
-    assert long.starts == 4
-    assert long.steps < 0.6 * 4000  # it stops as soon as it may
+    few, many = (sample_posterior(emulators, SPACE, points, 1) for points in (100, 2000))
+    assert not few.converged
+    assert few.points == 800
+    assert many.converged
+    assert 2000 < many.points < 8 * 2000  # the prior alone does not do, and it stops as soon as it may
     assert words_of(0.1, converged=False).startswith("not said")
-    assert [words_of(share, converged=True) for share in (0.1, 0.5, 0.9)] == [
-        "identified",
-        "narrowed",
-        "not identified",
-    ]
+    shares = (0.1, 0.5, 0.9)
+    assert [words_of(share, converged=True) for share in shares] == ["identified", "narrowed", "not identified"]
+
+
+def test_weights_are_those_of_the_density_from_wherever_points_are_drawn(known: tuple[Any, list[Observation]]) -> None:
+    """Means and deviations beside those of a grid over parameters and both discrepancies."""
+    emulators, _ = known
+    posterior = sample_posterior(emulators, SPACE, 10_000, 1)
+    coarse = np.stack(np.meshgrid(*[np.linspace(-3.0, 3.0, 13)] * 2), axis=-1).reshape(-1, 2)
+    fine = norm.ppf(np.stack(np.meshgrid(*[np.linspace(0.02, 0.98, 25)] * 2), axis=-1)).reshape(-1, 2)
+    density = Density(emulators, SPACE)
+    total = np.zeros(len(fine))
+    for one in coarse:
+        # Uniform steps in the cube: the prior's normal density of the parameters is not counted.
+        points = np.column_stack([fine, np.broadcast_to(one, fine.shape)])
+        total += np.exp(density(points) + 0.5 * np.sum(fine**2, axis=1))
+    unit, weight = norm.cdf(fine), total / total.sum()
+    mean = weight @ unit
+    np.testing.assert_allclose(posterior.unit.mean(axis=0), mean, atol=0.02)
+    np.testing.assert_allclose(posterior.unit.std(axis=0), np.sqrt(weight @ (unit - mean) ** 2), rtol=0.15)
 
 
 def test_an_impossible_observation_is_a_discrepancy() -> None:
@@ -384,44 +341,24 @@ def test_an_impossible_observation_is_a_discrepancy() -> None:
         *(observation(name, value, 0.05) for name, value in zip("pqxy", values, strict=True)),
         observation("never", 0.0, 0.05, "other"),
     ]
-    posterior = sample_posterior(fit_emulators(design, outcome, observations, 1), SPACE, 800, 1)
+    posterior = sample_posterior(fit_emulators(design, outcome, observations, 1), SPACE, 4000, 1)
     middle = np.median(posterior.discrepancy, axis=0)
     assert middle[posterior.groups.index("other")] > 20.0
     assert middle[posterior.groups.index("all")] < 2.0
     assert np.abs(np.median(posterior.unit, axis=0) - TRUTH[0]).max() < 0.1
 
 
-def test_sobol_indices_are_those_of_a_known_function() -> None:
-    """y = x1 + 2 x2 on the unit square, near its observation: the shares are 1/5 and 4/5."""
-    design = SPACE.design(64, 1)
-    outcome = (design[:, 0] + 2.0 * design[:, 1])[:, None]
-    emulators = fit_emulators(design, outcome, [observation("p", 1.5, 50.0)], 1)
-    first, total = sobol_indices(emulators, SPACE, 1)
-    np.testing.assert_allclose(first[0], [0.2, 0.8], atol=0.03)
-    np.testing.assert_allclose(total[0], [0.2, 0.8], atol=0.03)
-
-
-def test_sobol_indices_know_interactions() -> None:
-    """y = (x1 − ½)(x2 − ½): all of it is interaction, none of it a first order."""
-    design = SPACE.design(128, 1)
-    outcome = np.prod(design - 0.5, axis=1)[:, None]
-    emulators = fit_emulators(design, outcome, [observation("p", 0.0, 50.0)], 1)
-    first, total = sobol_indices(emulators, SPACE, 1)
-    np.testing.assert_allclose(first[0], [0.0, 0.0], atol=0.05)
-    np.testing.assert_allclose(total[0], [1.0, 1.0], atol=0.05)
-
-
-def test_sobol_indices_are_of_the_feasible_part() -> None:
-    """y = x1 + 2 x2 where x1 < ½: a quarter of the first variance is left, 1/17 and 16/17; never made: not a number."""
+def test_sobol_indices_are_those_of_known_functions() -> None:
+    """x1 + 2 x2: 1/5 and 4/5, and 1/17 and 16/17 where x1 < ½; a product is all interaction; never made: no number."""
     design = SPACE.design(128, 1)
     y = design[:, 0] + 2.0 * design[:, 1]
-    outcome = np.stack([np.where(design[:, 0] < 0.5, y, np.nan), y, np.full(128, np.nan)], axis=1)
-    emulators = fit_emulators(design, outcome, [observation(name, 1.5, 50.0) for name in "pqr"], 1)
-    indices = sobol_indices(emulators, SPACE, 1)
-    for order in indices:
-        np.testing.assert_allclose(order[0], [1.0 / 17.0, 16.0 / 17.0], atol=0.03)
-        np.testing.assert_allclose(order[1], [0.2, 0.8], atol=0.03)
-    assert np.isnan(indices[:, 2]).all()
+    product = 50.0 * np.prod(design - 0.5, axis=1)
+    outcome = np.stack([y, np.where(design[:, 0] < 0.5, y, np.nan), product, np.full(128, np.nan)], axis=1)
+    observations = [observation(name, value, 50.0) for name, value in zip("pqrs", (1.5, 1.5, 0.0, 0.0), strict=True)]
+    indices = sobol_indices(fit_emulators(design, outcome, observations, 1), SPACE, 1)
+    np.testing.assert_allclose(indices[:2], [[0.2, 0.8], [1.0 / 17.0, 16.0 / 17.0]], atol=0.03)
+    np.testing.assert_allclose(indices[2], [1.0, 1.0], atol=0.05)
+    assert np.isnan(indices[3]).all()
 
 
 # --- the real engine --------------------------------------------------------------------------------------------------
@@ -449,7 +386,7 @@ REDUCED: dict[str, Any] = {
     },
     "held_out": {"ratio": ["r"]},
     "bands": [{"title": "60 and 90 Hz", "of": ["slow", "strong"], "against": "gamma0"}],
-    "design": {"waves": [12, 6], "predictive": 2, "steps": 3000, "seed": 2},
+    "design": {"waves": [12, 6, 4], "predictive": 2, "points": 3000, "seed": 2},
 }
 
 
@@ -463,11 +400,15 @@ def reduced(values: dict[str, float]) -> dict[str, Any]:
     return {**copy.deepcopy(REDUCED), "observations": [*observations, ratio]}
 
 
+def small(folder: Path, **changes: Any) -> Calibration:
+    """The reduced calibration, other tables in place of its own."""
+    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3}) | changes
+    return read_calibration(document, source="small", name="small", folder=folder)
+
+
 @pytest.mark.slow
 def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: Path) -> None:
-    guess = read_calibration(
-        reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3}), source="truth", name="truth", folder=tmp_path
-    )
+    guess = small(tmp_path)
     truth = Space(guess.parameters).unit(np.array([list(TRUE.values())]))
     out = tmp_path / "runs"
     wave, failures = run_wave(guess, truth, "truth", out, Options(2))
@@ -477,24 +418,16 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     file.write_text(to_toml(document))
     command = ["calibrate", str(file), "--out", str(out), "--to", str(tmp_path / "here")]
     told = call(*command, check=True).stdout
-    names = [
-        "posterior.parquet",
-        "calibration.json",
-        "calibration.md",
-        "corner.png",
-        "predictions.png",
-        "sobol.png",
-        "bands.png",
-    ]
-    assert [Path(line).name for line in told.splitlines()] == names
+    names = "posterior.parquet calibration.json calibration.md corner.png predictions.png sobol.png bands.png"
+    assert [Path(line).name for line in told.splitlines()] == names.split()
     said = json.loads((tmp_path / "here" / "calibration.json").read_text())
-    assert said["sets"] == 18
-    assert said["chain"]["converged"]
+    assert said["sets"] == 22
+    assert said["posterior"]["converged"]
     assert "not converged" not in (tmp_path / "here" / "calibration.md").read_text()
     for name, true in TRUE.items():
         low, middle, high = said["intervals"][name]
         assert low * 0.97 < true < high * 1.03, name
-        # Less friction and less drag give the three speeds nearly as well: the engine tells them apart, 18 sets do not.
+        # Less of both gives the three speeds nearly as well: the engine tells them apart, so few sets do not.
         assert middle == pytest.approx(true, rel=0.6), name
         assert said["best"][name] == pytest.approx(true, rel=0.15), name
     assert said["agree"] == 4
@@ -517,34 +450,38 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
             assert row.name == "ratio"
             ((middle, width),) = row.held_out.values()
             assert middle == pytest.approx(row.value, abs=max(0.05, 2.0 * width))
-    # A design that cannot be one is told, and designs of other ranges are not taken for these.
-    design = out / "reduced" / "wave-1.json"
-    whole = design.read_text()
-    design.write_text(json.dumps({**json.loads(whole), "unit": [[0.5, 3.0]]}))
-    refused = call(*command)
-    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
-    design.write_text(whole)
-    document["parameters"]["drag"]["range"] = [0.5, 10.0]
-    file.write_text(to_toml(document))
-    refused = call(*command)
-    assert refused.returncode == 2
-    assert refused.stderr.count("\n") == 1
-    assert "wave-1.json" in refused.stderr
+
+
+def test_designs_that_cannot_be_ones_or_are_of_other_ranges_are_refused(tmp_path: Path) -> None:
+    found, file = small(tmp_path), tmp_path / "wave-1.json"
+    wide = small(
+        tmp_path, parameters=REDUCED["parameters"] | {"drag": {**REDUCED["parameters"]["drag"], "range": [1, 9]}}
+    )
+    whole = _kept(file, _determinants(found, 1), lambda: np.full((4, 2), 0.5))
+    with pytest.raises(InputError, match=r"wave-1\.json: parameters: was drawn with other parameters"):
+        _kept(file, _determinants(wide, 1), lambda: whole)
+    for unit in ([[0.5, 3.0]], [[0.5]], [0.5, 0.5], "half"):
+        file.write_text(json.dumps({**json.loads(file.read_text()), "unit": unit}))
+        with pytest.raises(InputError, match=r"wave-1\.json: cannot be read"):
+            _kept(file, _determinants(found, 1), lambda: whole)
 
 
 def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
     """They roll fast, each for itself; there is nothing to be observed."""
-    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
-    document |= {"case": "fig4b", "experiments": {"strong": {"drive.peak_acceleration": "10 g"}}}
-    document["observations"] = [one for one in document["observations"] if one["name"] == "strong"]
-    del document["held_out"], document["bands"]
-    document["set"] = {
-        "dimers": {"replicates": 1},
-        "run": {"cycles": 40, "settling_cycles": 20, "samples_per_cycle": 10},
-        "liquid": {"volume_fraction": 0.01, "law": "soulie"},
-        "contact": {"rolling_friction": 0.003},
-    }
-    found = read_calibration(document, source="apart", name="apart", folder=tmp_path)
+    found = small(
+        tmp_path,
+        case="fig4b",
+        experiments={"strong": {"drive.peak_acceleration": "10 g"}},
+        observations=reduced(dict.fromkeys(REDUCED["experiments"], 1e-3))["observations"][2:3],
+        held_out={},
+        bands=[],
+        set={
+            "dimers": {"replicates": 1},
+            "run": {"cycles": 40, "settling_cycles": 20, "samples_per_cycle": 10},
+            "liquid": {"volume_fraction": 0.01, "law": "soulie"},
+            "contact": {"rolling_friction": 0.003},
+        },
+    )
     unit = Space(found.parameters).unit(np.array([[0.1, 0.5], [0.2, 9.9]]))
     wave, _ = run_wave(found, unit, "apart", tmp_path / "runs", Options(2))
     whole, apart = wave.table["separated_fraction"]
@@ -555,13 +492,9 @@ def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
 
 
 def test_values_have_their_units_and_guesses_lead_the_first_wave(tmp_path: Path) -> None:
-    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
-    document["parameters"] = {
-        **REDUCED["parameters"],
-        "angle": {"keys": ["liquid.contact_angle"], "range": [0.0, 60.0], "unit": "deg"},
-    }
-    document["guesses"] = [{"angle": 30.0, "drag": 2.0, "friction": 0.1}]
-    found = read_calibration(document, source="units", name="units", folder=tmp_path)
+    angle = {"keys": ["liquid.contact_angle"], "range": [0.0, 60.0], "unit": "deg"}
+    guesses = [{"angle": 30.0, "drag": 2.0, "friction": 0.1}]
+    found = small(tmp_path, parameters={**REDUCED["parameters"], "angle": angle}, guesses=guesses)
     space = Space(found.parameters)
     assert found.guesses == ((0.1, 2.0, 30.0),)
     case = next(iter(wave_sweep(found, np.array(found.guesses), "units").cases()))
@@ -573,13 +506,9 @@ def test_values_have_their_units_and_guesses_lead_the_first_wave(tmp_path: Path)
 
 def test_a_set_that_loses_its_beads_is_told_and_not_run_again(tmp_path: Path) -> None:
     """A step ten times beyond the viscous limit; whoever goes on finds what is left of it, and the rest finished."""
-    document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
-    document["set"] = {
-        **document["set"],
-        "run": {**document["set"]["run"], "time_step": "40 us", "allow_unstable": True},
-        "contact": {"minimum_separation_ratio": 1e-3},
-    }
-    found = read_calibration(document, source="lost", name="lost", folder=tmp_path)
+    step = {**REDUCED["set"]["run"], "time_step": "40 us", "allow_unstable": True}
+    settings = {**REDUCED["set"], "run": step, "contact": {"minimum_separation_ratio": 1e-3}}
+    found = small(tmp_path, set=settings)
     unit = Space(found.parameters).unit(np.array([[0.1, 9.0]]))
     wave, failures = run_wave(found, unit, "lost", tmp_path / "runs", Options(2))
     assert {failure.reason for failure in failures} <= FINAL
@@ -590,6 +519,14 @@ def test_a_set_that_loses_its_beads_is_told_and_not_run_again(tmp_path: Path) ->
     _, again = run_wave(found, unit, "lost", tmp_path / "runs", Options(2, final=FINAL))
     assert again == failures
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("failure.json")} == remains
+
+
+@pytest.mark.parametrize("derived", [False, True])
+def test_what_is_derived_is_not_counted_among_those_that_agree(derived: bool) -> None:
+    numbers: dict[str, Any] = {field.name: 1.0 for field in fields(Row)}
+    rows = [Row(**{**numbers, "agrees": agrees, "derived": False}) for agrees in (True, False)]
+    rows.append(Row(**{**numbers, "agrees": True, "derived": derived}))
+    assert agreeing(rows) == ((1, 2) if derived else (2, 3))
 
 
 # --- files ------------------------------------------------------------------------------------------------------------
@@ -634,6 +571,10 @@ def _bad(path: str, value: Any) -> dict[str, Any]:
     return document
 
 
+def _sharing(*observations: str, share: float = 0.5) -> dict[str, Any]:
+    return {"observations": list(observations), "share": share}
+
+
 BAD = {
     "range": ("parameters/drag/range", [3.0, 1.0], r"parameters\.drag\.range"),
     "log": ("parameters/drag/range", [0.0, 1.0], r"parameters\.drag\.range"),
@@ -662,26 +603,15 @@ BAD = {
     ),
     "unknown sharer": (
         "shared_errors",
-        {"curve": {"observations": ["slow", "fats"], "share": 0.5}},
+        {"curve": _sharing("slow", "fats")},
         r'shared_errors\.curve\.observations.*"fats".*fast',
     ),
-    "sharer twice": (
-        "shared_errors",
-        {"curve": {"observations": ["slow", "slow"], "share": 0.5}},
-        r"shared_errors\.curve\.observations.*once",
-    ),
-    "no sharer": ("shared_errors", {"curve": {"observations": ["slow"], "share": 0.5}}, r"shared_errors\.curve"),
-    "all shared": (
-        "shared_errors",
-        {"curve": {"observations": ["slow", "fast"], "share": 1.0}},
-        r"shared_errors\.curve\.share",
-    ),
+    "sharer twice": ("shared_errors", {"curve": _sharing("slow", "slow")}, r"shared_errors\.curve\.observations.*once"),
+    "no sharer": ("shared_errors", {"curve": _sharing("slow")}, r"shared_errors\.curve"),
+    "all shared": ("shared_errors", {"curve": _sharing("slow", "fast", share=1.0)}, r"shared_errors\.curve\.share"),
     "more than all shared": (
         "shared_errors",
-        {
-            "curve": {"observations": ["slow", "fast"], "share": 0.5},
-            "scale": {"observations": ["slow", "fast"], "share": 0.6},
-        },
+        {"curve": _sharing("slow", "fast"), "scale": _sharing("slow", "fast", share=0.6)},
         r"shared_errors.*slow to have an error of its own.*curve, scale",
     ),
     "held": ("held_out", {"x": ["w"]}, r"held_out\.x"),

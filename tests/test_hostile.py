@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
-from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -143,19 +142,17 @@ def test_a_figure_is_xml_and_shows_a_text_as_it_is(name: str, tmp_path: Path) ->
 @EACH
 def test_a_calibrations_title_is_no_line_of_its_report(name: str) -> None:
     def told(text: str) -> str:
-        file = SimpleNamespace(title=text)
-        row = SimpleNamespace(
-            title=text, value=1.0, deviation=0.1, unit="", engine=1.0, low=None, emulator=1.0, error=0.1, agrees=True,
-            held_out={text: (1.0, 0.1)},
-        )  # fmt: skip
-        one = SimpleNamespace(label=text, best=1.0, interval=(0.0, 1.0, 2.0), low=0.0, high=1.0, words="")
-        return rendered(
-            "walkers.calibration",
-            "report.md.j2",
-            calibration=SimpleNamespace(file=file, name=text),
-            rows=[row], parameters=[one], trials=[text], discrepancies={text: (0.0, 1.0, 2.0)}, chains={},
-            agree=1, sets=1, narrow=0.5, samples=1, inside=1.0, checked=1, made=1.0, expected=1.0, limits=(1.0, 1.0),
-        )  # fmt: skip
+        row = {"title": text, "value": 1.0, "deviation": 0.1, "unit": "", "engine": 1.0, "low": None, "emulator": 1.0}
+        row |= {"error": 0.1, "agrees": True, "derived": False, "held_out": {text: (1.0, 0.1)}}
+        weights = {"points": 1, "effective_samples": 1.0, "converged": True}
+        found = {
+            "title": text, "calibration": text, "agree": 1, "of": 1, "sets": 1, "parameters": {"a": text},
+            "best": {"a": 1.0}, "intervals": {"a": (0.0, 1.0, 2.0)}, "words": {"a": ""}, "observations": [row],
+            "discrepancies": {text: 1.0}, "emulators_within_two_errors": 1.0, "emulators_checked": 1,
+            "feasible": {"seen": 1.0, "expected": 1.0}, "posterior": weights, "held_out_posteriors": {text: weights},
+        }  # fmt: skip
+        given = {"ranges": {"a": (0.0, 1.0)}, "trials": [text], "samples": 1, "least": 1.0, "narrow": 0.5}
+        return rendered("walkers.calibration", "report.md.j2", found=found, discrepancies=[(0.0, 1.0, 2.0)], **given)
 
     plain, odd = told("plain").split("\n"), told(HOSTILE[name])
     assert "\r" not in odd

@@ -21,7 +21,7 @@ from walkers.inputs.reading import read_toml
 from walkers.inputs.sweep import shipped_sweeps
 from walkers.paper import dimers, published
 from walkers.paper.alignment import climber, paper_drives
-from walkers.paper.comparison import as_markdown, compare, count
+from walkers.paper.comparison import as_dict, as_markdown, compare, count
 from walkers.paper.make import FIGURES, make_figures
 from walkers.paper.modes import MODES, classify, sliding_share
 from walkers.paper.rotation import model
@@ -99,8 +99,8 @@ def test_all_drives_of_the_paper_are_stable() -> None:
 
 def test_every_published_number_is_compared(sources: Sources) -> None:
     rows = compare(sources)
-    assert [row.key for row in rows] == [number.key for number in published.NUMBERS]
-    assert all(number.depends_on for number in published.NUMBERS if number.measured)
+    assert [row.key for row in rows] == [number.key for number in published.COMPARED]
+    assert all(number.depends_on for number in published.COMPARED if number.measured)
     for row in rows:
         assert (row.engine is not None) or not row.measured or row.left_out
         assert bool(row.why) != row.agrees
@@ -110,7 +110,7 @@ def test_every_published_number_is_compared(sources: Sources) -> None:
             assert row.ratio * row.published == pytest.approx(ours)
     in_words = [row for row in rows if row.published is None]
     assert [row.key for row in in_words] == ["fig2_threshold"]
-    assert all(number.bounds is not None for number in published.NUMBERS if number.value is None)
+    assert all(number.bounds is not None for number in published.COMPARED if number.value is None)
     agreeing, counted = count(rows, measured=True)
     assert counted == sum(row.measured for row in rows) - len(in_words)
     either_way = [[replace(row, agrees=agrees) if row in in_words else row for row in rows] for agrees in (True, False)]
@@ -118,6 +118,8 @@ def test_every_published_number_is_compared(sources: Sources) -> None:
     agree, of = count(rows, measured=False)
     assert of == 9
     assert agree == 9
+    contents = json.loads(json.dumps(as_dict(rows)))
+    assert (contents["agree"], contents["of"], len(contents["numbers"])) == (agreeing, counted, len(rows))
     told = as_markdown(rows)
     assert all(f"| {row.what} |" in told for row in rows)
     assert all(line.count("|") == 7 for line in told.splitlines() if line.startswith("|"))
@@ -144,10 +146,15 @@ def test_compared_numbers_are_those_of_the_runs(sources: Sources) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - {"sensitivity", "climbing", "zoo"}))
-def test_figures_say_what_they_were_made_from(sources: Sources, tmp_path: Path, name: str) -> None:
+def test_figures_can_be_printed_and_say_what_they_were_made_from(sources: Sources, tmp_path: Path, name: str) -> None:
     drawing = FIGURES[name]
     runs = sources.runs(*drawing.sweeps)
     figure = drawing.draw(sources)
+    assert spoilt(figure) == []
+    assert (
+        letters(figure)
+        == list("abcd")[: {"fig1b": 3, "fig2": 3, "fig3": 0, "fig4": 2, "alignment": 4, "modes": 2}[name]]
+    )
     paths = save_figure(figure, tmp_path / name, runs, ("png", "svg", "pdf"), drawing.title)
     assert [path.name for path in paths] == [f"{name}.png", f"{name}.svg", f"{name}.pdf"]
     picture = Image.open(paths[0])
@@ -167,14 +174,6 @@ def test_figures_say_what_they_were_made_from(sources: Sources, tmp_path: Path, 
             known = ("(mm/s)", "(mm)", "(s)", "(ms)", "(°)", "(Hz)", "9.8 m/s²)", "cycles", "Gamma", "delta")
             assert any(unit in label for unit in known) or label.endswith(" s"), label
     assert not list(tmp_path.glob("*.new"))
-
-
-@pytest.mark.parametrize("name", sorted(set(FIGURES) - {"sensitivity", "climbing", "zoo"}))
-def test_figures_can_be_printed(sources: Sources, name: str) -> None:
-    figure = FIGURES[name].draw(sources)
-    assert spoilt(figure) == []
-    panels = {"fig1b": 3, "fig2": 3, "fig3": 0, "fig4": 2, "alignment": 4, "modes": 2}[name]
-    assert letters(figure) == list("abcd")[:panels]
 
 
 @pytest.mark.slow
@@ -219,7 +218,7 @@ def test_figures_and_comparison_do_without_what_failed(sources: Sources, tmp_pat
                 with pytest.raises(NothingFinishedError):
                     drawing.draw(left)
         rows = compare(left)
-        assert len(rows) == len(published.NUMBERS)
+        assert len(rows) == len(published.COMPARED)
         for row in rows:
             if row.engine is None and not row.key.startswith("mathieu"):
                 assert not row.agrees
@@ -237,7 +236,7 @@ def test_a_descent_of_which_only_its_ends_are_left_is_drawn_without_a_threshold(
     left = Sources(out)
     assert len(left.finished("fig2-threshold"))
     assert FIGURES["fig2"].draw(left).axes
-    assert len(compare(left)) == len(published.NUMBERS)
+    assert len(compare(left)) == len(published.COMPARED)
 
 
 def test_the_theory_of_fig4_goes_through_the_cycle_as_the_engine_does(sources: Sources) -> None:
@@ -307,15 +306,6 @@ def test_a_run_that_failed_is_left_out_and_told(tmp_path: Path) -> None:
     assert {failure.reason for failure in made.failures["fig3"]} == {"TimeLimitExceeded"}
     assert list(made.left_out) == ["fig3"]
     assert not made.files
-
-
-def test_the_comparison_is_written_for_programs_too(sources: Sources, tmp_path: Path) -> None:
-    from walkers.paper.comparison import as_dict
-
-    rows = compare(sources)
-    contents = json.loads(json.dumps(as_dict(rows)))
-    assert len(contents["numbers"]) == len(rows)
-    assert contents["of"] == sum(row.measured and row.published is not None for row in rows)
 
 
 def test_unknown_figures_are_refused(tmp_path: Path) -> None:

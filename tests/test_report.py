@@ -307,7 +307,7 @@ def test_a_calibration_and_its_report(tmp_path: Path) -> None:
             "drag": {"keys": ["liquid.viscosity_ratio"], "range": [0.5, 2.0]},
         },
         "experiments": {"slow": {"drive.peak_acceleration": "3 g"}, "fast": {"drive.peak_acceleration": "6 g"}},
-        "design": {"waves": [4], "predictive": 2, "steps": 100},
+        "design": {"waves": [4], "predictive": 2, "points": 100},
     }
     lines = "".join(
         f'[[observations]]\nname = "{name}"\ngroup = "v"\nof = ["{name}"]\n'
@@ -327,7 +327,7 @@ def test_a_calibration_and_its_report(tmp_path: Path) -> None:
     assert HOSTILE in page.words
     assert sum(one.startswith("data:image/png;base64,") for one in page.references) == 3
     assert "contact.friction.bead_wall, contact.friction.bead_bead" in page.words
-    assert record["chain"]["converged"] or "have not converged" in page.words
+    assert record["posterior"]["converged"] or "has not converged" in page.words
     assert to.stat().st_size < LARGEST
     # What is no calibration any more is told in a line.
     (tmp_path / "runs" / "small" / "calibration.json").write_text("{}")

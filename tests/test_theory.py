@@ -27,29 +27,11 @@ from walkers.theory.friction import Friction
 from walkers.theory.mathieu import Alignment, alignment, growth, is_stable, largest_stable_v
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import alignment_of, describe_alignment, motion_of, threshold
-from walkers.theory.quasistatic import detachment, mean_velocity, mean_velocity_closed_form
+from walkers.theory.quasistatic import detachment, mass_asymmetry, mean_velocity
 from walkers.theory.sideways import time_to_turn
 
 RUBY = Dimer((0.3e-3, 0.2e-3), 4000.0, 19.2e-3)
 RUBY_COSINE = float(np.sqrt(1.0 - RUBY.sin_delta**2))
-
-# sin δ, Γ0, v̄ in mm/s with κ = 0.033 s/mm and equal densities.
-TABLE = [
-    (0.05, 0.5, 0.48364),
-    (0.1, 0.5, 0.99159),
-    (0.2, 0.1, 0.08119),
-    (0.2, 0.3, 0.75011),
-    (0.2, 0.5, 2.20005),
-    (0.3333, 0.5, 4.87919),
-]
-
-
-@pytest.mark.parametrize("model", [mean_velocity, mean_velocity_closed_form])
-@pytest.mark.parametrize(("sin_delta", "gamma0", "velocity"), TABLE)
-def test_velocities_of_the_papers_model(
-    model: Callable[..., Any], sin_delta: float, gamma0: float, velocity: float
-) -> None:
-    assert float(model(gamma0, sin_delta)) * 1e3 == pytest.approx(velocity, abs=6e-6)
 
 
 def _bridged(walker: Walker) -> Walker:
@@ -99,39 +81,6 @@ def test_bridges_resist_with_the_forces_and_couples_of_their_law() -> None:
     np.testing.assert_allclose(lifted, np.abs(pressed @ response), rtol=1e-3)
 
 
-def test_what_the_drive_gives_a_walker_its_bridges_take() -> None:
-    """S s² + 2 C s q + Q q² in the mean over a cycle, with q = -dφ/dt at the substrate, is the work of -M a(t)."""
-    walker, frequency, peak, steps = _bridged(Walker.of_dimer(RUBY)), 80.0, 9.8, 512
-    sliding = walk(walker, Friction(), frequency, peak, steps_per_cycle=steps).series[:, 0]
-    velocity = (sliding[0] + sliding[1] - sliding[2]) / 2.0
-    rolling = (sliding[:2] - velocity) / walker.radii
-    rolling = np.array([*rolling, rolling[0] - rolling[1]])
-    slide, couple, turn = walker.resistances
-    taken = (slide * sliding**2 + 2.0 * couple * sliding * rolling + turn * rolling**2).sum(axis=0).mean()
-    acceleration = peak * np.cos(2.0 * np.pi * np.arange(1, steps + 1) / steps)
-    assert taken == pytest.approx(-RUBY.total_mass * np.mean(acceleration * velocity), rel=1e-3)
-
-
-def test_a_drag_on_centres_presses_the_beads_as_far_as_it_is_not_in_proportion_to_their_masses() -> None:
-    """Without friction v_x has the amplitude a0/√(ω² + β²); a drag of c1 and c2 leaves (c1 m2 - c2 m1)/M v_x between
-    the beads, along the line of their centres, whose slope is tan δ. Such a drag is S = c, C = -cR, Q = cR².
-    """
-    frequency, peak = 80.0, 9.8
-    masses, radii = np.array(RUBY.masses), np.array(RUBY.radii)
-    for drags in (np.array([2e-3, 1e-3]), 1e3 * masses):
-        resistances = np.zeros((3, 3, 1))
-        resistances[:, :2, 0] = drags, -drags * radii, drags * radii**2
-        walker = replace(Walker.of_dimer(RUBY), resistances=resistances)
-        found = walk(walker, Friction(), frequency, peak, cycles=60, steps_per_cycle=512)
-        rate = drags.sum() / RUBY.total_mass
-        fastest = peak / np.hypot(2.0 * np.pi * frequency, rate)
-        between = abs(drags[0] * masses[1] - drags[1] * masses[0]) / RUBY.total_mass * fastest
-        slope = np.tan(np.arcsin(RUBY.sin_delta))
-        lifted = (walker.at_rest - found.smallest_normal_force)[:, 0] * RUBY.capillary_scale
-        np.testing.assert_allclose(lifted[:2], between * slope, rtol=0.01, atol=1e-12)
-        np.testing.assert_allclose(lifted[2], between * np.sqrt(1.0 + slope**2), rtol=0.01, atol=1e-12)
-
-
 @pytest.mark.parametrize("radii", [["0.3 mm", "0.2 mm"], ["0.2 mm", "0.3 mm"]])
 def test_a_dimer_without_friction_comes_to_its_speed_on_a_slope_as_in_the_engine(
     trajectory: Callable[..., Group], radii: list[str]
@@ -174,60 +123,18 @@ def test_bridges_slow_the_theorys_walker_as_they_do_the_engines(
     np.testing.assert_allclose(found, expected, rtol=5e-3, atol=5e-3 * float(motion.velocity[0]))
 
 
-def test_matrices_and_closed_form_are_the_same_model() -> None:
-    gamma, sine = np.meshgrid(np.linspace(0.01, 2.5, 60), np.linspace(-0.6, 0.6, 61))
-    matrices, closed = mean_velocity(gamma, sine), mean_velocity_closed_form(gamma, sine)
-    np.testing.assert_array_equal(np.isnan(matrices), np.isnan(closed))
-    assert 0.2 < np.isnan(matrices).mean() < 0.8
-    np.testing.assert_allclose(matrices, closed, rtol=1e-9, atol=1e-12)
-
-
-def test_matrices_and_closed_form_agree_identically() -> None:
-    """In exact fractions of polynomials, for beads of equal density: the difference of the two is zero.
-
-    Sine and cosine of δ are the rational functions of t that make up the unit circle, and Γ is the square root of two
-    times g.
-    """
-    import sympy
-    from sympy.polys.fields import field
-
-    _, t, g = field("t,g", sympy.QQ)
-    s, c = 2 * t / (1 + t**2), (1 - t**2) / (1 + t**2)
-    mu = (3 * s + s**3) / (1 + 3 * s**2)
-    heavy, light = (1 + mu) / 2, (1 - mu) / 2
-    matrix = [[-light * s, heavy * s, -1], [light * s, -heavy * s, 1], [light, -heavy, s]]
-    one, two = 5 / (1 + mu), 5 / (1 - mu)
-    gains = [[1 + one, 1, one], [1, 1 + two, two], [one, two, one + two]]
-    unit = [sympy.QQ(-1, 2), sympy.QQ(-1, 2), sympy.QQ(1, 2)]
-    assert [_product(row, unit) for row in gains] == [-1, -1, 0]
-    velocity = 0
-    for force in (g, -g):
-        at_rest = (1 + s, 1 - s, c**2 / 2)
-        normal = [load + _product(row, unit) * force / c for load, row in zip(at_rest, matrix, strict=True)]
-        sliding = [share * force / load for share, load in zip(unit, normal, strict=True)]
-        velocity += (sliding[0] + sliding[1] - sliding[2]) / 4
-    gamma_squared = 2 * g**2
-    first = c**3 * (1 + mu * s)
-    first /= (c**2 * (1 + s**2) - gamma_squared / 8 * (1 + mu * s) ** 2) ** 2 - (2 * c**2 * s) ** 2
-    second = 4 * c * (1 + s**2) / ((c**6 - gamma_squared / 2 * (mu + s) ** 2) * (1 + 3 * s**2))
-    assert velocity != 0
-    assert velocity - gamma_squared * s / 4 * (first + second) == 0
-
-
-def _product(row: list[Any], column: list[Any]) -> Any:
-    return sum(one * other for one, other in zip(row, column, strict=True))
-
-
-def test_exchanged_beads_walk_the_other_way() -> None:
-    np.testing.assert_allclose(mean_velocity(0.5, -0.2), -mean_velocity(0.5, 0.2), rtol=1e-12)
-    assert float(mean_velocity(0.5, 0.0)) == 0.0
-
-
-def test_velocities_are_none_where_a_contact_opens() -> None:
-    end = float(detachment(1 / 3).gamma)
-    assert np.isfinite(mean_velocity(np.sqrt(2.0) * end * 0.999, 1 / 3))
-    assert np.isnan(mean_velocity(np.sqrt(2.0) * end * 1.001, 1 / 3))
-    assert np.isnan(mean_velocity(3.5, 1 / 3))
+def test_velocities_are_those_of_the_papers_closed_form() -> None:
+    """The equation with h1 and h2; it has poles where contacts open, and beyond says nothing."""
+    gamma, s = np.meshgrid(np.linspace(0.01, 2.5, 60), np.linspace(-0.6, 0.6, 61))
+    found, mu, c = mean_velocity(gamma, s), mass_asymmetry(s), np.sqrt(1.0 - s**2)
+    first = c**3 * (1.0 + mu * s)
+    first /= (c**2 * (1.0 + s**2) - gamma**2 / 8.0 * (1.0 + mu * s) ** 2) ** 2 - (2.0 * c**2 * s) ** 2
+    second = 4.0 * c * (1.0 + s**2) / ((c**6 - gamma**2 / 2.0 * (mu + s) ** 2) * (1.0 + 3.0 * s**2))
+    closed = gamma**2 * s / (4.0 * 33.0) * (first + second)
+    opened = np.sqrt(0.5) * gamma >= detachment(s).gamma
+    np.testing.assert_array_equal(np.isnan(found), opened)
+    assert 0.2 < opened.mean() < 0.8
+    np.testing.assert_allclose(found[~opened], closed[~opened], rtol=1e-9, atol=1e-12)
 
 
 def test_the_motion_under_the_papers_friction_is_quasistatic_at_low_frequency() -> None:
@@ -307,8 +214,7 @@ def test_theory_and_engine_agree_on_the_threshold(tmp_path: Path, friction: floa
     assert (end["at_rest"] + end["moving"]) / 2.0 == pytest.approx(expected, rel=0.3)
 
 
-@pytest.mark.parametrize("frequency", ["60 Hz", "90 Hz"])
-@pytest.mark.parametrize("acceleration", ["2 g", "4 g"])
+@pytest.mark.parametrize(("frequency", "acceleration"), [("60 Hz", "4 g"), ("90 Hz", "2 g")])
 def test_theory_and_engine_agree_on_the_speed(
     run_directory: Callable[..., Path], frequency: str, acceleration: str
 ) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
@@ -27,12 +27,8 @@ from walkers.runner.files import read_json, write_json
 from walkers.sweeps.scheduler import Failure, Options
 
 FloatArray = npt.NDArray[np.float64]
-_STEPS_BETWEEN_WAVES = 800
-"""Of the chain that places the next wave; the last chain has the file's number."""
 _PARENTS, _NEAR, _TRIED = 5, 0.06, 4000
 """How many of the best sets a wave looks around, how far (of the ranges), and how many sets it thinks of."""
-_PARTS = 16
-"""In which these are thought of, for the memory's sake."""
 MISSING_MISFIT = float(np.log1p(30.0**2))
 """ln(1 + r²) of an observation that cannot be made: as of one that is 30 deviations off."""
 _END = 0.005
@@ -58,20 +54,17 @@ class Outcome:
         All sets of all waves, in the unit cube.
     outcome : ndarray, shape (P, K)
         What the engine made of them; NaN where there was nothing to observe.
-    emulators
-        Fitted to all waves.
-    posterior
-        From all observations.
+    emulators, posterior
+        Of all waves and of all observations.
     held_out
-        From those that each trial of the file leaves.
+        Posteriors of the observations that each trial of the file leaves.
     predictive
         The engine at samples of the posterior, that of the highest density first.
     checks
-        The engine at the best set of all that were run: as in the waves (``best``), with half the time step
-        (``half-step``), and for twice as long (``twice-as-long``).
-    sobol : ndarray, shape (2, K, D)
-        First and total order indices of each observation's transformed residual over the feasible part of the range
-        (`walkers.calibration.sensitivity`).
+        The engine at the best set that was run: as in the waves (``best``), with half the time step (``half-step``),
+        and for twice as long (``twice-as-long``).
+    sobol : ndarray, shape (K, D)
+        `walkers.calibration.sensitivity.sobol_indices`.
     failures
         Points that failed, by sweep.
     """
@@ -95,43 +88,10 @@ class Outcome:
         return dict(zip([one.name for one in self.space.parameters], map(float, values), strict=True))
 
     def _repr_html_(self) -> str:
-        """The tables in a notebook: parameters, observations beside predictions, chains."""
+        """The tables in a notebook: parameters, observations beside predictions, posteriors."""
         from walkers.calibration.page import outcome_html
 
         return outcome_html(self)
-
-
-@dataclass
-class _Engine:
-    """How waves are run, and what failed."""
-
-    calibration: Calibration
-    out: Path
-    options: Options
-    arguments: Mapping[str, Any]
-    progress_of: ProgressOf | None
-    failures: dict[str, list[Failure]]
-
-    def run(self, name: str, unit: FloatArray, extra: Mapping[str, Mapping[str, Any]] | None = None) -> Wave:
-        sweep = f"{self.calibration.name}-{name}"
-        with self.progress_of(sweep) if self.progress_of else nullcontext() as advance:
-            wave, failed = run_wave(
-                self.calibration,
-                unit,
-                sweep,
-                self.out,
-                self.options,
-                extra=extra,
-                on_progress=advance,
-                **self.arguments,
-            )
-        if failed:
-            self.failures[sweep] = failed
-        undone = [failure for failure in failed if failure.reason not in FINAL]
-        if undone or not wave.table["status"].isin(("finished", "failed")).all():
-            told = undone[0].message if undone else "another process is running them"
-            raise CalibrationStopped(f"{sweep}: points are missing ({told}); call again to go on")
-        return wave
 
 
 def calibrate(
@@ -170,37 +130,52 @@ def calibrate(
     runner.EngineFailure
         If there is no engine, or its audit failed.
     """
-    space, seed = Space(calibration.parameters), calibration.design.seed
     check_ranges(calibration)
-    folder = out / calibration.name
+    space, design = Space(calibration.parameters), calibration.design
+    folder, failures = out / calibration.name, {}
     folder.mkdir(parents=True, exist_ok=True)
-    arguments = {"engine": engine, "allow_failed_audit": allow_failed_audit}
-    runner = _Engine(calibration, out, replace(options, final=FINAL), arguments, progress_of, {})
+
+    def run(name: str, unit: FloatArray, extra: Mapping[str, Mapping[str, Any]] | None = None) -> Wave:
+        sweep = f"{calibration.name}-{name}"
+        with progress_of(sweep) if progress_of else nullcontext() as advance:
+            wave, failed = run_wave(
+                calibration,
+                unit,
+                sweep,
+                out,
+                replace(options, final=FINAL),
+                extra=extra,
+                engine=engine,
+                allow_failed_audit=allow_failed_audit,
+                on_progress=advance,
+            )
+        if failed:
+            failures[sweep] = failed
+        undone = [failure for failure in failed if failure.reason not in FINAL]
+        if undone or not wave.table["status"].isin(("finished", "failed")).all():
+            told = undone[0].message if undone else "another process is running them"
+            raise CalibrationStopped(f"{sweep}: points are missing ({told}); call again to go on")
+        return wave
+
     unit, outcome = np.zeros((0, space.dimensions)), np.zeros((0, len(calibration.observations)))
     filling = 0
-    for number, points in enumerate(calibration.design.waves, 1):
+    for number, points in enumerate(design.waves, 1):
         make = partial(next_wave, calibration, unit, outcome, points, filling)
-        design = _kept(folder / f"wave-{number}.json", _determinants(calibration, number), make)
-        wave = runner.run(f"wave-{number}", design)
-        unit, outcome = np.concatenate([unit, design]), np.concatenate([outcome, wave.outcome])
-        filling = filling or len(design)
-    emulators = fit_emulators(unit, outcome, calibration.observations, seed, filling)
-    sample = partial(sample_posterior, emulators, space, calibration.design.steps, seed)
-    sample = partial(sample, shared_errors=calibration.file.shared_errors)
+        sets = _kept(folder / f"wave-{number}.json", _determinants(calibration, number), make)
+        wave = run(f"wave-{number}", sets)
+        unit, outcome = np.concatenate([unit, sets]), np.concatenate([outcome, wave.outcome])
+        filling = filling or len(sets)
+    emulators = fit_emulators(unit, outcome, calibration.observations, design.seed, filling)
+    sample = partial(_posterior, calibration, emulators)
     posterior = sample()
-    held_out = {name: sample(groups) for name, groups in calibration.file.held_out.items()}
     seen = sha256(posterior.unit.tobytes() + posterior.log_density.tobytes())
-    draw = partial(_drawn, posterior, calibration.design.predictive)
-    follows = f"{seen.hexdigest()} {calibration.design.predictive}"
+    draw, follows = partial(_drawn, posterior, design.predictive), f"{seen.hexdigest()} {design.predictive}"
     drawn = _kept(folder / "predictive.json", _determinants(calibration, 0), draw, follows)
-    predictive = runner.run("predictive", drawn)
+    predictive = run("predictive", drawn)
     ranked = np.concatenate([unit, drawn])[ranking(calibration, np.concatenate([outcome, predictive.outcome]))]
     within = ((ranked > _END) & (ranked < 1.0 - _END)).all(axis=1)
     best = ranked[within][:1] if within.any() else ranked[:1]
-    checks = {
-        name: runner.run(name, best, extra)
-        for name, extra in _finer_and_longer(calibration, space.values(best)).items()
-    }
+    extras = _finer_and_longer(calibration, space.values(best))
     return Outcome(
         calibration,
         space,
@@ -208,12 +183,18 @@ def calibrate(
         outcome,
         emulators,
         posterior,
-        held_out,
-        predictive,
-        checks,
-        sobol_indices(emulators, space, seed),
-        runner.failures,
+        held_out={name: sample(groups) for name, groups in calibration.file.held_out.items()},
+        predictive=predictive,
+        checks={name: run(name, best, extra) for name, extra in extras.items()},
+        sobol=sobol_indices(emulators, space, design.seed),
+        failures=failures,
     )
+
+
+def _posterior(calibration: Calibration, emulators: Emulators, held_out: Collection[str] = ()) -> Posterior:
+    space, design = Space(calibration.parameters), calibration.design
+    shared = calibration.file.shared_errors
+    return sample_posterior(emulators, space, design.points, design.seed, held_out, shared_errors=shared)
 
 
 def check_ranges(calibration: Calibration) -> None:
@@ -235,23 +216,18 @@ def check_ranges(calibration: Calibration) -> None:
         for one in calibration.parameters:
             if problem.key in one.keys:
                 told = f"{problem.key} = {problem.value}: {problem.expected}"
-                key = f"parameters.{one.name}.range"
-                raise InputError(calibration.source, [Problem(key, f"[{one.low:g}, {one.high:g}]", told)]) from error
+                key, value = f"parameters.{one.name}.range", f"[{one.range[0]:g}, {one.range[1]:g}]"
+                raise InputError(calibration.source, [Problem(key, value, told)]) from error
         raise
 
 
 def _determinants(calibration: Calibration, wave: int) -> dict[str, Any]:
     """What the parameter sets of a wave (from 1; of none: 0) were drawn from, beside what the engine said before."""
-    parameters = {one.name: [one.low, one.high, one.log, one.unit] for one in calibration.parameters}
+    parameters = {one.name: [*one.range, one.log, one.unit] for one in calibration.parameters}
     if not wave:
         return {"parameters": parameters}
-    guesses = [list(guess) for guess in calibration.guesses]
-    return {
-        "parameters": parameters,
-        "seed": calibration.design.seed,
-        "guesses": guesses,
-        "waves": [*calibration.design.waves[:wave]],
-    }
+    seed, guesses = calibration.design.seed, [list(guess) for guess in calibration.guesses]
+    return {"parameters": parameters, "seed": seed, "guesses": guesses, "waves": calibration.design.waves[:wave]}
 
 
 def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArray], follows: str = "") -> FloatArray:
@@ -311,8 +287,7 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
     if not len(unit):
         return first_wave(calibration, space)
     emulators = fit_emulators(unit, outcome, calibration.observations, seed, filling)
-    steps = min(_STEPS_BETWEEN_WAVES, calibration.design.steps)
-    posterior = sample_posterior(emulators, space, steps, seed, shared_errors=calibration.file.shared_errors)
+    posterior = _posterior(calibration, emulators)
     samples, places = np.unique(posterior.unit, axis=0, return_index=True)
     likely = samples[np.argsort(posterior.log_density[places])[::-1]][: len(samples) // 2]
     draw = np.random.default_rng([seed, len(unit)])
@@ -336,7 +311,7 @@ def _promising(
     shares = draw.dirichlet(np.full(len(parents), 0.5), _TRIED)
     tried = np.clip(shares @ parents + draw.normal(0.0, _NEAR, (_TRIED, parents.shape[1])), 0.0, 1.0)
     own = [place for place, one in enumerate(emulators.observations) if not one.derived]
-    expected = np.concatenate([_expected_misfit(emulators.of(own), part) for part in np.array_split(tried, _PARTS)])
+    expected = _expected_misfit(emulators.of(own), tried)
     return spread_out(tried[np.argsort(expected)[: 4 * points]], points, taken)
 
 
@@ -350,7 +325,7 @@ def _expected_misfit(emulators: Emulators, unit: FloatArray) -> FloatArray:
 
 
 def _drawn(posterior: Posterior, points: int) -> FloatArray:
-    """The sample of the highest density, and so many others, evenly through the chain."""
+    """The sample of the highest density, and so many others, evenly through the samples."""
     every = np.linspace(0, len(posterior.unit) - 1, points - 1).round().astype(int)
     return np.concatenate([posterior.best[None], posterior.unit[every]])
 

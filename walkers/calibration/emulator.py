@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from walkers.calibration.feasibility import Feasibility, fit_feasibility
-from walkers.calibration.processes import Process, Processes, knowing_nothing, of_regressor
 from walkers.inputs.calibration import Observation
 
 FloatArray = npt.NDArray[np.float64]
@@ -46,7 +44,7 @@ class Emulator:
     observation
         What it gives.
     process
-        Fitted.
+        scikit-learn's, fitted; None if too few sets were feasible.
     error_inflation
         By how much its standard deviations are too small, from cross-validation in the later waves; at least 1.
     error
@@ -58,20 +56,20 @@ class Emulator:
     """
 
     observation: Observation
-    process: Process
+    process: Any
     error_inflation: float
     error: float
     explained: float
     sets: int
 
-    @cached_property
-    def _alone(self) -> Processes:
-        return Processes([self.process])
-
     def predict(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Transformed residual and its standard deviation, as the process gives them: shape (N,)."""
-        mean, deviation = self._alone.predict(unit)
-        return mean[:, 0], deviation[:, 0]
+        """Transformed residual and its standard deviation, widened by ``error_inflation``: shape (N,)."""
+        if self.process is None:
+            return np.zeros(len(unit)), np.full(len(unit), _UNKNOWN)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Predicted variances")  # at a set that was run: zero, but for rounding
+            mean, deviation = self.process.predict(unit, return_std=True)
+        return mean, deviation * self.error_inflation
 
     def draw(self, unit: FloatArray, normal: FloatArray) -> FloatArray:
         """The observation as it may be at points (N, D), SI units and degrees: shape (N,).
@@ -83,7 +81,7 @@ class Emulator:
             Standard normal numbers, one a point.
         """
         mean, deviation = self.predict(unit)
-        residual = np.sinh(np.clip(mean + deviation * self.error_inflation * normal, -LARGEST, LARGEST))
+        residual = np.sinh(np.clip(mean + deviation * normal, -LARGEST, LARGEST))
         return np.asarray(self.observation.value + self.observation.deviation * residual)
 
     def value(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -110,32 +108,15 @@ class Emulators:
     feasibility: Feasibility
     correlation: FloatArray
 
-    def __len__(self) -> int:
-        return len(self.each)
-
-    def __iter__(self) -> Iterator[Emulator]:
-        return iter(self.each)
-
-    def __getitem__(self, place: int) -> Emulator:
-        return self.each[place]
-
     @property
     def observations(self) -> list[Observation]:
         """What they give."""
         return [one.observation for one in self.each]
 
-    @cached_property
-    def _side_by_side(self) -> Processes:
-        return Processes([one.process for one in self.each])
-
-    @cached_property
-    def _inflation(self) -> FloatArray:
-        return np.array([one.error_inflation for one in self.each])
-
     def predict(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Transformed residuals and their standard deviations, widened by ``error_inflation``: shape (N, K)."""
-        mean, deviation = self._side_by_side.predict(unit)
-        return mean, deviation * self._inflation
+        """Transformed residuals and their standard deviations, shape (N, K)."""
+        mean, deviation = zip(*(one.predict(unit) for one in self.each), strict=True)
+        return np.stack(mean, axis=1), np.stack(deviation, axis=1)
 
     def of(self, places: list[int]) -> Emulators:
         """Those of some observations; their events are still those of all."""
@@ -182,8 +163,7 @@ def _fitted(
 
     made, errors = np.isfinite(outcome), np.zeros(len(outcome))
     if made.sum() < _LEAST:
-        nothing = knowing_nothing(unit.shape[1], 0.0, _UNKNOWN)
-        return Emulator(observation, nothing, 1.0, np.nan, np.nan, int(made.sum())), errors
+        return Emulator(observation, None, 1.0, np.nan, np.nan, int(made.sum())), errors
     wanted, known = transformed(outcome[made], observation), unit[made]
     scales = np.full(unit.shape[1], 0.7)
     kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(scales, (5e-2, 2e1), nu=2.5) + WhiteKernel(1e-2, (1e-6, 1.0))
@@ -198,7 +178,7 @@ def _fitted(
     spread = float(np.var(wanted))
     emulator = Emulator(
         observation,
-        of_regressor(process),
+        process,
         error_inflation=max(1.0, float(np.sqrt(np.mean(errors[judged] ** 2)))),
         error=float(np.sqrt(np.mean(miss**2))),
         explained=1.0 - float(np.mean(miss**2)) / spread if spread > 0.0 else 1.0,

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.special import log_expit
-
-from walkers.calibration.processes import Process, Processes, knowing_nothing, of_classifier
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -29,17 +27,13 @@ class Feasibility:
         Which of the events an observation needs.
     missing : ndarray, shape (P, E)
         Of the sets that were run, those in which an event did not come about.
-    processes
-        E latent functions; their logistic function is the probability.
+    classifiers
+        E of scikit-learn's, fitted; None of an event that came about in all sets, or in none.
     """
 
     event: npt.NDArray[np.int64]
     missing: BoolArray
-    processes: tuple[Process, ...]
-
-    @cached_property
-    def _side_by_side(self) -> Processes:
-        return Processes(self.processes)
+    classifiers: tuple[Any, ...]
 
     def log_probabilities(self, unit: FloatArray) -> FloatArray:
         """Logarithms of the probabilities of the events at points (N, D), shape (N, E).
@@ -47,8 +41,14 @@ class Feasibility:
         The mean of the logistic function over the normal latent one, by MacKay's approximation
         (doi 10.1162/neco.1992.4.5.720).
         """
-        mean, deviation = self._side_by_side.predict(unit)
-        return np.asarray(log_expit(mean / np.sqrt(1.0 + np.pi / 8.0 * deviation**2)))
+        latent = np.empty((len(unit), len(self.classifiers)))
+        for place, (one, missing) in enumerate(zip(self.classifiers, self.missing.T, strict=True)):
+            if one is None:  # Laplace's rule of succession
+                latent[:, place] = np.log(((~missing).sum() + 1.0) / (missing.sum() + 1.0))
+            else:
+                mean, variance = one.latent_mean_and_variance(unit)
+                latent[:, place] = mean / np.sqrt(1.0 + np.pi / 8.0 * np.maximum(variance, 0.0))
+        return np.asarray(log_expit(latent))
 
     def probability(self, unit: FloatArray) -> FloatArray:
         """Probabilities that each observation can be made, at points (N, D), shape (N, K)."""
@@ -90,24 +90,23 @@ def fit_feasibility(unit: FloatArray, outcome: FloatArray, seed: int) -> Feasibi
     return Feasibility(
         event=np.asarray(event, dtype=np.int64).reshape(-1),
         missing=missing,
-        processes=tuple(_classified(unit, ~column, seed) for column in missing.T),
+        classifiers=tuple(_classified(unit, ~column, seed) for column in missing.T),
     )
 
 
-def _classified(unit: FloatArray, made: BoolArray, seed: int) -> Process:
-    """The latent function of an event that came about in some sets; a constant, Laplace's rule, if in all or none."""
+def _classified(unit: FloatArray, made: BoolArray, seed: int) -> Any:
+    """The classifier of an event that came about in some sets."""
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessClassifier
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern
     from threadpoolctl import threadpool_limits
 
     if made.all() or not made.any():
-        return knowing_nothing(unit.shape[1], float(np.log((made.sum() + 1.0) / ((~made).sum() + 1.0))), 0.0)
+        return None
     # The constant kernel is the uncertainty of the share of feasible sets over the whole range: with few failures
     # most of the range is feasible, not half of it, as without. Scales below a tenth of the range cannot be learned.
     kernel = ConstantKernel(4.0, (1e-1, 1e2)) * Matern(np.full(unit.shape[1], 1.0), (1e-1, 2e1), nu=2.5)
     classifier = GaussianProcessClassifier(kernel + ConstantKernel(4.0, "fixed"), random_state=seed)
     with warnings.catch_warnings(), threadpool_limits(1):  # matrices are small: threads would wait for each other
         warnings.simplefilter("ignore", ConvergenceWarning)  # a scale at its bound: no influence
-        classifier.fit(unit, made)
-    return of_classifier(classifier)
+        return classifier.fit(unit, made)

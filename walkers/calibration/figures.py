@@ -191,14 +191,16 @@ def _band(axes: Axes, band: Band, found: Outcome) -> None:
 @styled
 def _sobol(found: Outcome) -> Figure:
     names = [one.symbol for one in found.space.parameters]
-    figure, axes = new_figure(TWO_COLUMNS, 0.2 * len(found.emulators) + 1.6)
-    total = found.sobol[1]
+    figure, axes = new_figure(TWO_COLUMNS, 0.2 * len(found.emulators.each) + 1.6)
+    total = found.sobol
     image = axes.imshow(total, aspect="auto", cmap="Blues", vmin=0.0, vmax=1.0)
     for row, column in np.argwhere(np.isfinite(total)):
         colour = "w" if total[row, column] > 0.55 else "0.2"
         axes.text(column, row, f"{total[row, column]:.2f}", ha="center", va="center", fontsize=7, color=colour)
     axes.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
-    axes.set_yticks(range(len(found.emulators)), [one.observation.title for one in found.emulators], fontsize=7)
+    axes.set_yticks(
+        range(len(found.emulators.each)), [one.observation.title for one in found.emulators.each], fontsize=7
+    )
     axes.grid(visible=False)
-    figure.colorbar(image, ax=axes, label="total Sobol index over the feasible part")
+    figure.colorbar(image, ax=axes, label="total Sobol index")
     return figure

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from walkers.calibration.emulator import LARGEST
 from walkers.inputs.calibration import Observation, SharedError
@@ -55,73 +54,44 @@ def log_likelihood(
     discrepancy : ndarray, shape (N, K)
         What no parameters explain, in the same; C is ``shared`` with its squares added to the diagonal.
     """
-    deviation = np.ascontiguousarray(np.maximum(deviation, _LEAST_DEVIATION))
-    inverse = np.asarray(np.linalg.inv(correlation), dtype=np.float64)
-    constant = -0.5 * np.linalg.slogdet(correlation)[1] - np.log(deviation).sum(axis=1)
-    start = np.ascontiguousarray(np.clip(mean, -LARGEST, LARGEST))
-    return np.asarray(constant + _laplace(start, deviation, inverse, shared, discrepancy))
+    mean, deviation = np.clip(mean, -LARGEST, LARGEST), np.maximum(deviation, _LEAST_DEVIATION)
+    covariance = shared + _diagonal(discrepancy**2)
+    of_numbers: FloatArray = np.asarray(np.linalg.inv(covariance), np.float64)
+    of_engine = np.linalg.inv(correlation) / deviation[:, :, None] / deviation[:, None, :]
+    z = _mode(mean, of_numbers, of_engine)
+    sinh, cosh, weight, away = np.sinh(z), np.cosh(z), _times(of_numbers, np.sinh(z)), z - mean
+    hessian = of_engine + of_numbers * cosh[:, :, None] * cosh[:, None, :] + _diagonal(sinh * weight)
+    sign, curvature = np.linalg.slogdet(hessian)
+    misfit = np.sum(sinh * weight + away * _times(of_engine, away), axis=1)
+    spread = np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(correlation)[1] + 2.0 * np.log(deviation).sum(axis=1)
+    total = -0.5 * (misfit + curvature + spread)
+    return np.where((sign > 0.0) & np.isfinite(total), total, -np.inf)  # else there is no minimum
 
 
-@njit(cache=True)
-def _laplace(
-    mean: FloatArray, deviation: FloatArray, inverse: FloatArray, shared: FloatArray, discrepancy: FloatArray
-) -> FloatArray:
-    """The logarithms, but for ½ ln |Σ|: Newton's steps to the mode, then the determinants there.
+def _mode(mean: FloatArray, of_numbers: FloatArray, of_engine: FloatArray) -> FloatArray:
+    """Where ψ is least, by Newton's steps.
 
-    ``inverse`` is that of the correlation. Steps are of one at most, which is what Newton's are where sinh is an
-    exponential, and take of the curvature what is positive, so that all are downhill.
+    They are of one at most, which is what Newton's are where sinh is an exponential, and take of the curvature what is
+    positive, so that all are downhill.
     """
-    total = np.full(len(mean), -np.inf)
-    for n in range(len(mean)):
-        covariance = shared + np.diag(discrepancy[n] ** 2)
-        of_numbers = np.linalg.inv(covariance)
-        of_engine = inverse / deviation[n] / deviation[n].reshape(-1, 1)
-        z = mean[n].copy()
-        for _ in range(_ITERATIONS):
-            sinh, cosh = np.sinh(z), np.cosh(z)
-            weight = of_numbers @ sinh
-            step = cosh * weight + of_engine @ (z - mean[n])
-            hessian = of_engine + of_numbers * cosh * cosh.reshape(-1, 1)
-            hessian += np.diag(np.maximum(sinh * weight, 0.0))
-            _solve(hessian, step)
-            step = np.minimum(np.maximum(step, -1.0), 1.0)
-            z -= step
-            if np.max(np.abs(step)) < _CONVERGED:
-                break
-        sinh, cosh = np.sinh(z), np.cosh(z)
-        weight, away = of_numbers @ sinh, z - mean[n]
-        hessian = of_engine + of_numbers * cosh * cosh.reshape(-1, 1) + np.diag(sinh * weight)
-        nothing = np.zeros(len(z))
-        logarithm = _solve(hessian, nothing) + _solve(covariance, nothing)
-        if np.isfinite(logarithm):  # else there is no minimum
-            total[n] = -0.5 * (sinh @ weight + away @ (of_engine @ away) + logarithm)
-    return total
+    z, left = mean.copy(), np.arange(len(mean))
+    for _ in range(_ITERATIONS):
+        sinh, cosh = np.sinh(z[left]), np.cosh(z[left])
+        weight = _times(of_numbers[left], sinh)
+        slope = cosh * weight + _times(of_engine[left], z[left] - mean[left])
+        hessian = of_engine[left] + of_numbers[left] * cosh[:, :, None] * cosh[:, None, :]
+        hessian += _diagonal(np.maximum(sinh * weight, 0.0))
+        step = np.clip(np.linalg.solve(hessian, slope[:, :, None])[:, :, 0], -1.0, 1.0)
+        z[left] -= step
+        left = left[np.abs(step).max(axis=1) >= _CONVERGED]
+        if not len(left):
+            break
+    return z
 
 
-@njit(cache=True)
-def _solve(matrix: FloatArray, vector: FloatArray) -> float:
-    """Solve in place by Cholesky's factors, which are left in the matrix, and return ln |matrix|; NaN if not positive.
+def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
 
-    LAPACK takes three times as long for matrices of twenty rows.
-    """
-    count, logarithm = len(vector), 0.0
-    for i in range(count):
-        for j in range(i + 1):
-            total = matrix[i, j]
-            for k in range(j):
-                total -= matrix[i, k] * matrix[j, k]
-            if j < i:
-                matrix[i, j] = total / matrix[j, j]
-            elif total <= 0.0:
-                return np.nan
-            else:
-                matrix[i, i] = np.sqrt(total)
-                logarithm += np.log(total)
-        for k in range(i):
-            vector[i] -= matrix[i, k] * vector[k]
-        vector[i] /= matrix[i, i]
-    for i in range(count - 1, -1, -1):
-        for k in range(i + 1, count):
-            vector[i] -= matrix[k, i] * vector[k]
-        vector[i] /= matrix[i, i]
-    return logarithm
+
+def _diagonal(rows: FloatArray) -> FloatArray:
+    return np.asarray(rows[:, :, None] * np.eye(rows.shape[1]))

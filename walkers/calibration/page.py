@@ -85,7 +85,7 @@ def _shown(record: dict[str, Any], directory: Path | None) -> dict[str, Any]:
             }
             for name, label in record["parameters"].items()
         ],
-        "chains": {"of all observations": record["chain"], **record["held_out_chains"]},
+        "posteriors": {"of all observations": record["posterior"], **record["held_out_posteriors"]},
         "settings": [
             (key, text_of(value)) for key, value in flat(settings) if key.partition(".")[0] not in _SHOWN_ELSEWHERE
         ],
@@ -94,24 +94,11 @@ def _shown(record: dict[str, Any], directory: Path | None) -> dict[str, Any]:
 
 
 def _observation(record: dict[str, Any], place: int) -> dict[str, Any]:
-    """An observation with its numbers."""
+    """An observation with its numbers, each to the digits that its error allows."""
     row = record["observations"][place]
-
-    def number(name: str, error: str | None = None) -> Number | None:
-        value = row[name]
-        return (
-            None
-            if value is None
-            else Number(f"observations.{place}.{name}", value, error=row[error] if error else None)
-        )
-
-    return {
-        **{name: row[name] for name in ("title", "name", "unit", "agrees", "samples")},
-        "value": number("value", "deviation"),
-        "deviation": number("deviation", "deviation"),
-        "engine": number("engine", "deviation"),
-        "low": number("low", "deviation"),
-        "high": number("high", "deviation"),
-        "emulator": number("emulator", "error"),
-        "error": number("error", "error"),
+    errors = dict.fromkeys(("value", "deviation", "engine", "low", "high"), row["deviation"])
+    numbers = {
+        name: None if row[name] is None else Number(f"observations.{place}.{name}", row[name], error=error)
+        for name, error in {**errors, "emulator": row["error"], "error": row["error"]}.items()
     }
+    return {**row, **numbers}

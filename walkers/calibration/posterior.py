@@ -1,26 +1,27 @@
-"""What the observations say of the parameters: a posterior, walked through by emcee from several starts."""
+"""What the observations say of the parameters: points of the prior, each with the weight of its likelihood."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtr
+from scipy.special import logsumexp, ndtr
 
-from walkers.calibration.convergence import LARGEST_RHAT, LEAST_SAMPLES, effective_samples, rhat
 from walkers.calibration.emulator import Emulators
 from walkers.calibration.likelihood import log_likelihood, observation_covariance
 from walkers.calibration.space import Space
 from walkers.inputs.calibration import SharedError
 
 FloatArray = npt.NDArray[np.float64]
-STARTS = 4
-_PARTS = 8
-"""Of the most steps; after each it is seen whether the chains have converged."""
-_BURN = 0.4
+LEAST_SAMPLES = 400.0
+"""A posterior is known well enough if its points are worth more than so many independent samples."""
+_ROUNDS = 8
+_WIDER, _TEMPERED = 1.5, 150.0
+"""How much wider than the weighted points before them those of a later round are, and what these are to be worth, which
+their likelihood is tempered for."""
+_AT_ONCE = 2048
 _KEPT = 4000
 _DISCREPANCY = 0.5
 """Scale of the half-Cauchy prior about a group's discrepancy, in standard deviations of its observations: most groups
@@ -31,7 +32,7 @@ _MOST = 0.998
 
 @dataclass(frozen=True)
 class Posterior:
-    """S samples.
+    """S samples of equal weight.
 
     Attributes
     ----------
@@ -43,41 +44,26 @@ class Posterior:
         But for a constant.
     groups
         G names; those that were held out have no discrepancy of their own.
-    starts
-        Number of ensembles that were started independently of each other.
-    steps
-        Of each ensemble, after those that were thrown away.
-    walkers
-        Of each ensemble.
-    acceptance
-        Mean share of accepted moves.
-    rhat
-        The largest of all coordinates (`walkers.calibration.convergence.rhat`).
+    best : ndarray, shape (D,)
+        The point of the highest density.
+    points
+        How many the samples were taken from, by their weights w.
     effective_samples
-        The fewest of all coordinates (`walkers.calibration.convergence.effective_samples`).
+        (Σ w)²/Σ w²: so many independent samples the points are worth.
     """
 
     unit: FloatArray
     discrepancy: FloatArray
     log_density: FloatArray
     groups: tuple[str, ...]
-    starts: int
-    steps: int
-    walkers: int
-    acceptance: float
-    rhat: float
+    best: FloatArray
+    points: int
     effective_samples: float
 
     @property
-    def best(self) -> FloatArray:
-        """The sample of the highest density, shape (D,)."""
-        best: FloatArray = self.unit[int(np.argmax(self.log_density))]
-        return best
-
-    @property
     def converged(self) -> bool:
-        """Whether the starts agree and the chains are long enough to say something of the posterior."""
-        return self.rhat < LARGEST_RHAT and self.effective_samples > LEAST_SAMPLES
+        """Whether enough of the points weigh something to say something of the posterior."""
+        return self.effective_samples > LEAST_SAMPLES
 
 
 class Density:
@@ -120,8 +106,11 @@ class Density:
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """At points (N, D + G), shape (N,)."""
+        return np.concatenate([self._of(points[at : at + _AT_ONCE]) for at in range(0, len(points), _AT_ONCE)])
+
+    def _of(self, points: FloatArray) -> FloatArray:
         unit, discrepancy = self.places(points)
-        # Chains know no ends: what is uniform in the cube, or half-Cauchy, is standard normal in their coordinates.
+        # What is uniform in the cube, or half-Cauchy, is standard normal in these coordinates.
         total: FloatArray = self._space.log_prior(unit) - 0.5 * np.sum(points**2, axis=1)
         mean, deviation = self._emulators.predict(unit)
         total += log_likelihood(mean, deviation, self._emulators.correlation, self._shared, discrepancy[:, self._group])
@@ -135,86 +124,77 @@ class Density:
         count = self._space.dimensions
         return uniform[:, :count], _DISCREPANCY * np.tan(0.5 * np.pi * np.minimum(uniform[:, count:], _MOST))
 
-    def beginnings(self, walkers: int, draw: np.random.Generator) -> FloatArray:
-        """The likelier of many points, so that a chain need not look for the posterior, shape (walkers, D + G)."""
-        tried = draw.standard_normal((40 * walkers, self.dimensions))
-        density = np.concatenate([self(part) for part in np.array_split(tried, walkers)])  # for the memory's sake
-        likely = np.argsort(density)[::-1][: 2 * walkers]
-        chosen: FloatArray = tried[draw.choice(likely, walkers, replace=False)]
-        return chosen
-
 
 def sample_posterior(
     emulators: Emulators,
     space: Space,
-    steps: int,
+    points: int,
     seed: int,
     held_out: Collection[str] = (),
     *,
     shared_errors: Mapping[str, SharedError] | None = None,
 ) -> Posterior:
-    """Walk through the posterior until the chains have converged, or for so many steps.
+    """Weigh points by importance: those of the prior first, then, while few of them weigh anything, others nearer.
+
+    Later rounds are normal with the mean and covariance of the points weighed so far; all points are weighed over the
+    mixture of what all rounds were drawn from (Cornuet et al. 2012, doi 10.1111/j.1467-9469.2011.00756.x).
 
     Parameters
     ----------
     emulators, space, held_out, shared_errors
         As for `Density`.
-    steps
-        Of each ensemble, at most; the first two fifths of those made are thrown away.
+    points
+        Of each round, of which there are eight at most.
     seed
-        Of the chains.
+        Of the points.
 
     Returns
     -------
     Posterior
         Whose ``converged`` says whether it may be believed.
     """
-    from threadpoolctl import threadpool_limits
-
-    density = Density(emulators, space, held_out, shared_errors)
-    walkers = 2 * (density.dimensions + 1)
-    part = max(steps // _PARTS, 1)
-    with threadpool_limits(1):  # matrices are small: threads would wait for each other
-        samplers = [_ensemble(density, walkers, seed, start) for start in range(STARTS)]
-        states = [density.beginnings(walkers, np.random.default_rng([seed, start])) for start in range(STARTS)]
-        while (left := steps - samplers[0].iteration) > 0:
-            states = [sampler.run_mcmc(state, min(part, left)) for sampler, state in zip(samplers, states, strict=True)]
-            found = _posterior(density, samplers)
-            if found.converged:
-                break
-    return found
-
-
-def _ensemble(density: Density, walkers: int, seed: int, start: int) -> Any:
-    """A sampler of emcee. A tenth of the moves are as long as from one walker to another: from peak to peak."""
-    import emcee
-    from emcee.moves import DEMove, DESnookerMove, StretchMove
-
-    moves = [(DEMove(), 0.6), (DEMove(gamma0=1.0), 0.1), (DESnookerMove(), 0.1), (StretchMove(), 0.2)]
-    sampler = emcee.EnsembleSampler(walkers, density.dimensions, density, vectorize=True, moves=moves)
-    sampler.random_state = np.random.RandomState(np.random.SeedSequence([seed, start]).generate_state(8)).get_state()
-    return sampler
+    density, draw = Density(emulators, space, held_out, shared_errors), np.random.default_rng(seed)
+    # What points were drawn from: means and roots of the covariances.
+    normals: list[tuple[FloatArray, FloatArray]] = [(np.zeros(density.dimensions), np.eye(density.dimensions))]
+    places, known = np.zeros((0, density.dimensions)), np.zeros(0)
+    for _ in range(_ROUNDS):
+        middle, root = normals[-1]
+        fresh = middle + draw.standard_normal((points, density.dimensions)) @ root.T
+        places, known = np.concatenate([places, fresh]), np.concatenate([known, density(fresh)])
+        logarithm = known - _log_mixture(places, normals)
+        weight = tempered = _weights(logarithm)
+        if _worth(weight) > LEAST_SAMPLES:
+            break
+        share, enough = 1.0, min(_TEMPERED, points / 2.0)
+        while _worth(tempered) < enough:
+            share *= 0.8
+            tempered = _weights(share * logarithm)
+        width = np.cov(places.T, aweights=tempered).reshape(density.dimensions, density.dimensions)
+        normals.append((tempered @ places, np.asarray(np.linalg.cholesky(_WIDER * width), np.float64)))
+    chosen = _systematic(weight, min(_KEPT, len(weight)), draw)
+    unit, discrepancy = density.places(places[chosen])
+    best = density.places(places[[np.argmax(known)]])[0][0]
+    return Posterior(unit, discrepancy, known[chosen], density.groups, best, len(places), _worth(weight))
 
 
-def _posterior(density: Density, samplers: Sequence[Any]) -> Posterior:
-    """What the ensembles have said so far."""
-    gone = int(_BURN * samplers[0].iteration)
-    # Starts, steps, walkers, coordinates.
-    chains = np.stack([sampler.get_chain(discard=gone) for sampler in samplers])
-    log_density = np.stack([sampler.get_log_prob(discard=gone) for sampler in samplers])
-    starts, steps, walkers, coordinates = chains.shape
-    apart = chains.transpose(3, 0, 2, 1)
-    thin = max(1, starts * steps * walkers // _KEPT)
-    unit, discrepancy = density.places(chains[:, ::thin].reshape(-1, coordinates))
-    return Posterior(
-        unit=unit,
-        discrepancy=discrepancy,
-        log_density=log_density[:, ::thin].reshape(-1),
-        groups=density.groups,
-        starts=starts,
-        steps=steps,
-        walkers=walkers,
-        acceptance=float(np.mean([sampler.acceptance_fraction.mean() for sampler in samplers])),
-        rhat=max(map(rhat, apart)),
-        effective_samples=min(map(effective_samples, apart)),
-    )
+def _weights(logarithm: FloatArray) -> FloatArray:
+    return np.asarray(np.exp(logarithm - logsumexp(logarithm)))
+
+
+def _worth(weight: FloatArray) -> float:
+    return 1.0 / float(np.sum(weight**2))
+
+
+def _systematic(weight: FloatArray, count: int, draw: np.random.Generator) -> npt.NDArray[np.int64]:
+    """Places of so many points, each as often as it weighs."""
+    steps = (np.arange(count) + draw.random()) / count
+    return np.asarray(np.minimum(np.searchsorted(np.cumsum(weight), steps), len(weight) - 1))
+
+
+def _log_mixture(places: FloatArray, normals: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """Log density of equal shares of normal distributions, but for a constant."""
+    each = [
+        -0.5 * np.sum(np.linalg.solve(root, (places - middle).T) ** 2, axis=0) - np.log(np.diag(root)).sum()
+        for middle, root in normals
+    ]
+    return np.asarray(logsumexp(each, axis=0) - np.log(len(normals)))

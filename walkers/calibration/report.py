@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from math import isfinite, nan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from walkers.calibration.calibrate import Outcome
-from walkers.calibration.convergence import LARGEST_RHAT, LEAST_SAMPLES
 from walkers.calibration.emulator import Emulator, transformed
-from walkers.calibration.posterior import Posterior
+from walkers.calibration.posterior import LEAST_SAMPLES, Posterior
 from walkers.calibration.waves import Wave
 from walkers.inputs.calibration import QUANTITIES, Observation, Parameter
 from walkers.inputs.text import rendered
@@ -23,8 +23,7 @@ FloatArray = npt.NDArray[np.float64]
 RECORD_NAME = "calibration.json"
 _SIGMAS = 2.0
 _NARROW, _NARROWER = 1.0 / 3.0, 2.0 / 3.0
-"""A parameter is identified if the posterior's interval is less than a third of the prior's and the chains have
-converged."""
+"""A parameter is identified if the posterior's interval is less than a third of the prior's and it has converged."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +42,8 @@ class Row:
         At the best set; ``feasible`` is the probability that there is a walker, as it is learned from the waves.
     agrees
         Whether the engine lies within the deviation of the published value.
+    derived
+        Whether it follows from others, and does not count.
     half_step, twice_as_long
         The engine at the best set with half the time step, and for twice as long; None where there is no walker.
     held_out
@@ -63,6 +64,7 @@ class Row:
     error: float
     feasible: float
     agrees: bool
+    derived: bool
     half_step: float | None
     twice_as_long: float | None
     held_out: dict[str, tuple[float, float]]
@@ -86,7 +88,7 @@ def rows_of(found: Outcome) -> list[Row]:
     feasible = found.emulators.feasibility.probability(found.checks["best"].unit)[0]
     for place, observation in enumerate(found.calibration.observations):
         unit, scale = unit_of(observation)
-        emulated, error = found.emulators[place].value(found.checks["best"].unit)
+        emulated, error = found.emulators.each[place].value(found.checks["best"].unit)
         seen = _seen(found.predictive, place, scale)
         best, finer, longer = (
             next(iter(_seen(found.checks[name], place, scale)), None) for name in ("best", "half-step", "twice-as-long")
@@ -107,10 +109,11 @@ def rows_of(found: Outcome) -> list[Row]:
                 error=float(error[0]) * scale,
                 feasible=float(feasible[place]),
                 agrees=best is not None and abs(best - observation.value * scale) <= observation.deviation * scale,
+                derived=observation.derived,
                 half_step=finer,
                 twice_as_long=longer,
                 held_out={
-                    name: _predicted(found.emulators[place], posterior, scale)
+                    name: _predicted(found.emulators.each[place], posterior, scale)
                     for name, posterior in found.held_out.items()
                     if observation.group in found.calibration.file.held_out[name]
                 },
@@ -163,23 +166,21 @@ def narrowing(found: Outcome) -> dict[str, float]:
 
     In logarithms where the parameter's range is one of these.
     """
-    fine = np.linspace(0.0, 1.0, 2001)
-    low, high = np.percentile(found.posterior.unit, (5.0, 95.0), axis=0)
-    shares = {}
+    fine, shares = np.linspace(0.0, 1.0, 2001), {}
     for place, one in enumerate(found.space.parameters):
         points = np.full((len(fine), found.space.dimensions), 0.5)
         points[:, place] = fine
         density = found.space.log_prior(points)
         below = np.cumsum(np.exp(density - density.max()))
-        begin, end = np.interp([0.05, 0.95], below / below[-1], fine)
-        shares[one.name] = float((high[place] - low[place]) / (end - begin))
+        prior = np.interp([0.05, 0.95], below / below[-1], fine)
+        shares[one.name] = float(np.ptp(np.percentile(found.posterior.unit[:, place], (5.0, 95.0))) / np.ptp(prior))
     return shares
 
 
 def words_of(share: float, *, converged: bool) -> str:
     """What may be said of a parameter whose interval is so much of the prior's."""
     if not converged:
-        return "not said: the chains have not converged"
+        return "not said: the posterior has not converged"
     return "identified" if share < _NARROW else "narrowed" if share < _NARROWER else "not identified"
 
 
@@ -213,10 +214,12 @@ def write_tables(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
     return [to / name for name in ("posterior.parquet", RECORD_NAME, "calibration.md")]
 
 
-def as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
+def as_dict(found: Outcome, rows: list[Row]) -> dict[str, Any]:
     """What ``calibration.json`` holds."""
-    posterior, (checked, inside), (made, expected) = found.posterior, _inside(found), feasibility_check(found)
-    contents: dict[str, object] = {
+    posterior, parameters = found.posterior, [one.name for one in found.space.parameters]
+    (checked, inside), (made, expected), narrowed = _inside(found), feasibility_check(found), narrowing(found)
+    middle = np.median(posterior.discrepancy, axis=0).tolist()
+    return {
         "calibration": found.calibration.name,
         "title": found.calibration.file.title,
         "settings": found.calibration.file.model_dump(mode="json"),
@@ -224,13 +227,11 @@ def as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
         "sets": len(found.unit),
         "best": found.best,
         "intervals": intervals(found),
-        "discrepancies": {
-            group: float(np.median(posterior.discrepancy[:, place])) for place, group in enumerate(posterior.groups)
-        },
-        "narrowing": narrowing(found),
-        "words": {name: words_of(share, converged=posterior.converged) for name, share in narrowing(found).items()},
-        "chain": {"converged": posterior.converged, **_chain(posterior)},
-        "held_out_chains": {name: {"converged": one.converged, **_chain(one)} for name, one in found.held_out.items()},
+        "discrepancies": dict(zip(posterior.groups, middle, strict=True)),
+        "narrowing": narrowed,
+        "words": {name: words_of(share, converged=posterior.converged) for name, share in narrowed.items()},
+        "posterior": _weights(posterior),
+        "held_out_posteriors": {name: _weights(one) for name, one in found.held_out.items()},
         "emulators": {
             one.observation.name: {
                 "explained": _finite(one.explained),
@@ -238,70 +239,45 @@ def as_dict(found: Outcome, rows: list[Row]) -> dict[str, object]:
                 "error_inflation": one.error_inflation,
                 "sets": one.sets,
             }
-            for one in found.emulators
+            for one in found.emulators.each
         },
         "emulators_checked": checked,
         "emulators_within_two_errors": _finite(inside),
         "feasible": {"seen": made, "expected": expected},
-        "agree": sum(row.agrees for row in rows),
+        "agree": agreeing(rows)[0],
+        "of": agreeing(rows)[1],
         "observations": [asdict(row) for row in rows],
         "sobol_total": {
-            one.observation.name: dict(
-                zip([p.name for p in found.space.parameters], map(_finite, found.sobol[1, place]), strict=True)
-            )
-            for place, one in enumerate(found.emulators)
+            one.observation.name: dict(zip(parameters, map(_finite, total), strict=True))
+            for one, total in zip(found.emulators.each, found.sobol, strict=True)
         },
     }
-    return contents
+
+
+def agreeing(rows: list[Row]) -> tuple[int, int]:
+    """How many observations agree, of how many; those that are derived from others count in neither."""
+    own = [row for row in rows if not row.derived]
+    return sum(row.agrees for row in own), len(own)
 
 
 def _finite(value: float) -> float | None:
     return float(value) if isfinite(value) else None
 
 
-def _chain(posterior: Posterior) -> dict[str, float | None]:
-    return {
-        "starts": posterior.starts,
-        "walkers": posterior.walkers,
-        "steps": posterior.steps,
-        "acceptance": posterior.acceptance,
-        "rhat": _finite(posterior.rhat),
-        "effective_samples": _finite(posterior.effective_samples),
-    }
+def _weights(posterior: Posterior) -> dict[str, Any]:
+    return {name: getattr(posterior, name) for name in ("converged", "points", "effective_samples")}
 
 
 def as_markdown(found: Outcome, rows: list[Row]) -> str:
     """The tables as a page."""
-    known, narrowed, posterior = intervals(found), narrowing(found), found.posterior
-    parameters = [
-        {
-            "label": labelled(one),
-            "best": found.best[one.name],
-            "interval": known[one.name],
-            "low": one.low,
-            "high": one.high,
-            "words": words_of(narrowed[one.name], converged=posterior.converged),
-        }
-        for one in found.space.parameters
-    ]
-    (checked, inside), (made, expected) = _inside(found), feasibility_check(found)
-    percentiles = np.percentile(posterior.discrepancy, (5.0, 50.0, 95.0), axis=0).T
     return rendered(
         "walkers.calibration",
         "report.md.j2",
-        calibration=found.calibration,
-        rows=rows,
-        agree=sum(row.agrees for row in rows),
-        sets=len(found.unit),
-        parameters=parameters,
-        trials=list(found.calibration.file.held_out),
+        found=as_dict(found, rows),
+        ranges={one.name: one.range for one in found.space.parameters},
+        trials=list(found.held_out),
         samples=len(found.predictive.unit),
-        discrepancies=dict(zip(posterior.groups, percentiles, strict=True)),
-        checked=checked,
-        inside=inside,
-        made=made,
-        expected=expected,
-        chains={"of all observations": posterior, **{f"for {name}": one for name, one in found.held_out.items()}},
-        limits=(LARGEST_RHAT, LEAST_SAMPLES),
+        discrepancies=np.percentile(found.posterior.discrepancy, (5.0, 50.0, 95.0), axis=0).T.tolist(),
+        least=LEAST_SAMPLES,
         narrow=_NARROW,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -30,48 +31,43 @@ class Space:
         """D."""
         return len(self.parameters)
 
-    @property
-    def bounds(self) -> FloatArray:
-        """Ends of the coordinates before they are scaled (logarithms where a parameter says so), shape (2, D)."""
-        return np.array([[_scaled(one, value) for one in self.parameters] for value in (0, 1)])
+    @cached_property
+    def _log(self) -> npt.NDArray[np.bool_]:
+        return np.array([one.log for one in self.parameters])
+
+    @cached_property
+    def _ends(self) -> FloatArray:
+        """Lower and upper ends of the coordinates before they are scaled, shape (2, D)."""
+        return self._scaled(np.array([one.range for one in self.parameters]).T)
+
+    def _scaled(self, values: FloatArray) -> FloatArray:
+        """Logarithms where a parameter says so."""
+        return np.where(self._log, np.log(np.where(self._log, values, 1.0)), values)
 
     def values(self, unit: FloatArray) -> FloatArray:
         """Values of the parameters at points of the unit cube, shape (..., D)."""
-        low, high = self.bounds
-        scaled = low + np.asarray(unit) * (high - low)
-        log = np.array([one.log for one in self.parameters])
-        return np.where(log, np.exp(np.where(log, scaled, 0.0)), scaled)
+        scaled = self._ends[0] + np.asarray(unit) * np.diff(self._ends, axis=0)[0]
+        return np.where(self._log, np.exp(np.where(self._log, scaled, 0.0)), scaled)
 
     def unit(self, values: FloatArray) -> FloatArray:
         """Points of the unit cube at values of the parameters, shape (..., D)."""
-        low, high = self.bounds
-        log = np.array([one.log for one in self.parameters])
-        values = np.asarray(values, dtype=np.float64)
-        scaled = np.where(log, np.log(np.where(log, values, 1.0)), values)
-        return np.asarray((scaled - low) / (high - low), dtype=np.float64)
+        return np.asarray((self._scaled(np.asarray(values)) - self._ends[0]) / np.diff(self._ends, axis=0)[0])
 
     def log_prior(self, unit: FloatArray) -> FloatArray:
         """Logarithm of the density that is assumed beforehand, but for a constant, shape (...); -inf outside."""
         unit = np.asarray(unit)
-        low, high = self.bounds
-        scaled = low + unit * (high - low)
         total = np.where(np.all((unit >= 0.0) & (unit <= 1.0), axis=-1), 0.0, -np.inf)
+        scaled = self._scaled(self.values(unit))
         for place, one in enumerate(self.parameters):
             if one.normal is not None:
                 mean, deviation = one.normal
-                centre = np.log(mean) if one.log else mean
-                total = total + norm.logpdf(scaled[..., place], centre, deviation)
+                total = total + norm.logpdf(scaled[..., place], np.log(mean) if one.log else mean, deviation)
         return total
 
     def design(self, points: int, seed: int) -> FloatArray:
         """A space-filling first wave, shape (points, D): a scrambled Sobol sequence (`scipy.stats.qmc`)."""
         sampler = qmc.Sobol(self.dimensions, rng=np.random.default_rng(seed))
         return np.asarray(sampler.random_base2(int(np.ceil(np.log2(points))))[:points], dtype=np.float64)
-
-
-def _scaled(parameter: Parameter, end: int) -> float:
-    value = (parameter.low, parameter.high)[end]
-    return float(np.log(value)) if parameter.log else value
 
 
 def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatArray:

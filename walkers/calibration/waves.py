@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from walkers.calibration.space import Space
 from walkers.inputs.axes import flatten
-from walkers.inputs.calibration import Calibration, Observation
+from walkers.inputs.calibration import Calibration
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.schema import ALTERNATIVES
 from walkers.inputs.sweep import Sweep, expand
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 _DIGITS = 9
+_LEAST_SPEED = 5e-5
 
 
 @dataclass(frozen=True)
@@ -116,21 +117,17 @@ def observed(calibration: Calibration, table: pd.DataFrame) -> FloatArray:
     labels = list(calibration.experiments)
     seen = seen_in(calibration, table, {observation.quantity for observation in calibration.observations})
 
-    def mean(observation: Observation, experiments: list[str]) -> FloatArray:
-        return np.asarray(seen[observation.quantity][:, [labels.index(one) for one in experiments]].mean(axis=1))
+    def mean(quantity: str, chosen: list[str]) -> FloatArray:
+        return np.asarray(seen[quantity][:, [labels.index(label) for label in chosen]].mean(axis=1))
 
     columns = []
-    for observation in calibration.observations:
-        value = mean(observation, observation.of)
-        if observation.over:
-            below = mean(observation, observation.over)
-            # A ratio of two speeds says nothing where the lower one is none.
-            value = np.where(np.abs(below) > _LEAST_SPEED, value / np.where(below == 0.0, 1.0, below), np.nan)
+    for one in calibration.observations:
+        value = mean(one.quantity, one.of)
+        if one.over:  # a ratio of two speeds says nothing where the lower one is none
+            below = mean(one.quantity, one.over)
+            value = value / np.where(np.abs(below) > _LEAST_SPEED, below, np.nan)
         columns.append(value)
     return np.stack(columns, axis=1)
-
-
-_LEAST_SPEED = 5e-5
 
 
 def seen_in(calibration: Calibration, table: pd.DataFrame, quantities: Collection[str]) -> dict[str, FloatArray]:

@@ -20,8 +20,9 @@ deviation = "0.18 mm/s"
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from math import degrees
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -102,12 +103,12 @@ class Band(_Table):
 
 
 class DesignTable(_Table):
-    """``[design]``: sizes of the waves and of the predictive check, and of the walk through the posterior."""
+    """``[design]``: sizes of the waves and of the predictive check, and how many points of the prior are weighed."""
 
     seed: Annotated[Whole, Field(ge=0)] = 1
     waves: Annotated[list[Annotated[Whole, Field(ge=4, le=_MOST)]], Field(min_length=1)] = [64]
     predictive: Annotated[Whole, Field(ge=2, le=1000)] = 8
-    steps: Annotated[Whole, Field(ge=100, le=1_000_000)] = 2000
+    points: Annotated[Whole, Field(ge=100, le=1_000_000)] = 20_000
 
 
 class CalibrationFile(_Table):
@@ -131,16 +132,6 @@ class Parameter(ParameterTable):
 
     name: str
     experiments: list[str]
-
-    @property
-    def low(self) -> float:
-        """The smaller end of its range, in its unit."""
-        return self.range[0]
-
-    @property
-    def high(self) -> float:
-        """The larger end of its range, in its unit."""
-        return self.range[1]
 
 
 class Observation(ObservationTable):
@@ -179,7 +170,7 @@ class Calibration:
 
     @property
     def design(self) -> DesignTable:
-        """Sizes of the waves and of the walk through the posterior."""
+        """Sizes of the waves and of the posterior."""
         return self.file.design
 
 
@@ -204,10 +195,8 @@ def load_calibration(calibration: str | Path) -> Calibration:
 def read_calibration(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Calibration:
     """A calibration given as nested tables; parameters and errors as for `walkers.inputs.sweep.expand`."""
     file = validated(CalibrationFile, document, source, "a calibration")
-    problems = _problems(file)
-    if problems:
+    if problems := list(_problems(file)):
         raise InputError(source, problems)
-    everywhere = list(file.experiments)
     return Calibration(
         name=name,
         source=source,
@@ -215,8 +204,7 @@ def read_calibration(document: Mapping[str, Any], *, source: str, name: str, fol
         file=file,
         parameters=tuple(
             Parameter(
-                **{**vars(table), "symbol": table.symbol or label, "experiments": table.experiments or everywhere},
-                name=label,
+                **{**vars(table), "symbol": table.symbol or label, "experiments": _experiments(file, table)}, name=label
             )
             for label, table in file.parameters.items()
         ),
@@ -236,136 +224,123 @@ def _number(value: str | float, quantity: str) -> float:
     if not isinstance(value, str):
         return float(value)
     number = parse_quantity(value, QUANTITIES[quantity])
-    return number * _DEGREES if QUANTITIES[quantity] is ANGLE else number
+    return degrees(number) if QUANTITIES[quantity] is ANGLE else number
 
 
-_DEGREES = 57.29577951308232
+def _experiments(file: CalibrationFile, table: ParameterTable) -> list[str]:
+    """Those that a parameter belongs to."""
+    return list(file.experiments) if table.experiments is None else table.experiments
 
 
-def _problems(file: CalibrationFile) -> list[Problem]:
+def _problems(file: CalibrationFile) -> Iterator[Problem]:
     """What pydantic cannot see."""
-    found = [*_problems_of_experiments(file), *_problems_of_parameters(file)]
+    yield from _problems_of_experiments(file)
+    for name, table in file.parameters.items():
+        yield from _problems_of_parameter(file, name, table)
     names = [observation.name for observation in file.observations]
-    groups = {observation.group for observation in file.observations}
     for number, observation in enumerate(file.observations):
         place = f"observations[{number}]"
         if names.index(observation.name) != number:
-            found.append(Problem(f"{place}.name", f'"{observation.name}"', "expected a name of its own"))
+            yield Problem(f"{place}.name", f'"{observation.name}"', "expected a name of its own")
         for key in ("of", "over"):
-            found += _unknown(f"{place}.{key}", getattr(observation, key), file.experiments, "an experiment")
+            yield from _unknown(f"{place}.{key}", getattr(observation, key), file.experiments, "an experiment")
         if observation.over and set(observation.over) == set(observation.of):
-            found.append(Problem(f"{place}.over", None, "expected other experiments than in of: the ratio would be 1"))
+            yield Problem(f"{place}.over", None, "expected other experiments than in of: the ratio would be 1")
         for key in ("value", "deviation"):
-            found += _unreadable(f"{place}.{key}", getattr(observation, key), observation)
+            yield from _unreadable(f"{place}.{key}", getattr(observation, key), observation)
     if all(observation.derived for observation in file.observations):
-        found.append(Problem("observations", None, "expected one that is not derived"))
-    found += _problems_of_shared_errors(file, names)
-    found += _problems_of_guesses(file)
+        yield Problem("observations", None, "expected one that is not derived")
+    yield from _problems_of_shared_errors(file, names)
+    for number, guess in enumerate(file.guesses):
+        yield from _problems_of_guess(file, f"guesses[{number}]", guess)
     for number, band in enumerate(file.bands):
-        found += _unknown(f"bands[{number}].of", band.of, file.experiments, "an experiment")
+        yield from _unknown(f"bands[{number}].of", band.of, file.experiments, "an experiment")
+    groups = {observation.group for observation in file.observations}
     for name, held in file.held_out.items():
-        found += _unknown(f"held_out.{name}", held, groups, "a group of observations")
+        yield from _unknown(f"held_out.{name}", held, groups, "a group of observations")
         if set(held) >= {observation.group for observation in file.observations if not observation.derived}:
-            found.append(Problem(f"held_out.{name}", None, "expected to leave a group to calibrate on"))
-    return found
+            yield Problem(f"held_out.{name}", None, "expected to leave a group to calibrate on")
 
 
-def _problems_of_shared_errors(file: CalibrationFile, names: list[str]) -> list[Problem]:
-    found = []
+def _problems_of_experiments(file: CalibrationFile) -> Iterator[Problem]:
+    """All experiments have the same keys, each of a parameter too, and of one parameter alone."""
+    first, *others = [(label, set(flatten(table, lambda _: False))) for label, table in file.experiments.items()]
+    for label, keys in others:
+        for key in sorted(keys ^ first[1]):
+            told = f"expected the same keys in every experiment; {first[0]} and {label} differ in {key}"
+            yield Problem(f"experiments.{label}", None, told)
+    taken: dict[str, dict[str, str]] = {}
+    for name, table in file.parameters.items():
+        for key in table.keys:
+            for experiment in _experiments(file, table):
+                other = taken.setdefault(key, {}).setdefault(experiment, name)
+                if other != name:
+                    told = f"{key} of the experiment {experiment} is set by {other} already"
+                    yield Problem(f"parameters.{name}.keys", None, told)
+    for key, having in taken.items():
+        if lacking := [experiment for experiment in file.experiments if experiment not in having]:
+            told = f"no parameter gives {key} to {', '.join(lacking)}: all experiments have it or none"
+            yield Problem("parameters", None, told)
+
+
+def _problems_of_parameter(file: CalibrationFile, name: str, table: ParameterTable) -> Iterator[Problem]:
+    place, (low, high) = f"parameters.{name}", table.range
+    if low >= high or (table.log and low <= 0.0):
+        expected = "expected a smaller and a larger number" + (", both above zero" if table.log else "")
+        yield Problem(f"{place}.range", f"[{low:g}, {high:g}]", expected)
+    if table.normal is not None and table.log and table.normal[0] <= 0.0:
+        expected = "expected a median above zero: the prior is one of the logarithm"
+        yield Problem(f"{place}.normal", f"[{table.normal[0]:g}, {table.normal[1]:g}]", expected)
+    if table.experiments is not None and not table.experiments:
+        yield Problem(f"{place}.experiments", "[]", "expected at least one experiment")
+    yield from _unknown(f"{place}.experiments", _experiments(file, table), file.experiments, "an experiment")
+
+
+def _problems_of_shared_errors(file: CalibrationFile, names: list[str]) -> Iterator[Problem]:
     for label, error in file.shared_errors.items():
         place = f"shared_errors.{label}.observations"
-        found += _unknown(place, error.observations, names, "an observation")
+        yield from _unknown(place, error.observations, names, "an observation")
         for name in dict.fromkeys(error.observations):
             if error.observations.count(name) > 1:
-                found.append(Problem(place, f'"{name}"', "expected each observation once"))
+                yield Problem(place, f'"{name}"', "expected each observation once")
     for name in names:
         having = [label for label, error in file.shared_errors.items() if name in error.observations]
         whole = sum(file.shared_errors[label].share for label in having)
         if whole >= 1.0:
             told = f"expected {name} to have an error of its own: the shares of {', '.join(having)} are {whole:g} of it"
-            found.append(Problem("shared_errors", None, told))
-    return found
+            yield Problem("shared_errors", None, told)
 
 
-def _problems_of_guesses(file: CalibrationFile) -> list[Problem]:
-    found = []
-    for number, guess in enumerate(file.guesses):
-        place = f"guesses[{number}]"
-        for name in guess:
-            found += _unknown(f"{place}.{name}", [name], file.parameters, "a parameter")
-        for name, table in file.parameters.items():
-            low, high = table.range
-            if name not in guess:
-                found.append(Problem(f"{place}.{name}", None, "missing; a guess has all parameters"))
-            elif not low <= guess[name] <= high:
-                told = f"expected a number within the parameter's range, {low:g} to {high:g}"
-                found.append(Problem(f"{place}.{name}", f"{guess[name]:g}", told))
-    return found
-
-
-def _problems_of_experiments(file: CalibrationFile) -> list[Problem]:
-    first, *others = [(label, set(flatten(table, lambda _: False))) for label, table in file.experiments.items()]
-    found = []
-    for label, keys in others:
-        for key in sorted(keys ^ first[1]):
-            told = f"expected the same keys in every experiment; {first[0]} and {label} differ in {key}"
-            found.append(Problem(f"experiments.{label}", None, told))
-    return found
-
-
-def _problems_of_parameters(file: CalibrationFile) -> list[Problem]:
-    found = []
-    taken: dict[tuple[str, str], str] = {}
-    for key in {key for table in file.parameters.values() for key in table.keys}:
-        having = {
-            experiment
-            for table in file.parameters.values()
-            if key in table.keys
-            for experiment in table.experiments or file.experiments
-        }
-        if lacking := [experiment for experiment in file.experiments if experiment not in having]:
-            told = f"no parameter gives {key} to {', '.join(lacking)}: all experiments have it or none"
-            found.append(Problem("parameters", None, told))
+def _problems_of_guess(file: CalibrationFile, place: str, guess: Mapping[str, float]) -> Iterator[Problem]:
+    yield from (one for name in guess for one in _unknown(f"{place}.{name}", [name], file.parameters, "a parameter"))
     for name, table in file.parameters.items():
-        place = f"parameters.{name}"
         low, high = table.range
-        if low >= high or (table.log and low <= 0.0):
-            expected = "expected a smaller and a larger number" + (", both above zero" if table.log else "")
-            found.append(Problem(f"{place}.range", f"[{low:g}, {high:g}]", expected))
-        if table.normal is not None and table.log and table.normal[0] <= 0.0:
-            expected = "expected a median above zero: the prior is one of the logarithm"
-            found.append(Problem(f"{place}.normal", f"[{table.normal[0]:g}, {table.normal[1]:g}]", expected))
-        if table.experiments is not None and not table.experiments:
-            found.append(Problem(f"{place}.experiments", "[]", "expected at least one experiment"))
-        found += _unknown(f"{place}.experiments", table.experiments or [], file.experiments, "an experiment")
-        for key in table.keys:
-            for experiment in table.experiments or file.experiments:
-                other = taken.setdefault((key, experiment), name)
-                if other != name:
-                    told = f"{key} of the experiment {experiment} is set by {other} already"
-                    found.append(Problem(f"{place}.keys", None, told))
-    return found
+        if name not in guess:
+            yield Problem(f"{place}.{name}", None, "missing; a guess has all parameters")
+        elif not low <= guess[name] <= high:
+            told = f"expected a number within the parameter's range, {low:g} to {high:g}"
+            yield Problem(f"{place}.{name}", f"{guess[name]:g}", told)
 
 
-def _unknown(place: str, given: list[str], known: Any, what: str) -> list[Problem]:
-    return [
-        Problem(place, f'"{name}"', f"expected {what}: one of {', '.join(sorted(known))}{suggestion(name, known)}")
-        for name in given
-        if name not in known
-    ]
+def _unknown(place: str, given: Collection[str], known: Collection[str], what: str) -> Iterator[Problem]:
+    for name in given:
+        if name not in known:
+            expected = f"expected {what}: one of {', '.join(sorted(known))}{suggestion(name, known)}"
+            yield Problem(place, f'"{name}"', expected)
 
 
-def _unreadable(place: str, given: str | float, observation: ObservationTable) -> list[Problem]:
+def _unreadable(place: str, given: str | float, observation: ObservationTable) -> Iterator[Problem]:
+    kind, wrong = QUANTITIES[observation.quantity], ""
     if observation.over:
         wrong = "expected a plain number: a ratio has no unit" if isinstance(given, str) else ""
     elif not isinstance(given, str):
-        wrong = QUANTITIES[observation.quantity].expectation
+        wrong = kind.expectation
     else:
-        wrong = ""
         try:
-            parse_quantity(given, QUANTITIES[observation.quantity])
+            parse_quantity(given, kind)
         except ValueError as error:
             wrong = str(error)
     if not wrong and place.endswith("deviation") and _number(given, observation.quantity) <= 0.0:
         wrong = "expected more than zero"
-    return [Problem(place, f'"{given}"' if isinstance(given, str) else f"{given:g}", wrong)] if wrong else []
+    if wrong:
+        yield Problem(place, f'"{given}"' if isinstance(given, str) else f"{given:g}", wrong)

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING
+from functools import partial
+from math import nan
+from statistics import fmean
 
 import numpy as np
 
-from walkers.inputs.loads import dimer_of
-from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
 from walkers.paper import dimers, published
 from walkers.paper.alignment import paper_drives
-from walkers.paper.published import NUMBERS, Published
+from walkers.paper.published import COMPARED, Point, Published
 from walkers.paper.sensitivity import misalignment
 from walkers.paper.sources import NothingFinishedError, Sources
 from walkers.postprocess.steady_state import steady_walkers
 from walkers.sweeps.table import thresholds
 from walkers.theory.mathieu import largest_stable_v
 from walkers.theory.prediction import motion_of, threshold
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from walkers.inputs.case import Case
 
 AGREES = 0.15
 """A number within this share of the published one agrees with it, where the paper gives no spread."""
@@ -39,16 +35,11 @@ class Value:
     are none until the end (`walkers.postprocess.steady_state`).
     """
 
-    engine: float
-    low: float
-    high: float
-    theory: float = float("nan")
+    engine: float = nan
+    low: float = nan
+    high: float = nan
+    theory: float = nan
     left_out: int = 0
-
-
-_NOTHING = Value(float("nan"), float("nan"), float("nan"))
-_OF_THEORY = ("mathieu", "mathieu_stable")
-"""Numbers of which the engine knows nothing."""
 
 
 @dataclass(frozen=True)
@@ -94,17 +85,11 @@ class Row:
 
 def compare(sources: Sources) -> list[Row]:
     """All published numbers, in the order of the paper."""
-    values: dict[str, Value] = {}
-    for group in (_fig2, _threshold, _fig3, _fig4, _alignment, _mathieu):
-        try:
-            values |= group(sources)
-        except NothingFinishedError:
-            continue
-    return [_row(number, values.get(number.key, _NOTHING)) for number in NUMBERS]
+    return [_row(number, _found(number, sources)) for number in COMPARED]
 
 
 def _row(number: Published, value: Value) -> Row:
-    ours = value.theory if number.key in _OF_THEORY else value.engine
+    ours = value.theory if number.key.startswith("mathieu") else value.engine  # the engine knows nothing of Mathieu's
     within = None if number.bounds is None else number.bounds[0] <= ours <= number.bounds[1]
     agrees = within if within is not None else _near(ours, number.value)
     return Row(
@@ -144,133 +129,95 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _speed(rows: pd.DataFrame, column: str = "velocity", theory: float = float("nan")) -> Value:
-    """The mean over some points; its range over walkers of one point, or over several points. NaN if one has none."""
-    walkers = [steady_walkers(run)[column].to_numpy() * 1e3 for run in rows["run"]]
-    left_out = int(rows["walkers"].sum()) - sum(map(len, walkers))
-    if not walkers or not all(map(len, walkers)):
-        return replace(_NOTHING, theory=theory, left_out=left_out)
-    means = np.array([one.mean() for one in walkers])
-    ends = walkers[0] if len(rows) == 1 else means
-    return Value(float(means.mean()), float(ends.min()), float(ends.max()), theory, left_out)
+def _found(number: Published, sources: Sources) -> Value:
+    try:
+        if not number.of:
+            return _OTHERS[number.key](sources)
+        if number.quantity == "gamma0":
+            return _exact(dimers.gamma0(dimers.of_point(number.of[0])))
+        tried = [_speed(point, number.quantity, sources) for point in number.of]
+        if number.over:
+            below = [_speed(point, number.quantity, sources) for point in number.over]
+            pairs = zip(tried, below, strict=True)
+            tried = [_quotient(one or Value(), other or Value()) for one, other in pairs if one or other]
+    except NothingFinishedError:
+        return Value()
+    return _together([one for one in tried if one is not None])
 
 
-def _speed_of_all(rows: pd.DataFrame, theory: float) -> Value:
-    """As `_speed`, but of all walkers, whichever way they turn."""
-    mean, low, high = (float(rows[name].mean()) * 1e3 for name in ("velocity", "smallest", "largest"))
-    return Value(mean, low, high, theory)
+def _together(values: Sequence[Value]) -> Value:
+    """The mean over some points, with its range over these; of one point itself."""
+    if len(values) <= 1:
+        return values[0] if values else Value()
+    engine = [value.engine for value in values]
+    theory, left_out = fmean(value.theory for value in values), sum(value.left_out for value in values)
+    whole = not np.isnan(engine).any()
+    low, high = (min(engine), max(engine)) if whole else (nan, nan)
+    return Value(float(np.mean(engine)), low, high, theory, left_out)
 
 
-def _theory(case: Case) -> float:
-    return float(motion_of(case).velocity[0]) * 1e3
+def _speed(point: Point, quantity: str, sources: Sources) -> Value | None:
+    """A speed of the walkers of a point, and the theory's; None if the point is not among the finished."""
+    rows, theory = sources.rows(point), _theory(point, quantity)
+    if rows.empty:
+        return None
+    if quantity == "velocity_of_all":
+        mean, low, high = (float(rows[name].mean()) * 1e3 for name in ("velocity", "smallest", "largest"))
+        return Value(mean, low, high, theory)
+    walkers = steady_walkers(rows["run"].iloc[0])[quantity].to_numpy() * 1e3
+    left_out = int(rows["walkers"].iloc[0]) - len(walkers)
+    if not len(walkers):
+        return Value(theory=theory, left_out=left_out)
+    return Value(float(walkers.mean()), float(walkers.min()), float(walkers.max()), theory, left_out)
 
 
-def _fig2(sources: Sources) -> dict[str, Value]:
-    table, case = sources.finished("fig2"), dimers.shipped()
-    dimer = dimer_of(case)
-    values = {}
-    frequencies = sorted(table["frequency"].unique())
-    for g in published.FIT:
-        rows = table[np.isclose(table["peak_acceleration"], g * published.GRAVITY)]
-        cases = [one for f in frequencies for one in dimers.driven(case, f, [g * published.GRAVITY])]
-        values[f"fig2_{g:g}g"] = _speed(rows, theory=float(motion_of(*cases).velocity.mean() * 1e3))
-        values[f"fig2_gamma_{g:g}g"] = _exact(dimer.gamma0(g * published.GRAVITY))
-    slow, fast = frequencies[0], frequencies[-1]
-    values["fig2_frequency"] = _quotient(table, case, (fast, published.PLATEAU), (slow, published.PLATEAU))
-    plateau = [_quotient(table, case, (f, 10.0), (f, published.PLATEAU)) for f in frequencies]
-    values["fig2_plateau"] = _mean(plateau)
-    return values
+def _theory(point: Point, quantity: str) -> float:
+    """Of the shipped case at a point; NaN for what contacts do that open."""
+    motion = motion_of(dimers.of_point(point))
+    family, _, _ = quantity.partition("_")
+    if family == "velocity":
+        return float(motion.velocity[0]) * 1e3
+    return nan if motion.opened[0] else float(getattr(motion, family)[0, 0]) * 1e3
 
 
-def _threshold(sources: Sources) -> dict[str, Value]:
+def _quotient(over: Value, under: Value) -> Value:
+    theory, left_out = over.theory / under.theory, over.left_out + under.left_out
+    return replace(_exact(over.engine / under.engine, theory), left_out=left_out)
+
+
+def _exact(value: float, theory: float = nan) -> Value:
+    return Value(value, value, value, theory)
+
+
+def _threshold(sources: Sources) -> tuple[Value, Value]:
     """Γc between the last drive that moved the walkers and the first that did not; ratios with the error of both."""
     sources.finished("fig2-threshold")
     ends = thresholds(sources.out / "fig2-threshold").sort_values("drive.frequency")
     low, high = ends["gamma0_at_rest"].to_numpy(), ends["gamma0_moving"].to_numpy()
     middle, case = (low + high) / 2.0, dimers.shipped()
     slow, fast = (float(ends["drive.frequency"].iloc[end]) for end in (0, -1))
-    predicted = [threshold(one) for f in (slow, fast) for one in dimers.driven(case, f, [published.GRAVITY])]
-    return {
-        "fig2_threshold": Value(float(middle.mean()), float(low.min()), float(high.max()), float(np.mean(predicted))),
-        "fig2_threshold_frequency": Value(
-            float(middle[-1] / middle[0]),
-            float(low[-1] / high[0]),
-            float(high[-1] / low[0]),
-            predicted[1] / predicted[0],
-        ),
-    }
+    first, last = (threshold(one) for f in (slow, fast) for one in dimers.driven(case, f, [published.GRAVITY]))
+    ratio = Value(float(middle[-1] / middle[0]), float(low[-1] / high[0]), float(high[-1] / low[0]), last / first)
+    return Value(float(middle.mean()), float(low.min()), float(high.max()), float(np.mean([first, last]))), ratio
 
 
-def _exact(value: float, theory: float = float("nan")) -> Value:
-    return Value(float(value), float(value), float(value), float(theory))
-
-
-def _mean(values: list[Value]) -> Value:
-    engine = [value.engine for value in values]
-    theory, left_out = float(np.mean([value.theory for value in values])), sum(value.left_out for value in values)
-    return Value(float(np.mean(engine)), min(engine), max(engine), theory, left_out)
-
-
-def _quotient(table: pd.DataFrame, case: Case, upper: tuple[float, float], lower: tuple[float, float]) -> Value:
-    """A ratio of two speeds, each at a frequency in Hz and an acceleration in g."""
-
-    def at(drive: tuple[float, float]) -> Value:
-        frequency, peak = drive[0], drive[1] * published.GRAVITY
-        rows = table[(table["frequency"] == frequency) & np.isclose(table["peak_acceleration"], peak)]
-        return _speed(rows, theory=_theory(dimers.driven(case, frequency, [peak])[0]))
-
-    over, under = at(upper), at(lower)
-    found = _exact(over.engine / under.engine, over.theory / under.theory)
-    return replace(found, left_out=over.left_out + under.left_out)
-
-
-def _fig3(sources: Sources) -> dict[str, Value]:
-    table, case = sources.finished("fig3"), dimers.shipped()
-    values = {}
-    for r1, r2 in published.FIG3_FIT:
-        radii = (r1 * 1e-3, r2 * 1e-3)
-        rows = table[np.isclose(table["radius_1"], radii[0]) & np.isclose(table["radius_2"], radii[1])]
-        values[f"fig3_{r1:g}_{r2:g}"] = _speed(rows, theory=_theory(dimers.of_radii(case, radii, 0.5)))
-    still = table[dimers.symmetric(table)]
-    values["fig3_symmetric"] = _speed_of_all(still, _theory(dimers.of_asymmetry(case, 0.0, 0.5)))
-    return values
-
-
-def _fig4(sources: Sources) -> dict[str, Value]:
-    values = {}
-    table = sources.finished("fig4")
-    for letter, peak in zip("ab", published.FIG4_PEAKS, strict=True):
-        motion = motion_of(load_case(f"fig4{letter}"))
-        rows = table[np.isclose(table["peak_acceleration"], peak * published.GRAVITY)]
-        values[f"fig4{letter}_gamma"] = _exact(rows["gamma0"].mean())
-        values[f"fig4{letter}_velocity"] = _speed(rows, theory=float(motion.velocity[0]) * 1e3)
-        # Where a contact opens the theory says nothing.
-        rotation, sliding = np.where(motion.opened[0], np.nan, [motion.rotation[0, 0], motion.sliding[0, 0]]) * 1e3
-        values[f"fig4{letter}_rotation"] = _speed(rows, "rotation_1", float(rotation))
-        values[f"fig4{letter}_sliding"] = _speed(rows, "sliding_1", float(sliding))
-    return values
-
-
-def _alignment(sources: Sources) -> dict[str, Value]:
+def _alignment(sources: Sources, *, symmetric: bool) -> Value:
     table = sources.finished("alignment")
-    values = {}
-    for name, chosen, worst in (
-        ("alignment_asymmetric", ~dimers.symmetric(table), np.max),
-        ("alignment_symmetric", dimers.symmetric(table), np.min),
-    ):
-        angles = [misalignment(run) for run in table["run"][chosen]]
-        if angles:
-            found = np.concatenate(angles)
-            values[name] = Value(float(worst(found)), float(found.min()), float(found.max()))
-    return values
+    runs = table["run"][dimers.symmetric(table) == symmetric]
+    if runs.empty:
+        return Value()
+    found = np.concatenate([misalignment(run) for run in runs])
+    return Value(float(found.min() if symmetric else found.max()), float(found.min()), float(found.max()))
 
 
-def _mathieu(_: Sources) -> dict[str, Value]:
-    nothing = float("nan")
-    return {
-        "mathieu": Value(nothing, nothing, nothing, max(one.v for one in paper_drives().values())),
-        "mathieu_stable": Value(nothing, nothing, nothing, largest_stable_v()),
-    }
+_OTHERS: Mapping[str, Callable[[Sources], Value]] = {
+    "fig2_threshold": lambda sources: _threshold(sources)[0],
+    "fig2_threshold_frequency": lambda sources: _threshold(sources)[1],
+    "alignment_asymmetric": partial(_alignment, symmetric=False),
+    "alignment_symmetric": partial(_alignment, symmetric=True),
+    "mathieu": lambda _: Value(theory=max(one.v for one in paper_drives().values())),
+    "mathieu_stable": lambda _: Value(theory=largest_stable_v()),
+}
 
 
 def count(rows: list[Row], *, measured: bool) -> tuple[int, int]:

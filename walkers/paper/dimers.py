@@ -10,7 +10,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive, Harmonic
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
-from walkers.paper.published import GRAVITY
+from walkers.paper.published import FIG4_PEAKS, GRAVITY, Point
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,6 +46,21 @@ def of_radii(case: Case, radii: tuple[float, float], gamma0: float) -> Case:
     """A case with other beads, radii in m, driven at a Γ0."""
     dimer = replace(case, walkers=(replace(case.walkers[0], radii=radii),))
     return replace(dimer, drive=case.drive.with_peak(dimer_of(dimer).peak_acceleration(gamma0)))
+
+
+def of_point(point: Point) -> Case:
+    """The shipped case at a point."""
+    if point.sweep == "fig4":
+        return load_case("fig4a" if point.peak == FIG4_PEAKS[0] else "fig4b")
+    if point.peak is None:
+        large, small = point.radii
+        return of_radii(shipped(), (large * 1e-3, small * 1e-3), 0.5)
+    return driven(shipped(), point.frequency, [point.peak * GRAVITY])[0]
+
+
+def gamma0(case: Case) -> float:
+    """Γ0 of a case."""
+    return dimer_of(case).gamma0(case.drive.peak_acceleration)
 
 
 def described(case: Case) -> str:

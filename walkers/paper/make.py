@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +11,7 @@ from typing import TYPE_CHECKING
 from walkers.inputs.errors import InputError, Problem
 from walkers.paper.alignment import fig_alignment
 from walkers.paper.climbing import fig_climbing, fig_zoo
-from walkers.paper.comparison import Row, as_dict, as_markdown, compare, count
+from walkers.paper.comparison import as_dict, as_markdown, compare, count
 from walkers.paper.modes import fig_modes
 from walkers.paper.rotation import fig4
 from walkers.paper.sensitivity import fig_sensitivity
@@ -25,9 +23,6 @@ from walkers.runner.files import write_text
 from walkers.sweeps.scheduler import Failure, Options
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
-
-    from joblib.externals.loky import ProcessPoolExecutor
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg")
@@ -121,6 +116,8 @@ def make_figures(  # noqa: PLR0913
     runner.EngineFailure
         If there is no engine, or its audit failed.
     """
+    import joblib
+
     usual = [name for name, drawing in FIGURES.items() if not drawing.only_asked]
     chosen = list(only) or [*usual, COMPARISON]
     for name in chosen:
@@ -131,46 +128,28 @@ def make_figures(  # noqa: PLR0913
         if folder.exists() and not folder.is_dir():
             raise InputError(option, [Problem("", None, f"expected a folder, {folder} is a file")])
     needed = {name: FIGURES[name].sweeps if name in FIGURES else COMPARED for name in chosen}
-    failures: dict[str, list[Failure]] = {}
-    drawn: dict[str, Future[list[Path] | str]] = {}
-    rows: Future[list[Row]] | None = None
-    with _drawers(options.workers) as drawers:
-        for sweep in dict.fromkeys(sweep for names in needed.values() for sweep in names):
-            failures |= make_sources(
-                [sweep], out, options, engine=engine, allow_failed_audit=allow_failed_audit, progress_of=progress_of
-            )[1]
-            for name in [name for name in chosen if name not in drawn and failures.keys() >= set(needed[name])]:
-                if name in FIGURES:
-                    drawn[name] = drawers.submit(draw_figure, name, out, to, formats)
-                elif rows is None:
-                    rows = drawers.submit(_compared, out)
-        outcomes = {name: drawn[name].result() for name in chosen if name in drawn}
-        compared = rows.result() if rows else []
+    sweeps = dict.fromkeys(sweep for names in needed.values() for sweep in names)
+    sources, failures = make_sources(
+        sweeps, out, options, engine=engine, allow_failed_audit=allow_failed_audit, progress_of=progress_of
+    )
+    figures = [name for name in chosen if name in FIGURES]
+    # Processes of loky do not import the caller's script, as those of `multiprocessing` do.
+    draw = joblib.Parallel(n_jobs=min(options.workers, len(figures) or 1))
+    outcomes = dict(
+        zip(figures, draw(joblib.delayed(draw_figure)(name, out, to, formats) for name in figures), strict=True)
+    )
     files = [path for outcome in outcomes.values() if isinstance(outcome, list) for path in outcome]
     left_out = {name: outcome for name, outcome in outcomes.items() if isinstance(outcome, str)}
     failed = {name: points for name, points in failures.items() if points}
     if COMPARISON not in chosen:
         return Made(files, failed, left_out)
+    compared = compare(sources)
     to.mkdir(parents=True, exist_ok=True)
     texts = {".md": as_markdown(compared), ".json": json.dumps(as_dict(compared), indent=2, ensure_ascii=False) + "\n"}
     for suffix, text in texts.items():
         files.append((to / COMPARISON).with_suffix(suffix))
         write_text(files[-1], text)
     return Made(files, failed, left_out, *count(compared, measured=True))
-
-
-@contextmanager
-def _drawers(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes that draw while engines run; they do not import the caller's script, as `multiprocessing`'s do."""
-    from joblib.externals.loky import ProcessPoolExecutor
-
-    drawers = ProcessPoolExecutor(workers, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))
-    try:
-        yield drawers
-    except BaseException:
-        drawers.shutdown(kill_workers=True)
-        raise
-    drawers.shutdown()
 
 
 def draw_figure(name: str, out: Path, to: Path, formats: Sequence[str] = FORMATS) -> list[Path] | str:
@@ -181,7 +160,3 @@ def draw_figure(name: str, out: Path, to: Path, formats: Sequence[str] = FORMATS
         return save_figure(drawing.draw(sources), to / name, runs, formats, drawing.title)
     except NothingFinishedError as missing:
         return str(missing)
-
-
-def _compared(out: Path) -> list[Row]:
-    return compare(Sources(out))

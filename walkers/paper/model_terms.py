@@ -14,38 +14,30 @@ from functools import cache
 from math import isfinite, nan
 from pathlib import Path
 from statistics import fmean
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from walkers.inputs import library
 from walkers.inputs.case import Case
-from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
-from walkers.paper import dimers, published
+from walkers.paper import dimers
+from walkers.paper.published import FITTED, Point, Published
 from walkers.runner.files import write_json, write_text
 from walkers.theory.friction import Friction
 from walkers.theory.motion import Walker, walk
 from walkers.theory.quasistatic import translation
 
 FloatArray = npt.NDArray[np.float64]
-_FREQUENCIES = (60.0, 90.0)
-_PEAKS = (0.5, 2.0, 3.0, 4.0, 5.0, 6.0, 10.0)
 _CYCLES = 40
 _DEVIATION = 0.15
+_FREQUENCIES = (60.0, 90.0)
 _HOPELESS = 30.0
 
 
-@dataclass(frozen=True)
-class Term:
-    """Something that the theory may have: parameters and their ranges.
-
-    Attributes
-    ----------
-    name
-        In words.
-    ranges
-        Parameter to lowest and highest value; ``log10_`` parameters are logarithms.
-    """
+class Term(NamedTuple):
+    """Something that the theory may have: parameters and their ranges; ``log10_`` parameters are logarithms."""
 
     name: str
     ranges: Mapping[str, tuple[float, float]]
@@ -87,46 +79,48 @@ NOTHING_ELSE = {
 """What leaves the paper's law alone, F∥ = κ v F, but integrated in time, with inertia."""
 
 
-@dataclass(frozen=True)
-class Target:
-    """A published number: a mean over walkers of `walkers_of_the_paper`, or its ratio to the mean over others.
+class Target(NamedTuple):
+    """A published number as the theory is fitted to it: m/s or a ratio, and its error in the same."""
 
-    Attributes
-    ----------
-    name
-        In words.
-    quantity
-        ``velocity``, ``rotation`` or ``sliding`` (both of the large bead).
-    of, over
-        Names of walkers.
-    value, deviation
-        m/s, or a ratio; `_DEVIATION` of the value where the paper gives no spread.
-    """
-
-    name: str
-    quantity: str
-    of: tuple[str, ...]
-    over: tuple[str, ...]
+    number: Published
     value: float
     deviation: float
+
+    @property
+    def name(self) -> str:
+        """Of the number."""
+        return self.number.fitted
+
+    def points(self) -> tuple[list[Point], list[Point]]:
+        """Walkers that it is a mean over, and those that it is a ratio to: at the ends of the range of frequencies."""
+        of, over = (
+            [one for one in points if one.frequency in _FREQUENCIES or len(points) == 1]
+            for points in (self.number.of, self.number.over)
+        )
+        return of, over
+
+
+def targets() -> list[Target]:
+    """The published numbers that tell of walkers on the axis."""
+    scales = [1.0 if number.over else 1e-3 for number in FITTED]
+    return [
+        Target(number, number.si, _DEVIATION * abs(number.si) if number.deviation is None else number.deviation * scale)
+        for number, scale in zip(FITTED, scales, strict=True)
+    ]
 
 
 @dataclass(frozen=True)
 class Fit:
-    """What an term gives at best.
+    """What terms give at best.
 
     Attributes
     ----------
-    name
-        Of the term.
-    parameters
-        The best ones.
+    name, parameters
+        Of the terms; the best parameters.
     values
         Target's name to what comes out (m/s, or a ratio); None where the forces have no solution.
-    met
-        How many of them lie within their deviations.
-    missed
-        The names of the others, the worst first.
+    met, missed
+        How many of them lie within their deviations; the names of the others, the worst first.
     misfit
         Σ ln(1 + r²), r in deviations.
     """
@@ -140,26 +134,17 @@ class Fit:
 
 
 @cache
-def walkers_of_the_paper() -> dict[str, Case]:
-    """The walkers of Figs. 2, 3 and 4a by name, as one would take them without a calibration (see `_bare`)."""
-    base = dimers.shipped()
-    found = {
-        f"{f:g} Hz, {peak:g} g": dimers.driven(base, f, [peak * published.GRAVITY])[0]
-        for f in _FREQUENCIES
-        for peak in _PEAKS
-    }
-    found |= {
-        f"{one:g}/{other:g} mm": dimers.of_radii(base, (one * 1e-3, other * 1e-3), 0.5)
-        for one, other in published.FIG3_FIT
-    }
-    found["4a"] = load_case("fig4a")  # in Fig. 4b contacts open in every cycle: that is beyond the theory
-    return {name: _bare(case) for name, case in found.items()}
+def walkers_of_the_paper() -> dict[Point, Case]:
+    """The walkers that the numbers are of, as one would take them without a calibration.
+
+    Of Fig. 4b there are none: there contacts open in every cycle, and that is beyond the theory.
+    """
+    points = [point for target in targets() for part in target.points() for point in part]
+    return {point: _bare(dimers.of_point(point)) for point in points}
 
 
 def _bare(case: Case) -> Case:
     """With perfectly wetting bridges of 1 % liquid, of its own viscosity."""
-    from walkers.inputs import library
-
     known = library.liquid(case.liquid.name or "")
     liquid = replace(
         case.liquid,
@@ -170,38 +155,8 @@ def _bare(case: Case) -> Case:
     return replace(case, liquid=liquid, contact=replace(case.contact, minimum_separation_ratio=0.01))
 
 
-def targets() -> list[Target]:
-    """The published numbers that tell of walkers on the axis."""
-
-    def speed(name: str, quantity: str, of: Sequence[str], value: float, deviation: float | None = None) -> Target:
-        return Target(name, quantity, tuple(of), (), value, deviation or _DEVIATION * abs(value))
-
-    def ratio(name: str, of: Sequence[str], over: Sequence[str], deviation: float) -> Target:
-        return Target(name, "velocity", tuple(of), tuple(over), 1.0, deviation)
-
-    def at(peak: float) -> list[str]:
-        return [f"{f:g} Hz, {peak:g} g" for f in _FREQUENCIES]
-
-    slow, fast = _FREQUENCIES
-    return [
-        *(speed(f"Fig. 2, {peak:g} g", "velocity", at(peak), value) for peak, value in published.FIT.items()),
-        ratio("Fig. 2, plateau", at(10.0), at(6.0), 0.2),
-        *(
-            ratio(f"Fig. 2, frequency at {peak:g} g", [f"{fast:g} Hz, {peak:g} g"], [f"{slow:g} Hz, {peak:g} g"], 0.15)
-            for peak in (4.0, 6.0)
-        ),
-        speed("Fig. 2, rest at 0.5 g", "velocity", at(0.5), 0.0, 2e-5),
-        *(
-            speed(f"Fig. 3, {one:g}/{other:g} mm", "velocity", [f"{one:g}/{other:g} mm"], value)
-            for (one, other), value in published.FIG3_FIT.items()
-        ),
-        speed("Fig. 4a, velocity", "velocity", ["4a"], published.FIG4_VELOCITY[0]),
-        speed("Fig. 4a, sliding", "sliding", ["4a"], 0.0, 3e-4),
-    ]
-
-
-def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
-    """What walkers of the paper do, m/s, by quantity and name; NaN where the forces have no solution.
+def speeds(parameters: Mapping[str, float]) -> dict[str, dict[Point, float]]:
+    """What walkers of the paper do, m/s, by quantity and point; NaN where the forces have no solution.
 
     Parameters
     ----------
@@ -212,7 +167,7 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
     walkers = _walkers()
     known = {**dict.fromkeys(("wall_bridge_factor", "bead_bridge_factor", "static_ratio"), 1.0), **parameters}
     scale = np.array([[known["wall_bridge_factor"]]] * 2 + [[known["bead_bridge_factor"]]])
-    on_slide = np.array([name.startswith("4") for name in cases])
+    on_slide = np.array([point.sweep == "fig4" for point in cases])
     wall = np.where(on_slide, known["friction_slide"], known["friction_wall"])
     dry = Friction.coulomb(wall, np.full(len(cases), known["friction_bead"]))
     kinetic = np.asarray(dry.kinetic)
@@ -233,7 +188,7 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[str, float]]:
     # Contacts that would open for a moment are let be: the engine's walkers hop there and walk on.
     sliding = np.where(motion.solved, motion.sliding, np.nan)
     velocity = translation(sliding)
-    columns = {"velocity": velocity, "rotation": velocity - sliding[0], "sliding": sliding[0]}
+    columns = {"velocity": velocity, "rotation_1": velocity - sliding[0], "sliding_1": sliding[0]}
     return {name: dict(zip(cases, map(float, values), strict=True)) for name, values in columns.items()}
 
 
@@ -248,10 +203,10 @@ def values_of(parameters: Mapping[str, float], wanted: Sequence[Target]) -> dict
     found = speeds(parameters)
     values = {}
     for target in wanted:
-        value = fmean(found[target.quantity][name] for name in target.of)
-        if target.over:
-            below = fmean(found[target.quantity][name] for name in target.over)
-            value = value / below if below else nan
+        above, below = ([found[target.number.quantity][one] for one in points] for points in target.points())
+        value = fmean(above)
+        if below:
+            value = value / fmean(below) if fmean(below) else nan
         values[target.name] = value
     return values
 
@@ -335,10 +290,16 @@ def write_model_terms(fits: Sequence[Fit], to: Path) -> list[Path]:
     """Write ``model_terms.json`` and ``model_terms.md``."""
     to.mkdir(parents=True, exist_ok=True)
     write_json(
-        to / "model_terms.json", {"targets": [asdict(one) for one in targets()], "fits": [asdict(one) for one in fits]}
+        to / "model_terms.json", {"targets": [_told(one) for one in targets()], "fits": [asdict(one) for one in fits]}
     )
     write_text(to / "model_terms.md", as_markdown(fits))
     return [to / "model_terms.json", to / "model_terms.md"]
+
+
+def _told(target: Target) -> dict[str, object]:
+    of, over = ([point.name for point in points] for points in target.points())
+    told = {"name": target.name, "quantity": target.number.quantity.removesuffix("_1"), "of": of, "over": over}
+    return told | {"value": target.value, "deviation": target.deviation}
 
 
 def as_markdown(fits: Sequence[Fit]) -> str:

@@ -1,36 +1,43 @@
-"""What the paper publishes of the walker as numbers: in its text and captions (the points of its figures are not)."""
+"""What the paper publishes of the walker as numbers: ``published.toml``, and of which walkers each is."""
 
 from __future__ import annotations
 
+import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
 
 GRAVITY = 9.8
 """The paper's g, m/s²."""
-FIT = {2.0: 0.30e-3, 3.0: 0.68e-3, 4.0: 1.23e-3, 5.0: 1.98e-3, 6.0: 2.96e-3}
-"""Fig. 2: the paper's fitted curve below the plateau, m/s, at peak accelerations in g."""
-FIG3_FIT = {
-    (0.25, 0.2): 1.11e-3,
-    (0.4, 0.3): 1.47e-3,
-    (0.3, 0.2): 2.20e-3,
-    (0.35, 0.2): 3.42e-3,
-    (0.4, 0.2): 4.88e-3,
-}
-"""Fig. 3: the same curve at Γ0 = 0.5, m/s, by the radii in mm."""
 PLATEAU = 6.0
 """Peak acceleration in g at which the plateau of Fig. 2 begins; Γ0 ≈ 0.6."""
 FIG4_PEAKS = (2.0, 10.0)
 """Fig. 4a and b: peak acceleration, g."""
-FIG4_VELOCITY = (2.3e-3, 8.0e-3)
-"""Fig. 4a and b: mean velocity, m/s."""
-FIG4B_ROTATION, FIG4B_SLIDING = 13.3e-3, -5.3e-3
-"""Fig. 4b: mean rotation and sliding velocity of the large bead, m/s."""
-LARGEST_V, STABLE_V = 0.4, 0.45
-"""|V| of all that the paper investigated is below 0.4; small angles stay small up to 0.45."""
+
+
+class Point(NamedTuple):
+    """A walker of the paper's: the sweep that has it, its radii (mm), its frequency (Hz) and peak acceleration (g).
+
+    Where no acceleration is given Γ0 is 0.5.
+    """
+
+    sweep: str
+    radii: tuple[float, float]
+    frequency: float
+    peak: float | None
+
+    @property
+    def name(self) -> str:
+        """What the walker differs from others of its figure in."""
+        if self.sweep == "fig4":
+            return f"4{'ab'[FIG4_PEAKS.index(self.peak or 0.0)]}"
+        return "{:g}/{:g} mm".format(*self.radii) if self.peak is None else f"{self.frequency:g} Hz, {self.peak:g} g"
 
 
 @dataclass(frozen=True)
 class Published:
-    """A published number.
+    """A published number, and of what it is one.
 
     Attributes
     ----------
@@ -44,131 +51,75 @@ class Published:
     unit
         Shown with it.
     bounds
-        Between which a value is what the paper says, if it says so: the rounding of its digits is none.
+        Between which a value is what the paper says, if it says so: the rounding of its digits (0.735, of which Γ0 =
+        0.74 is made, is on its edge) is none. Those of angles are ours.
     depends_on
-        A sentence: what a disagreement of the engine depends on, as the sensitivity study and
-        docs/explanation/physics.md find.
+        A sentence: what a disagreement of the engine depends on.
     measured
         Whether it tests the engine: Γ0 and Mathieu's V follow from beads and drive alone.
+    of, over
+        The number is a mean over walkers, or its ratio to one over others, pair by pair.
+    quantity
+        Of these: ``velocity``, ``rotation_1`` or ``sliding_1`` of those that walk; ``gamma0``; ``velocity_of_all``,
+        whichever way they turn. Empty where `walkers.paper.comparison` has a function for the number.
+    fitted
+        What it is called among those that the theory is fitted to (`walkers.paper.model_terms`), if it is one.
+    deviation
+        Its error there, in ``unit``; a share of it if None.
+    compared
+        Whether it is one of the comparison.
     """
 
     key: str
     what: str
-    value: float | None
+    value: float | None = None
     unit: str = "mm/s"
     bounds: tuple[float, float] | None = None
     depends_on: str = ""
     measured: bool = True
+    of: tuple[Point, ...] = ()
+    over: tuple[Point, ...] = ()
+    quantity: str = ""
+    fitted: str = ""
+    deviation: float | None = None
+    compared: bool = True
+
+    @property
+    def si(self) -> float:
+        """The value in SI units, to the digits that it was published with."""
+        return float(f"{self.value or 0.0}e-3") if self.unit == "mm/s" else self.value or 0.0
 
 
-def _in_mm(speed: float) -> float:
-    """A published speed, m/s, in mm/s with the digits that it was published with."""
-    return round(speed * 1e3, 6)
+def _points(given: Mapping[str, Any]) -> tuple[Point, ...]:
+    large, small = given["radii"]
+    return tuple(Point(given["sweep"], (large, small), one, given.get("peak")) for one in given["frequencies"])
 
 
-_SPEED = (
-    "Speeds depend on friction and on the tangential drag of the bridges, which are calibrated to all of these numbers "
-    "at once."
-)
-_ASYMMETRY = (
-    "With Coulomb friction and the bridges' drag speeds grow less with the asymmetry, in every set of the calibration "
-    "that gives Fig. 2. The published curve is quasi-static: the paper's own law integrated in time gives 3.9 mm/s for "
-    "4.88."
-)
-_FIG4A = (
-    "It depends on the frictions of the slide and between the beads: with less of the latter the walker is slower, and "
-    "with less of the former the large bead slides."
-)
-_FIG4B = (
-    "Its beads part in every cycle and come together again. With less viscous bridges the large bead rotates and "
-    "slides less: 8.2 and -1.1 mm/s with the liquid's own viscosity, at the same velocity of the walker."
-)
-_THRESHOLD = "The threshold depends on friction alone: it is 0.7 to 0.85 times the coefficient."
-_TURNED = (
-    "Dimers turn into or across the axis within two seconds or three; whether they do depends on friction, rolling "
-    "friction and viscosity."
-)
+def _read(given: Mapping[str, Any], reasons: Mapping[str, str]) -> Published:
+    points = {name: _points(given[name]) for name in ("of", "over") if name in given}
+    bounds = {"bounds": tuple(given["bounds"])} if "bounds" in given else {}
+    return Published(**{**given, **points, **bounds, "depends_on": reasons.get(given.get("depends_on", ""), "")})
 
-# Bounds of Γ0 are the rounding of the published digits (0.735, of which 0.74 is made, is on its edge), those of angles
-# are ours.
-NUMBERS = (
-    *(
-        Published(f"fig2_{g:g}g", f"Fig. 2, fit at {g:g} g, 60 to 90 Hz", _in_mm(v), depends_on=_SPEED)
-        for g, v in FIT.items()
-    ),
-    *(
-        Published(
-            f"fig2_gamma_{g:g}g", f"Fig. 2, Γ0 at {g:g} g", value, "", (value - 5e-4, value + 5e-4), measured=False
-        )
-        for g, value in ((2.0, 0.191), (3.0, 0.286), (4.0, 0.381), (5.0, 0.476), (6.0, 0.572))
-    ),
-    Published(
-        "fig2_frequency",
-        "Fig. 2, v(90 Hz)/v(60 Hz) at 6 g: no significant dependence",
-        1.0,
-        "",
-        depends_on="Where friction alone limits sliding, speeds go as 1/f; in theory a tangential drag ten times the "
-        "bridges' nominal one removes eight tenths of that.",
-    ),
-    Published(
-        "fig2_plateau",
-        "Fig. 2, v(10 g)/v(6 g): a plateau from Γ0 ≈ 0.6 on",
-        1.0,
-        "",
-        depends_on="It levels off from 7 g on, in the engine and in theory, where the large bead begins to slide. "
-        "More drag or more liquid brings the ratio to 6 g within the bounds, too.",
-    ),
-    Published(
-        "fig2_threshold",
-        "Fig. 2, inset: Γc, in words: a threshold, below the least drive of the fit",
-        None,
-        "",
-        (0.0, 0.191),
-        depends_on=_THRESHOLD,
-    ),
-    Published(
-        "fig2_threshold_frequency",
-        "Fig. 2, inset: Γc(90 Hz)/Γc(60 Hz): independent within its uncertainties",
-        1.0,
-        "",
-        depends_on=_THRESHOLD,
-    ),
-    *(
-        Published(f"fig3_{r1:g}_{r2:g}", f"Fig. 3, fit for R = {r1:g}/{r2:g} mm", _in_mm(v), depends_on=_ASYMMETRY)
-        for (r1, r2), v in FIG3_FIT.items()
-    ),
-    Published("fig3_symmetric", "Fig. 3, a symmetric dimer does not walk", 0.0, depends_on=_TURNED),
-    Published("fig4a_gamma", "Fig. 4a, Γ0", 0.74, "", (0.7345, 0.745), measured=False),
-    Published(
-        "fig4a_velocity",
-        "Fig. 4a, velocity",
-        _in_mm(FIG4_VELOCITY[0]),
-        depends_on=_FIG4A,
-    ),
-    Published("fig4a_sliding", "Fig. 4a, large bead's mean sliding: hardly any", 0.0, depends_on=_FIG4A),
-    Published("fig4b_gamma", "Fig. 4b, Γ0", 3.5, "", (3.45, 3.55), measured=False),
-    Published("fig4b_velocity", "Fig. 4b, velocity", _in_mm(FIG4_VELOCITY[1]), depends_on=_FIG4B),
-    Published(
-        "fig4b_rotation", "Fig. 4b, large bead's mean rotation velocity", _in_mm(FIG4B_ROTATION), depends_on=_FIG4B
-    ),
-    Published("fig4b_sliding", "Fig. 4b, large bead's mean sliding velocity", _in_mm(FIG4B_SLIDING), depends_on=_FIG4B),
-    Published(
-        "alignment_asymmetric",
-        "Asymmetric dimers align with the shaking axis: largest angle to it at the end",
-        0.0,
-        "°",
-        (-10.0, 10.0),
-        _TURNED,
-    ),
-    Published(
-        "alignment_symmetric",
-        "Symmetric dimers align across it: smallest angle to the axis at the end",
-        90.0,
-        "°",
-        (80.0, 90.0),
-        _TURNED,
-    ),
-    Published("mathieu", "Largest V of the paper's drives, at most", LARGEST_V, "", (0.0, LARGEST_V), measured=False),
-    Published("mathieu_stable", "V up to which small angles stay small", STABLE_V, "", (0.445, 0.455), measured=False),
+
+_FILE = tomllib.loads(Path(__file__).with_name("published.toml").read_text("utf-8"))
+NUMBERS = tuple(_read(given, _FILE["reasons"]) for given in _FILE["numbers"])
+"""Every number that the paper publishes of walkers, and others that follow from what it says."""
+COMPARED = tuple(number for number in NUMBERS if number.compared)
+_KEYS = {number.key: number for number in NUMBERS}
+FIT = {float(g): _KEYS[f"fig2_{g}g"].si for g in range(2, 7)}
+"""Fig. 2: the paper's fitted curve below the plateau, m/s, at peak accelerations in g."""
+FIG3_FIT = {one.of[0].radii: one.si for one in NUMBERS if one.key.startswith("fig3_") and one.value}
+"""Fig. 3: the same curve at Γ0 = 0.5, m/s, by the radii in mm."""
+FIG4_VELOCITY = (_KEYS["fig4a_velocity"].si, _KEYS["fig4b_velocity"].si)
+"""Fig. 4a and b: mean velocity, m/s."""
+FIG4B_ROTATION = _KEYS["fig4b_rotation"].si
+"""Fig. 4b: mean rotation velocity of the large bead, m/s."""
+LARGEST_V = _KEYS["mathieu"].si
+"""|V| of all that the paper investigated is below; small angles stay small up to 0.45."""
+_FITTED = (
+    *(f"fig2_{g}g" for g in range(2, 7)),
+    *("fig2_plateau", "fig2_frequency_4g", "fig2_frequency", "fig2_rest"),
+    *(number.key for number in NUMBERS if number.fitted and number.key.startswith(("fig3", "fig4"))),
 )
-"""Every number that the paper publishes of walkers."""
+FITTED = tuple(_KEYS[key] for key in _FITTED)
+"""Those that the theory is fitted to: of walkers on the axis whose contacts stay closed."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -32,33 +31,7 @@ PARAMETERS = {
 }
 """What is varied, and the column that says so (the friction of bead on bead goes with that of bead on wall)."""
 _TOGETHER = "uncalibrated"
-
-
-@dataclass(frozen=True)
-class Observation:
-    """Something that the paper observes, as a number of a set of parameters.
-
-    Attributes
-    ----------
-    name
-        With its unit.
-    value
-        From the table of one set, a row an experiment, indexed by (mm of R1, Hz, g, start in degrees).
-    published
-        The paper's.
-    """
-
-    name: str
-    value: Callable[[pd.DataFrame], float]
-    published: float
-
-
-def _ratio(upper: tuple[float, ...], lower: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
-    return lambda table: steady_speed(table["run"][upper]) / steady_speed(table["run"][lower])
-
-
-def _speed(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
-    return lambda table: steady_speed(table["run"][of]) * 1e3
+_EXPERIMENT = ["dimers.radii[0]", "drive.frequency", "drive.peak_acceleration", "dimers.angle"]
 
 
 def steady_speed(run: str | Path) -> float:
@@ -74,28 +47,51 @@ def misalignment(run: str | Path) -> np.ndarray[tuple[int], np.dtype[np.float64]
     return angles
 
 
-def _angle(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
-    return lambda table: float(misalignment(table["run"][of]).max())
+def _astray(run: str | Path) -> float:
+    """Share of walkers that are off the axis in the end, per cent."""
+    return 100.0 * float((~on_axis(read_table(run, "walkers"))).mean())
 
 
-def _astray(of: tuple[float, ...]) -> Callable[[pd.DataFrame], float]:
-    def share(table: pd.DataFrame) -> float:
-        ends = read_table(table["run"][of], "walkers")
-        return 100.0 * float((~on_axis(ends)).mean())
+_MEASURES: Mapping[str, Callable[[str], float]] = {
+    "mm/s": lambda run: steady_speed(run) * 1e3,
+    "%": _astray,
+    "°": lambda run: float(misalignment(run).max()),
+}
 
-    return share
+
+class Observation(NamedTuple):
+    """Something that the paper observes, as a number of a set of parameters.
+
+    Attributes
+    ----------
+    name
+        With its unit.
+    published
+        The paper's.
+    unit
+        That says what is measured (`_MEASURES`).
+    of, over
+        Of which experiment, as R1 (mm), frequency (Hz), peak acceleration (g) and start (degrees); and of which the
+        ratio to it is taken.
+    """
+
+    name: str
+    published: float
+    unit: str
+    of: tuple[float, ...]
+    over: tuple[float, ...] | None = None
 
 
-_STRONG = (0.3, 60.0, 10.0, 0.0)
+_STRONG, _SIX = (0.3, 60.0, 10.0, 0.0), (0.3, 60.0, 6.0, 0.0)
 OBSERVATIONS = (
-    Observation("Fig. 2: v at 80 Hz, 4 g (mm/s)", _speed((0.3, 80.0, 4.0, 0.0)), published.FIT[4.0] * 1e3),
+    Observation("Fig. 2: v at 80 Hz, 4 g (mm/s)", published.FIT[4.0] * 1e3, "mm/s", (0.3, 80.0, 4.0, 0.0)),
     Observation(
-        "Fig. 3: v for 0.4/0.2 mm (mm/s)", _speed((0.4, 80.0, 3.0612, 0.0)), published.FIG3_FIT[0.4, 0.2] * 1e3
+        "Fig. 3: v for 0.4/0.2 mm (mm/s)", published.FIG3_FIT[0.4, 0.2] * 1e3, "mm/s", (0.4, 80.0, 3.0612, 0.0)
     ),
-    Observation("Fig. 2: v(90 Hz)/v(60 Hz) at 6 g", _ratio((0.3, 90.0, 6.0, 0.0), (0.3, 60.0, 6.0, 0.0)), 1.0),
-    Observation("plateau: v(10 g)/v(6 g) at 60 Hz", _ratio(_STRONG, (0.3, 60.0, 6.0, 0.0)), 1.0),
-    Observation("walkers astray at 60 Hz, 10 g (%)", _astray(_STRONG), 0.0),
-    Observation("angle after a start at 60° (°)", _angle((0.3, 80.0, 4.0, 60.0)), 0.0),
+    Observation("Fig. 2: v(90 Hz)/v(60 Hz) at 6 g", 1.0, "mm/s", (0.3, 90.0, 6.0, 0.0), _SIX),
+    Observation("plateau: v(10 g)/v(6 g) at 60 Hz", 1.0, "mm/s", _STRONG, _SIX),
+    Observation("walkers astray at 60 Hz, 10 g (%)", 0.0, "%", _STRONG),
+    Observation("angle after a start at 60° (°)", 0.0, "°", (0.3, 80.0, 4.0, 60.0)),
 )
 
 
@@ -119,27 +115,18 @@ def sensitivities(sources: Sources) -> pd.DataFrame:
         changed = [name for name, key in PARAMETERS.items() if group[key].iloc[0] != shipped[key]]
         name = changed[0] if len(changed) == 1 else _TOGETHER if changed else "shipped"
         value = values[keys.index(PARAMETERS[name])] if name in PARAMETERS else np.nan
-        experiments = group.set_index(
-            pd.MultiIndex.from_arrays(
-                [
-                    group["dimers.radii[0]"],
-                    group["drive.frequency"],
-                    group["drive.peak_acceleration"],
-                    group["dimers.angle"],
-                ]
-            )
-        )
-        experiments = experiments[experiments["status"] == "finished"]
-        found = {one.name: _value(one, experiments) for one in OBSERVATIONS}
+        runs = group[group["status"] == "finished"].set_index(_EXPERIMENT)["run"]
+        found = {one.name: _value(one, runs) for one in OBSERVATIONS}
         rows.append({"parameter": name, "value": value, **found})
     return pd.DataFrame(rows)
 
 
-def _value(observation: Observation, experiments: pd.DataFrame) -> float:
+def _value(observation: Observation, runs: pd.Series[str]) -> float:
     try:
-        return observation.value(experiments)
+        values = [_MEASURES[observation.unit](runs[one]) for one in (observation.of, observation.over) if one]
     except KeyError:  # a run that it needs is missing
         return np.nan
+    return values[0] / values[1] if observation.over else values[0]
 
 
 _NO_RANGE = 1e-6

@@ -8,8 +8,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from walkers.inputs.errors import WalkersError
 from walkers.inputs.sweep import load_sweep
+from walkers.paper.published import GRAVITY, Point
 from walkers.postprocess.motion import Group, read_motion
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Failure, Options, SweepProgress
@@ -60,6 +63,15 @@ class Sources:
         if done.empty:
             raise NothingFinishedError(f"no point of the sweep {sweep} is finished")
         return done
+
+    def rows(self, point: Point) -> pd.DataFrame:
+        """The row of a sweep that is a point of the paper's; none if it is not finished."""
+        table = self.finished(point.sweep)
+        radii = np.isclose(table[["radius_1", "radius_2"]] * 1e3, point.radii).all(axis=1)
+        driven = np.isclose(table["frequency"], point.frequency)
+        if point.peak is not None:
+            driven &= np.isclose(table["peak_acceleration"], point.peak * GRAVITY)
+        return table[radii & driven]
 
     def runs(self, *sweeps: str) -> list[str]:
         """Names of the finished runs of sweeps."""

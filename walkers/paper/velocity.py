@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -42,7 +42,15 @@ def fig2(sources: Sources) -> Figure:
     for number, frequency in enumerate(sorted(table["frequency"].unique())):
         rows_there = table[table["frequency"] == frequency]
         colour, dashes = f"C{number}", _DASHES[number % len(_DASHES)]
-        _points(engine, rows_there, MARKERS[frequency], colour, frequency)
+        look = {
+            "fmt": MARKERS[frequency],
+            "color": colour,
+            "ms": 4,
+            "lw": 0.7,
+            "mew": 0.8,
+            "label": f"{frequency:g} Hz",
+        }
+        _points(engine, rows_there["peak_acceleration"] / published.GRAVITY, rows_there, **look)
         cases = dimers.driven(case, frequency, peaks)
         engine.plot(peaks / published.GRAVITY, motion_of(*cases).velocity * 1e3, ls=dashes, color=colour, lw=0.9)
         slippery = motion_of(*cases, viscous=False).velocity * 1e3
@@ -78,21 +86,10 @@ def _limits(speeds: Sequence[float]) -> tuple[float, float]:
     return low - 0.04 * (high - low), high + 0.1 * (high - low)
 
 
-def _points(axes: Axes, rows: pd.DataFrame, marker: str, colour: str, frequency: object) -> None:
+def _points(axes: Axes, x: pd.Series[float], rows: pd.DataFrame, **look: Any) -> None:
     """Means with bars from the smallest to the largest of the walkers, as in the paper."""
     mean, low, high = (rows[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
-    axes.errorbar(
-        rows["peak_acceleration"] / published.GRAVITY,
-        mean,
-        yerr=[mean - low, high - mean],
-        fmt=marker,
-        color=colour,
-        ms=4,
-        lw=0.7,
-        mfc="none",
-        mew=0.8,
-        label=f"{frequency:g} Hz",
-    )
+    axes.errorbar(x, mean, yerr=[mean - low, high - mean], mfc="none", **look)
 
 
 def _threshold(axes: Axes, sources: Sources) -> None:
@@ -140,10 +137,7 @@ def fig3(sources: Sources) -> Figure:
         ms=6,
         label="Coulomb friction, bridges, these beads",
     )
-    mean, low, high = (table[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
-    axes.errorbar(
-        table["sin_delta"], mean, yerr=[mean - low, high - mean], fmt="s", color="C2", ms=5, mfc="none", label="engine"
-    )
+    _points(axes, table["sin_delta"], table, fmt="s", color="C2", ms=5, label="engine")
     _name_pairs(axes, table)
     _mark_end(axes, gamma0)
     axes.set(

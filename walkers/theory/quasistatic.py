@@ -172,21 +172,3 @@ def mean_velocity(
         sides.append(translation(np.moveaxis(sliding, -1, 0)))
     mean: FloatArray = (sides[0] + sides[1]) / 2.0
     return mean
-
-
-def mean_velocity_closed_form(
-    gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike, friction: float = FRICTION_OF_THE_PAPER
-) -> FloatArray:
-    """The paper's closed form of `mean_velocity` (the equation with h1 and h2).
-
-    Parameters and result as there; beyond `detachment` it has poles and is NaN here.
-    """
-    gamma, s = np.broadcast_arrays(np.asarray(gamma0, np.float64), np.asarray(sin_delta, np.float64))
-    mu, c = mass_asymmetry(s), np.sqrt(1.0 - s**2)
-    square = gamma**2
-    first = c**3 * (1.0 + mu * s)
-    first /= (c**2 * (1.0 + s**2) - square / 8.0 * (1.0 + mu * s) ** 2) ** 2 - (2.0 * c**2 * s) ** 2
-    second = 4.0 * c * (1.0 + s**2)
-    second /= (c**6 - square / 2.0 * (mu + s) ** 2) * (1.0 + 3.0 * s**2)
-    velocity: FloatArray = square * s / (4.0 * friction) * (first + second)
-    return np.where(_QUASISTATIC * gamma < detachment(s).gamma, velocity, np.nan)
