@@ -25,17 +25,7 @@ _OF_ALL = ("orientation_end", "separated_fraction")
 
 @dataclass(frozen=True)
 class Side:
-    """One of two that are compared.
-
-    Attributes
-    ----------
-    name
-        What it is called.
-    case
-        Its case.
-    directory
-        Of its finished run; None if there is none.
-    """
+    """One of two that are compared: its name, its case, and the directory of its finished run if there is one."""
 
     name: str
     case: Case

@@ -43,10 +43,8 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
 
     Parameters
     ----------
-    layout
-        From `walkers.sweeps.figure_layout.layout_of`.
-    drawn
-        From `walkers.sweeps.figure_layout.drawn_column`, of the same rows.
+    layout, drawn
+        From `walkers.sweeps.figure_layout.layout_of` and `drawn_column` there, of the same rows.
     title
         Of the figure.
     log

@@ -29,10 +29,8 @@ class SweepComparison:
 
     Attributes
     ----------
-    names
-        Of the sweeps.
-    keys
-        What varies in both, with its unit.
+    names, keys
+        Of the sweeps; what varies in both, with its unit.
     points
         The values of the keys, and the column of both sweeps.
     unmatched
