@@ -19,8 +19,8 @@ from walkers.inputs.readable import differing, flattened
 from walkers.runner.directory import MANIFEST_NAME, finished_places
 from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import locked
+from walkers.sweeps.comparison import _matched
 from walkers.sweeps.listing import bytes_text
-from walkers.sweeps.matching import _matched
 
 STEP = ["run.time_step", "run.steps_per_cycle"]
 OTHER, FASTER = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}

@@ -16,8 +16,7 @@ Y = Annotated[str | None, typer.Option("--y", help="Of sweeps: a column; velocit
 def command(first: RunOrSweep, second: RunOrSweep, out: Out = DEFAULT_OUT, y: Y = None, as_json: Json = False) -> None:
     """Print by what two runs or cases differ, in parameters and results; or two sweeps, point by point."""
     from walkers.pipeline import find_side, find_sweep
-    from walkers.sweeps.comparison import Comparison, compare_runs
-    from walkers.sweeps.matching import SweepComparison, compare_sweeps
+    from walkers.sweeps.comparison import Comparison, SweepComparison, compare_runs, compare_sweeps
 
     sweeps = [find_sweep(one, out) for one in (first, second)]
     found: Comparison | SweepComparison

@@ -229,10 +229,8 @@ def _sweep(path: Path, runs: Sequence[Entry], now: float) -> Entry | None:
 
 
 def _status_of(points: Mapping[str, int]) -> str:
-    for found, status in (("running", "running"), ("missing", "interrupted"), ("failed", "failed")):
-        if points.get(found):
-            return status
-    return "finished"
+    statuses = {"running": "running", "missing": "interrupted", "failed": "failed"}
+    return next((status for found, status in statuses.items() if points.get(found)), "finished")
 
 
 def select(

@@ -136,6 +136,8 @@ def read_record(directory: str | Path) -> SweepRecord:
     InputError
         If it is none.
     """
+    from walkers.inputs.sweep import Descent
+
     given, directory = directory, Path(directory).resolve()
     try:
         contents = read_json(directory / RECORD_NAME)
@@ -148,7 +150,7 @@ def read_record(directory: str | Path) -> SweepRecord:
             values=[point["values"] for point in points],
             derived=[point["derived"] for point in points],
             runs=[point["run"] for point in points],
-            descent=_descent(contents["descent"]),
+            descent=Descent(**contents["descent"]) if contents["descent"] else None,
             analyses=contents["analyses"],
             file=contents.get("file", {}),
         )
@@ -157,14 +159,6 @@ def read_record(directory: str | Path) -> SweepRecord:
         raise InputError(str(given), [Problem("", None, told)]) from error
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(str(given), [Problem("", None, f"{RECORD_NAME} cannot be read ({error})")]) from error
-
-
-def _descent(known: Mapping[str, Any] | None) -> Descent | None:
-    if not known:
-        return None
-    from walkers.inputs.sweep import Descent
-
-    return Descent(**known)
 
 
 @dataclass(frozen=True)
