@@ -76,13 +76,10 @@ def test_every_point_travels_once_and_cores_finish_together(sweep: str, workers:
 
 
 def test_sharing_a_deck_is_cheaper_than_a_deck_each() -> None:
+    """More cores part the decks further."""
     cases = _numbered(*(make_case(run={**STEP, "seed": seed}) for seed in range(48)))
     alone = sum(deck.seconds for number, case in cases.items() for deck in pack({number: case}, 1))
     assert sum(deck.seconds for deck in pack(cases, 2)) < 0.35 * alone
-
-
-def test_more_cores_than_decks_part_them_further() -> None:
-    cases = _numbered(*(make_case(run={**STEP, "seed": seed}) for seed in range(48)))
     assert len(pack(cases, 2)) < len(pack(cases, 16))
 
 
