@@ -39,7 +39,7 @@ def test_walkers_of_an_ensemble_move_as_they_do_alone(trajectory: Callable[..., 
     assert walk(together).velocity[0] == pytest.approx(walk(alone).velocity[0], rel=1e-6)
 
 
-def test_replicates_are_perturbed_and_face_both_ways(trajectory: Callable[..., Group], ensemble: Case) -> None:
+def test_replicates_are_perturbed_and_keep_their_distance(trajectory: Callable[..., Group], ensemble: Case) -> None:
     moved = trajectory(ensemble)
     assert [walker.facing for walker in moved.walkers] == [1, -1, 1, -1, 1, -1]
     angles = [walker.start_angle for walker in moved.walkers]
@@ -49,6 +49,9 @@ def test_replicates_are_perturbed_and_face_both_ways(trajectory: Callable[..., G
     overlaps = moved.radii[0] - moved.position[0, :, 0, 2]
     assert len(set(overlaps)) == 6
     assert np.all(overlaps > 0.0)
+    centre = moved.mass_centre[..., :2]
+    first, second = np.triu_indices(6, 1)
+    assert np.linalg.norm(centre[:, first] - centre[:, second], axis=-1).min() > 0.5 * ensemble.walkers[0].spacing
 
 
 def test_another_seed_starts_otherwise_and_the_same_seed_alike(ensemble: Case) -> None:
@@ -57,13 +60,6 @@ def test_another_seed_starts_otherwise_and_the_same_seed_alike(ensemble: Case) -
 
     assert start(1) == start(1)
     assert not set(start(1)) & set(start(2))
-
-
-def test_walkers_keep_their_distance(trajectory: Callable[..., Group], ensemble: Case) -> None:
-    moved = trajectory(ensemble)
-    centre = moved.mass_centre[..., :2]
-    first, second = np.triu_indices(6, 1)
-    assert np.linalg.norm(centre[:, first] - centre[:, second], axis=-1).min() > 0.5 * ensemble.walkers[0].spacing
 
 
 def test_a_rerun_is_bitwise_the_same(tmp_path: Path, ensemble: Case) -> None:

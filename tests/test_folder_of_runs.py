@@ -19,10 +19,11 @@ from walkers.inputs.readable import differing, flattened
 from walkers.runner.directory import MANIFEST_NAME, finished_places
 from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import locked
+from walkers.sweeps.comparison import _matched
 from walkers.sweeps.listing import bytes_text
-from walkers.sweeps.matching import _matched
 
 STEP = ["run.time_step", "run.steps_per_cycle"]
+OTHER, FASTER = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}
 SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
 
 
@@ -148,24 +149,27 @@ def test_what_follows_from_another_value_is_no_difference() -> None:
     assert "run.time_step" in differing([cases[0], step])
 
 
-def test_what_a_case_gives_is_a_difference_whatever_else_differs() -> None:
-    def between(*changes: dict[str, Any]) -> list[str]:
-        return differing([flattened(walkers.load_case("fig1b", one).as_dict()) for one in changes])
-
-    other, faster = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}
-    assert between({}, {**faster, "run.time_step": "2 us"}) == ["drive.frequency", *STEP]
-    same = {"run.time_step": "2 us"}
-    assert between(same, {**faster, **same}) == ["drive.frequency"], "fitted into another cycle"
-    assert "run.until_steady" in between({}, {**faster, "run.cycles": 60})
-    assert set(between({}, {**other, "liquid.viscosity_ratio": 1.0})) == {"liquid.name", "liquid.viscosity_ratio"}
-    given = {**other, "liquid.kinematic_viscosity": "20 mm^2/s"}
-    assert set(between({}, given)) == {"liquid.name", "liquid.dynamic_viscosity"}
-    assert set(between({}, {**other, "liquid.surface_tension": "30 mN/m"})) == {"liquid.name", "liquid.surface_tension"}
+@pytest.mark.parametrize(
+    ("first", "second", "differ"),
+    [
+        ({}, {**FASTER, "run.time_step": "2 us"}, {"drive.frequency", *STEP}),
+        ({"run.time_step": "2 us"}, {**FASTER, "run.time_step": "2 us"}, {"drive.frequency"}),
+        ({}, {**OTHER, "liquid.viscosity_ratio": 1.0}, {"liquid.name", "liquid.viscosity_ratio"}),
+        ({}, {**OTHER, "liquid.kinematic_viscosity": "20 mm^2/s"}, {"liquid.name", "liquid.dynamic_viscosity"}),
+        ({}, {**OTHER, "liquid.surface_tension": "30 mN/m"}, {"liquid.name", "liquid.surface_tension"}),
+    ],
+)
+def test_what_a_case_gives_is_a_difference_whatever_else_differs(
+    first: dict[str, Any], second: dict[str, Any], differ: set[str]
+) -> None:
+    cases = [flattened(walkers.load_case("fig1b", one).as_dict()) for one in (first, second)]
+    assert set(differing(cases)) == differ
+    cases[1] = flattened(walkers.load_case("fig1b", {**FASTER, "run.cycles": 60}).as_dict())
+    assert "run.until_steady" in differing(cases)
 
 
 def test_products_of_viscosity_are_called_so_where_nothing_was_recorded() -> None:
-    case = {**walkers.load_case("fig1b").as_dict(), "recorded": []}
-    flat = flattened(case)
+    flat = flattened({**walkers.load_case("fig1b").as_dict(), "recorded": []})
     assert flat["liquid.bridge_viscosity"] == pytest.approx(4.6e-3 * 19.0)
     assert "liquid.dynamic_viscosity" not in flat
 
@@ -239,13 +243,8 @@ def test_clean_removes_leftovers_alone(out: Path) -> None:
         assert (refused.returncode, "no terminal" in refused.stderr) == (2, True)
         assert failed.exists()
         call("clean", "--yes", check=True)
-        assert [path.exists() for path in (failed, interrupted, held, stale, theirs)] == [
-            False,
-            False,
-            True,
-            False,
-            True,
-        ]
+        assert not any(path.exists() for path in (failed, interrupted, stale))
+        assert all(path.exists() for path in (held, theirs))
     assert finished_places(out) == before
     assert "nothing to remove" in call("clean", "--case", "other", check=True).stdout
 

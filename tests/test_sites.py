@@ -84,18 +84,13 @@ def test_what_parsl_is_told(tmp_path: Path) -> None:
     assert site.workers == 2 * 16 * 4
     (executor,) = pilots(site, tmp_path / "parsl").executors
     provider = executor.provider
-    assert (provider.partition, provider.account, provider.walltime, provider.qos) == (
-        "main",
-        "granular",
-        "02:00:00",
-        "long",
-    )
-    assert (provider.nodes_per_block, provider.cores_per_node, provider.max_blocks) == (2, 16, 4)
+    told = {"partition": "main", "account": "granular", "walltime": "02:00:00", "qos": "long", "exclusive": False}
+    told |= {"nodes_per_block": 2, "cores_per_node": 16, "max_blocks": 4}
+    assert {name: getattr(provider, name) for name in told} == told
     assert type(provider.launcher).__name__ == "SrunLauncher"
     assert provider.worker_init.splitlines()[:2] == ["module load openmpi", "ulimit -c 0"]
     assert (executor.max_workers_per_node, executor.heartbeat_period, executor.encrypted) == (16, 7, True)
     assert executor.worker_port_range == (54000, 54100)
-    assert not provider.exclusive
 
 
 # Of the last one SLURM makes something else: jobs end at once whose output goes to a folder that is not there.
@@ -122,10 +117,16 @@ def test_texts_that_a_shell_would_take_for_more_are_refused_or_quoted(in_folder:
 
 
 def test_workers_of_another_process_give_the_same(in_folder: Path) -> None:
-    """Parsl's local provider: pilots without a scheduler."""
+    """Parsl's local provider: pilots without a scheduler, in a container.
+
+    A script in place of ``apptainer exec IMAGE`` starts what starts the engines.
+    """
     (in_folder / "base.toml").write_text(to_toml(document(run=TINY)))
     (in_folder / "test.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
-    (in_folder / "site.toml").write_text('scheduler = "local"\ncores = 2\n[executor]\naddress = "127.0.0.1"\n')
+    (in_folder / "apptainer").write_text(f'#!/bin/sh\necho "$@" >> {in_folder}/called\nshift 2\nexec "$@"\n')
+    (in_folder / "apptainer").chmod(0o755)
+    site = f'scheduler = "local"\ncores = 2\ncontainer = "{in_folder}/apptainer exec walkers.sif"\n'
+    (in_folder / "site.toml").write_text(site + '[executor]\naddress = "127.0.0.1"\n')
     there = [PROGRAM, "sweep", "test.toml", "--out", "there", "--site", "site.toml"]
     program = subprocess.Popen(there, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     call("sweep", "test.toml", "--out", "here", "-j", "2", check=True)  # meanwhile
@@ -133,21 +134,6 @@ def test_workers_of_another_process_give_the_same(in_folder: Path) -> None:
     assert program.returncode == 0, errors
     assert contents_of(in_folder / "here") == contents_of(in_folder / "there")
     assert set(load(in_folder / "there" / "test")["status"]) == {"finished"}
-
-
-def test_workers_in_a_container(in_folder: Path) -> None:
-    """A script in place of ``apptainer exec IMAGE`` starts what starts the engines."""
-    (in_folder / "base.toml").write_text(to_toml(document(run=TINY)))
-    (in_folder / "test.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
-    (in_folder / "apptainer").write_text(f'#!/bin/sh\necho "$@" >> {in_folder}/called\nshift 2\nexec "$@"\n')
-    (in_folder / "apptainer").chmod(0o755)
-    site = f'scheduler = "local"\ncores = 2\ncontainer = "{in_folder}/apptainer exec walkers.sif"\n'
-    (in_folder / "site.toml").write_text(site + '[executor]\naddress = "127.0.0.1"\n')
-    program = subprocess.run(
-        [PROGRAM, "sweep", "test.toml", "--site", "site.toml"], capture_output=True, text=True, check=False
-    )
-    assert program.returncode == 0, program.stderr
-    assert set(load(in_folder / "runs" / "test")["status"]) == {"finished"}
     assert (in_folder / "called").read_text().startswith("exec walkers.sif process_worker_pool.py ")
 
 

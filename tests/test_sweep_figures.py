@@ -189,13 +189,13 @@ def test_points_that_are_not_finished_are_left_out_and_counted(looked_through: P
         walkers.sweep_figure(out / "grid")
 
 
-@pytest.mark.parametrize(("suffix", "begin"), [(".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")])
-def test_plot_writes_what_the_suffix_says(looked_through: Path, tmp_path: Path, suffix: str, begin: bytes) -> None:
-    to = tmp_path / f"figure{suffix}"
-    done = call("plot", "grid", "--out", str(looked_through), "--to", str(to), check=True)
-    assert (done.stdout, done.stderr) == (f"{to}\n", "")
-    assert to.read_bytes().startswith(begin)
-    assert list(tmp_path.iterdir()) == [to]
+def test_plot_writes_what_the_suffix_says(looked_through: Path, tmp_path: Path) -> None:
+    for suffix, begin in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
+        to = tmp_path / f"figure{suffix}"
+        done = call("plot", "grid", "--out", str(looked_through), "--to", str(to), check=True)
+        assert (done.stdout, done.stderr) == (f"{to}\n", "")
+        assert to.read_bytes().startswith(begin)
+    assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_plot_tells_runs_from_sweeps(looked_through: Path, tmp_path: Path) -> None:

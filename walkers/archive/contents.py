@@ -52,19 +52,7 @@ _TEXT = (".lig", ".txt", ".log")
 
 @dataclass(frozen=True)
 class Item:
-    """A file of an archive.
-
-    Attributes
-    ----------
-    place
-        Its path in the archive.
-    source
-        Where it is, or what is to be in it.
-    sha256
-        Of its contents, if that is known already.
-    told
-        Its role and meaning, where its name does not say them.
-    """
+    """A file of an archive: path there, source or contents, SHA-256 if known, role and meaning if its name has none."""
 
     place: str
     source: Path | bytes
@@ -109,19 +97,7 @@ def _told(name: str) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class PackedRun:
-    """A run as it goes into an archive.
-
-    Attributes
-    ----------
-    directory
-        Where it is.
-    place
-        Where it goes, a folder of the archive.
-    manifest
-        As in the archive: it names what was left out.
-    items
-        Its files.
-    """
+    """A run as it goes into an archive: from where, to which folder, the manifest as it is there, and the files."""
 
     directory: Path
     place: str
@@ -140,21 +116,7 @@ class PackedRun:
 
 @dataclass(frozen=True)
 class Contents:
-    """All that goes into an archive.
-
-    Attributes
-    ----------
-    name
-        Of the run or sweep.
-    title
-        For people.
-    runs
-        Its run directories.
-    sweep
-        Files of the sweep itself.
-    record
-        The sweep, None of a single run.
-    """
+    """All that goes into an archive: name and title, runs, and of a sweep its own files and its record."""
 
     name: str
     title: str

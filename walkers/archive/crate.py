@@ -6,6 +6,7 @@ the deck (this program), from the deck to the dumps (the engine), from the dumps
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -67,7 +68,8 @@ def describe_crate(
     people = [_person(crate, author) for author in authors]
     if people:
         root["author"] = people
-    _preview(crate)
+    about = {"@type": "CreativeWork", "name": "What this is, for people", "encodingFormat": "text/html"}
+    _entity(crate, PREVIEW_NAME, {**about, "about": {"@id": "./"}})
     described = _Described(crate, sums, people)
     for item in contents.sweep:
         described.file(item)
@@ -121,11 +123,6 @@ def _entity(crate: ROCrate, identifier: str, properties: Mapping[str, Any]) -> E
 def _person(crate: ROCrate, author: Author) -> Entity:
     identifier = f"https://orcid.org/{author.orcid}" if author.orcid else f"#{quote(author.name)}"
     return _entity(crate, identifier, {"@type": "Person", "name": author.name})
-
-
-def _preview(crate: ROCrate) -> None:
-    properties = {"@type": "CreativeWork", "name": "What this is, for people", "about": {"@id": "./"}}
-    _entity(crate, PREVIEW_NAME, {**properties, "encodingFormat": "text/html"})
 
 
 def _moment(iso: str) -> str:
@@ -240,46 +237,30 @@ class _Described:
 
     def engine(self, manifest: Mapping[str, Any]) -> Entity:
         """LIGGGHTS, by its binary."""
-        engine = manifest["engine"]
-        properties = {
-            "@type": "SoftwareApplication",
-            "name": "LIGGGHTS",
-            "softwareVersion": engine["version"],
-            "url": ENGINE_HOME,
-            "sha256": engine["sha256"],
-            "description": "Discrete element method. The SHA-256 is over those of the executable and its libliggghts.",
-        }
-        return _entity(self.crate, f"{ENGINE_HOME}#{engine['sha256'][:12]}", properties)
+        version, sha256 = manifest["engine"]["version"], manifest["engine"]["sha256"]
+        told = "Discrete element method. The SHA-256 is over those of the executable and its libliggghts."
+        more = {"url": ENGINE_HOME, "sha256": sha256, "description": told}
+        return self._software(f"{ENGINE_HOME}#{sha256[:12]}", "LIGGGHTS", version, **more)
 
     def program(self, made_by: Mapping[str, Any]) -> Entity:
         """Our own, with Python and the packages, as a manifest names them."""
-        version, commit = made_by["granular_walkers"], made_by.get("commit")
+        version, commit, python = made_by["granular_walkers"], made_by.get("commit"), made_by.get("python")
         packages = dict(made_by.get("packages", {}))
-        needed = [self._package(name, version) for name, version in packages.items()]
-        if python := made_by.get("python"):
-            properties = {"@type": "SoftwareApplication", "name": "Python", "softwareVersion": python}
-            needed.append(
-                _entity(
-                    self.crate, f"https://www.python.org/#{python}", {**properties, "url": "https://www.python.org/"}
-                )
-            )
-        properties = {
-            "@type": "SoftwareApplication",
-            "name": PROJECT,
-            "softwareVersion": f"{version}, commit {commit}" if commit else version,
-            "description": "Cases, decks, runs and analyses of wet granular walkers.",
-            **({"softwareRequirements": needed} if needed else {}),
-        }
+        homes = {name: f"https://pypi.org/project/{name}/{one}/" for name, one in packages.items()}
+        needed = [self._software(home, name, packages[name], url=home) for name, home in homes.items()]
+        if python:
+            home = "https://www.python.org/"
+            needed.append(self._software(f"{home}#{python}", "Python", python, url=home))
         identity = json.dumps([version, commit, python, packages], sort_keys=True)
-        return _entity(self.crate, f"#{PROJECT}-{_short(identity)}", properties)
+        more = {"softwareRequirements": needed} if needed else {}
+        return self._software(
+            f"#{PROJECT}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}",
+            PROJECT,
+            f"{version}, commit {commit}" if commit else version,
+            description="Cases, decks, runs and analyses of wet granular walkers.",
+            **more,
+        )
 
-    def _package(self, name: str, version: str) -> Entity:
-        home = f"https://pypi.org/project/{name}/{version}/"
-        properties = {"@type": "SoftwareApplication", "name": name, "softwareVersion": version, "url": home}
-        return _entity(self.crate, home, properties)
-
-
-def _short(identity: str) -> str:
-    import hashlib
-
-    return hashlib.sha256(identity.encode()).hexdigest()[:8]
+    def _software(self, identifier: str, name: str, version: str, **more: Any) -> Entity:
+        properties = {"@type": "SoftwareApplication", "name": name, "softwareVersion": version, **more}
+        return _entity(self.crate, identifier, properties)

@@ -345,8 +345,7 @@ def compare(
 ) -> None:
     """Print by what two runs or cases differ, in parameters and results; or two sweeps, point by point."""
     from walkers.pipeline import find_side, find_sweep
-    from walkers.sweeps.comparison import Comparison, compare_runs
-    from walkers.sweeps.matching import SweepComparison, compare_sweeps
+    from walkers.sweeps.comparison import Comparison, SweepComparison, compare_runs, compare_sweeps
 
     sweeps = [find_sweep(one, out) for one in (first, second)]
     found: Comparison | SweepComparison

@@ -200,18 +200,7 @@ def _place(lock: Path) -> Path:
 
 
 def clean(cleaning: Cleaning) -> dict[Path, str]:
-    """Remove what was planned.
-
-    Parameters
-    ----------
-    cleaning
-        From `plan_cleaning`.
-
-    Returns
-    -------
-    dict
-        What is still there, and why: a process has begun to make it meanwhile, or the system refused.
-    """
+    """Remove what `plan_cleaning` named; what is still there, and why: somebody makes it now, or the system refused."""
     left = {}
     for entry in cleaning.remove:
         with locked([] if entry.is_sweep else [entry.place]) as ours:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from walkers.inputs.axes import flatten, is_axis
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
@@ -52,6 +55,10 @@ class Factor:
         """The label without the unit and without what else varies with it."""
         first = self.label.partition("\n")[0]
         return first.removesuffix(f" ({self.unit})") if self.unit else first
+
+    def where(self, level: Any) -> npt.NDArray[np.bool_]:
+        """Which of the points have a level."""
+        return np.array([value == level for value in self.values], dtype=bool)
 
     def told(self, level: Any) -> str:
         """A level as text, with its unit."""

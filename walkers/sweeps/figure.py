@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import ceil
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ import numpy.typing as npt
 from walkers.inputs.errors import InputError, Problem
 from walkers.postprocess.drawing import letter_panels, new_figure, plain_text, styled
 from walkers.sweeps.factors import SEEDS, Factor
-from walkers.sweeps.figure_layout import Drawn, FloatArray, Layout
+from walkers.sweeps.figure_layout import Drawn, Layout
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,9 +29,8 @@ _MOST_COLOURS = 12
 _ASIDE = 0.12
 """How far symbols of different colours stand aside of their category."""
 _FEW_TICKS = 6
-_SHORT_TICK = 5
 _LEAST_APART = 0.08
-"""Ticks are at the values of x if these are few, short, and this share of the axis apart."""
+"""Ticks are at the values of x if these are few, and this share of the axis apart."""
 _MARGIN = 0.06
 """Of the range along y, above and below."""
 _LONG_NAMES = 40
@@ -45,10 +43,8 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
 
     Parameters
     ----------
-    layout
-        From `walkers.sweeps.figure_layout.layout_of`.
-    drawn
-        From `walkers.sweeps.figure_layout.drawn_column`, of the same rows.
+    layout, drawn
+        From `walkers.sweeps.figure_layout.layout_of` and `drawn_column` there, of the same rows.
     title
         Of the figure.
     log
@@ -89,12 +85,11 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
 
 def _parts(layout: Layout) -> list[tuple[Factor, npt.NDArray[np.bool_], str]]:
     """What each panel has along x, which rows it shows, and its name."""
-    if layout.panels is None:
+    panels = layout.panels
+    if panels is None:
         return [(x, np.ones(len(x.values), dtype=bool), "") for x in layout.x]
-    panels, name = layout.panels, layout.panels.name
-    values = np.array(panels.values, dtype=object)
-    told = [f"{name} = {panels.told(level)}" if panels.is_number else panels.told(level) for level in panels.levels]
-    return [(layout.x[0], values == level, text) for level, text in zip(panels.levels, told, strict=True)]
+    names = [f"{panels.name} = {panels.told(one)}" if panels.is_number else panels.told(one) for one in panels.levels]
+    return [(layout.x[0], panels.where(level), name) for level, name in zip(panels.levels, names, strict=True)]
 
 
 class _Colours:
@@ -112,12 +107,6 @@ class _Colours:
         shades = colormaps["viridis" if is_number else "turbo"](np.linspace(0.0, 0.92, len(levels)))
         self.colours = [f"C{place}" if len(levels) <= _FEW_COLOURS else shade for place, shade in enumerate(shades)]
 
-    def rows(self, place: int) -> npt.NDArray[np.bool_] | bool:
-        """Which rows are of a level."""
-        if self.factor is None or self.norm:
-            return True
-        return np.array([value == self.levels[place] for value in self.factor.values], dtype=bool)
-
     def look(self, place: int) -> dict[str, Any]:
         """Options of the symbols of a level."""
         colour = self.colours[place]
@@ -126,43 +115,33 @@ class _Colours:
 
 
 def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, colours: _Colours) -> None:
-    places, count = _places(x), len(colours.levels)
-    for place in range(count):
-        rows = np.flatnonzero(here & colours.rows(place))
+    """Means with their errors, joined by lines unless a theory's are there, and the theory's values."""
+    places, count = (
+        np.array(x.values if x.is_number else [x.levels.index(one) for one in x.values], float),
+        len(colours.levels),
+    )
+    for place, level in enumerate(colours.levels):
+        rows = np.flatnonzero(here & (True if colours.factor is None or colours.norm else colours.factor.where(level)))
         rows = rows[np.argsort(places[rows], kind="stable")]
-        aside = 0.0 if x.is_number else (place - (count - 1) / 2.0) * min(_ASIDE, 0.6 / count)
+        along = places[rows] + (0.0 if x.is_number else (place - (count - 1) / 2.0) * min(_ASIDE, 0.6 / count))
         is_course = x.is_number and not x.is_sample and x.keys[0] not in SEEDS
         joined = is_course and len(set(places[rows])) == len(rows) > 1
-        _symbols(axes, places[rows] + aside, drawn, rows, colours, (place, joined))
+        y, errors = drawn.values[rows], drawn.errors[rows]
+        bars: Any = errors if np.isfinite(errors).any() else None
+        if colours.norm is not None and colours.factor is not None:
+            axes.errorbar(along, y, yerr=bars, fmt="none", ecolor="0.6", lw=0.8, zorder=1)
+            tints = np.array(colours.factor.values, dtype=float)[rows]
+            axes.scatter(along, y, c=tints, cmap=colours.map, norm=colours.norm, s=18, zorder=2)
+        else:
+            line = "-" if joined and not drawn.theory else "none"
+            axes.errorbar(along, y, yerr=bars, capsize=2, lw=0.9, ls=line, **colours.look(place))
         for number, values in enumerate(drawn.theory.values()):
             tint = "0.3" if colours.norm else colours.colours[place]
-            axes.plot(places[rows] + aside, values[rows], zorder=1, **_model_look(number, joined, tint))
+            axes.plot(along, values[rows], zorder=1, **_model_look(number, joined, tint))
     if np.nanmin(drawn.values) <= 0.0 <= np.nanmax(drawn.values):
         axes.axhline(0.0, color="0.4", lw=0.6, zorder=0)
     if not x.is_number:
         _name_categories(axes, x)
-
-
-def _places(x: Factor) -> FloatArray:
-    """Where points are along x."""
-    number = {level: place for place, level in enumerate(x.levels)}
-    return np.array([value if x.is_number else number[value] for value in x.values], dtype=np.float64)
-
-
-def _symbols(
-    axes: Axes, x: FloatArray, drawn: Drawn, rows: npt.NDArray[np.int64], colours: _Colours, how: tuple[int, bool]
-) -> None:
-    """Means with their errors, joined by lines unless a theory's are there."""
-    place, joined = how
-    y, errors = drawn.values[rows], drawn.errors[rows]
-    bars: Any = errors if np.isfinite(errors).any() else None
-    if colours.norm is not None and colours.factor is not None:
-        axes.errorbar(x, y, yerr=bars, fmt="none", ecolor="0.6", lw=0.8, zorder=1)
-        tints = np.array(colours.factor.values, dtype=float)[rows]
-        axes.scatter(x, y, c=tints, cmap=colours.map, norm=colours.norm, s=18, zorder=2)
-        return
-    line = "-" if joined and not drawn.theory else "none"
-    axes.errorbar(x, y, yerr=bars, capsize=2, lw=0.9, ls=line, **colours.look(place))
 
 
 def _model_look(number: int, joined: bool, colour: Any) -> dict[str, Any]:
@@ -171,12 +150,10 @@ def _model_look(number: int, joined: bool, colour: Any) -> dict[str, Any]:
 
 
 def _name_categories(axes: Axes, x: Factor) -> None:
-    axes.set_xticks(range(len(x.levels)), [plain_text(level) for level in x.levels])
+    aslant = sum(map(len, x.levels)) > _LONG_NAMES
+    look: dict[str, Any] = {"rotation": 35, "ha": "right", "rotation_mode": "anchor"} if aslant else {}
+    axes.set_xticks(range(len(x.levels)), [plain_text(level) for level in x.levels], **look)
     axes.set_xlim(-0.6, len(x.levels) - 0.4)
-    if sum(len(level) for level in x.levels) > _LONG_NAMES:
-        axes.tick_params(axis="x", labelrotation=35)
-        for label in axes.get_xticklabels():
-            label.set(ha="right", rotation_mode="anchor")
 
 
 def _scale(axes: Axes, x: Factor, log: str) -> None:
@@ -185,17 +162,14 @@ def _scale(axes: Axes, x: Factor, log: str) -> None:
 
     if "x" in log:
         axes.set_xscale("log")
-    if x.is_number and _can_be_ticks(x.levels):
-        axes.set_xticks(x.levels, [f"{level:g}" for level in x.levels])
+    if not x.is_number:
+        return
+    apart = np.diff(x.levels) > _LEAST_APART * (x.levels[-1] - x.levels[0])
+    if len(x.levels) <= _FEW_TICKS and apart.all():
+        axes.set_xticks(x.levels, [f"{level:.4g}" for level in x.levels])
         axes.set_xticks([], minor=True)
-    elif x.is_number and "x" not in log and all(float(level).is_integer() for level in x.levels):
+    elif "x" not in log and all(float(level).is_integer() for level in x.levels):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-
-
-def _can_be_ticks(levels: Sequence[float]) -> bool:
-    if len(levels) > _FEW_TICKS or max(len(f"{level:g}") for level in levels) > _SHORT_TICK:
-        return False
-    return len(levels) < 2 or bool(min(np.diff(levels)) > _LEAST_APART * (levels[-1] - levels[0]))
 
 
 def _limits(axes: Axes, drawn: Drawn, log: str) -> None:

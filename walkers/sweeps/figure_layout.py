@@ -33,17 +33,7 @@ _MOST_PANELS = 12
 
 @dataclass(frozen=True)
 class Layout:
-    """What is drawn where.
-
-    Attributes
-    ----------
-    x
-        One for each panel if points were sampled, else one.
-    hue, panels
-        What colours and panels tell apart, if anything.
-    untold
-        Names of what varies and is not told apart.
-    """
+    """What is drawn along x (samples have a panel for each), in colours, in panels; names of what is not told apart."""
 
     x: Sequence[Factor]
     hue: Factor | None
@@ -53,17 +43,7 @@ class Layout:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What of a table is drawn: a column in readable units, its errors, and the theory's values of it.
-
-    Attributes
-    ----------
-    label
-        Of the axis.
-    values, errors : ndarray, shape (N,)
-        Of each row.
-    theory
-        From what a model is called to its values.
-    """
+    """A column of a table in readable units, its errors, and what models predict, row by row; the axis's label."""
 
     label: str
     values: FloatArray

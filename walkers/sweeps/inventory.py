@@ -10,7 +10,6 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +28,6 @@ from walkers.runner.directory import (
 from walkers.runner.files import read_json
 from walkers.runner.locks import is_locked
 from walkers.runner.manifest import MANIFEST_NAME, check_unchanged
-from walkers.sweeps.columns import velocity_in
 from walkers.sweeps.record import RECORD_NAME, read_record, states
 
 STATUSES = ("finished", "running", "interrupted", "failed")
@@ -214,7 +212,7 @@ def _sweep(path: Path, runs: Sequence[Entry], now: float) -> Entry | None:
         record = read_record(path)
     except InputError:
         return None
-    points = Counter(state.status for state in states(record, _velocity))
+    points = Counter(state.status for state in states(record))
     named = set(record.runs)
     values = {key: {str(row[number]) for row in record.values} for number, key in enumerate(record.units)}
     return Entry(
@@ -231,17 +229,8 @@ def _sweep(path: Path, runs: Sequence[Entry], now: float) -> Entry | None:
 
 
 def _status_of(points: Mapping[str, int]) -> str:
-    for found, status in (("running", "running"), ("missing", "interrupted"), ("failed", "failed")):
-        if points.get(found):
-            return status
-    return "finished"
-
-
-def _velocity(directory: Path) -> float:
-    try:
-        return velocity_in(read_json(directory / RESULT_NAME))
-    except (OSError, ValueError, KeyError, TypeError):
-        return nan
+    statuses = {"running": "running", "missing": "interrupted", "failed": "failed"}
+    return next((status for found, status in statuses.items() if points.get(found)), "finished")
 
 
 def select(

@@ -33,25 +33,17 @@ def varied(runs: Sequence[Entry]) -> dict[str, list[str]]:
 def as_json(entries: Sequence[Entry]) -> list[dict[str, Any]]:
     """Entries as JSON objects, SI units; ``varies`` has, of a run, the values by which runs of its case differ."""
     keys = varied([entry for entry in entries if not entry.is_sweep])
+    common = ("name", "case", "status", "age", "size")
+    of_runs = ("reason", "message", "velocity", "standard_error", "climbs")
     rows = []
     for entry in entries:
-        row: dict[str, Any] = {
-            "kind": "sweep" if entry.is_sweep else "run",
-            "name": entry.name,
-            "case": entry.case,
-            "status": entry.status,
-            "directory": str(entry.directory),
-            "age": entry.age,
-            "size": entry.size,
-        }
+        told: dict[str, Any] = {name: getattr(entry, name) for name in common}
         if entry.is_sweep:
-            row |= {"varies": dict(entry.parameters), "points": dict(entry.points or {}), "runs": list(entry.runs)}
+            told |= {"varies": dict(entry.parameters), "points": dict(entry.points or {}), "runs": list(entry.runs)}
         else:
-            row["varies"] = {key: entry.parameters.get(key) for key in keys[entry.case]}
-            row |= {
-                name: getattr(entry, name) for name in ("reason", "message", "velocity", "standard_error", "climbs")
-            }
-        rows.append(row)
+            told |= {"varies": {key: entry.parameters.get(key) for key in keys[entry.case]}}
+            told |= {name: getattr(entry, name) for name in of_runs}
+        rows.append({"kind": "sweep" if entry.is_sweep else "run", "directory": str(entry.directory), **told})
     return rows
 
 

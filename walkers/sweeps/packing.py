@@ -36,7 +36,7 @@ class PlannedDeck:
 
 
 def pack(cases: Mapping[int, Case], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
-    """Pack points into decks.
+    """Pack points into decks, longest first: the order in which they are to be started.
 
     Parameters
     ----------
@@ -46,11 +46,6 @@ def pack(cases: Mapping[int, Case], workers: int, longest_seconds: float = LONGE
         How many decks run at once.
     longest_seconds
         Predicted time that no deck of several points may exceed.
-
-    Returns
-    -------
-    list of PlannedDeck
-        Longest first, the order in which they are to be started.
     """
     groups: dict[Hashable, list[int]] = {}
     for number, case in cases.items():

@@ -6,7 +6,8 @@ being made is read from them and from nowhere else.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
@@ -15,10 +16,12 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.axes import plain
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.postprocess.analysis import RESULT_NAME, current_result
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, finished_run, run_place, unfinished
 from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import is_locked
+from walkers.runner.manifest import check_unchanged
 from walkers.sweeps.columns import analyses_of_all, derived_columns, derived_of, result_columns, velocity_in
 
 if TYPE_CHECKING:
@@ -133,6 +136,8 @@ def read_record(directory: str | Path) -> SweepRecord:
     InputError
         If it is none.
     """
+    from walkers.inputs.sweep import Descent
+
     given, directory = directory, Path(directory).resolve()
     try:
         contents = read_json(directory / RECORD_NAME)
@@ -145,7 +150,7 @@ def read_record(directory: str | Path) -> SweepRecord:
             values=[point["values"] for point in points],
             derived=[point["derived"] for point in points],
             runs=[point["run"] for point in points],
-            descent=_descent(contents["descent"]),
+            descent=Descent(**contents["descent"]) if contents["descent"] else None,
             analyses=contents["analyses"],
             file=contents.get("file", {}),
         )
@@ -154,14 +159,6 @@ def read_record(directory: str | Path) -> SweepRecord:
         raise InputError(str(given), [Problem("", None, told)]) from error
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(str(given), [Problem("", None, f"{RECORD_NAME} cannot be read ({error})")]) from error
-
-
-def _descent(known: Mapping[str, Any] | None) -> Descent | None:
-    if not known:
-        return None
-    from walkers.inputs.sweep import Descent
-
-    return Descent(**known)
 
 
 @dataclass(frozen=True)
@@ -185,16 +182,8 @@ class PointState:
     lost: int = 0
 
 
-def states(record: SweepRecord, velocity: Callable[[Path], float] | None = None) -> list[PointState]:
-    """What has become of each point, as the run directories say.
-
-    Parameters
-    ----------
-    record
-        The sweep.
-    velocity
-        What gives the mean velocity (m/s) of a finished run, by which descents end; `velocity_of` if left out.
-    """
+def states(record: SweepRecord) -> list[PointState]:
+    """What has become of each point, as the run directories say."""
     found = [_state(record.out / run) for run in record.runs]
     if record.descent is None:
         return found
@@ -205,7 +194,7 @@ def states(record: SweepRecord, velocity: Callable[[Path], float] | None = None)
                 found[number] = PointState("not needed")
             directory = found[number].directory
             if found[number].status == "finished" and directory is not None:
-                stopped = record.descent.at_rest((velocity or velocity_of)(directory))
+                stopped = record.descent.at_rest(velocity_of(directory))
     return found
 
 
@@ -231,10 +220,13 @@ def chains(record: SweepRecord) -> list[list[int]]:
 
 
 def velocity_of(directory: Path) -> float:
-    """Mean velocity of a finished run, m/s; NaN if its files are damaged."""
+    """Mean velocity of a finished run, m/s, as its result says, of whatever version; NaN if its files are damaged."""
     try:
-        return velocity_in(result_in(directory))
-    except DamagedRunError:
+        check_unchanged(directory, [RESULT_NAME])
+        return velocity_in(read_json(directory / RESULT_NAME))
+    except (OSError, ValueError, KeyError, TypeError):
+        with suppress(DamagedRunError):
+            return velocity_in(result_in(directory))
         return nan
 
 
@@ -251,8 +243,6 @@ def result_in(directory: Path) -> dict[str, Any]:
         If it can neither be read nor be made anew from the dumps.
     """
     try:
-        from walkers.postprocess.analysis import current_result
-
         return current_result(directory)
     except (OSError, ValueError, KeyError, TypeError, IndexError, WalkersError) as error:
         raise DamagedRunError(f"{directory} is damaged ({error}): delete it to have it made again") from error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import cycle
 from math import isfinite
@@ -59,12 +59,11 @@ class Cell:
 
 @dataclass(frozen=True)
 class Multiple:
-    """A small picture of a run: lines in its own units, what it is of, and whether the whole run can be opened."""
+    """A small picture of a run: what it is of, and its lines in its own units, with their colours."""
 
     point: int
     name: str
     lines: list[tuple[str, str]]
-    opens: bool
 
 
 def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARGEST) -> Path:
@@ -100,7 +99,7 @@ def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARG
     in_order = _spread_out(list(finished))
     plot = _overview(frame, record)
     carried = {} if plot is None else {"plots-sweep": packed_plots(plot)}
-    pictures = _Pictures({number: _curves(finished[number]) for number in in_order[:_MOST_MULTIPLES]}, frame, record)
+    curves = {number: _curves(finished[number]) for number in in_order[:_MOST_MULTIPLES]}
     head, cells = _table(frame, record)
     values: dict[str, Any] = {
         "title": record.title or record.name,
@@ -109,8 +108,9 @@ def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARG
         "rows": cells,
         "points": frame["point"].tolist(),
         "has_plot": plot is not None,
+        "multiples": _multiples(curves, frame, record),
     }
-    bare = fill("sweep.html.j2", "walkers.sweeps", runs={}, multiples=pictures.told({}), **values)
+    bare = fill("sweep.html.j2", "walkers.sweeps", runs={}, **values)
     room = largest - overhead() - len(bare.encode()) - sum(map(len, carried.values()))
     runs: dict[int, RunReport] = {}
     for number in in_order:
@@ -121,8 +121,8 @@ def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARG
         room -= needed
         runs[number] = run
         carried |= run.carried
-    told = {"runs": dict(sorted(runs.items())), "multiples": pictures.told(runs)}
-    return write_page(path, values["title"], fill("sweep.html.j2", "walkers.sweeps", **told, **values), carried)
+    body = fill("sweep.html.j2", "walkers.sweeps", runs=dict(sorted(runs.items())), **values)
+    return write_page(path, values["title"], body, carried)
 
 
 def _spread_out(numbers: list[int]) -> list[int]:
@@ -205,35 +205,29 @@ def _curves(directory: Path) -> list[FloatArray]:
     return [np.stack([bed["time"], 1e3 * bed[name]]) for name in ("surface", "highest")]
 
 
-class _Pictures:
-    """The small pictures, on one scale."""
+def _multiples(curves: Mapping[int, list[FloatArray]], frame: pd.DataFrame, record: SweepRecord) -> dict[str, Any]:
+    """What the page needs to draw the small pictures, all on one scale."""
+    every = [curve for one in curves.values() for curve in one]
+    if not every:
+        return {"pictures": []}
+    values = np.concatenate(every, axis=1)
+    low, high = np.minimum(values.min(axis=1), 0.0), values.max(axis=1)
+    begin, end = np.array([_EDGE, _TALL - _EDGE]), np.array([_WIDE - _EDGE, _EDGE])
+    size = (end - begin) / np.where(high > low, high - low, 1.0)
 
-    def __init__(self, curves: Mapping[int, list[FloatArray]], frame: pd.DataFrame, record: SweepRecord) -> None:
-        self.curves, self.names = curves, _names(frame, record)
-        self.what = "height of the surface and of the highest bead" if "pile" in record.analyses else "distance walked"
+    def drawn(curve: FloatArray) -> str:
+        places = begin + (curve.T[:: -(-curve.shape[1] // _MOST_CORNERS)] - low) * size
+        return " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
 
-    def told(self, runs: Collection[int]) -> dict[str, Any]:
-        """What the page needs to draw them; those of whole runs that it holds open these."""
-        every = [curve for one in self.curves.values() for curve in one]
-        if not every:
-            return {"pictures": []}
-        values = np.concatenate(every, axis=1)
-        low, high = np.minimum(values.min(axis=1), 0.0), values.max(axis=1)
-        inner = np.array([_WIDE, -_TALL]) - 2.0 * np.array([_EDGE, -_EDGE])
-        size = inner / np.where(high > low, high - low, 1.0)
-        begin = np.array([_EDGE, _TALL - _EDGE])
-
-        def drawn(curve: FloatArray) -> str:
-            places = begin + (curve.T[:: -(-curve.shape[1] // _MOST_CORNERS)] - low) * size
-            return " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
-
-        pictures = [
-            Multiple(number, self.names[number], list(zip(map(drawn, ones), cycle(COLOURS))), number in runs)
-            for number, ones in sorted(self.curves.items())
-        ]
-        scale = f"{self.what}, {low[1]:.3g} to {high[1]:.3g} mm, against time, {low[0]:.3g} to {high[0]:.3g} s"
-        zero = f"{(begin - low * size)[1]:.1f}"
-        return {"pictures": pictures, "scale": scale, "zero": zero, "wide": _WIDE, "tall": _TALL}
+    names = _names(frame, record)
+    pictures = [
+        Multiple(number, names[number], list(zip(map(drawn, ones), cycle(COLOURS))))
+        for number, ones in sorted(curves.items())
+    ]
+    what = "height of the surface and of the highest bead" if "pile" in record.analyses else "distance walked"
+    scale = f"{what}, {low[1]:.3g} to {high[1]:.3g} mm, against time, {low[0]:.3g} to {high[0]:.3g} s"
+    zero = f"{(begin - low * size)[1]:.1f}"
+    return {"pictures": pictures, "scale": scale, "zero": zero, "wide": _WIDE, "tall": _TALL}
 
 
 def _names(frame: pd.DataFrame, record: SweepRecord) -> dict[int, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,18 +28,14 @@ class SweepPlan:
 
     Attributes
     ----------
-    record
-        The sweep, its points resolved.
-    cases
-        Of the points.
-    engine
-        The binary.
+    record, cases
+        The sweep, and the cases of its points.
+    engine, options
+        The binary, and how it is to be run.
     decks
         Those that are missing. Of a sweep with a descent all down to its bottom: it may end earlier.
     statuses
         Of the points, see `walkers.sweeps.record.PointState`.
-    workers
-        How many decks run at once.
     final
         Points that failed before and are not run again.
     """
@@ -48,7 +45,7 @@ class SweepPlan:
     engine: Engine
     decks: Sequence[PlannedDeck]
     statuses: Sequence[str]
-    workers: int
+    options: Options
     final: list[Failure]
 
     @property
@@ -59,7 +56,7 @@ class SweepPlan:
     @property
     def wall_seconds(self) -> float:
         """Predicted time until all is done, s."""
-        return makespan((deck.seconds for deck in self.decks), self.workers)
+        return makespan((deck.seconds for deck in self.decks), self.options.decks_at_once)
 
     @property
     def core_seconds_apart(self) -> float:
@@ -69,8 +66,8 @@ class SweepPlan:
 
     def as_text(self) -> str:
         """The plan in a few lines."""
-        record, counts = self.record, {status: self.statuses.count(status) for status in set(self.statuses)}
-        told = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
+        record = self.record
+        told = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
         keys = ", ".join(f"{key} ({unit})" if unit else key for key, unit in record.units.items())
         atmost = "at most " if record.descent else ""
         lines = [
@@ -79,7 +76,7 @@ class SweepPlan:
             f"  points     {len(record.runs)}: {told}",
             f"  to do      {atmost}{sum(len(deck.points) for deck in self.decks)} points in {len(self.decks)} decks",
             f"  predicted  {atmost}{self.core_seconds:.0f} core-seconds ({self.core_seconds_apart:.0f} with a deck a "
-            f"point), {self.wall_seconds:.0f} s with {self.workers} at once",
+            f"point), {self.wall_seconds:.0f} s with {self.options.decks_at_once} at once",
             f"  directory  {record.directory}",
         ]
         return "\n".join(lines)
@@ -116,16 +113,12 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     found = states(record)
     statuses = [state.status for state in found]
     final = final_failures(record, found, options)
-    given_up = {failure.point for failure in final}
+    settled = {point for point, status in enumerate(statuses) if status in _SETTLED}
+    settled |= {failure.point for failure in final}
     numbered = dict(enumerate(cases))
-    decks = [
-        part
-        for deck in pack(numbered, options.decks_at_once, options.longest_seconds)
-        for part in unfinished_parts(
-            deck.points, numbered, lambda point: statuses[point] in _SETTLED or point in given_up
-        )
-    ]
-    return SweepPlan(record, cases, binary, decks, statuses, options.decks_at_once, final)
+    packed = pack(numbered, options.decks_at_once, options.longest_seconds)
+    decks = [part for deck in packed for part in unfinished_parts(deck.points, numbered, settled.__contains__)]
+    return SweepPlan(record, cases, binary, decks, statuses, options, final)
 
 
 def run_sweep(
@@ -170,8 +163,7 @@ def run_sweep(
     write_record(plan.record)
     if not plan.decks:
         return plan.record, plan.final
-    options = options.for_ranks(max(case.run.ranks for case in plan.cases))
-    failures = schedule(plan.record, plan.cases, plan.engine, options, on_progress)
+    failures = schedule(plan.record, plan.cases, plan.engine, plan.options, on_progress)
     if not (plan.record.directory / RECORD_NAME).is_file():
         raise OutputGone(plan.record.directory)
     return plan.record, failures

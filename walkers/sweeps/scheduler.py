@@ -136,20 +136,7 @@ def schedule(
     options: Options,
     on_progress: Callable[[SweepProgress], None] | None = None,
 ) -> list[Failure]:
-    """Make all runs of a sweep that are missing.
-
-    Parameters
-    ----------
-    record
-        The sweep.
-    cases
-        Of its points.
-    engine
-        The binary.
-    options
-        How.
-    on_progress
-        Called whenever a deck has ended, and a few times a second.
+    """Make all runs of a sweep that are missing, as `walkers.sweeps.run.run_sweep` says.
 
     Returns
     -------

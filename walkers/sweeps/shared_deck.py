@@ -46,17 +46,7 @@ DECK_FOLDER = "shared_deck"
 
 @dataclass(frozen=True)
 class Made:
-    """What has become of cases whose runs were wanted, by the names of the runs.
-
-    Attributes
-    ----------
-    runs
-        Finished.
-    found
-        Names of those that were there before.
-    busy
-        Names of those that somebody else is making.
-    """
+    """Runs that were wanted: the finished ones, by their names, which of these were found, and which others make."""
 
     runs: Mapping[str, FinishedRun]
     found: frozenset[str]

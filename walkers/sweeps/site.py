@@ -89,15 +89,7 @@ class SiteFile(BaseModel):
 
 @dataclass(frozen=True)
 class Site:
-    """A cluster, and what Parsl is told.
-
-    Attributes
-    ----------
-    file
-        As it was read.
-    ranks
-        MPI processes of each deck: a node takes so many decks fewer.
-    """
+    """A cluster as its file describes it, and MPI processes (ranks) of its decks: a node takes so many decks fewer."""
 
     file: SiteFile
     ranks: int = 1
@@ -232,15 +224,7 @@ def threads(workers: int, run_dir: Path) -> Config:
 
 
 def pilots(site: Site, run_dir: Path) -> Config:
-    """Parsl's configuration for a cluster.
-
-    Parameters
-    ----------
-    site
-        The cluster.
-    run_dir
-        Where Parsl keeps its scripts and logs; the nodes must see it.
-    """
+    """Parsl's configuration for a cluster; its scripts and logs go to a folder that the nodes must see."""
     import parsl.launchers
     import parsl.providers
     from parsl.config import Config

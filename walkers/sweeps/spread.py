@@ -57,10 +57,8 @@ class Spread:
     ----------
     directory
         The sweep's, with a table of all points.
-    varied
-        What was drawn, each from its range.
-    held
-        What nobody measured but the case gives: it stayed as it is.
+    varied, held
+        What was drawn, each from its range; what nobody measured but the case gives, which stayed as it is.
     bands
         Of the results that count, by the columns of the sweep's table; without walkers that came apart.
     depends

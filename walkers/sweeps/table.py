@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,10 +70,16 @@ def load(directory: str | Path) -> pd.DataFrame:
     record = read_record(directory)
     rows = [_row(record, number, state) for number, state in enumerate(states(record)) if state.status != "not needed"]
     described = {**_varied(record), **derived_columns(record.analyses), **result_columns(record.analyses), **STATE}
-    frame = pd.DataFrame(rows, columns=["point", *described])
-    frame.attrs["units"] = {"point": "", **{name: unit for name, (unit, _) in described.items()}}
-    frame.attrs["meanings"] = {"point": "number of the point", **{name: told for name, (_, told) in described.items()}}
+    described = {"point": ("", "number of the point"), **described}
+    frame = _with_units(pd.DataFrame(rows, columns=list(described)), described)
     frame.attrs["sweep"] = record.name
+    return frame
+
+
+def _with_units(frame: pd.DataFrame, described: Mapping[str, tuple[str, str]]) -> pd.DataFrame:
+    """A table with the units and meanings of its columns."""
+    frame.attrs["units"] = {name: unit for name, (unit, _) in described.items()}
+    frame.attrs["meanings"] = {name: meaning for name, (_, meaning) in described.items()}
     return frame
 
 
@@ -204,17 +211,14 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
             row[name] = part.iloc[0][descent.key] if len(part) else nan
             row[f"gamma0_{name}"] = part.iloc[0]["gamma0"] if len(part) else nan
         rows.append(row)
-    table = pd.DataFrame(rows)
-    unit = record.units[descent.key] or ""
-    table.attrs["units"] = {**{name: frame.attrs["units"][name] for name in others}, "moving": unit, "at_rest": unit}
-    table.attrs["units"] |= {name: "" for name in table.columns if name not in table.attrs["units"]}
-    table.attrs["meanings"] = dict.fromkeys(others, "varied") | {
-        "moving": f"last {descent.key} at which the walkers moved",
-        "at_rest": f"first {descent.key} at which they did not",
-        "gamma0_moving": "dimensionless peak force Γ0 of moving",
-        "gamma0_at_rest": "dimensionless peak force Γ0 of at_rest",
+    table, unit = pd.DataFrame(rows), record.units[descent.key] or ""
+    described = {name: (frame.attrs["units"][name], "varied") for name in others} | {
+        "moving": (unit, f"last {descent.key} at which the walkers moved"),
+        "gamma0_moving": ("", "dimensionless peak force Γ0 of moving"),
+        "at_rest": (unit, f"first {descent.key} at which they did not"),
+        "gamma0_at_rest": ("", "dimensionless peak force Γ0 of at_rest"),
     }
-    return table
+    return _with_units(table, described)
 
 
 def write_table_file(frame: pd.DataFrame, path: Path) -> None:

@@ -27,22 +27,9 @@ class SweepStopped(Stopped):
 
 @dataclass(frozen=True)
 class Task:
-    """One deck's worth of work.
+    """One deck's worth of work: its scheduler, names and cases of its runs, their folder, the engine by path and sum.
 
-    Attributes
-    ----------
-    sweep
-        Which scheduler it is from.
-    runs
-        Names of the runs, as the scheduler calls them.
-    cases
-        Of the runs; may share a deck.
-    out
-        Folder of the run directories.
-    engine, sha256
-        The binary: its path or name, and what it must be.
-    time_limit
-        Wall time in s that the engine may take, or None.
+    The time limit is the wall time in s that the engine may take, or None.
     """
 
     sweep: str
@@ -56,16 +43,9 @@ class Task:
 
 @dataclass(frozen=True)
 class Report:
-    """What became of a task: runs that are finished (others are busy elsewhere), or the failure of the deck.
+    """What became of a task: velocities (m/s) of its finished runs (others are busy elsewhere), or the deck's failure.
 
-    Attributes
-    ----------
-    finished
-        From names of runs to their mean velocities (m/s).
-    failure
-        Name of the failure's class, None if there was none.
-    message, directory
-        What it says and where its remains are.
+    A failure has the name of its class, what it says, and where its remains are.
     """
 
     finished: Mapping[str, float] = field(default_factory=dict)
