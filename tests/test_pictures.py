@@ -1,5 +1,6 @@
 """Figures, renderings and files for ParaView, read back."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
@@ -18,7 +19,9 @@ from walkers.postprocess import Group, read_motion, read_table
 from walkers.postprocess.analysis import plot_run
 from walkers.postprocess.drawing import legend_below, new_figure, series_look, styled
 from walkers.postprocess.figures import _gait_figure, _walk_figure
+from walkers.postprocess.panels import gait_panels
 from walkers.postprocess.paraview import write_vtk
+from walkers.postprocess.paraview_script import write_paraview
 from walkers.postprocess.series import _panels, render_run
 
 
@@ -121,6 +124,18 @@ def test_one_frame_a_cycle_is_the_default(directory: Path, tmp_path: Path) -> No
     assert not list(tmp_path.glob("*.new"))
 
 
+def test_the_camera_of_a_run_in_segments_sees_what_the_files_hold(
+    run_directory: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Walkers of a run in segments are drawn side by side too, and the script looks at them."""
+    run = {"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 10, "segment": "0.05 s"}
+    script = write_paraview(run_directory(dimers={"replicates": 2}, run=run), tmp_path / "vtk")
+    (line,) = re.findall(r"view.CameraFocalPoint = \[(.*)\]", script.read_text())
+    beads = pv.read(script.parent / "beads_000000.vtp").points
+    np.testing.assert_allclose([float(one) for one in line.split(",")][:2], beads[:, :2].mean(axis=0), atol=1e-3)
+    assert np.ptp(beads[:, 1]) < 4e-3
+
+
 def test_walkers_are_drawn_side_by_side(directory: Path, moved: Group, tmp_path: Path) -> None:
     collection = write_vtk(directory, destination=tmp_path / "gathered")
     points = [pv.read(collection.parent / f"beads_{frame:06d}.vtp").points for frame in (0, 80)]
@@ -159,7 +174,7 @@ def test_figures_of_runs_come_in_other_formats_and_in_no_unknown_one(directory: 
 
 def test_figures_of_runs_can_be_printed(directory: Path) -> None:
     groups = read_motion(directory).groups
-    for figure, panels in ((_walk_figure(groups), "abc"), (_gait_figure(groups[0]), "ab")):
+    for figure, panels in ((_walk_figure(groups), "abc"), (_gait_figure(groups[0], gait_panels(groups[0])), "ab")):
         assert spoilt(figure) == []
         assert letters(figure) == list(panels)
 

@@ -225,6 +225,10 @@ def test_contacts_and_bridges_are_counted_at_rest_and_while_shaken(run: Path) ->
     # Bridges form by touch: those that do not touch are there once the beads were shaken apart.
     assert found["shaken"]["bridges"] > found["shaken"]["contacts"] + 0.3
     assert "between beads, at rest" in call("result", str(run), check=True).stdout
+    # A sweep's onset is that by which a cluster first counted, not where its greatest gain began.
+    told = as_results(np.array([0.5]), np.array([8.0]), 1.0)[Path("0")]["climbs"][0]
+    climbs = [{**told, "begin": 3.0, "height": 5e-3}]
+    assert Pile().row({**current_result(run), "climbs": climbs})["onset"] == 0.5
 
 
 def test_an_interrupted_pile_goes_on_bit_for_bit(killed: Killed, tmp_path: Path) -> None:
@@ -411,6 +415,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     assert spoilt(_climb_figure(analyse(run))) == []
     assert told("render", str(run), "--to", "here/box.png", "--images", "2").strip() == "here/box.png"
     assert told("render", str(run), "--to", "here/row.png", "--interval", "0.1 s").strip() == "here/row.png"
+    told("film", str(run), "--to", "one.gif", "--fps", "10", "--size", "64x64", "--until", "8 ms")  # within a frame
     film = in_folder / told("film", str(run), "--to", "here/box.mp4", "--fps", "10", "--slowdown", "5").strip()
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(film))
     assert frames == int(50.0 * read_motion(run).time[-1]) + 1

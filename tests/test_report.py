@@ -27,7 +27,7 @@ from walkers.postprocess.analysis import current_result
 from walkers.postprocess.motion import gathered
 from walkers.postprocess.quantities import rounded
 from walkers.postprocess.report.page import LARGEST, overhead
-from walkers.postprocess.report.run import report_run
+from walkers.postprocess.report.run import report_run, summary_of
 from walkers.postprocess.report.scene import cameras_of, scene_of
 from walkers.postprocess.scene import camera_axes
 from walkers.runner.provenance import software
@@ -250,6 +250,12 @@ def test_the_scene_is_the_motion(walked_run: Path) -> None:
         rolled[number % 2].append(way * motion.radius[number] / seconds)
     for bead, key in enumerate(("bead_1", "bead_2")):
         assert np.mean(rolled[bead]) == pytest.approx(rotation[key], rel=0.01, abs=2e-6)
+
+
+def test_a_liquid_without_a_name_is_not_named() -> None:
+    case = make_case()
+    assert "glass, Si AK5; 80 Hz" in summary_of(case)
+    assert "glass; 80 Hz" in summary_of(replace(case, liquid=replace(case.liquid, name=None)))
 
 
 def test_the_page_says_what_wrote_it(walked_report: Path) -> None:

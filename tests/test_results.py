@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
+from errno import EROFS
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from walkers.postprocess.slopes import fit_slopes
 from walkers.postprocess.steady_state import steady_walkers
 from walkers.postprocess.tables import FAMILIES, TABLES
 from walkers.postprocess.walking import Walking, walkers_met
+from walkers.runner.directory import SEGMENTS
 from walkers.runner.files import write_json
 from walkers.runner.manifest import record_tables
 
@@ -88,7 +90,9 @@ def test_a_walker_without_noise_has_no_error() -> None:
     assert (error < 1e-12).all()
 
 
-def test_a_result_of_before_is_made_anew(directory: Path, tmp_path: Path) -> None:
+def test_a_result_of_before_is_made_anew_if_it_can_be(
+    directory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """One of an earlier method, and one of before methods had versions, lack what is told of walkers today."""
     copy = tmp_path / directory.name
     shutil.copytree(directory, copy)
@@ -100,6 +104,17 @@ def test_a_result_of_before_is_made_anew(directory: Path, tmp_path: Path) -> Non
         record_tables(copy, [RESULT_NAME])
         assert current_result(copy) == known
         assert read_result(copy) == known
+    write_json(copy / RESULT_NAME, {**known, "analyses": {"walking": Walking.version - 1}})
+    record_tables(copy, [RESULT_NAME])
+
+    def refuse(*_: object) -> None:
+        raise OSError(EROFS, "Read-only file system")
+
+    with monkeypatch.context() as patch:  # what cannot be written is told all the same
+        patch.setattr("walkers.postprocess.analysis.forget_tables", refuse)
+        assert current_result(copy) == known
+    shutil.rmtree(copy / SEGMENTS)  # as in an archive without dumps
+    assert current_result(copy) == {**known, "analyses": {"walking": Walking.version - 1}}
 
 
 def test_symmetric_dimers_need_not_be_on_the_axis_to_be_kept(run_directory: Callable[..., Path]) -> None:

@@ -6,6 +6,7 @@ tables, results, text and figures, and sweeps of columns, follows.
 
 from __future__ import annotations
 
+import errno
 import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -165,10 +166,16 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
     runner.manifest.FileChanged
         If a file of a finished run is not what it was.
     """
-    from walkers.postprocess.motion import read_motion
-    from walkers.postprocess.tables import write_table
-
     directory = Path(directory)
+    result, tables = _measured(directory)
+    _write(directory, result, tables)
+    return result
+
+
+def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
+    """The result of a run directory and its tables, from its dumps."""
+    from walkers.postprocess.motion import read_motion
+
     files = (path.relative_to(directory) for path in (directory / SEGMENTS).rglob("*"))
     check_unchanged(directory, [path.as_posix() for path in files])
     motion = read_motion(directory)
@@ -189,13 +196,18 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
         measured = one.of(motion)
         tables |= measured.tables
         result |= measured.summary
+    return result, tables
+
+
+def _write(directory: Path, result: Mapping[str, Any], tables: Mapping[str, Columns]) -> None:
+    from walkers.postprocess.tables import write_table
+
     names = [RESULT_NAME, *(f"{name}.parquet" for name in tables)]
     forget_tables(directory, names)
     for name, columns in tables.items():
         write_table(directory, name, columns)
     write_json(directory / RESULT_NAME, result)
     record_tables(directory, names)
-    return result
 
 
 def read_result(directory: str | Path) -> dict[str, Any]:
@@ -216,6 +228,9 @@ def read_result(directory: str | Path) -> dict[str, Any]:
 def current_result(directory: str | Path) -> dict[str, Any]:
     """The result of a finished run; tabulated anew if it or a table is gone or damaged, or of an earlier method.
 
+    What cannot be written, as where all is read-only, is not. Without dumps a result of an earlier method stays what it
+    is, if it has all that is told of one today.
+
     Raises
     ------
     postprocess.dump.DumpError, OSError, ValueError
@@ -226,20 +241,31 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     from walkers.postprocess.tables import intact
 
     directory = Path(directory)
+    kept: dict[str, Any] | None = None
     try:
         result = read_result(directory)
         wanted = analyses_of(case_of(directory))
-        tables = [name for one in wanted for name in one.tables]
         result.setdefault("rests_on", [])  # of runs that did not say it
-        known = result.get("analyses") == {one.name: one.version for one in wanted} and intact(directory, tables)
-        if known and check_unchanged(directory, [RESULT_NAME]) and all(one.can_show(result) for one in wanted):
-            lines_of_rest(result["rests_on"])
+        lines_of_rest(result["rests_on"])
+        versions = {one.name: one.version for one in wanted}
+        whole = intact(directory, [name for one in wanted for name in one.tables])
+        if whole and result["analyses"].keys() == versions.keys() and all(one.can_show(result) for one in wanted):
+            kept = result
+        if kept and check_unchanged(directory, [RESULT_NAME]) and result["analyses"] == versions:
             return result
     except FileChanged:
         raise
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         pass
-    return tabulate(directory)
+    if kept is not None and not any((directory / SEGMENTS).rglob("*.bin")):
+        return kept
+    result, tables = _measured(directory)
+    try:
+        _write(directory, result, tables)
+    except OSError as error:
+        if error.errno not in (errno.EACCES, errno.EPERM, errno.EROFS):
+            raise
+    return result
 
 
 def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
