@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
@@ -57,6 +58,8 @@ class Analysis(ABC):
         Names of the tables that it writes.
     derived, columns
         Columns of a sweep's table: what follows from a point's case, and what its run gives.
+    places
+        Where the result has those of `columns` that it has not by their names, such as ``velocity.mean``.
     headlines
         Those of `columns` that count first.
     """
@@ -66,6 +69,7 @@ class Analysis(ABC):
     tables: ClassVar[tuple[str, ...]]
     derived: ClassVar[Described] = {}
     columns: ClassVar[Described] = {}
+    places: ClassVar[Mapping[str, str]] = {}
     headlines: ClassVar[tuple[str, ...]] = ()
 
     def can_show(self, result: Mapping[str, Any]) -> bool:
@@ -97,9 +101,8 @@ class Analysis(ABC):
         return {}
 
     def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """The columns `columns` of a result."""
-        del result
-        return {}
+        """The columns `columns` of a result; NaN for what it has not."""
+        return {name: _at(result, self.places.get(name, name)) for name in self.columns}
 
     @abstractmethod
     def lines(self, result: Mapping[str, Any]) -> list[str]:
@@ -124,6 +127,14 @@ class Analysis(ABC):
         """Draw its figures of a run into a folder, in each of some formats."""
         del directory, destination, formats
         return []
+
+
+def _at(result: Mapping[str, Any], place: str) -> Any:
+    """What a result has at a place; NaN where it says that there is none."""
+    value: Any = result
+    for part in place.split("."):
+        value = None if value is None else value[part]
+    return nan if value is None else value
 
 
 @cache

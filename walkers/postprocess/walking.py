@@ -70,6 +70,13 @@ class Walking(Analysis):
         "ended_early": ("", "whether that was less than it might have been, for the walkers were steady"),
         "walkers_met": ("", "whether two of them came near each other"),
     }
+    places: ClassVar[Mapping[str, str]] = {
+        "velocity": "velocity.mean",
+        **{name: f"velocity.{name}" for name in ("smallest", "largest", "standard_error")},
+        **{name: f"{name}.mean" for name in ("right_facing", "left_facing", "axial_velocity", "orientation_end")},
+        "upright": "posture.upright",
+        **{name: f"{name[:-2]}.{'bead' if 'rotation' in name else 'contact'}{name[-2:]}" for name in _DIMERS},
+    }
 
     def applies(self, case: Case) -> bool:
         """Of walkers."""
@@ -116,27 +123,6 @@ class Walking(Analysis):
         dimer = dimer_of(case)
         known |= {"sin_delta": dimer.sin_delta, "mass_asymmetry": dimer.mass_asymmetry}
         return {"gamma0": dimer.gamma0(case.drive.peak_acceleration), **known}
-
-    def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """Means over the walkers."""
-        velocity = result["velocity"]
-        beads = {f"rotation_{bead}": result["rotation"][f"bead_{bead}"] for bead in (1, 2)}
-        contacts = {f"{what}_{at}": result[what][f"contact_{at}"] for what in ("sliding", "open") for at in (1, 2, 3)}
-        return {
-            "velocity": velocity["mean"],
-            **{name: velocity[name] for name in ("smallest", "largest", "standard_error")},
-            **{name: result[name]["mean"] for name in ("right_facing", "left_facing", "orientation_end")},
-            **{name: nan if value is None else value for name, value in {**beads, **contacts}.items()},
-            "axial_velocity": result["axial_velocity"]["mean"],
-            "upright": nan if result["posture"] is None else result["posture"]["upright"],
-            **{
-                name: result[name]
-                for name in (
-                    *("separated_fraction", "walkers", "steady", "turned_round", "walkers_met"),
-                    *("cycles", "ended_early"),
-                )
-            },
-        }
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Velocities, rotation, sliding and orientation of all walkers, and velocities of each make."""
