@@ -7,9 +7,8 @@ import numpy.typing as npt
 
 from walkers.inputs.boundary import Boundary
 from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
+from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Bridges, Motion
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def bed_of(motion: Motion, bulk: npt.NDArray[np.bool_], bridges: Bridges, liquid: FloatArray) -> dict[str, float | int]:

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.postprocess.analysis import analyses_of
+from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.panels import Panel, gait_panels, pile_panels, velocity_panel, walk_panels
 from walkers.postprocess.piles import analyse
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from bokeh.models import Model
     from bokeh.plotting import figure as Figure  # noqa: N812
 
-FloatArray = npt.NDArray[np.float64]
 
 COLOURS = ("#b0203c", "#1f3b73", "#3f7f93", "#c78a2c", "#5b6770", "#7a4a8c", "#4c8c4a", "#1d2429")
 _MARKERS = {"o": "circle", "s": "square", "^": "triangle", "v": "inverted_triangle", "D": "diamond", "x": "x"}
