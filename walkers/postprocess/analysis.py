@@ -19,13 +19,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin
-from walkers.postprocess.drawing import check_formats
+from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.runner.directory import SEGMENTS, case_of
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import FileChanged, check_unchanged, forget_tables, record_tables
 
 if TYPE_CHECKING:  # how far a sweep is can be told without numpy
     import numpy.typing as npt
+    from matplotlib.figure import Figure
 
     from walkers.postprocess.motion import Bridges, Motion
     from walkers.postprocess.quantities import Quantity
@@ -123,10 +124,10 @@ class Analysis(ABC):
         del motion
         return lambda _: {}
 
-    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
-        """Draw its figures of a run into a folder, in each of some formats."""
-        del directory, destination, formats
-        return []
+    def figures(self, directory: Path) -> Mapping[str, Figure]:
+        """Its figures of a run, by the names of their files."""
+        del directory
+        return {}
 
 
 def _at(result: Mapping[str, Any], place: str) -> Any:
@@ -377,4 +378,7 @@ def plot_run(directory: Path, destination: Path | None = None, formats: Sequence
     destination = destination or directory
     destination.mkdir(parents=True, exist_ok=True)
     case = case_of(directory)
-    return [path for one in analyses_of(case) for path in one.plot(directory, destination, formats)]
+    figures = (pair for one in analyses_of(case) for pair in one.figures(directory).items())
+    return [
+        path for name, figure in figures for path in save_figure(figure, destination / name, [directory.name], formats)
+    ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,43 +14,30 @@ from walkers.postprocess.drawing import (
     letter_panels,
     new_figure,
     plain_text,
-    save_figure,
     series_look,
     styled,
 )
-from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.motion import Group
 from walkers.postprocess.panels import MOST_NAMED, Panel, gait_panels, pile_panels, walk_panels
-from walkers.postprocess.piles import PileAnalysis, analyse
+from walkers.postprocess.piles import PileAnalysis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-def plot_walkers(directory: Path, destination: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
-    """Draw the walkers of a run.
-
-    Parameters
-    ----------
-    directory
-        The run directory.
-    destination
-        Folder for the pictures.
-    formats
-        Of `walkers.postprocess.drawing.FORMATS`.
+def walk_figures(groups: list[Group]) -> dict[str, Figure]:
+    """The figures of the walkers of a run.
 
     Returns
     -------
-    list of Path
-        ``walk`` (strobed positions, distance walked and orientation against time) and, if the run was sampled at least
-        eight times a cycle, ``gait`` (velocity and rotation velocities through two cycles, as in Fig. 4 of Khan et
-        al., and the substrate's velocity), in each format.
+    dict
+        ``walk``, strobed positions, distance walked and orientation against time; and, if the run was sampled at least
+        eight times a cycle, ``gait``, velocity and rotation velocities through two cycles, as in Fig. 4 of Khan et al.,
+        and the substrate's velocity.
     """
-    groups = read_motion(directory).groups
-    written = save_figure(_walk_figure(groups), destination / "walk", [directory.name], formats)
-    if panels := gait_panels(groups[0]):
-        written += save_figure(_gait_figure(groups[0], panels), destination / "gait", [directory.name], formats)
-    return written
+    panels = gait_panels(groups[0])
+    return {"walk": _walk_figure(groups), **({"gait": _gait_figure(groups[0], panels)} if panels else {})}
 
 
 def _draw(axes: Axes, panel: Panel) -> None:
@@ -152,25 +138,9 @@ def _gait_figure(group: Group, panels: Sequence[Panel]) -> Figure:
     return figure
 
 
-def plot_pile(directory: Path, destination: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
-    """Draw what a pile did.
-
-    Parameters
-    ----------
-    directory, destination, formats
-        As for `plot_walkers`.
-
-    Returns
-    -------
-    list of Path
-        ``climb``: heights of the clusters' leaders over the pile's surface against time with the events in their
-        lives, the Brazil-nut index, contacts and bridges a bead, the mean square velocity.
-    """
-    return save_figure(_climb_figure(analyse(directory)), destination / "climb", [directory.name], formats)
-
-
 @styled
-def _climb_figure(found: PileAnalysis) -> Figure:
+def climb_figure(found: PileAnalysis) -> Figure:
+    """What a pile did: `walkers.postprocess.panels.pile_panels`, one below the other."""
     panels, case = pile_panels(found), found.motion.case
     figure, axes = new_figure(TWO_COLUMNS, 8.0, nrows=len(panels), height_ratios=[2, 1, 1, 1], sharex=True)
     for one, panel in zip(axes, panels, strict=True):

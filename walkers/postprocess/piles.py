@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -27,11 +27,13 @@ from walkers.postprocess.clusters import (
     follow,
     held_clusters,
 )
+from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.events import Event, events_of
 from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
 from walkers.postprocess.quantities import Quantity, of_piles
 
-FloatArray = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _LAYERS = 0.5
 """Thickness of the layers of the packing profile, in diameters of the largest bead."""
@@ -233,11 +235,11 @@ class Pile(Analysis):
 
         return of_frame
 
-    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
+    def figures(self, directory: Path) -> Mapping[str, Figure]:
         """Heights of the clusters, their events, segregation and agitation."""
-        from walkers.postprocess.figures import plot_pile
+        from walkers.postprocess.figures import climb_figure
 
-        return plot_pile(directory, destination, formats)
+        return {"climb": climb_figure(analyse(directory))}
 
 
 def _bed_columns(found: PileAnalysis) -> Columns:

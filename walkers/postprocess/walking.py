@@ -6,10 +6,10 @@ smallest, with the walkers that face left and right also apart.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from math import degrees, nan, sqrt
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,10 +19,13 @@ from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, averages, gait, settled_samples, walk
-from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
+from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges, read_motion
 from walkers.postprocess.posture import describe_posture, posture_summary, postures, turned_over_at, ways
 from walkers.postprocess.quantities import Quantity, of_walkers
 from walkers.postprocess.tables import WALKERS, described
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SEPARATED = 0.1
 """Share of the time beyond which beads that no bridge can hold together are no walker."""
@@ -161,11 +164,11 @@ class Walking(Analysis):
             warnings.append("walkers came close to each other and are not independent: give them more spacing")
         return warnings
 
-    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
-        """Where they went and turned, and their gait."""
-        from walkers.postprocess.figures import plot_walkers
+    def figures(self, directory: Path) -> Mapping[str, Figure]:
+        """Where they went and turned, and their gait if it was sampled often enough."""
+        from walkers.postprocess.figures import walk_figures
 
-        return plot_walkers(directory, destination, formats)
+        return walk_figures(read_motion(directory).groups)
 
 
 def _stacked(parts: list[Columns]) -> Columns:
