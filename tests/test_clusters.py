@@ -1,5 +1,6 @@
 """Climbs of made-up trajectories: what counts, what does not, and what becomes of clusters that meet or part."""
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -107,15 +108,6 @@ def test_the_error_of_a_speed_is_its_scatter() -> None:
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(speeds), rel=0.25)
 
 
-def test_beads_that_are_taken_up_or_left_behind_gain_no_height() -> None:
-    """The same dimer at the same height, with beads high above that come and go."""
-    scene = Scene()
-    scene.height[:, 22:] = 9e-3
-    scene.pairs = [[(20, 21), (22, 23), *([(21, 22)] if number % 20 < 10 else [])] for number in range(FRAMES)]
-    _, climbs = scene.climbs()
-    assert not any(climb.climbed for climb in climbs)
-
-
 def test_the_leader_is_the_bead_that_is_mostly_topmost() -> None:
     """The small bead overtakes at the end."""
     scene = Scene()
@@ -126,28 +118,66 @@ def test_the_leader_is_the_bead_that_is_mostly_topmost() -> None:
     assert climb.leader == 20
 
 
-def test_a_column_that_sinks_does_not() -> None:
-    scene = Scene()
+def _with_others(scene: Scene) -> None:
+    """The same dimer at the same height, with beads high above that come and go: these gain no height."""
+    scene.height[:, 22:] = 9e-3
+    scene.pairs = [[(20, 21), (22, 23), *([(21, 22)] if number % 20 < 10 else [])] for number in range(FRAMES)]
+
+
+def _sinking(scene: Scene) -> None:
     scene.height[:, 20:22] += 8e-3 - 1e-3 * TIME[:, None]
-    _, (climb,) = scene.climbs()
-    assert not climb.climbed
-    assert climb.gain < 1e-4
 
 
-def test_a_bead_thrown_into_the_air_does_not() -> None:
-    scene = Scene()
+def _thrown_into_the_air(scene: Scene) -> None:
     scene.height[:, 20:22] += (40e-3 * TIME - 10e-3 * TIME**2)[:, None]
     for walls in scene.walls:
         del walls[20]
-    assert scene.climbs() == ([], [])
 
 
-def test_what_rises_with_the_pile_does_not() -> None:
-    scene = Scene()
+def _rising_with_the_pile(scene: Scene) -> None:
     scene.height[:, 20:22] += 3e-3 * TIME[:, None]
     for pairs in scene.pairs:
         pairs.append((21, 19))  # the tail stays on the pile
-    assert scene.climbs() == ([], [])
+
+
+def _hopping_between_frames(scene: Scene) -> None:
+    scene.height[100:, 20:22] += 4e-3
+    scene.height[:, 20:22] -= 1e-5 * TIME[:, None]
+
+
+def _hopping_between_holds(scene: Scene) -> None:
+    """Held at the begin and again a tenth of a second later, 4 mm higher."""
+    for number, walls in enumerate(scene.walls):
+        if number not in (0, 4):
+            del walls[20]
+    scene.height[4:, 20:22] += 4e-3
+
+
+def _single(scene: Scene) -> None:
+    scene.pairs = [[(22, 19), (23, 19), (21, 19)] for _ in TIME]
+    scene.height[:, 20] += 3e-3 * TIME
+
+
+@pytest.mark.parametrize(
+    ("made", "gains"),
+    [
+        (_with_others, None),
+        (_sinking, 1e-4),
+        (_hopping_between_frames, None),
+        (_hopping_between_holds, None),
+        (_thrown_into_the_air, 0.0),
+        (_rising_with_the_pile, 0.0),
+        (_single, 0.0),
+    ],
+)
+def test_what_is_no_climb(made: Callable[[Scene], None], gains: float | None) -> None:
+    """Of some not even a cluster that is free and held is seen: they gain nothing."""
+    scene = Scene()
+    made(scene)
+    tracks, climbs = scene.climbs()
+    assert bool(tracks) == (gains != 0.0)
+    assert not any(climb.climbed for climb in climbs)
+    assert gains is None or all(climb.gain < gains for climb in climbs)
 
 
 @pytest.mark.parametrize(("seconds", "tracks"), [(0.06, 1), (0.3, 2)])
@@ -206,36 +236,24 @@ def test_one_that_parts_is_followed_by_its_beads() -> None:
     assert {tracks[0].members[-1], tracks[1].members[-1]} == {frozenset({20, 21}), frozenset({22, 23})}
 
 
-@pytest.mark.parametrize("event", ["rejoined", "detached"])
-def test_how_a_cluster_ends(event: str) -> None:
+@pytest.mark.parametrize(
+    ("freed", "let_go", "fallen", "events"),
+    [
+        (5, range(0), range(FRAMES // 2, FRAMES), ["freed", "rejoined"]),
+        (5, range(FRAMES // 2, FRAMES), range(0), ["freed", "detached"]),
+        (0, range(FRAMES // 2, FRAMES), range(FRAMES // 2 + 3, FRAMES), ["rejoined"]),
+        (0, range(FRAMES - 3, FRAMES), range(0), []),  # which may still go on
+    ],
+)
+def test_how_a_cluster_begins_and_ends(freed: int, let_go: range, fallen: range, events: list[str]) -> None:
+    """On the pile in so many first frames, off the wall in some, on the pile again in some."""
     scene = Scene()
-    for number in range(FRAMES // 2, FRAMES):
-        if event == "rejoined":
-            scene.pairs[number].append((21, 19))
-        else:
-            del scene.walls[number][20]
-    for number in range(5):
-        scene.pairs[number].append((21, 19))  # on the pile at first
-    scene.climbs()
-    assert scene.events == [("freed", 0, None), (event, 0, None)]
-
-
-def test_a_cluster_that_lets_go_and_then_falls_on_the_pile_rejoins_it() -> None:
-    scene = Scene()
-    for number in range(FRAMES // 2, FRAMES):
+    for number in (*range(freed), *fallen):
+        scene.pairs[number].append((21, 19))
+    for number in let_go:
         del scene.walls[number][20]
-        if number > FRAMES // 2 + 2:
-            scene.pairs[number].append((21, 19))
     scene.climbs()
-    assert scene.events == [("rejoined", 0, None)]
-
-
-def test_a_cluster_without_a_wall_in_the_last_frames_may_still_go_on() -> None:
-    scene = Scene()
-    for walls in scene.walls[-3:]:
-        del walls[20]
-    scene.climbs()
-    assert scene.events == []
+    assert scene.events == [(event, 0, None) for event in events]
 
 
 def test_a_climb_qualifies_when_it_has_gained_enough() -> None:
@@ -267,14 +285,6 @@ def test_what_comes_later_does_not_change_when_a_climb_qualified() -> None:
             assert (climb.onset, climb.qualified) == (whole.onset, whole.qualified)
 
 
-def test_a_hop_between_two_frames_is_no_climb() -> None:
-    scene = Scene()
-    scene.height[100:, 20:22] += 4e-3
-    scene.height[:, 20:22] -= 1e-5 * TIME[:, None]
-    _, (climb,) = scene.climbs()
-    assert not climb.climbed
-
-
 def test_a_fall_ends_a_climb_at_its_top() -> None:
     scene = Scene()
     up = np.minimum(3e-3 * TIME, 6e-3 - 2e-3 * (TIME - 2.0))
@@ -290,24 +300,6 @@ def test_the_bulk_is_the_component_of_most_beads() -> None:
     assert np.flatnonzero(bulk_of(labels, frame([(20, 21)], {}))).tolist() == BULK
     floor = frame([(20, 21)], {20: 0})
     assert np.flatnonzero(bulk_of(labels, floor)).tolist() == [*BULK, 20, 21]
-
-
-def test_a_hop_between_two_holds_does_not_count() -> None:
-    """Held at the begin and again a tenth of a second later, 4 mm higher."""
-    scene = Scene()
-    for number, walls in enumerate(scene.walls):
-        if number not in (0, 4):
-            del walls[20]
-    scene.height[4:, 20:22] += 4e-3
-    _, climbs = scene.climbs()
-    assert not any(climb.climbed for climb in climbs)
-
-
-def test_a_single_bead_is_no_cluster() -> None:
-    scene = Scene()
-    scene.pairs = [[(22, 19), (23, 19), (21, 19)] for _ in TIME]
-    scene.height[:, 20] += 3e-3 * TIME
-    assert scene.climbs() == ([], [])
 
 
 def test_the_packing_profile_holds_all_of_the_beads() -> None:

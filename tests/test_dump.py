@@ -59,27 +59,20 @@ def test_a_truncated_last_frame_is_left_out_and_told(beads: Path, tmp_path: Path
     assert dump.truncated
     assert len(dump) == 60
     np.testing.assert_array_equal(dump.stack(), BinaryDump(beads, COLUMNS).stack()[:60])
-
-
-def test_an_empty_dump_has_no_frames(tmp_path: Path) -> None:
-    (tmp_path / "empty.bin").touch()
-    dump = BinaryDump(tmp_path / "empty.bin", BEAD_COLUMNS)
-    assert len(dump) == 0
-    assert not dump.truncated
+    short.write_bytes(b"")
+    empty = BinaryDump(short, COLUMNS)
+    assert (len(empty), empty.truncated) == (0, False)
 
 
 @pytest.mark.parametrize("contents", [b"no dump at all, but text that is long enough for a header" * 5, b"\xff" * 500])
-def test_what_is_no_dump_is_refused(contents: bytes, tmp_path: Path) -> None:
+def test_what_is_no_dump_or_has_other_columns_is_refused(contents: bytes, beads: Path, tmp_path: Path) -> None:
+    with pytest.raises(DumpError, match="2 columns"):
+        BinaryDump(beads, ("id", "x"))
     (tmp_path / "other.bin").write_bytes(contents)
     with pytest.raises(DumpError, match=r"other\.bin"):
         BinaryDump(tmp_path / "other.bin", BEAD_COLUMNS)
     with pytest.raises(DumpError, match=r"other\.bin"):
         read_local_dump(tmp_path / "other.bin", ("x",))
-
-
-def test_other_columns_are_refused(beads: Path) -> None:
-    with pytest.raises(DumpError, match="2 columns"):
-        BinaryDump(beads, ("id", "x"))
 
 
 def test_bridges_of_a_walker_at_rest_carry_the_capillary_load(tmp_path: Path) -> None:

@@ -43,21 +43,11 @@ def test_beads_turn_as_far_as_the_result_says_they_roll(directory: Path, motion:
         begin, end = (Rotation.from_quat(turns.turned[frame, rows]) for frame in (settled, -1))
         angle = (end * begin.inv()).as_rotvec() @ group.across_axis
         rolled.append(walker.facing * angle * group.radii / (motion.time[-1] - motion.time[settled]))
+    np.testing.assert_allclose(turns.at(17, 1.0), turns.at(18, 0.0), atol=1e-12)  # and join between frames
+    strobed = replace(motion.case, run=replace(motion.case.run, samples_per_cycle=1))
+    assert turns_of(replace(motion, case=strobed, mean_spin=None)) is None  # of whole cycles nothing is known
     rotation = current_result(directory)["rotation"]
     np.testing.assert_allclose(np.mean(rolled, axis=0), [rotation["bead_1"], rotation["bead_2"]], rtol=1e-3)
-
-
-def test_orientations_between_frames_join(motion: Motion) -> None:
-    turns = turns_of(motion)
-    assert turns is not None
-    np.testing.assert_allclose(turns.at(17, 1.0), turns.at(18, 0.0), atol=1e-12)
-    half = Rotation.from_matrix(turns.at(17, 0.5)) * Rotation.from_matrix(turns.at(17, 0.0)).inv()
-    np.testing.assert_allclose(half.as_rotvec(), turns.step[17] / 2.0, atol=1e-12)
-
-
-def test_spins_that_are_whole_cycles_apart_give_no_orientation(motion: Motion) -> None:
-    strobed = replace(motion.case, run=replace(motion.case.run, samples_per_cycle=1))
-    assert turns_of(replace(motion, case=strobed, mean_spin=None)) is None
 
 
 def test_places_between_frames_lie_on_the_motion(motion: Motion) -> None:
@@ -76,15 +66,12 @@ def test_pictures_are_as_far_apart_as_the_slow_motion_says(motion: Motion) -> No
     shown = motion.time[times.frame] + times.share * np.median(np.diff(motion.time))
     np.testing.assert_allclose(shown, times.time, atol=1e-12)
     assert film_times(motion, fps=25).slowdown == 100.0  # 0.1 s in ten seconds
+    strobed = film_times(motion, fps=25, slowdown=1.0)
+    cycles = strobed.time * motion.case.drive.frequency
+    assert strobed.stroboscopic
+    np.testing.assert_allclose(cycles, np.round(cycles), atol=1e-9)
     part = film_times(motion, 25, 20.0, 0.02, 0.05)
     assert (part.time[0], len(part.time)) == (pytest.approx(0.02), 16)
-
-
-def test_films_in_real_time_are_stroboscopic(motion: Motion) -> None:
-    times = film_times(motion, fps=25, slowdown=1.0)
-    assert times.stroboscopic
-    cycles = times.time * motion.case.drive.frequency
-    np.testing.assert_allclose(cycles, np.round(cycles), atol=1e-9)
 
 
 @pytest.mark.parametrize(("begin", "end"), [(0.2, None), (0.05, 0.05), (-0.1, None)])

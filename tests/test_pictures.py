@@ -1,5 +1,6 @@
 """Figures, renderings and files for ParaView, read back."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
@@ -17,8 +18,9 @@ from walkers.inputs import InputError
 from walkers.postprocess import Group, read_motion, read_table
 from walkers.postprocess.analysis import plot_run
 from walkers.postprocess.drawing import legend_below, new_figure, series_look, styled
-from walkers.postprocess.figures import _gait_figure, _walk_figure
+from walkers.postprocess.figures import walk_figures
 from walkers.postprocess.paraview import write_vtk
+from walkers.postprocess.paraview_script import write_paraview
 from walkers.postprocess.series import _panels, render_run
 
 
@@ -47,11 +49,7 @@ def test_the_collection_is_in_seconds(moved: Group, collection: Path) -> None:
     np.testing.assert_allclose(seconds, moved.time)
     assert all((collection.parent / str(entry.get("file"))).is_file() for entry in sets)
     assert {entry.get("part") for entry in sets} == {"0", "1", "2"}
-
-
-def test_pyvista_reads_the_collection(moved: Group, collection: Path) -> None:
     reader = pv.get_reader(collection)
-    np.testing.assert_allclose(reader.time_values, moved.time)
     reader.set_active_time_value(reader.time_values[-1])
     assert len(reader.read()) == 3
 
@@ -67,6 +65,9 @@ def test_beads_are_where_the_engine_put_them(moved: Group, collection: Path) -> 
     np.testing.assert_array_equal(beads["large"], [1, 0, 1, 0])
     np.testing.assert_allclose(beads["velocity"], moved.velocity[frame].reshape(-1, 3))
     np.testing.assert_allclose(beads["omega"], moved.spin[frame].reshape(-1, 3))
+    mesh = meshio.read(collection.parent / f"beads_{frame:06d}.vtu")
+    np.testing.assert_allclose(mesh.points, beads.points)
+    np.testing.assert_array_equal(mesh.point_data["radius"], beads["radius"])
 
 
 def test_the_substrate_moves(moved: Group, collection: Path) -> None:
@@ -108,17 +109,23 @@ def test_bridges_are_lines_with_force_and_gap(directory: Path, moved: Group, col
     assert len(list(collection.parent.glob("beads_*.vtp"))) == 81
 
 
-def test_meshio_reads_the_vtu(moved: Group, collection: Path) -> None:
-    mesh = meshio.read(collection.parent / "beads_000080.vtu")
-    np.testing.assert_allclose(mesh.points, (moved.position[80] + moved.motion.substrate[80]).reshape(-1, 3))
-    np.testing.assert_array_equal(mesh.point_data["radius"], [3e-4, 2e-4, 3e-4, 2e-4])
-
-
 def test_one_frame_a_cycle_is_the_default(directory: Path, tmp_path: Path) -> None:
     collection = write_vtk(directory, destination=tmp_path / "strobed")
     reader = pv.get_reader(collection)
     np.testing.assert_allclose(reader.time_values, np.arange(9) / 80.0)
     assert not list(tmp_path.glob("*.new"))
+
+
+def test_the_camera_of_a_run_in_segments_sees_what_the_files_hold(
+    run_directory: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Walkers of a run in segments are drawn side by side too, and the script looks at them."""
+    run = {"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 10, "segment": "0.05 s"}
+    script = write_paraview(run_directory(dimers={"replicates": 2}, run=run), tmp_path / "vtk")
+    (line,) = re.findall(r"view.CameraFocalPoint = \[(.*)\]", script.read_text())
+    beads = pv.read(script.parent / "beads_000000.vtp").points
+    np.testing.assert_allclose([float(one) for one in line.split(",")][:2], beads[:, :2].mean(axis=0), atol=1e-3)
+    assert np.ptp(beads[:, 1]) < 4e-3
 
 
 def test_walkers_are_drawn_side_by_side(directory: Path, moved: Group, tmp_path: Path) -> None:
@@ -141,17 +148,16 @@ def test_a_folder_with_other_files_is_not_replaced(directory: Path, tmp_path: Pa
     assert again[0] == again[1]
 
 
-def test_figures_are_pictures(directory: Path, tmp_path: Path) -> None:
-    paths = plot_run(directory, tmp_path)
-    assert [path.name for path in paths] == ["walk.png", "gait.png"]
-    for path in paths:
-        assert len(Image.open(path).convert("RGB").getcolors(maxcolors=1 << 24)) > 20
-
-
-def test_figures_of_runs_come_in_other_formats_and_in_no_unknown_one(directory: Path, tmp_path: Path) -> None:
-    paths = plot_run(directory, tmp_path, ["pdf", "svg"])
-    assert [path.name for path in paths] == ["walk.pdf", "walk.svg", "gait.pdf", "gait.svg"]
+def test_figures_of_runs_come_in_other_formats_and_in_no_unknown_one(
+    directory: Path, run_directory: Callable[..., Path], tmp_path: Path
+) -> None:
+    paths = plot_run(directory, tmp_path, ["pdf", "svg", "png"])
+    names = [f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg", "png")]
+    assert [path.name for path in paths] == names
     assert all(directory.name.encode() in path.read_bytes() for path in paths)
+    assert len(Image.open(paths[2]).convert("RGB").getcolors(maxcolors=1 << 24)) > 20
+    strobed = run_directory(run={"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 1})
+    assert [path.name for path in plot_run(strobed, tmp_path)] == ["walk.png"]  # which shows no gait
     with pytest.raises(InputError, match="jpeg"):
         plot_run(directory, tmp_path / "none", ["jpeg"])
     assert not (tmp_path / "none").exists()
@@ -159,7 +165,8 @@ def test_figures_of_runs_come_in_other_formats_and_in_no_unknown_one(directory: 
 
 def test_figures_of_runs_can_be_printed(directory: Path) -> None:
     groups = read_motion(directory).groups
-    for figure, panels in ((_walk_figure(groups), "abc"), (_gait_figure(groups[0]), "ab")):
+    figures = walk_figures(groups)
+    for figure, panels in ((figures["walk"], "abc"), (figures["gait"], "ab")):
         assert spoilt(figure) == []
         assert letters(figure) == list(panels)
 
@@ -198,11 +205,6 @@ def test_a_dozen_walkers_are_told_apart() -> None:
         shown = np.clip(linear @ seen.T, 0.0, 1.0) ** (1.0 / 2.4)
         apart = np.linalg.norm(shown[:, None] - shown, axis=-1)
         assert apart[np.triu_indices(len(shown), 1)].min() > 0.1
-
-
-def test_a_strobed_run_has_no_gait(run_directory: Callable[..., Path], tmp_path: Path) -> None:
-    strobed = run_directory(run={"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 1})
-    assert [path.name for path in plot_run(strobed, tmp_path)] == ["walk.png"]
 
 
 def test_rendering_shows_ruby_beads_on_a_grey_floor(directory: Path, tmp_path: Path) -> None:

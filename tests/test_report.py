@@ -27,7 +27,7 @@ from walkers.postprocess.analysis import current_result
 from walkers.postprocess.motion import gathered
 from walkers.postprocess.quantities import rounded
 from walkers.postprocess.report.page import LARGEST, overhead
-from walkers.postprocess.report.run import report_run
+from walkers.postprocess.report.run import report_run, summary_of
 from walkers.postprocess.report.scene import cameras_of, scene_of
 from walkers.postprocess.scene import camera_axes
 from walkers.runner.provenance import software
@@ -164,16 +164,9 @@ def test_every_number_of_a_report_is_the_results(name: str, request: pytest.Fixt
     assert path.stat().st_size < LARGEST
 
 
-def test_numbers_have_the_digits_that_their_errors_leave() -> None:
-    assert rounded(1.38173201, 4.9e-5) == "1.381732"
-    assert rounded(1.38173201, 0.31) == "1.38"
-    assert rounded(1234.5678, 20.0) == "1235"
-    assert rounded(0.0012345678) == "0.001235"
-    assert rounded(6) == "6"
-
-
 def test_parameters_say_where_they_come_from(walked_report: Path, walked_run: Path) -> None:
     words = Page(walked_report).words
+    assert f"Written by granular-walkers {software().version}." in words
     origins = walkers.find_run(walked_run).case.origins
     assert len(origins) > 20
     for one in origins:
@@ -252,8 +245,13 @@ def test_the_scene_is_the_motion(walked_run: Path) -> None:
         assert np.mean(rolled[bead]) == pytest.approx(rotation[key], rel=0.01, abs=2e-6)
 
 
-def test_the_page_says_what_wrote_it(walked_report: Path) -> None:
-    assert f"Written by granular-walkers {software().version}." in Page(walked_report).words
+def test_words_and_numbers() -> None:
+    """Numbers have the digits that their errors leave; a liquid without a name is not named."""
+    given = [(1.38173201, 4.9e-5), (1.38173201, 0.31), (1234.5678, 20.0), (0.0012345678,), (6,)]
+    assert [rounded(*one) for one in given] == ["1.381732", "1.38", "1235", "0.001235", "6"]
+    case = make_case()
+    assert "glass, Si AK5; 80 Hz" in summary_of(case)
+    assert "glass; 80 Hz" in summary_of(replace(case, liquid=replace(case.liquid, name=None)))
 
 
 def test_a_scene_without_gravity_is_seen_as_the_floor_lies(walked_run: Path) -> None:

@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
+from errno import EROFS
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from walkers.postprocess.slopes import fit_slopes
 from walkers.postprocess.steady_state import steady_walkers
 from walkers.postprocess.tables import FAMILIES, TABLES
 from walkers.postprocess.walking import Walking, walkers_met
+from walkers.runner.directory import SEGMENTS
 from walkers.runner.files import write_json
 from walkers.runner.manifest import record_tables
 
@@ -41,6 +43,12 @@ def test_slopes_are_those_of_least_squares() -> None:
     for column in range(2):
         expected, _ = np.polyfit(time - 3.5, values[:, column] - 1e3, 1)
         assert slope[column] == pytest.approx(expected, rel=1e-9)
+    slope, error = fit_slopes(time, np.outer(time, [1e-3, 0.0]))  # a walker without noise
+    np.testing.assert_allclose(slope, [1e-3, 0.0], atol=1e-15)
+    assert (error < 1e-12).all()
+    slope, error = fit_slopes(np.array([0.0, 2.0]), np.array([[1.0], [5.0]]))  # of two points nothing is known
+    assert slope[0] == 2.0
+    assert np.isnan(error[0])
 
 
 def _autocorrelated(rng: np.random.Generator, phi: float, shape: tuple[int, int]) -> np.ndarray[Any, Any]:
@@ -81,14 +89,9 @@ def test_the_error_of_a_slope_is_how_far_slopes_are_off(cycles: int, made: str, 
         assert naive < 0.2 * np.std(slope)
 
 
-def test_a_walker_without_noise_has_no_error() -> None:
-    time = np.arange(30) / 80.0
-    slope, error = fit_slopes(time, np.outer(time, [1e-3, 0.0]))
-    np.testing.assert_allclose(slope, [1e-3, 0.0], atol=1e-15)
-    assert (error < 1e-12).all()
-
-
-def test_a_result_of_before_is_made_anew(directory: Path, tmp_path: Path) -> None:
+def test_a_result_of_before_is_made_anew_if_it_can_be(
+    directory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """One of an earlier method, and one of before methods had versions, lack what is told of walkers today."""
     copy = tmp_path / directory.name
     shutil.copytree(directory, copy)
@@ -100,6 +103,17 @@ def test_a_result_of_before_is_made_anew(directory: Path, tmp_path: Path) -> Non
         record_tables(copy, [RESULT_NAME])
         assert current_result(copy) == known
         assert read_result(copy) == known
+    write_json(copy / RESULT_NAME, {**known, "analyses": {"walking": Walking.version - 1}})
+    record_tables(copy, [RESULT_NAME])
+
+    def refuse(*_: object) -> None:
+        raise OSError(EROFS, "Read-only file system")
+
+    with monkeypatch.context() as patch:  # what cannot be written is told all the same
+        patch.setattr("walkers.postprocess.analysis.forget_tables", refuse)
+        assert current_result(copy) == known
+    shutil.rmtree(copy / SEGMENTS)  # as in an archive without dumps
+    assert current_result(copy) == {**known, "analyses": {"walking": Walking.version - 1}}
 
 
 def test_symmetric_dimers_need_not_be_on_the_axis_to_be_kept(run_directory: Callable[..., Path]) -> None:
@@ -110,12 +124,6 @@ def test_symmetric_dimers_need_not_be_on_the_axis_to_be_kept(run_directory: Call
         for radius in ("0.25 mm", "0.26 mm")
     }
     assert kept == {"0.25 mm": 1, "0.26 mm": 0}
-
-
-def test_two_points_give_a_slope_without_an_error() -> None:
-    slope, error = fit_slopes(np.array([0.0, 2.0]), np.array([[1.0], [5.0]]))
-    assert slope[0] == 2.0
-    assert np.isnan(error[0])
 
 
 def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
@@ -129,12 +137,9 @@ def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
     np.testing.assert_allclose(walked.velocity, crude, rtol=0.01)
     assert np.all(walked.steady)
     assert np.all(walked.standard_error < 1e-3 * walked.velocity)
-
-
-def test_mean_velocity_through_the_cycle_is_the_strobed_one(moved: Group) -> None:
-    """Twenty samples a cycle represent the gait: their mean velocity is the displacement a cycle."""
+    # Twenty samples a cycle represent the gait: their mean velocity is the displacement a cycle.
     through = gait(moved).velocity[settled_samples(moved)].mean(axis=0)
-    np.testing.assert_allclose(through, walk(moved).velocity, rtol=0.03)
+    np.testing.assert_allclose(through, walked.velocity, rtol=0.03)
 
 
 def test_sliding_is_velocity_less_rotation(moved: Group) -> None:
@@ -154,16 +159,13 @@ def test_velocities_follow_from_positions(moved: Group) -> None:
     assert np.median(np.abs(differences - moved.velocity[1:-1])) < 0.02 * scale
 
 
-def test_orientation_starts_at_the_start_angle_for_both_facings(moved: Group) -> None:
-    np.testing.assert_allclose(moved.orientation[0], [walker.start_angle for walker in moved.walkers], atol=1e-12)
-
-
 def test_distance_is_walked_toward_the_large_bead_by_both_facings(moved: Group) -> None:
     time, distance = distance_walked(moved)
     run = moved.case.run
     assert len(time) == run.cycles + 1 >= 13
     assert np.all(distance[-1] > distance[run.settled_strobes])
     assert np.all(np.diff(distance[run.settled_strobes :], axis=0) > 0)
+    np.testing.assert_allclose(moved.orientation[0], [walker.start_angle for walker in moved.walkers], atol=1e-12)
 
 
 def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
@@ -190,11 +192,6 @@ NUMBERED = {
 """Columns of the tables of dimers that there are for each bead or contact."""
 
 
-def test_tables_of_walkers(directory: Path) -> None:
-    assert Walking.tables == tuple(NUMBERED)
-    assert {path.stem for path in directory.glob("*.parquet")} == set(NUMBERED)
-
-
 @pytest.mark.parametrize("name", NUMBERED)
 def test_tables_have_units_and_meanings(directory: Path, name: str) -> None:
     import pyarrow.parquet as pq
@@ -219,6 +216,7 @@ def test_rows_of_the_tables(directory: Path) -> None:
     assert len(bridges) == (cycles + 1) * 6 * 3
     assert bridges["touching"].dtype == bool
     assert not series.isna().any().any()
+    assert {path.stem for path in directory.glob("*.parquet")} == set(NUMBERED) == set(Walking.tables)
 
 
 def test_a_single_walker_has_the_error_of_its_fit(run_directory: Callable[..., Path]) -> None:
@@ -227,13 +225,10 @@ def test_a_single_walker_has_the_error_of_its_fit(run_directory: Callable[..., P
     assert result["velocity"]["standard_error"] == walkers["standard_error"][0]
     assert result["left_facing"] == {"n": 0, "mean": None, "smallest": None, "largest": None, "standard_error": None}
     assert "left none" in describe_result(directory, result)
-
-
-def test_walkers_that_have_not_settled_are_reported(run_directory: Callable[..., Path]) -> None:
-    directory = run_directory(run={"cycles": 6, "settling_cycles": 0})
-    result = read_result(directory)
+    unsettled = run_directory(run={"cycles": 6, "settling_cycles": 0})
+    result = read_result(unsettled)
     assert result["steady"] == 0
-    assert "not steady" in describe_result(directory, result)
+    assert "not steady" in describe_result(unsettled, result)
 
 
 def test_walkers_that_come_close_are_reported(moved: Group, directory: Path) -> None:

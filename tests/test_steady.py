@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.conftest import REFERENCE, call, document, make_case, to_toml
+from tests.conftest import document, make_case
 from walkers import run as run_case
 from walkers.inputs import load_case, resolve_case
 from walkers.inputs.case import Case
@@ -147,16 +148,8 @@ def test_what_settles_slowly_runs_in_full_and_numbers_are_obeyed() -> None:
     ],
 )
 def test_a_length_said_twice_is_refused(key: str, run: dict[str, Any], expected: str) -> None:
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError, match=rf"(?s){re.escape(key)}.*{re.escape(expected)}"):
         _until_steady(run=run)
-    assert key in str(refused.value)
-    assert expected in str(refused.value)
-
-
-def test_the_program_refuses_it_with_one_line(in_folder: Path) -> None:
-    Path("twice.toml").write_text(to_toml({**REFERENCE, "run": {"cycles": "auto", "settling_cycles": 5}}))
-    done = call("run", "twice.toml")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
 
 
 def _companions() -> list[Case]:

@@ -6,24 +6,27 @@ tables, results, text and figures, and sweeps of columns, follows.
 
 from __future__ import annotations
 
+import errno
 import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin
-from walkers.postprocess.drawing import check_formats
+from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.runner.directory import SEGMENTS, case_of
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import FileChanged, check_unchanged, forget_tables, record_tables
 
 if TYPE_CHECKING:  # how far a sweep is can be told without numpy
     import numpy.typing as npt
+    from matplotlib.figure import Figure
 
     from walkers.postprocess.motion import Bridges, Motion
     from walkers.postprocess.quantities import Quantity
@@ -56,6 +59,8 @@ class Analysis(ABC):
         Names of the tables that it writes.
     derived, columns
         Columns of a sweep's table: what follows from a point's case, and what its run gives.
+    places
+        Where the result has those of `columns` that it has not by their names, such as ``velocity.mean``.
     headlines
         Those of `columns` that count first.
     """
@@ -65,6 +70,7 @@ class Analysis(ABC):
     tables: ClassVar[tuple[str, ...]]
     derived: ClassVar[Described] = {}
     columns: ClassVar[Described] = {}
+    places: ClassVar[Mapping[str, str]] = {}
     headlines: ClassVar[tuple[str, ...]] = ()
 
     def can_show(self, result: Mapping[str, Any]) -> bool:
@@ -96,9 +102,8 @@ class Analysis(ABC):
         return {}
 
     def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """The columns `columns` of a result."""
-        del result
-        return {}
+        """The columns `columns` of a result; NaN for what it has not."""
+        return {name: _at(result, self.places.get(name, name)) for name in self.columns}
 
     @abstractmethod
     def lines(self, result: Mapping[str, Any]) -> list[str]:
@@ -119,10 +124,18 @@ class Analysis(ABC):
         del motion
         return lambda _: {}
 
-    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
-        """Draw its figures of a run into a folder, in each of some formats."""
-        del directory, destination, formats
-        return []
+    def figures(self, directory: Path) -> Mapping[str, Figure]:
+        """Its figures of a run, by the names of their files."""
+        del directory
+        return {}
+
+
+def _at(result: Mapping[str, Any], place: str) -> Any:
+    """What a result has at a place; NaN where it says that there is none."""
+    value: Any = result
+    for part in place.split("."):
+        value = None if value is None else value[part]
+    return nan if value is None else value
 
 
 @cache
@@ -165,10 +178,16 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
     runner.manifest.FileChanged
         If a file of a finished run is not what it was.
     """
-    from walkers.postprocess.motion import read_motion
-    from walkers.postprocess.tables import write_table
-
     directory = Path(directory)
+    result, tables = _measured(directory)
+    _write(directory, result, tables)
+    return result
+
+
+def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
+    """The result of a run directory and its tables, from its dumps."""
+    from walkers.postprocess.motion import read_motion
+
     files = (path.relative_to(directory) for path in (directory / SEGMENTS).rglob("*"))
     check_unchanged(directory, [path.as_posix() for path in files])
     motion = read_motion(directory)
@@ -189,13 +208,18 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
         measured = one.of(motion)
         tables |= measured.tables
         result |= measured.summary
+    return result, tables
+
+
+def _write(directory: Path, result: Mapping[str, Any], tables: Mapping[str, Columns]) -> None:
+    from walkers.postprocess.tables import write_table
+
     names = [RESULT_NAME, *(f"{name}.parquet" for name in tables)]
     forget_tables(directory, names)
     for name, columns in tables.items():
         write_table(directory, name, columns)
     write_json(directory / RESULT_NAME, result)
     record_tables(directory, names)
-    return result
 
 
 def read_result(directory: str | Path) -> dict[str, Any]:
@@ -216,6 +240,9 @@ def read_result(directory: str | Path) -> dict[str, Any]:
 def current_result(directory: str | Path) -> dict[str, Any]:
     """The result of a finished run; tabulated anew if it or a table is gone or damaged, or of an earlier method.
 
+    What cannot be written, as where all is read-only, is not. Without dumps a result of an earlier method stays what it
+    is, if it has all that is told of one today.
+
     Raises
     ------
     postprocess.dump.DumpError, OSError, ValueError
@@ -226,20 +253,31 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     from walkers.postprocess.tables import intact
 
     directory = Path(directory)
+    kept: dict[str, Any] | None = None
     try:
         result = read_result(directory)
         wanted = analyses_of(case_of(directory))
-        tables = [name for one in wanted for name in one.tables]
         result.setdefault("rests_on", [])  # of runs that did not say it
-        known = result.get("analyses") == {one.name: one.version for one in wanted} and intact(directory, tables)
-        if known and check_unchanged(directory, [RESULT_NAME]) and all(one.can_show(result) for one in wanted):
-            lines_of_rest(result["rests_on"])
+        lines_of_rest(result["rests_on"])
+        versions = {one.name: one.version for one in wanted}
+        whole = intact(directory, [name for one in wanted for name in one.tables])
+        if whole and result["analyses"].keys() == versions.keys() and all(one.can_show(result) for one in wanted):
+            kept = result
+        if kept and check_unchanged(directory, [RESULT_NAME]) and result["analyses"] == versions:
             return result
     except FileChanged:
         raise
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         pass
-    return tabulate(directory)
+    if kept is not None and not any((directory / SEGMENTS).rglob("*.bin")):
+        return kept
+    result, tables = _measured(directory)
+    try:
+        _write(directory, result, tables)
+    except OSError as error:
+        if error.errno not in (errno.EACCES, errno.EPERM, errno.EROFS):
+            raise
+    return result
 
 
 def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
@@ -340,4 +378,7 @@ def plot_run(directory: Path, destination: Path | None = None, formats: Sequence
     destination = destination or directory
     destination.mkdir(parents=True, exist_ok=True)
     case = case_of(directory)
-    return [path for one in analyses_of(case) for path in one.plot(directory, destination, formats)]
+    figures = (pair for one in analyses_of(case) for pair in one.figures(directory).items())
+    return [
+        path for name, figure in figures for path in save_figure(figure, destination / name, [directory.name], formats)
+    ]

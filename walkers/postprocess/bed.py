@@ -2,66 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.boundary import Boundary
 from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
+from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Bridges, Motion
 
-FloatArray = npt.NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class Bed:
-    """One frame of a pile.
-
-    Attributes
-    ----------
-    surface, surface_low, surface_high : float
-        Median, 10th and 90th percentile over x-y cells of the height of each cell's highest bead top in the bulk, m.
-    brazil_nut, brazil_nut_of_bulk : float
-        Mean height of the large beads minus that of the small ones, over the sum of the two; of all beads, and of the
-        bulk alone.
-    mean_square_velocity : float
-        m²/s², relative to the container, at the phase at which frames are taken (at 0 several times below the mean over
-        a cycle).
-    contacts, bridges : float
-        A bead, between beads alone: those bridges that touch, and all of them, touching or open, twice, over beads.
-    touching, opened : int
-        Bridges between beads that touch and that do not.
-    mean_force : float
-        Normal force of the bridges between beads, positive where they pull together, N.
-    liquid_in_bridges : float
-        Sum of the volumes of all bridges, to walls too, m³ (`liquid_of_beads`).
-    bulk : int
-        Beads in the bulk.
-    """
-
-    surface: float
-    surface_low: float
-    surface_high: float
-    brazil_nut: float
-    brazil_nut_of_bulk: float
-    mean_square_velocity: float
-    contacts: float
-    bridges: float
-    touching: int
-    opened: int
-    mean_force: float
-    liquid_in_bridges: float
-    bulk: int
-
-
-def bed_of(motion: Motion, frame: int, bulk: npt.NDArray[np.bool_], bridges: Bridges, liquid: FloatArray) -> Bed:
-    """The state of a pile in a frame.
+def bed_of(motion: Motion, bulk: npt.NDArray[np.bool_], bridges: Bridges, liquid: FloatArray) -> dict[str, float | int]:
+    """The state of a pile in a frame: most columns of `walkers.postprocess.tables.BED`.
 
     Parameters
     ----------
-    motion, frame
-        Of the pile; and which frame.
+    motion
+        Of the pile.
     bulk : ndarray of bool, shape (N,)
         Whether a bead belongs to the bulk.
     bridges
@@ -69,27 +25,28 @@ def bed_of(motion: Motion, frame: int, bulk: npt.NDArray[np.bool_], bridges: Bri
     liquid : ndarray, shape (N,)
         Of `liquid_of_beads`.
     """
+    frame = bridges.frame
     position, radius, large = motion.position[frame], motion.radius, motion.large
     container = motion.case.boundary  # its cross-section is cut into cells of about four large radii
     tops = surface_cells(position[bulk], radius[bulk], container, 4.0 * float(radius.max()))
     # With no bulk the floor is the surface.
     low, middle, high = (float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0)))
     touching = int((bridges.gap <= 0.0).sum())
-    return Bed(
-        surface=middle,
-        surface_low=low,
-        surface_high=high,
-        brazil_nut=segregation(position[:, 2], large),
-        brazil_nut_of_bulk=segregation(position[bulk, 2], large[bulk]),
-        mean_square_velocity=float(np.mean(np.sum(motion.velocity[frame] ** 2, axis=1))),
-        contacts=2.0 * touching / len(position),
-        bridges=2.0 * len(bridges.beads) / len(position),
-        touching=touching,
-        opened=len(bridges.gap) - touching,
-        mean_force=float(bridges.force.mean()) if len(bridges.force) else 0.0,
-        liquid_in_bridges=float(liquid.sum()),
-        bulk=int(bulk.sum()),
-    )
+    return {
+        "surface": middle,
+        "surface_low": low,
+        "surface_high": high,
+        "brazil_nut": segregation(position[:, 2], large),
+        "brazil_nut_of_bulk": segregation(position[bulk, 2], large[bulk]),
+        "mean_square_velocity": float(np.mean(np.sum(motion.velocity[frame] ** 2, axis=1))),
+        "contacts": 2.0 * touching / len(position),
+        "bridges": 2.0 * len(bridges.beads) / len(position),
+        "touching": touching,
+        "opened": len(bridges.gap) - touching,
+        "mean_force": float(bridges.force.mean()) if len(bridges.force) else 0.0,
+        "liquid_in_bridges": float(liquid.sum()),
+        "bulk": int(bulk.sum()),
+    }
 
 
 def coordination_of_inner(bridges: Bridges, count: int) -> dict[str, float | None]:

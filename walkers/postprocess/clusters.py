@@ -23,9 +23,9 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import FLOOR, Bridges
 
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 Cluster = tuple[frozenset[int], frozenset[int]]
 """The beads of a cluster in a frame and the side walls that hold it."""
@@ -178,35 +178,12 @@ def _same(before: frozenset[int], now: frozenset[int], share: float) -> bool:
 
 @dataclass(frozen=True)
 class Climb:
-    """What a track did.
+    """What a track did: columns of `walkers.postprocess.tables.CLUSTERS`, which says what they mean.
 
-    Attributes
-    ----------
-    begin, end : float
-        Of the greatest gain of height, s.
-    onset : float
-        When the gain began by which it qualified, s; NaN if it never did. Unlike `begin` it does not depend on what
-        comes later.
-    qualified : float
-        When the track first counted as a climb, s: in the first frame up to which it is one; NaN if it never did. What
-        comes later does not change it, so that a longer record has no other climbs up to a time than a shorter one.
-    gain : float
-        m.
-    speed, standard_error : float
-        The gain over the time in which it was made, m/s, and the error of that mean, from the speeds in up to ten equal
-        numbers of frames (NaN with less than four of them). It is too small where the speed changes more slowly than
-        a tenth of the climb takes; that begin and end are those of the greatest gain makes the speed of a short and
-        unsteady climb too large.
-    leader : int
-        The bead that was most often topmost meanwhile.
-    height : float
-        Of the leader at the end, m.
-    size, large : int
-        Beads at the end, and how many of them are of the large class.
-    walls : tuple of int
-        Side walls that held it at the end.
-    climbed : bool
-        Whether it counts as a climb: once it has, whatever comes later.
+    Unlike ``begin``, ``onset`` and ``qualified`` do not depend on what comes later, so that a longer record has no
+    other climbs up to a time than a shorter one. The error of the speed is that of a mean over up to ten equal numbers
+    of frames (NaN with less than four). It is too small where the speed changes more slowly than a tenth of the climb
+    takes; that begin and end are those of the greatest gain makes the speed of a short and unsteady climb too large.
     """
 
     begin: float

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.postprocess.clusters import ClimbCriteria, Track
+from walkers.postprocess.dump import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,53 +14,49 @@ from walkers.postprocess.drawing import (
     letter_panels,
     new_figure,
     plain_text,
-    save_figure,
     series_look,
     styled,
 )
-from walkers.postprocess.gait import averages, distance_walked, gait, walk
-from walkers.postprocess.motion import Group, read_motion
-from walkers.postprocess.piles import PileAnalysis, analyse
-from walkers.postprocess.posture import ways
-from walkers.postprocess.slopes import fit_slopes
+from walkers.postprocess.motion import Group
+from walkers.postprocess.panels import MOST_NAMED, Panel, gait_panels, pile_panels, walk_panels
+from walkers.postprocess.piles import PileAnalysis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MOST_NAMED = 12
-"""Walkers, or climbs, that a legend names."""
-_MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
-"""How events are marked (`walkers.postprocess.events`)."""
-_FEWEST_SAMPLES = 8
-"""Samples a cycle below which a gait shows nothing."""
 
-
-def plot_walkers(directory: Path, destination: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
-    """Draw the walkers of a run.
-
-    Parameters
-    ----------
-    directory
-        The run directory.
-    destination
-        Folder for the pictures.
-    formats
-        Of `walkers.postprocess.drawing.FORMATS`.
+def walk_figures(groups: list[Group]) -> dict[str, Figure]:
+    """The figures of the walkers of a run.
 
     Returns
     -------
-    list of Path
-        ``walk`` (strobed positions, distance walked and orientation against time) and, if the run was sampled at least
-        eight times a cycle, ``gait`` (velocity and rotation velocities through two cycles, as in Fig. 4 of Khan et
-        al., and the substrate's velocity), in each format.
+    dict
+        ``walk``, strobed positions, distance walked and orientation against time; and, if the run was sampled at least
+        eight times a cycle, ``gait``, velocity and rotation velocities through two cycles, as in Fig. 4 of Khan et al.,
+        and the substrate's velocity.
     """
-    groups = read_motion(directory).groups
-    written = save_figure(_walk_figure(groups), destination / "walk", [directory.name], formats)
-    samples = groups[0].case.run.samples_per_cycle
-    if samples >= _FEWEST_SAMPLES and len(groups[0].time) > 2 * samples:
-        written += save_figure(_gait_figure(groups[0]), destination / "gait", [directory.name], formats)
-    return written
+    panels = gait_panels(groups[0])
+    return {"walk": _walk_figure(groups), **({"gait": _gait_figure(groups[0], panels)} if panels else {})}
+
+
+def _draw(axes: Axes, panel: Panel) -> None:
+    """A panel without its title and what is below it; lines with a number of many are marked to be told apart."""
+    for line in panel.lines:
+        look: dict[str, Any] = {"color": line.colour, "lw": line.width, "ls": "--" if line.dashed else "-"}
+        if isinstance(line.colour, int):
+            look["color"] = f"C{line.colour}"
+        if line.marker:
+            look |= {"marker": line.marker, "mfc": "none"}
+        axes.plot(line.x, line.y, label=line.label or None, **look)
+    if panel.band:
+        low, high = panel.band
+        axes.fill_between(low.x, low.y, high.y, color="0.85", lw=0, label=low.label, zorder=0)
+    if panel.settled:
+        axes.axvspan(0.0, panel.settled, color="0.93", zorder=0)
+    if panel.log:
+        axes.set_yscale("log")
+    axes.set_ylabel(panel.y)
 
 
 def _title(case: Case) -> str:
@@ -76,29 +71,20 @@ def _title(case: Case) -> str:
 def _walk_figure(groups: list[Group]) -> Figure:
     rows = [["strobe", "walked"], ["strobe", "turned"]]
     figure, axes = new_figure(TWO_COLUMNS, 5.2, mosaic=rows, width_ratios=[1, 1.6])
-    walked, turned = axes["walked"], axes["turned"]
     figure.suptitle(_title(groups[0].case))
     _draw_strobe(axes["strobe"], groups[0])
-    run, facing = groups[0].case.run, ways(uphill=groups[0].case.goes_uphill)
-    for group in groups:
-        time, distance = distance_walked(group)
-        slope, _ = fit_slopes(time[run.settled_strobes :], distance[run.settled_strobes :])
-        for place, walker in enumerate(group.walkers):
-            number = walker.walker
+    for name, panel in zip(("walked", "turned"), walk_panels(groups), strict=False):
+        _draw(axes[name], panel)
+        axes[name].set_xlabel(panel.x)
+        for number, line in enumerate(axes[name].lines):
             # Marks of walkers that do the same stand beside each other.
-            look = series_look(number) | {"markevery": (number % 6, 6), "linewidth": 0.9}
-            told = f"{number}: {facing[int(walker.facing < 0)]}, {slope[place] * 1e3:.3g} mm/s"
-            label = told if number < _MOST_NAMED else None
-            walked.plot(time, distance[:, place] * 1e3, label=label, **look)
-            turned.plot(time, np.degrees(group.orientation[:: run.samples_per_cycle, place]), **look)
-    for panel in (walked, turned):
-        panel.axvspan(0.0, time[run.settled_strobes], color="0.93", zorder=0)
-        panel.set_xlabel("time (s)")
-    walked.set(ylabel="distance walked (mm)", title="grey: settling")
-    turned.set(ylabel=r"orientation $\psi$ (°)")
+            line.set(**series_look(number), markevery=(number % 6, 6), linewidth=0.9)
+    axes["walked"].set_title("grey: settling")
     letter_panels(axes.values())
-    more = " (the first 12)" if sum(len(group.walkers) for group in groups) > _MOST_NAMED else ""
-    figure.legend(loc="outside lower center", ncols=4, title=f"walker: facing at the start, velocity{more}")
+    more = " (the first 12)" if sum(len(group.walkers) for group in groups) > MOST_NAMED else ""
+    handles = axes["walked"].get_legend_handles_labels()
+    title = f"walker: facing at the start, velocity{more}"
+    figure.legend(*handles, loc="outside lower center", ncols=4, title=title)
     return figure
 
 
@@ -135,115 +121,35 @@ def _draw_strobe(axes: Axes, group: Group) -> None:
 
 
 @styled
-def _gait_figure(group: Group) -> Figure:
-    run = group.case.run
-    motion = gait(group)
-    cycles = (len(group.time) - 1) // run.samples_per_cycle
-    last = slice((cycles - 2) * run.samples_per_cycle, cycles * run.samples_per_cycle + 1)
-    phase = group.time[last] * group.case.drive.frequency - (cycles - 2)
-    shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
-    # The substrate is faster than its walkers by far: in their panel it would make them all flat.
-    rows = [["walker"], ["substrate"]] if np.any(shaken) else [["walker"]]
-    figure, panels = new_figure(
-        TWO_COLUMNS, 3.0 + 1.3 * len(rows), mosaic=rows, height_ratios=[2.5, 1.0][: len(rows)], sharex=True
+def _gait_figure(group: Group, panels: Sequence[Panel]) -> Figure:
+    ratios = [2.5, 1.0][: len(panels)]
+    figure, axes = new_figure(
+        TWO_COLUMNS, 3.0 + 1.3 * len(panels), nrows=len(panels), height_ratios=ratios, sharex=True, squeeze=False
     )
     figure.suptitle(_title(group.case))
-    axes = panels["walker"]
-    marks = [("o", "0.1"), ("^", "#1f3b73"), ("v", "#3f7f93"), ("D", "0.5")]
-    means = averages(group).rotation[0]
-    series = [("walker", motion.velocity[last, 0], walk(group).velocity[0], "s", "#c4473a")]
-    series += [
-        (f"bead {bead + 1}", motion.rotation[last, 0, bead], mean, *marks[bead % len(marks)])
-        for bead, mean in enumerate(means)
-    ]
-    for label, values, mean, marker, colour in series:
-        look = {"marker": marker, "color": colour, "mfc": "none"}
-        axes.plot(phase, values * 1e3, label=f"{label} (mean {mean * 1e3:.2f} mm/s)", **look)
-    axes.axhline(0.0, color="0.4", lw=0.6)
-    axes.set(title="walker 0", ylabel="velocity; beads:\n" r"$-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)")
-    if "substrate" in panels:
-        panels["substrate"].plot(phase, group.walkers[0].facing * shaken * 1e3, color="0.4", ls="--")
-        panels["substrate"].axhline(0.0, color="0.4", lw=0.6)
-        panels["substrate"].set(title="substrate, positive as for the walker", ylabel="velocity\n(mm/s)")
-        letter_panels(panels.values())
-    panels[rows[-1][0]].set_xlabel("time (cycles of the drive), the last two")
-    figure.legend(*axes.get_legend_handles_labels(), ncols=4, loc="outside lower center")
+    for one, panel in zip(axes[:, 0], panels, strict=True):
+        _draw(one, panel)
+        one.axhline(0.0, color="0.4", lw=0.6)
+        one.set_title(panel.title)
+    if len(panels) > 1:
+        letter_panels(axes[:, 0])
+    axes[-1, 0].set_xlabel(panels[-1].x)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), ncols=4, loc="outside lower center")
     return figure
-
-
-def plot_pile(directory: Path, destination: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
-    """Draw what a pile did.
-
-    Parameters
-    ----------
-    directory, destination, formats
-        As for `plot_walkers`.
-
-    Returns
-    -------
-    list of Path
-        ``climb``: heights of the clusters' leaders over the pile's surface against time with the events in their
-        lives, the Brazil-nut index, contacts and bridges a bead, the mean square velocity.
-    """
-    return save_figure(_climb_figure(analyse(directory)), destination / "climb", [directory.name], formats)
 
 
 @styled
-def _climb_figure(found: PileAnalysis) -> Figure:
-    rows = [["height"], ["height"], ["index"], ["bridges"], ["agitation"]]
-    figure, axes = new_figure(TWO_COLUMNS, 8.0, mosaic=rows, sharex=True)
-    time, case = found.motion.time, found.motion.case
-    beside = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "borderaxespad": 0.0}
-    _heights(axes["height"], found)
-    axes["height"].legend(**beside)
-    axes["index"].plot(time, [bed.brazil_nut for bed in found.beds], color="C0", label="all beads")
-    axes["index"].plot(time, [bed.brazil_nut_of_bulk for bed in found.beds], "--", color="C2", label="bulk alone")
-    axes["index"].set_ylabel("Brazil-nut\nindex")
-    axes["index"].legend(**beside)
-    axes["bridges"].plot(time, [bed.bridges for bed in found.beds], color="C0", label="bridges")
-    axes["bridges"].plot(time, [bed.contacts for bed in found.beds], "--", color="C2", label="contacts")
-    axes["bridges"].set(ylabel="how many a bead,\nto other beads", ylim=(0.0, None))
-    axes["bridges"].legend(**beside)
-    axes["agitation"].semilogy(time, [max(bed.mean_square_velocity, 1e-12) for bed in found.beds], color="C0")
-    axes["agitation"].set(
-        xlabel="time from the begin of the drive (s)", ylabel="mean square\nvelocity, strobed\n(m²/s²)"
-    )
-    letter_panels(axes.values())
+def climb_figure(found: PileAnalysis) -> Figure:
+    """What a pile did: `walkers.postprocess.panels.pile_panels`, one below the other."""
+    panels, case = pile_panels(found), found.motion.case
+    figure, axes = new_figure(TWO_COLUMNS, 8.0, nrows=len(panels), height_ratios=[2, 1, 1, 1], sharex=True)
+    for one, panel in zip(axes, panels, strict=True):
+        _draw(one, panel)
+        if any(line.label for line in panel.lines):
+            one.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), borderaxespad=0.0)
+    axes[2].set_ylim(0.0, None)
+    axes[-1].set_xlabel(panels[-1].x)
+    letter_panels(axes)
     figure.align_ylabels()
     figure.suptitle(f"{plain_text(case.title or case.name)}\n{case.count} beads, {case.drive.described()}")
     return figure
-
-
-def _heights(axes: Axes, found: PileAnalysis) -> None:
-    time, height = found.motion.time, found.motion.position[:, :, 2]
-    low, middle, high = (
-        np.array([getattr(bed, name) for bed in found.beds]) * 1e3
-        for name in ("surface_low", "surface", "surface_high")
-    )
-    axes.fill_between(time, low, high, color="0.85", lw=0, label="surface, 10th to\n90th percentile")
-    axes.plot(time, middle, color="0.4", lw=1.0, label="surface, median")
-    named = 0
-    for track, climb in zip(found.tracks, found.climbs, strict=True):
-        places = [frame for frame, members in zip(track.frames, track.members, strict=True) if climb.leader in members]
-        leads = "large" if found.motion.large[climb.leader] else "small"
-        colour, width = ("C2", 1.6) if climb.climbed else ("C1", 0.6)
-        line = axes.plot(time[places], height[places, climb.leader] * 1e3, color=colour, lw=width)[0]
-        named += climb.climbed
-        if climb.climbed and named <= _MOST_NAMED:
-            line.set_label(f"{climb.size} beads climb, led by a\n{leads} one: {climb.speed * 1e3:.1f} mm/s")
-    _mark_events(axes, found)
-    if named > _MOST_NAMED:
-        axes.plot([], [], color="C2", lw=1.6, label=f"and {named - _MOST_NAMED} more climbs")
-    axes.set(ylabel="height (mm)")
-
-
-def _mark_events(axes: Axes, found: PileAnalysis) -> None:
-    """A mark where something happened to a cluster, at the height of its leader in the frame nearest to it."""
-    for kind, marker in _MARKS.items():
-        told = [event for event in found.events if event.kind == kind]
-        if not told:
-            continue
-        frames = np.searchsorted(found.motion.time, [event.time for event in told])
-        leaders = [found.climbs[event.track].leader for event in told]
-        heights = found.motion.position[frames.astype(int), np.array(leaders, dtype=int), 2] * 1e3
-        axes.plot([event.time for event in told], heights, marker, ms=4, color="0.3", mfc="none", lw=0, label=kind)

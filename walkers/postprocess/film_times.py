@@ -102,13 +102,6 @@ def _usual_slowdown(seconds: float, between: float | None) -> float:
 
 def positions_at(motion: Motion, frame: int, share: float) -> FloatArray:
     """Centres between a frame and the next one, m, shape (N, 3): the cubic through their places and velocities."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    if share == 0.0:
-        here: FloatArray = motion.position[frame]
-        return here
-    ends = slice(frame, frame + 2)
-    time = motion.time[ends]
-    cubic = CubicHermiteSpline(time, motion.position[ends], motion.velocity[ends])
-    place: FloatArray = cubic(time[0] + share * (time[1] - time[0]))
+    part = motion.select(slice(frame, frame + 2)).between(share) if share else motion.select(slice(frame, frame + 1))
+    place: FloatArray = part.position[0]
     return place

@@ -58,10 +58,6 @@ class Meetings(Analysis):
         }
         return Measured({"meetings": _columns(rows)}, summary)
 
-    def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """How often."""
-        return {name: result[name] for name in self.columns}
-
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """How often, and who is together at the end."""
         together = "; ".join(", ".join(map(str, group)) for group in result["groups_at_end"])

@@ -256,8 +256,10 @@ def gathered(motion: Motion, lane: float = 2.0) -> Motion:
         return motion
     lane *= max(make.length for make in case.walkers)
     across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
-    shift = np.array([-number * lane * across - [*one.origin, 0.0] for number, one in enumerate(motion.walkers)])
-    moved = replace(motion, position=motion.position + shift[motion.walker_of])
+    shift = np.zeros((len(motion.radius), 3))
+    for number, one in enumerate(motion.walkers):
+        shift[np.array(one.beads) - motion.first_id] = -number * lane * across - [*one.origin, 0.0]
+    moved = replace(motion, position=motion.position + shift)
     return moved if case.boundary.bare else moved.of_walkers(moved.walkers[:1])
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
-from walkers.postprocess.bed import Bed, bed_of, coordination_of_inner, liquid_of_beads, packing_profile
+from walkers.postprocess.bed import bed_of, coordination_of_inner, liquid_of_beads, packing_profile
 from walkers.postprocess.clusters import (
     Climb,
     ClimbCriteria,
@@ -27,11 +27,13 @@ from walkers.postprocess.clusters import (
     follow,
     held_clusters,
 )
+from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.events import Event, events_of
 from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
 from walkers.postprocess.quantities import Quantity, of_piles
 
-FloatArray = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _LAYERS = 0.5
 """Thickness of the layers of the packing profile, in diameters of the largest bead."""
@@ -45,8 +47,8 @@ class PileAnalysis:
     ----------
     motion
         Of the beads.
-    beds
-        One a frame.
+    bed
+        The columns of `walkers.postprocess.bed.bed_of`, one row a frame.
     liquid : ndarray, shape (F, N)
         In the bridges of each bead, m³.
     inner
@@ -63,16 +65,16 @@ class PileAnalysis:
     """
 
     motion: Motion
-    beds: list[Bed]
+    bed: Columns
     liquid: FloatArray
     inner: dict[str, float | None]
     bulks: list[npt.NDArray[np.bool_]]
     held: list[list[Cluster]]
-    tracks: list[Track]
-    climbs: list[Climb]
-    out_of_pile: list[bool]
-    events: list[Event]
-    definition: ClimbCriteria
+    tracks: list[Track] = field(default_factory=list)
+    climbs: list[Climb] = field(default_factory=list)
+    out_of_pile: list[bool] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    definition: ClimbCriteria = field(default_factory=ClimbCriteria)
 
 
 def analyse(run: str | Path | Motion, definition: ClimbCriteria | None = None) -> PileAnalysis:
@@ -90,24 +92,23 @@ def analyse(run: str | Path | Motion, definition: ClimbCriteria | None = None) -
     postprocess.dump.DumpError
         If a dump cannot be read.
     """
-    rule = definition or ClimbCriteria()
     motion = run if isinstance(run, Motion) else read_motion(run)
-    case = motion.case
-    beds: list[Bed] = []
-    liquid, bulks, held = [], [], []
+    case, count = motion.case, len(motion.radius)
+    beds, liquid, bulks, held = [], [], [], []
     inner: dict[str, float | None] = {}
     rest = _at_rest(motion)
     for bridges in read_bridges(motion):
-        labels = connected(len(motion.radius), bridges.beads)
+        labels = connected(count, bridges.beads)
         bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
         liquid.append(liquid_of_beads(motion.radius, case.liquid.volume_fraction, bridges))
-        beds.append(bed_of(motion, bridges.frame, bulks[-1], bridges, liquid[-1]))
+        beds.append(bed_of(motion, bulks[-1], bridges, liquid[-1]))
         if bridges.frame == rest:
-            inner = coordination_of_inner(bridges, len(motion.radius))
+            inner = coordination_of_inner(bridges, count)
         # While the pile falls and settles, most of it is free of the rest.
         driven = motion.time[bridges.frame] >= 0.0
         held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
-    return classified(PileAnalysis(motion, beds, np.stack(liquid), inner, bulks, held, [], [], [], [], rule), rule)
+    bed = {name: np.array([one[name] for one in beds]) for name in beds[0]}
+    return classified(PileAnalysis(motion, bed, np.stack(liquid), inner, bulks, held), definition or ClimbCriteria())
 
 
 def _at_rest(motion: Motion) -> int:
@@ -200,7 +201,7 @@ class Pile(Analysis):
         speeds = [climb["speed"] for climb in climbs if climb["speed"] is not None]
         return {
             "climbs": len(climbs),
-            "onset": min((climb["begin"] for climb in climbs), default=nan),
+            "onset": min((climb["onset"] for climb in climbs), default=nan),
             "speed": sum(speeds) / len(speeds) if speeds else nan,
             "highest": max((climb["height"] for climb in climbs), default=nan),
             "led_by_large": sum(climb["leader_large"] for climb in climbs),
@@ -234,51 +235,51 @@ class Pile(Analysis):
 
         return of_frame
 
-    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
+    def figures(self, directory: Path) -> Mapping[str, Figure]:
         """Heights of the clusters, their events, segregation and agitation."""
-        from walkers.postprocess.figures import plot_pile
+        from walkers.postprocess.figures import climb_figure
 
-        return plot_pile(directory, destination, formats)
+        return {"climb": climb_figure(analyse(directory))}
 
 
 def _bed_columns(found: PileAnalysis) -> Columns:
-    held = np.zeros(len(found.beds), dtype=np.int64)
-    highest = np.array([bed.surface for bed in found.beds])
+    held = np.zeros(len(found.motion.time), dtype=np.int64)
+    highest = found.bed["surface"].copy()
     for track in found.tracks:
         for frame, members in zip(track.frames, track.members, strict=True):
             held[frame] += 1
             highest[frame] = max(highest[frame], found.motion.position[frame, list(members), 2].max())
-    columns = {name: np.array([getattr(bed, name) for bed in found.beds]) for name in vars(found.beds[0])}
-    return {"time": found.motion.time, **columns, "clusters": held, "highest": highest}
+    return {"time": found.motion.time, **found.bed, "clusters": held, "highest": highest}
+
+
+_KINDS = {
+    np.float64: ("begin", "end", "onset", "qualified", "gain", "speed", "standard_error", "height"),
+    np.int64: ("leader", "size", "large"),
+    np.bool_: ("climbed",),
+}
+"""Of what a climb is told by, as columns."""
 
 
 def _cluster_columns(found: PileAnalysis) -> Columns:
     time, tracks, climbs = found.motion.time, found.tracks, found.climbs
-
-    def column(values: list[Any], kind: npt.DTypeLike) -> npt.NDArray[Any]:
-        return np.array(values, dtype=kind)
-
-    surface = np.array([bed.surface for bed in found.beds])
-    at_end = np.searchsorted(time, [climb.end for climb in climbs])
+    names = [names_of_walls(climb.walls, found.motion.case.boundary) for climb in climbs]
+    merged = [-1 if track.merged_into is None else track.merged_into for track in tracks]
     columns: Columns = {
-        "track": np.arange(len(tracks), dtype=np.int64),
-        "first": column([time[track.frames[0]] for track in tracks], np.float64),
-        "last": column([time[track.frames[-1]] for track in tracks], np.float64),
-        "leader_large": column([found.motion.large[climb.leader] for climb in climbs], np.bool_),
-        "above_surface": column([climb.height for climb in climbs], np.float64) - surface[at_end],
-        "walls": column([len(climb.walls) for climb in climbs], np.int64),
-        "merged_into": column([-1 if track.merged_into is None else track.merged_into for track in tracks], np.int64),
+        name: np.array([getattr(climb, name) for climb in climbs], dtype=kind)
+        for kind, keys in _KINDS.items()
+        for name in keys
     }
-    columns["wall_names"] = np.array(
-        [names_of_walls(climb.walls, found.motion.case.boundary) for climb in climbs], dtype=np.str_
-    )
-    for name in ("begin", "end", "onset", "qualified", "gain", "speed", "standard_error", "height"):
-        columns[name] = column([getattr(climb, name) for climb in climbs], np.float64)
-    for name in ("leader", "size", "large"):
-        columns[name] = column([getattr(climb, name) for climb in climbs], np.int64)
-    columns["climbed"] = column([climb.climbed for climb in climbs], np.bool_)
-    columns["out_of_pile"] = column(found.out_of_pile, np.bool_)
-    return columns
+    return columns | {
+        "track": np.arange(len(tracks), dtype=np.int64),
+        "first": np.array([time[track.frames[0]] for track in tracks], dtype=np.float64),
+        "last": np.array([time[track.frames[-1]] for track in tracks], dtype=np.float64),
+        "leader_large": found.motion.large[columns["leader"]],
+        "above_surface": columns["height"] - found.bed["surface"][np.searchsorted(time, columns["end"])],
+        "walls": np.array([len(climb.walls) for climb in climbs], dtype=np.int64),
+        "wall_names": np.array(names, dtype=np.str_),
+        "merged_into": np.array(merged, dtype=np.int64),
+        "out_of_pile": np.array(found.out_of_pile, dtype=np.bool_),
+    }
 
 
 def _event_columns(events: list[Event]) -> Columns:
@@ -307,44 +308,40 @@ def _in_second_half(motion: Motion) -> npt.NDArray[np.bool_]:
 
 def _coordination(found: PileAnalysis) -> dict[str, Any]:
     """Contacts and bridges a bead: at rest, then those of the inner beads, and in the second half of the drive."""
-    motion, rest = found.motion, found.beds[_at_rest(found.motion)]
-    late = [bed for bed, one in zip(found.beds, _in_second_half(motion), strict=True) if one]
-    shaken = {name: float(np.mean([getattr(bed, name) for bed in late])) for name in ("contacts", "bridges")}
+    rest, late = _at_rest(found.motion), _in_second_half(found.motion)
+    counts = {name: found.bed[name] for name in ("contacts", "bridges")}
     return {
-        "rest": {"contacts": rest.contacts, "bridges": rest.bridges},
+        "rest": {name: float(values[rest]) for name, values in counts.items()},
         "rest_inner": found.inner,
-        "shaken": shaken if motion.time[-1] > 0.0 else None,
+        "shaken": {name: float(np.mean(values[late])) for name, values in counts.items()}
+        if found.motion.time[-1] > 0.0
+        else None,
     }
 
 
 def _result(found: PileAnalysis) -> dict[str, Any]:
-    motion, beds = found.motion, found.beds
-    case = motion.case
-    start = motion.first_driven
+    motion, start = found.motion, found.motion.first_driven
+    ends = {
+        name: {"start": float(found.bed[name][start]), "end": float(found.bed[name][-1])}
+        for name in ("surface", "brazil_nut")
+    }
     return {
         "beads": len(motion.radius),
         "large": int(motion.large.sum()),
         "driven": float(max(motion.time[-1], 0.0)),
         "settling": float(min(motion.time[-1], 0.0) - motion.time[0]),
-        "surface": {"start": beds[start].surface, "end": beds[-1].surface},
-        "brazil_nut": {"start": beds[start].brazil_nut, "end": beds[-1].brazil_nut},
+        **ends,
         "coordination": _coordination(found),
         "clusters": len(found.tracks),
         "events": dict(Counter(event.kind for event in found.events)),
         "climbs": [
             {
-                "begin": climb.begin,
-                "end": climb.end,
-                "onset": climb.onset,
-                "qualified": climb.qualified,
-                "gain": climb.gain,
+                **{name: getattr(climb, name) for name in ("begin", "end", "onset", "qualified", "gain")},
                 "speed": climb.speed if np.isfinite(climb.speed) else None,
                 "standard_error": climb.standard_error if np.isfinite(climb.standard_error) else None,
                 "leader_large": bool(motion.large[climb.leader]),
-                "height": climb.height,
-                "size": climb.size,
-                "large": climb.large,
-                "walls": names_of_walls(climb.walls, case.boundary).split(),
+                **{name: getattr(climb, name) for name in ("height", "size", "large")},
+                "walls": names_of_walls(climb.walls, motion.case.boundary).split(),
                 "out_of_pile": out_of_pile,
             }
             for climb, out_of_pile in zip(found.climbs, found.out_of_pile, strict=True)

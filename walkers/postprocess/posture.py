@@ -17,11 +17,9 @@ from math import degrees
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Group
-
-FloatArray = npt.NDArray[np.float64]
 
 UPRIGHT = np.radians(15.0)
 """rad; how far off an upright walker may end."""

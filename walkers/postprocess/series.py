@@ -78,7 +78,7 @@ def render_series(
     path = destination or directory / (SERIES_NAME if walker is None else PICTURE_NAME)
     check_picture(path, ".png")
     whole = read_motion(directory)
-    motion = gathered(whole) if walker is None else whole.of_walkers(whole.walkers[walker : walker + 1])
+    motion = gathered(whole if walker is None else whole.of_walkers(whole.walkers[walker : walker + 1]))
     frames = _frames_evenly(motion, images) if apart is None else _frames_apart(motion, images, apart, directory)
     sideways, chosen = motion.case.boundary.closed, pointed_out(motion)
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) if sideways else np.eye(3)

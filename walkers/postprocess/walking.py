@@ -6,10 +6,10 @@ smallest, with the walkers that face left and right also apart.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from math import degrees, nan, sqrt
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,10 +19,13 @@ from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, averages, gait, settled_samples, walk
-from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
+from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges, read_motion
 from walkers.postprocess.posture import describe_posture, posture_summary, postures, turned_over_at, ways
 from walkers.postprocess.quantities import Quantity, of_walkers
 from walkers.postprocess.tables import WALKERS, described
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SEPARATED = 0.1
 """Share of the time beyond which beads that no bridge can hold together are no walker."""
@@ -69,6 +72,13 @@ class Walking(Analysis):
         "cycles": ("", "driven, those to settle among them"),
         "ended_early": ("", "whether that was less than it might have been, for the walkers were steady"),
         "walkers_met": ("", "whether two of them came near each other"),
+    }
+    places: ClassVar[Mapping[str, str]] = {
+        "velocity": "velocity.mean",
+        **{name: f"velocity.{name}" for name in ("smallest", "largest", "standard_error")},
+        **{name: f"{name}.mean" for name in ("right_facing", "left_facing", "axial_velocity", "orientation_end")},
+        "upright": "posture.upright",
+        **{name: f"{name[:-2]}.{'bead' if 'rotation' in name else 'contact'}{name[-2:]}" for name in _DIMERS},
     }
 
     def applies(self, case: Case) -> bool:
@@ -117,27 +127,6 @@ class Walking(Analysis):
         known |= {"sin_delta": dimer.sin_delta, "mass_asymmetry": dimer.mass_asymmetry}
         return {"gamma0": dimer.gamma0(case.drive.peak_acceleration), **known}
 
-    def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """Means over the walkers."""
-        velocity = result["velocity"]
-        beads = {f"rotation_{bead}": result["rotation"][f"bead_{bead}"] for bead in (1, 2)}
-        contacts = {f"{what}_{at}": result[what][f"contact_{at}"] for what in ("sliding", "open") for at in (1, 2, 3)}
-        return {
-            "velocity": velocity["mean"],
-            **{name: velocity[name] for name in ("smallest", "largest", "standard_error")},
-            **{name: result[name]["mean"] for name in ("right_facing", "left_facing", "orientation_end")},
-            **{name: nan if value is None else value for name, value in {**beads, **contacts}.items()},
-            "axial_velocity": result["axial_velocity"]["mean"],
-            "upright": nan if result["posture"] is None else result["posture"]["upright"],
-            **{
-                name: result[name]
-                for name in (
-                    *("separated_fraction", "walkers", "steady", "turned_round", "walkers_met"),
-                    *("cycles", "ended_early"),
-                )
-            },
-        }
-
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Velocities, rotation, sliding and orientation of all walkers, and velocities of each make."""
         rotation, end, names = result["rotation"], result["orientation_end"], result["contacts"]
@@ -175,11 +164,11 @@ class Walking(Analysis):
             warnings.append("walkers came close to each other and are not independent: give them more spacing")
         return warnings
 
-    def plot(self, directory: Path, destination: Path, formats: Sequence[str]) -> list[Path]:
-        """Where they went and turned, and their gait."""
-        from walkers.postprocess.figures import plot_walkers
+    def figures(self, directory: Path) -> Mapping[str, Figure]:
+        """Where they went and turned, and their gait if it was sampled often enough."""
+        from walkers.postprocess.figures import walk_figures
 
-        return plot_walkers(directory, destination, formats)
+        return walk_figures(read_motion(directory).groups)
 
 
 def _stacked(parts: list[Columns]) -> Columns:

@@ -14,7 +14,6 @@ from walkers.inputs.origins import Origin, text_of
 from walkers.inputs.readable import dotted
 from walkers.postprocess.analysis import analyses_in, current_result, quantities_of, warnings_of
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.quantities import Quantity
 from walkers.postprocess.report.page import NAME, check_report, fill, packed_plots, packed_scene, write_page
 from walkers.postprocess.report.plots import plots_of
 from walkers.postprocess.report.scene import MOST_PLACES, Scene, scene_of
@@ -29,9 +28,10 @@ class Parameter:
 
     key: str
     text: str
-    origin: str
-    source: str
-    range: str
+    origin: str = ""
+    source: str = ""
+    range: str = ""
+    guessed: bool = False
 
 
 @dataclass(frozen=True)
@@ -74,64 +74,20 @@ class RunReport:
         """What the case calls itself."""
         return self.case.title or self.case.name
 
-    @property
-    def summary(self) -> str:
-        """What was run, in a sentence."""
-        return summary_of(self.case)
-
-    @property
-    def warnings(self) -> list[str]:
-        """What a reader should know."""
-        return warnings_of(self.result)
-
-    @property
-    def quantities(self) -> list[Quantity]:
-        """The numbers of the result."""
-        return quantities_of(self.result)
-
-    @property
-    def parameters(self) -> list[Parameter]:
-        """The values of the case and where they come from."""
-        return parameters_of(self.case, self.origins)
-
-    @property
-    def guessed(self) -> list[Parameter]:
-        """What of them is neither measured nor calibrated."""
-        return guessed_of(self.case, self.origins)
+    @cached_property
+    def shown(self) -> dict[str, Any]:
+        """What is told of a result and its case wherever they are shown."""
+        return shown_of(self.directory, self.result, self.origins)
 
     @cached_property
-    def _manifest(self) -> dict[str, Any]:
+    def manifest(self) -> dict[str, Any]:
+        """What the run directory says of the run."""
         return read_json(self.directory / MANIFEST_NAME)
-
-    @property
-    def engine(self) -> str:
-        """The engine that made it."""
-        return str(self._manifest.get("engine", {}).get("version", ""))
-
-    @property
-    def finished(self) -> str:
-        """When."""
-        return str(self._manifest.get("finished", ""))
 
     @cached_property
     def scene(self) -> Scene:
         """The beads in three dimensions."""
         return scene_of(read_motion(self.directory), places=self.places)
-
-    @property
-    def begin(self) -> float:
-        """Of the scene, s."""
-        return self.scene.begin
-
-    @property
-    def end(self) -> float:
-        """Of the scene, s."""
-        return self.scene.end
-
-    @property
-    def captions(self) -> tuple[str, ...]:
-        """What the scene shows and what not."""
-        return self.scene.captions
 
     @property
     def cameras(self) -> dict[str, str]:
@@ -185,25 +141,29 @@ def summary_of(case: Case) -> str:
     if case.loose:
         bodies.append(f"{case.count - sum(make.count for make in case.walkers)} loose beads")
     boundary = f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"
-    return f"{', '.join(bodies)} {boundary} of {case.boundary.material}, {case.liquid.name}; {case.drive.described()}."
+    liquid = f", {case.liquid.name}" if case.liquid.name else ""
+    return f"{', '.join(bodies)} {boundary} of {case.boundary.material}{liquid}; {case.drive.described()}."
 
 
-def parameters_of(case: Case, origins: tuple[Origin, ...] | None = None) -> list[Parameter]:
-    """The values of a case, each with where it comes from; of runs that did not keep this, the values in SI units."""
-    known = case.origins if origins is None else origins
-    if known:
-        return [_parameter(one) for one in known]
-    return [Parameter(key, text_of(value), "", "", "") for key, value in flat(case.as_dict())]
+def shown_of(directory: Path, result: dict[str, Any], origins: tuple[Origin, ...] | None = None) -> dict[str, Any]:
+    """Of a result the warnings and quantities; of its case a summary, the parameters, and those that are guessed.
 
-
-def guessed_of(case: Case, origins: tuple[Origin, ...] | None = None) -> list[Parameter]:
-    """The values of a case that are neither measured nor calibrated."""
-    return [_parameter(one) for one in (case.origins if origins is None else origins) if one.guessed]
+    Of runs that did not keep where their values come from, the parameters are in SI units.
+    """
+    case = case_of(directory)
+    known = [_parameter(one) for one in (case.origins if origins is None else origins)]
+    return {
+        "summary": summary_of(case),
+        "warnings": warnings_of(result),
+        "quantities": quantities_of(result),
+        "guessed": [parameter for parameter in known if parameter.guessed],
+        "parameters": known or [Parameter(key, text_of(value)) for key, value in flat(case.as_dict())],
+    }
 
 
 def _parameter(one: Origin) -> Parameter:
     ends = " … ".join(text_of(end) for end in one.range) if one.range else ""
-    return Parameter(one.key, one.text, one.origin, one.source, ends)
+    return Parameter(one.key, one.text, one.origin, one.source, ends, one.guessed)
 
 
 def flat(values: Any) -> Iterator[tuple[str, Any]]:
@@ -213,14 +173,6 @@ def flat(values: Any) -> Iterator[tuple[str, Any]]:
 
 def result_html(directory: Path, result: dict[str, Any], origins: tuple[Origin, ...] | None = None) -> str:
     """A result as a piece of HTML: a table with errors and units, warnings, and the parameters folded in."""
-    case = case_of(directory)
-    headline = [line for one in analyses_in(result) for line in one.lines(result)][:1]
-    return fill(
-        "result.html.j2",
-        headline=headline[0] if headline else case.name,
-        warnings=warnings_of(result),
-        quantities=quantities_of(result),
-        guessed=guessed_of(case, origins),
-        parameters=parameters_of(case, origins),
-        run=directory.name,
-    )
+    headline = [line for one in analyses_in(result) for line in one.lines(result)][:1] or [result["case"]]
+    shown = shown_of(directory, result, origins)
+    return fill("result.html.j2", headline=headline[0], shown=shown, run=directory.name)

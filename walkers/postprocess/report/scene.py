@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, gathered, read_motion
 from walkers.postprocess.paraview import boundary_of
 from walkers.postprocess.rolling import turns_of
@@ -31,7 +32,6 @@ from walkers.postprocess.scene import (
 if TYPE_CHECKING:
     import k3d
 
-FloatArray = npt.NDArray[np.float64]
 
 MOST_PLACES = 8000
 """Beads times instants of a scene, for the size of its file."""
@@ -204,11 +204,8 @@ def _walls(motion: Motion) -> list[Any]:
     corners = np.asarray(faces.points, dtype=np.float32) * 1e3
     low, high = corners.min(axis=0), corners.max(axis=0)
     walls = []
-    cells = faces.faces.tolist()
-    place = 0
-    while place < len(cells):
-        polygon = corners[cells[place + 1 : place + 1 + cells[place]]]
-        place += 1 + cells[place]
+    for cell in faces.irregular_faces:
+        polygon = corners[cell]
         fan = np.array([(0, one, one + 1) for one in range(1, len(polygon) - 1)], dtype=np.uint32)
         level = bool(np.ptp(polygon[:, 2]) < 1e-6)
         # A hair below the beads that touch it.
