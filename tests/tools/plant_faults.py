@@ -47,7 +47,10 @@ def planted(fault: Mapping[str, Any]) -> Iterator[None]:
 def failing(arguments: list[str], seconds: float) -> str | None:
     """The first test that fails, None if all pass."""
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:randomly", "-p", "no:cacheprovider", *arguments]
-    tests = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    environment = {**os.environ, "PYTHONHASHSEED": "0"}  # of a set of parameters, processes have another order each
+    tests = subprocess.Popen(
+        command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
     try:
         output, _ = tests.communicate(timeout=seconds)
     except subprocess.TimeoutExpired:
