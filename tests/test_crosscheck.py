@@ -18,7 +18,7 @@ from walkers.check.crosscheck import full_cases
 from walkers.check.engine import TERMS, Beads, Matter, SecondEngine, Surroundings
 from walkers.check.scenes import SCENES, full_case, second_engine
 from walkers.inputs import resolve_case
-from walkers.inputs.boundary import BOTTOM
+from walkers.inputs.boundary import BOTTOM, Round
 from walkers.inputs.reading import load_case, read_toml, shipped_cases
 from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import law_of
@@ -73,6 +73,30 @@ def test_a_sliding_bead_rolls_at_five_sevenths() -> None:
     frame = engine.run(20_000, 20_000)[0, 0]
     assert frame[3] == pytest.approx(5.0 / 7.0 * 0.02, rel=2e-3)
     assert RADIUS * frame[7] == pytest.approx(frame[3], rel=2e-3)
+
+
+def test_a_bead_rolls_to_rest_and_swings_in_a_cylinder() -> None:
+    """Rolling friction slows at 5/7 μ_r g; beside the lowest line of a cylinder on its side ω² = 5/7 g/(C - R)."""
+    depth = (3.0 * 4.0 / 3.0 * pi * RADIUS**3 * 4000.0 * 9.81 / (4.0 * 5e7 / 1.82 * sqrt(RADIUS))) ** (2.0 / 3.0)
+    contact = replace(ELASTIC.contact, friction_bead_wall=0.9, restitution=0.3)
+    rough = replace(ELASTIC, contact=replace(contact, rolling_friction=0.01))
+    speed, slowing, none = 5e-3, 5.0 / 7.0 * 0.01 * 9.81, np.zeros((1, 3))
+    rolls = Beads(np.array([RADIUS]), np.array([[0.0, 0.0, RADIUS - depth]]), np.array([[speed, 0.0, 0.0]]),
+                  np.array([[0.0, speed / RADIUS, 0.0]]))  # fmt: skip
+    engine = SecondEngine(rolls, rough, replace(FLOOR, gravity=(0.0, 0.0, -9.81)), 2e-6, without=DRY)
+    frames = engine.run(25_000, 1000)[:, 0, 3]
+    expected = speed - slowing * 2e-3 * np.arange(1, 26)
+    assert frames == pytest.approx(expected, abs=2e-3 * speed)
+
+    out, turn = 3e-3 - RADIUS + depth, 0.05
+    place = np.array([[-out * np.cos(turn), out * np.sin(turn), 0.0]])
+    around = Surroundings([Round(3e-3)], gravity=(-9.81, 0.0, 0.0))
+    matter = replace(ELASTIC, contact=contact)
+    engine = SecondEngine(Beads(np.array([RADIUS]), place, none, none), matter, around, 1e-6, without=DRY)
+    swings = engine.run(100_000, 500)[:, 0, 1]
+    frequency = sqrt(5.0 / 7.0 * 9.81 / out) * (1.0 - turn**2 / 16.0)
+    expected = out * np.sin(turn * np.cos(frequency * 5e-4 * np.arange(1, 201)))
+    assert swings == pytest.approx(expected, abs=2e-3 * out * turn)
 
 
 def test_bridges_are_the_law_between_its_knots() -> None:
