@@ -154,7 +154,9 @@ def _nested(annotation: Any) -> tuple[type[BaseModel], str] | None:
 def _walk(table: type[BaseModel], prefix: str) -> Iterator[tuple[str, type[BaseModel] | None]]:
     for name, field in table.model_fields.items():
         inner, named = _nested(field.annotation) or (None, "")
-        yield f"{prefix}{name}{named}", inner
+        yield f"{prefix}{name}", None if named else inner
+        if named:
+            yield f"{prefix}{name}{named}", inner
         if inner is not None:
             yield from _walk(inner, f"{prefix}{name}{named}.")
 
@@ -181,7 +183,7 @@ def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     table = known.get(place)
     siblings = [field.alias or name for name, field in table.model_fields.items()] if table else []
     hint = suggestion(word, siblings)
-    elsewhere = [key for key, inner in known.items() if inner is None and key.split(".")[-1] == word]
+    elsewhere = [key for key, inner in known.items() if inner is None and "*" not in key and key.split(".")[-1] == word]
     if not hint and elsewhere:
         hint = f'; did you mean "{elsewhere[0]}"?'
     within = f"[{'.'.join(tables)}]" if tables else whole
