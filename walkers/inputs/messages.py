@@ -179,7 +179,7 @@ def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     known, place = keys_of(file), ""
     for part in tables:
         below = f"{place}.{part}".lstrip(".")
-        place = below if below in known else f"{place}.*"
+        place = below if below in known or f"{below}.*" in known else f"{place}.*"
     table = known.get(place)
     siblings = [field.alias or name for name, field in table.model_fields.items()] if table else []
     hint = suggestion(word, siblings)
