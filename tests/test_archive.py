@@ -25,6 +25,7 @@ from urllib3 import HTTPResponse
 
 from tests.conftest import SHORT, call, document, make_case, to_toml
 from walkers import Run, load_case
+from walkers.archive import writing
 from walkers.archive.citation import PAPER
 from walkers.archive.writing import ArchiveOptions, ArchiveRefused, write_archive
 from walkers.inputs.reading import resolve_case
@@ -346,6 +347,21 @@ def test_what_is_no_run(run: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "other.zip", "w") as other:
         other.writestr("readme", "no run")
     assert "it has no sha256sums.txt" in call("verify", str(tmp_path / "other.zip")).stderr
+
+
+def test_a_file_that_changes_while_it_is_archived(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The list of checksums is written before the files; the engine's log grows in between."""
+    preview = writing._preview
+
+    def grown(*given: Any) -> bytes:
+        with next(run.rglob("engine.log")).open("a") as log:
+            log.write("more\n")
+        return preview(*given)
+
+    monkeypatch.setattr(writing, "_preview", grown)
+    with pytest.raises(ArchiveRefused, match="changed while it was archived"):
+        write_archive(run, tmp_path / "run.zip")
+    assert not (tmp_path / "run.zip").exists()
 
 
 def test_an_archive_that_was_damaged(run: Path, tmp_path: Path) -> None:

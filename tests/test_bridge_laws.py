@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import simpson, solve_bvp
 
 from walkers.check.bridge_laws import willett_simple
-from walkers.physics import reynolds, van_der_waals, willett, young_laplace
+from walkers.physics import rabinovich, reynolds, van_der_waals, willett, young_laplace
 from walkers.physics import soulie as soulie_law
 from walkers.physics.bridge import FloatArray, Surfaces
 from walkers.physics.capillary import bridge_volume_at_wall, capillary_force, rupture_distance
@@ -65,6 +65,11 @@ def test_the_polynomial_is_the_equation(given: tuple[float, float, float, float]
     assert curve.rupture == pytest.approx(exact.rupture, rel=1e-13)
     assert curve.formation == 0.0
     assert curve.forces(gaps).pull == pytest.approx(exact.forces, abs=1e-7 * exact.forces[0])
+
+
+def test_rabinovichs_pull_at_contact() -> None:
+    """By hand, of spheres of 1, V = 0.001, θ = 0.7: α² = √(2V/π), F = 2π (cos θ + sin α sin(θ + α))."""
+    assert rabinovich.pull(1.0, 1.0, 1e-3, 0.7, np.zeros(1)) == pytest.approx([5.5580], rel=1e-4)
 
 
 # --- The resistances ------------------------------------------------------------------------------------------------

@@ -117,7 +117,9 @@ def test_posture_is_that_of_the_whole_run(upright: Path) -> None:
     assert np.isnan(turned_over_at(group)).all()
     tilting = np.linspace(0.0, np.radians(20.0), len(group.time))[:, None]
     over = np.where(group.time == group.time[9], np.radians(100.0), 0.0)[:, None]
-    for turn, expected in ((tilting, "leaning"), (0.5 * tilting, "leaning"), (over, "turned over")):
+    low, high = (np.full((len(group.time), 1), np.radians(angle)) for angle in (14.0, 16.0))
+    turns = ((low, "upright"), (high, "leaning"), (tilting, "leaning"), (0.5 * tilting, "leaning"))
+    for turn, expected in (*turns, (over, "turned over")):
         turned = replace(group)
         turned.__dict__["orientation"] = np.broadcast_to(turn, group.orientation.shape)
         assert postures(turned) == [expected] * 6

@@ -140,3 +140,9 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
         decks += [render_deck(case, Segment(0, settled, None)), render_deck(case, Segment(settled, end, settled))]
     digest = sha256("\n".join(map(_reads, decks)).encode()).hexdigest()[:16]
     assert {CONTENT_VERSION: digest} == CONTENT
+
+
+def test_a_mixture_is_placed_by_its_seed() -> None:
+    pile = load_case("pile-ci")
+    places = [[bead.centre for bead in place((replace(pile, seed=seed),))[0].beads] for seed in (1, 1, 2)]
+    assert places[0] == places[1] != places[2]

@@ -25,7 +25,7 @@ from walkers.inputs.sweep import expand
 from walkers.postprocess import read_motion
 from walkers.postprocess.analysis import current_result
 from walkers.postprocess.motion import gathered
-from walkers.postprocess.quantities import rounded
+from walkers.postprocess.quantities import number_of, rounded
 from walkers.postprocess.report.page import LARGEST, overhead
 from walkers.postprocess.report.run import report_run, summary_of
 from walkers.postprocess.report.scene import cameras_of, scene_of
@@ -354,3 +354,13 @@ def test_progress_is_shown_where_it_is_asked_for(tmp_path: Path, capsys: pytest.
     walkers.run(case, tmp_path, progress=lambda progress: seen.append(progress.step), force=True)
     assert seen
     assert capsys.readouterr().err == ""
+
+
+def test_units_of_a_table_are_those_that_one_reads() -> None:
+    shown = {unit: number_of({"a": 0.25}, "a", unit) for unit in ("m", "m/s", "rad", "share")}
+    assert {unit: (one.text, one.unit) for unit, one in shown.items() if one} == {
+        "m": ("250", "mm"),
+        "m/s": ("250", "mm/s"),
+        "rad": ("14.32", "°"),
+        "share": ("25", "%"),
+    }

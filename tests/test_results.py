@@ -142,6 +142,24 @@ def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
     np.testing.assert_allclose(through, walked.velocity, rtol=0.03)
 
 
+def test_the_columns_along_and_across_the_axis(moved: Group, directory: Path) -> None:
+    walked, table = walk(moved), read_table(directory, "walkers")
+    assert table["axial_velocity"].to_numpy() == pytest.approx(walked.axial)
+    assert table["lateral_velocity"].to_numpy() == pytest.approx(walked.lateral)
+    assert np.abs(walked.lateral).max() < 0.1 * np.abs(walked.axial).min()
+
+
+def test_the_orientation_of_a_walker_that_goes_round_does_not_jump(moved: Group) -> None:
+    angle = np.linspace(0.0, 4.0 * np.pi, len(moved.time))
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    position = moved.position.copy()
+    position[..., :2] = np.einsum("xyf,wby->fwbx", turn, moved.position[0, ..., :2])
+    round_and_round = replace(moved)
+    round_and_round.__dict__["position"] = position
+    turned = round_and_round.orientation - round_and_round.orientation[0]
+    np.testing.assert_allclose(turned, np.broadcast_to(angle[:, None], turned.shape), atol=1e-9)
+
+
 def test_sliding_is_velocity_less_rotation(moved: Group) -> None:
     motion = gait(moved)
     # The mass centre moves as its beads do, weighted by their masses.
