@@ -202,6 +202,13 @@ def test_a_bead_in_a_narrow_channel_is_held_by_its_walls(tmp_path: Path) -> None
     assert abs(done.result["velocity"]["mean"]) < 1.0 * MM_PER_S
 
 
+def test_a_bead_rests_on_both_walls_of_a_groove() -> None:
+    groove = make_case(boundary={"shape": "groove", "opening": "60 deg"}).boundary
+    height = groove.rest_height(3e-4)
+    assert height == pytest.approx(2.0 * 3e-4)
+    assert [np.dot(wall.normal, (0.0, 0.0, height)) for wall in groove.walls] == pytest.approx([3e-4, 3e-4])
+
+
 def test_a_dimer_in_a_groove_rolls_on_both_walls(tmp_path: Path) -> None:
     """It touches both walls, as high as that needs, is held by both, rolls about its chord, v = R sin(60°) dφ/dt."""
     dimers = {"dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2}}
