@@ -63,6 +63,8 @@ class Analysis(ABC):
         Where the result has those of `columns` that it has not by their names, such as ``velocity.mean``.
     headlines
         Those of `columns` that count first.
+    rows
+        Of the table of a result: what `walkers.postprocess.quantities.quantity` takes after the result.
     """
 
     name: ClassVar[str]
@@ -72,6 +74,7 @@ class Analysis(ABC):
     columns: ClassVar[Described] = {}
     places: ClassVar[Mapping[str, str]] = {}
     headlines: ClassVar[tuple[str, ...]] = ()
+    rows: ClassVar[tuple[tuple[str, ...], ...]] = ()
 
     def can_show(self, result: Mapping[str, Any]) -> bool:
         """Whether a result has all that it gives."""
@@ -109,10 +112,10 @@ class Analysis(ABC):
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """What it found, as text: mm, mm/s, degrees."""
 
-    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
-        """Its numbers as rows of a table, with errors and units."""
+    def rows_of(self, result: Mapping[str, Any]) -> Iterable[tuple[str, ...]]:
+        """Its numbers as rows of a table, as `rows` are."""
         del result
-        return ()
+        return self.rows
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What a reader of the result should know."""
@@ -348,7 +351,10 @@ def warnings_of(result: Mapping[str, Any]) -> list[str]:
 
 def quantities_of(result: Mapping[str, Any]) -> list[Quantity]:
     """The numbers that a result has, as rows of a table."""
-    return [row for one in analyses_in(result) for row in one.quantities(result) if row.value is not None]
+    from walkers.postprocess.quantities import quantity
+
+    found = (quantity(result, *row) for one in analyses_in(result) for row in one.rows_of(result))
+    return [row for row in found if row.value is not None]
 
 
 def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,7 +11,6 @@ from walkers.inputs.case import Case
 from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
 from walkers.postprocess.clusters import connected
 from walkers.postprocess.motion import Motion, read_bridges
-from walkers.postprocess.quantities import Quantity, of_meetings
 
 Pair = tuple[int, int]
 
@@ -27,6 +26,11 @@ class Meetings(Analysis):
         "parted": ("", "how often two of them parted again"),
         "largest_group": ("", "walkers in the largest group that bridges ever joined"),
     }
+    rows = (
+        ("meetings of walkers: merged", "merged"),
+        ("meetings of walkers: parted", "parted"),
+        ("most walkers together", "largest_group"),
+    )
 
     def applies(self, case: Case) -> bool:
         """Where walkers are meant to meet."""
@@ -65,10 +69,6 @@ class Meetings(Analysis):
             f"  meetings   {result['merged']} merged, {result['parted']} parted, at most {result['largest_group']} "
             f"together; at the end {f'walkers {together}' if together else 'all are alone'}"
         ]
-
-    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
-        """The same as rows of a table."""
-        return of_meetings(result)
 
 
 def groups_of(joined: frozenset[Pair], count: int) -> list[list[int]]:

@@ -20,8 +20,7 @@ from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, averages, gait, settled_samples, walk
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges, read_motion
-from walkers.postprocess.posture import describe_posture, posture_summary, postures, turned_over_at, ways
-from walkers.postprocess.quantities import Quantity, of_walkers
+from walkers.postprocess.posture import POSTURES, describe_posture, posture_summary, postures, turned_over_at, ways
 from walkers.postprocess.tables import WALKERS, described
 
 if TYPE_CHECKING:
@@ -80,6 +79,16 @@ class Walking(Analysis):
         "upright": "posture.upright",
         **{name: f"{name[:-2]}.{'bead' if 'rotation' in name else 'contact'}{name[-2:]}" for name in _DIMERS},
     }
+    rows = (
+        ("walkers", "walkers"),
+        ("of them steady", "steady"),
+        ("of them turned round by more than 90°", "turned_round"),
+        ("beads farther apart than a bridge reaches", "separated_fraction", "share"),
+        ("cycles driven", "cycles"),
+        ("of them to settle", "settling_cycles"),
+        ("dimensionless peak force Γ0", "gamma0"),
+        ("asymmetry sin δ", "sin_delta"),
+    )
 
     def applies(self, case: Case) -> bool:
         """Of walkers."""
@@ -143,14 +152,31 @@ class Walking(Analysis):
         if any(result["open"].values()):
             shares = ", ".join(f"{name} {100 * result['open'][contact]:.1f} %" for contact, name in names.items())
             lines.append(f"  contacts open: {shares} of the time")
-        for make in result.get("makes", []):
-            radii = "/".join(f"{radius * 1e3:g}" for radius in make["radii"])
-            lines.append(f"  of {radii} mm  {_speed(make['velocity']['mean'])} mm/s; {_steady(make)}")
-        return lines
+        makes = result.get("makes", [])
+        return lines + [
+            f"  of {_radii(one)} mm  {_speed(one['velocity']['mean'])} mm/s; {_steady(one)}" for one in makes
+        ]
 
-    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
+    def rows_of(self, result: Mapping[str, Any]) -> Iterable[tuple[str, ...]]:
         """The same as rows of a table."""
-        return of_walkers(result)
+        first, second = ways(uphill=result["goes_uphill"])
+        yield "velocity along the heading, positive toward the large bead", "velocity", "m/s"
+        yield f"velocity of those that started facing {first}", "right_facing", "m/s"
+        yield f"velocity of those that started facing {second}", "left_facing", "m/s"
+        if result["turned_round"]:
+            yield "velocity of those that kept their heading", "kept_heading", "m/s"
+        yield "velocity along the drive axis", "axial_velocity.mean", "m/s"
+        yield "velocity across the drive axis", "lateral_velocity.mean", "m/s"
+        for bead in result["rotation"]:
+            yield f"rotation of {bead.replace('_', ' ')}, −R dφ/dt", f"rotation.{bead}", "m/s"
+        for family, told, unit in (("sliding", "sliding", "m/s"), ("open", "contact open", "share")):
+            for contact, name in result["contacts"].items():
+                yield f"{told}, {name}", f"{family}.{contact}", unit
+        yield "orientation at the end", "orientation_end", "rad"
+        for number, make in enumerate(result.get("makes", [])):
+            yield f"velocity of those of {_radii(make)} mm", f"makes.{number}.velocity", "m/s"
+        yield from ((f"walkers that are {posture}", f"posture.{posture}") for posture in POSTURES)
+        yield from self.rows
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What makes the velocity doubtful."""
@@ -169,6 +195,11 @@ class Walking(Analysis):
         from walkers.postprocess.figures import walk_figures
 
         return walk_figures(read_motion(directory).groups)
+
+
+def _radii(make: Mapping[str, Any]) -> str:
+    """Of the beads of a make, mm."""
+    return "/".join(f"{radius * 1e3:g}" for radius in make["radii"])
 
 
 def _stacked(parts: list[Columns]) -> Columns:
