@@ -10,7 +10,6 @@ import errno
 import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from math import nan
 from pathlib import Path
@@ -36,14 +35,6 @@ _WIDTH = 110
 Columns: TypeAlias = "dict[str, npt.NDArray[Any]]"
 Described = Mapping[str, tuple[str, str]]
 """From the names of columns to their units and meanings."""
-
-
-@dataclass(frozen=True)
-class Measured:
-    """What an analysis found: tables by name, and its part of the result (SI units)."""
-
-    tables: Mapping[str, Columns]
-    summary: Mapping[str, Any]
 
 
 class Analysis(ABC):
@@ -90,8 +81,8 @@ class Analysis(ABC):
         """Whether it means something for a case."""
 
     @abstractmethod
-    def of(self, motion: Motion) -> Measured:
-        """Measure a motion.
+    def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
+        """Measure a motion: tables by name, and its part of the result (SI units).
 
         Raises
         ------
@@ -208,9 +199,9 @@ def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
     }
     tables: dict[str, Columns] = {}
     for one in analyses_of(case):
-        measured = one.of(motion)
-        tables |= measured.tables
-        result |= measured.summary
+        found, summary = one.of(motion)
+        tables |= found
+        result |= summary
     return result, tables
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from walkers.inputs.case import Case
-from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
+from walkers.postprocess.analysis import Analysis, Columns, Described
 from walkers.postprocess.clusters import connected
 from walkers.postprocess.motion import Motion, read_bridges
 
@@ -36,7 +36,7 @@ class Meetings(Analysis):
         """Where walkers are meant to meet."""
         return case.meets
 
-    def of(self, motion: Motion) -> Measured:
+    def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """Events from one recorded frame of bridges to the next; who stands together from the first has merged then."""
         rows: list[tuple[float, str, int, int, int]] = []
         before: frozenset[Pair] = frozenset()
@@ -60,7 +60,7 @@ class Meetings(Analysis):
             "largest_group": largest,
             "groups_at_end": sorted((group for group in groups if len(group) > 1), key=len, reverse=True),
         }
-        return Measured({"meetings": _columns(rows)}, summary)
+        return {"meetings": _columns(rows)}, summary
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """How often, and who is together at the end."""

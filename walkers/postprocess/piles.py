@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
+from walkers.postprocess.analysis import Analysis, Columns, Described
 from walkers.postprocess.bed import bed_of, coordination_of_inner, liquid_of_beads, packing_profile
 from walkers.postprocess.clusters import (
     Climb,
@@ -192,7 +192,7 @@ class Pile(Analysis):
         """Of loose beads in a container."""
         return case.loose and case.boundary.closed
 
-    def of(self, motion: Motion) -> Measured:
+    def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """The bed, the clusters, what happened to them, and the packing."""
         found = analyse(motion)
         tables = {
@@ -201,7 +201,7 @@ class Pile(Analysis):
             "events": _event_columns(found.events),
             "profile": _profile_columns(found),
         }
-        return Measured(tables, _result(found))
+        return tables, _result(found)
 
     def derived_of(self, case: Case) -> dict[str, float]:
         """Numbers of beads and the length of the drive."""

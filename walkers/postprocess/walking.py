@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
-from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
+from walkers.postprocess.analysis import Analysis, Columns, Described
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, averages, gait, settled_samples, walk
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges, read_motion
@@ -94,7 +94,7 @@ class Walking(Analysis):
         """Of walkers."""
         return bool(case.walkers)
 
-    def of(self, motion: Motion) -> Measured:
+    def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """Tables of all walkers; the result is of all of them, its contacts of the first make, and of each make."""
         groups, gaits, walks = motion.groups, [gait(one) for one in motion.groups], [walk(one) for one in motion.groups]
         rows = [_walker_columns(*one) for one in zip(groups, gaits, walks, strict=True)]
@@ -124,7 +124,7 @@ class Walking(Analysis):
             summary["makes"] = [
                 {"radii": list(group.make.radii), **one} for group, one in zip(groups, makes, strict=True)
             ]
-        return Measured(tables, summary)
+        return tables, summary
 
     def derived_of(self, case: Case) -> dict[str, float]:
         """Of dimers; NaN where walkers are larger clusters."""
