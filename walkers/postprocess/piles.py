@@ -55,8 +55,7 @@ class PileAnalysis:
     bulks, held
         Of each frame, which beads were of the bulk, and the clusters that were free and held (none before the drive).
     tracks, climbs, out_of_pile
-        These clusters followed through time, what each of them did, and whether it came out of the pile
-        (`came_out_of_pile`).
+        These clusters followed through time, what each of them did, and whether it came out of the pile.
     events
         When they came free, met, parted and ended.
     definition
@@ -120,29 +119,16 @@ def classified(found: PileAnalysis, definition: ClimbCriteria) -> PileAnalysis:
     motion = found.motion
     tracks = follow(motion.time, found.held, definition)
     climbs = [classify(track, motion.time, motion.position[:, :, 2], motion.large, definition) for track in tracks]
-    out = [came_out_of_pile(track, found.bulks, motion.first_driven, definition) for track in tracks]
+    out = [_came_out_of_pile(track, found.bulks, motion.first_driven, definition) for track in tracks]
     events = events_of(tracks, motion.time, found.bulks, definition, motion.first_driven)
     return replace(found, tracks=tracks, climbs=climbs, out_of_pile=out, events=events, definition=definition)
 
 
-def came_out_of_pile(
+def _came_out_of_pile(
     track: Track, bulks: Sequence[npt.NDArray[np.bool_]], first: int, definition: ClimbCriteria
 ) -> bool:
-    """Whether most of the beads that a cluster began with were in the bulk before, while the pile was driven.
-
-    What was not has hung on a wall since the beads were poured.
-
-    Parameters
-    ----------
-    track
-        Of the cluster.
-    bulks
-        Of each frame, which beads were of the bulk.
-    first
-        The first frame of the drive.
-    definition
-        That of the track: what most of them are.
-    """
+    """Whether most of a cluster's first beads were in the bulk before it, from the first frame of the drive on."""
+    # What was not has hung on a wall since the beads were poured.
     members = list(track.members[0])
     return any(bulk[members].mean() >= definition.min_overlap for bulk in bulks[first : track.frames[0]])
 

@@ -102,9 +102,9 @@ class Walking(Analysis):
         tables = {
             "trajectory": _stacked([_trajectory_columns(group, one) for group, one in zip(groups, gaits, strict=True)]),
             "walkers": walkers,
-            "bridges": bridge_columns(motion),
+            "bridges": _bridge_columns(motion),
         }
-        case = motion.case
+        case, known = motion.case, self.derived_of(motion.case)
         turned = [np.isfinite(row["turned_at"]) for row in rows]
         makes = [_summary(*one) for one in zip(rows, turned, strict=True)]
         summary = {
@@ -118,7 +118,7 @@ class Walking(Analysis):
             "settling_cycles": case.run.settling_cycles,
             "ended_early": motion.ended_early,
             "posture": _posture(groups, walkers) if case.goes_uphill else None,
-            **_of_dimer(case),
+            **{name: known.get(name) for name in ("gamma0", "sin_delta")},
         }
         if len(groups) > 1:
             summary["makes"] = [
@@ -268,14 +268,8 @@ def _walker_columns(group: Group, motion: Gait, walked: Walk) -> Columns:
     }
 
 
-def bridge_columns(motion: Motion) -> Columns:
-    """Columns of the table ``bridges``, sorted by time, walker and contact.
-
-    Raises
-    ------
-    postprocess.dump.DumpError
-        If a dump cannot be read.
-    """
+def _bridge_columns(motion: Motion) -> Columns:
+    """Columns of the table ``bridges``, sorted by time, walker and contact."""
     contact_of = {
         (walker.beads[one] - motion.first_id, walker.beads[other] - motion.first_id): len(walker.beads) + number
         for walker in motion.walkers
@@ -376,13 +370,6 @@ def _contact_names(group: Group) -> dict[str, str]:
     names = [f"bead {bead}" for bead in range(1, count + 1)]
     names += ["bead on bead"] if len(pairs) == 1 else [f"beads {one + 1}-{other + 1}" for one, other in pairs]
     return {f"contact_{number}": name for number, name in enumerate(names, 1)}
-
-
-def _of_dimer(case: Case) -> dict[str, float | None]:
-    if len(case.walkers[0].radii) != 2:
-        return {"gamma0": None, "sin_delta": None}
-    dimer = dimer_of(case)
-    return {"gamma0": dimer.gamma0(case.drive.peak_acceleration), "sin_delta": dimer.sin_delta}
 
 
 def walkers_met(groups: Iterable[Group]) -> bool:
