@@ -55,7 +55,8 @@ class Page:
 
 
 def _attributes(tag: str) -> dict[str, str]:
-    return dict(re.findall(r'\s([\w-]+)="([^"]*)"', tag))
+    found = re.findall(r"""\s([\w-]+)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s>"']+))""", tag)
+    return {name: "".join(values) for name, *values in found}
 
 
 def at(result: Any, key: str) -> Any:
