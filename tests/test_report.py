@@ -9,7 +9,6 @@ import shutil
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -40,44 +39,24 @@ Once = Callable[[str, Callable[[Path], object]], Path]
 HOSTILE = "<script>window.hostile = true</script> \" ' </title> & {{ 7 * 7 }}"
 
 
-class Page(HTMLParser):
+class Page:
     """Numbers of a page with their texts and places in the result, its words, its scripts, and what it refers to."""
 
     def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.numbers: list[tuple[dict[str, str], str]] = []
-        self.words, self.title = "", ""
-        self.scripts: list[str] = []
-        self.references: list[str] = []
-        self._open: list[str] = []
-        self._number: dict[str, str] | None = None
-        self.feed(path.read_text("utf-8"))
+        text = path.read_text("utf-8")
+        self.scripts = re.findall(r"<script\b[^>]*>(.*?)</script>", text, re.DOTALL)
+        bare = re.sub(r"(<(script|style)\b[^>]*>).*?</\2>", r"\1", text, flags=re.DOTALL)
+        self.title = html.unescape("".join(re.findall(r"<title>(.*?)</title>", bare, re.DOTALL)))
+        self.numbers = [(_attributes(tag), told) for tag, told in re.findall(r"<data\b([^>]*)>([^<]*)</data>", bare)]
+        tags = [_attributes(tag) for tag in re.findall(r"<[a-z][^>]*>", bare)]
+        names = ("src", "href", "srcset", "action", "data")
+        self.references = [tag[name] for tag in tags for name in names if name in tag]
+        self.words = html.unescape(re.sub(r"<(title|data)\b.*?</\1>|<[^>]*>", "", bare, flags=re.DOTALL))
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        known = {name: value or "" for name, value in attrs}
-        self.references += [known[name] for name in ("src", "href", "srcset", "action", "data") if name in known]
-        if tag not in {"meta", "input", "img", "line", "polyline", "link", "br"}:
-            self._open.append(tag)
-        if tag == "script":
-            self.scripts.append("")
-        if tag == "data":
-            self._number = known
 
-    def handle_endtag(self, tag: str) -> None:
-        if self._open and self._open[-1] == tag:
-            self._open.pop()
-
-    def handle_data(self, data: str) -> None:
-        inside = self._open[-1] if self._open else ""
-        if inside == "script":
-            self.scripts[-1] += data
-        elif inside == "title":
-            self.title += data
-        elif inside == "data" and self._number is not None:
-            self.numbers.append((self._number, data))
-            self._number = None
-        elif inside != "style":
-            self.words += data
+def _attributes(tag: str) -> dict[str, str]:
+    found = re.findall(r"""\s([\w-]+)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s>"']+))""", tag)
+    return {name: "".join(values) for name, *values in found}
 
 
 def at(result: Any, key: str) -> Any:

@@ -10,7 +10,6 @@ import errno
 import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from math import nan
 from pathlib import Path
@@ -38,14 +37,6 @@ Described = Mapping[str, tuple[str, str]]
 """From the names of columns to their units and meanings."""
 
 
-@dataclass(frozen=True)
-class Measured:
-    """What an analysis found: tables by name, and its part of the result (SI units)."""
-
-    tables: Mapping[str, Columns]
-    summary: Mapping[str, Any]
-
-
 class Analysis(ABC):
     """Something that is measured of runs.
 
@@ -63,6 +54,8 @@ class Analysis(ABC):
         Where the result has those of `columns` that it has not by their names, such as ``velocity.mean``.
     headlines
         Those of `columns` that count first.
+    rows
+        Of the table of a result: what `walkers.postprocess.quantities.quantity` takes after the result.
     """
 
     name: ClassVar[str]
@@ -72,6 +65,7 @@ class Analysis(ABC):
     columns: ClassVar[Described] = {}
     places: ClassVar[Mapping[str, str]] = {}
     headlines: ClassVar[tuple[str, ...]] = ()
+    rows: ClassVar[tuple[tuple[str, ...], ...]] = ()
 
     def can_show(self, result: Mapping[str, Any]) -> bool:
         """Whether a result has all that it gives."""
@@ -87,8 +81,8 @@ class Analysis(ABC):
         """Whether it means something for a case."""
 
     @abstractmethod
-    def of(self, motion: Motion) -> Measured:
-        """Measure a motion.
+    def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
+        """Measure a motion: tables by name, and its part of the result (SI units).
 
         Raises
         ------
@@ -109,10 +103,10 @@ class Analysis(ABC):
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """What it found, as text: mm, mm/s, degrees."""
 
-    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
-        """Its numbers as rows of a table, with errors and units."""
+    def rows_of(self, result: Mapping[str, Any]) -> Iterable[tuple[str, ...]]:
+        """Its numbers as rows of a table, as `rows` are."""
         del result
-        return ()
+        return self.rows
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What a reader of the result should know."""
@@ -205,9 +199,9 @@ def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
     }
     tables: dict[str, Columns] = {}
     for one in analyses_of(case):
-        measured = one.of(motion)
-        tables |= measured.tables
-        result |= measured.summary
+        found, summary = one.of(motion)
+        tables |= found
+        result |= summary
     return result, tables
 
 
@@ -348,7 +342,10 @@ def warnings_of(result: Mapping[str, Any]) -> list[str]:
 
 def quantities_of(result: Mapping[str, Any]) -> list[Quantity]:
     """The numbers that a result has, as rows of a table."""
-    return [row for one in analyses_in(result) for row in one.quantities(result) if row.value is not None]
+    from walkers.postprocess.quantities import quantity
+
+    found = (quantity(result, *row) for one in analyses_in(result) for row in one.rows_of(result))
+    return [row for row in found if row.value is not None]
 
 
 def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:

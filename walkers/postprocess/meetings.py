@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
 from walkers.inputs.case import Case
-from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
+from walkers.postprocess.analysis import Analysis, Columns, Described
 from walkers.postprocess.clusters import connected
 from walkers.postprocess.motion import Motion, read_bridges
-from walkers.postprocess.quantities import Quantity, of_meetings
 
 Pair = tuple[int, int]
 
@@ -27,12 +26,17 @@ class Meetings(Analysis):
         "parted": ("", "how often two of them parted again"),
         "largest_group": ("", "walkers in the largest group that bridges ever joined"),
     }
+    rows = (
+        ("meetings of walkers: merged", "merged"),
+        ("meetings of walkers: parted", "parted"),
+        ("most walkers together", "largest_group"),
+    )
 
     def applies(self, case: Case) -> bool:
         """Where walkers are meant to meet."""
         return case.meets
 
-    def of(self, motion: Motion) -> Measured:
+    def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """Events from one recorded frame of bridges to the next; who stands together from the first has merged then."""
         rows: list[tuple[float, str, int, int, int]] = []
         before: frozenset[Pair] = frozenset()
@@ -56,7 +60,7 @@ class Meetings(Analysis):
             "largest_group": largest,
             "groups_at_end": sorted((group for group in groups if len(group) > 1), key=len, reverse=True),
         }
-        return Measured({"meetings": _columns(rows)}, summary)
+        return {"meetings": _columns(rows)}, summary
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """How often, and who is together at the end."""
@@ -65,10 +69,6 @@ class Meetings(Analysis):
             f"  meetings   {result['merged']} merged, {result['parted']} parted, at most {result['largest_group']} "
             f"together; at the end {f'walkers {together}' if together else 'all are alone'}"
         ]
-
-    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
-        """The same as rows of a table."""
-        return of_meetings(result)
 
 
 def groups_of(joined: frozenset[Pair], count: int) -> list[list[int]]:

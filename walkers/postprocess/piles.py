@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
+from walkers.postprocess.analysis import Analysis, Columns, Described
 from walkers.postprocess.bed import bed_of, coordination_of_inner, liquid_of_beads, packing_profile
 from walkers.postprocess.clusters import (
     Climb,
@@ -30,7 +30,6 @@ from walkers.postprocess.clusters import (
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.events import Event, events_of
 from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
-from walkers.postprocess.quantities import Quantity, of_piles
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,8 +55,7 @@ class PileAnalysis:
     bulks, held
         Of each frame, which beads were of the bulk, and the clusters that were free and held (none before the drive).
     tracks, climbs, out_of_pile
-        These clusters followed through time, what each of them did, and whether it came out of the pile
-        (`came_out_of_pile`).
+        These clusters followed through time, what each of them did, and whether it came out of the pile.
     events
         When they came free, met, parted and ended.
     definition
@@ -121,29 +119,16 @@ def classified(found: PileAnalysis, definition: ClimbCriteria) -> PileAnalysis:
     motion = found.motion
     tracks = follow(motion.time, found.held, definition)
     climbs = [classify(track, motion.time, motion.position[:, :, 2], motion.large, definition) for track in tracks]
-    out = [came_out_of_pile(track, found.bulks, motion.first_driven, definition) for track in tracks]
+    out = [_came_out_of_pile(track, found.bulks, motion.first_driven, definition) for track in tracks]
     events = events_of(tracks, motion.time, found.bulks, definition, motion.first_driven)
     return replace(found, tracks=tracks, climbs=climbs, out_of_pile=out, events=events, definition=definition)
 
 
-def came_out_of_pile(
+def _came_out_of_pile(
     track: Track, bulks: Sequence[npt.NDArray[np.bool_]], first: int, definition: ClimbCriteria
 ) -> bool:
-    """Whether most of the beads that a cluster began with were in the bulk before, while the pile was driven.
-
-    What was not has hung on a wall since the beads were poured.
-
-    Parameters
-    ----------
-    track
-        Of the cluster.
-    bulks
-        Of each frame, which beads were of the bulk.
-    first
-        The first frame of the drive.
-    definition
-        That of the track: what most of them are.
-    """
+    """Whether most of a cluster's first beads were in the bulk before it, from the first frame of the drive on."""
+    # What was not has hung on a wall since the beads were poured.
     members = list(track.members[0])
     return any(bulk[members].mean() >= definition.min_overlap for bulk in bulks[first : track.frames[0]])
 
@@ -171,12 +156,29 @@ class Pile(Analysis):
         "brazil_nut_end": ("", "Brazil-nut index at the end"),
         "settling": ("s", "before the drive"),
     }
+    rows = (
+        ("beads", "beads"),
+        ("of them large", "large"),
+        ("time shaken", "driven", "s"),
+        ("time to settle before", "settling", "s"),
+        ("height of the surface at the start", "surface.start", "m"),
+        ("Brazil-nut index at the start", "brazil_nut.start"),
+        ("height of the surface at the end", "surface.end", "m"),
+        ("Brazil-nut index at the end", "brazil_nut.end"),
+        ("contacts per bead, at rest", "coordination.rest.contacts"),
+        ("bridges per bead, at rest", "coordination.rest.bridges"),
+        ("contacts per bead, at rest, beads at no wall", "coordination.rest_inner.contacts"),
+        ("bridges per bead, at rest, beads at no wall", "coordination.rest_inner.bridges"),
+        ("contacts per bead, while shaken", "coordination.shaken.contacts"),
+        ("bridges per bead, while shaken", "coordination.shaken.bridges"),
+        ("clusters free of the pile and held to a wall", "clusters"),
+    )
 
     def applies(self, case: Case) -> bool:
         """Of loose beads in a container."""
         return case.loose and case.boundary.closed
 
-    def of(self, motion: Motion) -> Measured:
+    def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """The bed, the clusters, what happened to them, and the packing."""
         found = analyse(motion)
         tables = {
@@ -185,7 +187,7 @@ class Pile(Analysis):
             "events": _event_columns(found.events),
             "profile": _profile_columns(found),
         }
-        return Measured(tables, _result(found))
+        return tables, _result(found)
 
     def derived_of(self, case: Case) -> dict[str, float]:
         """Numbers of beads and the length of the drive."""
@@ -213,11 +215,41 @@ class Pile(Analysis):
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Did it climb, when, how fast, who led."""
-        return _lines(result)
+        surface, nuts = result["surface"], result["brazil_nut"]
+        lines = [
+            f"{result['case']}: {result['beads']} beads ({result['large']} large), {result['drive']}",
+            f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling",
+            f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
+            f"  segregation (z of large - z of small)/sum: {nuts['start']:.3f} at the start, "
+            f"{nuts['end']:.3f} at the end",
+            *_told_coordination(result["coordination"]),
+            f"  clusters   {result['clusters']} were free of the pile and held to a wall for a while"
+            + "".join(f", {count} {kind}" for kind, count in result["events"].items()),
+            f"  climbs     {len(result['climbs']) or 'none'}",
+        ]
+        for climb in result["climbs"]:
+            speed = "-" if climb["speed"] is None else f"{climb['speed'] * 1e3:.2f}"
+            names = " ".join(climb["walls"])
+            where = f"in the corner {names}" if len(climb["walls"]) > 1 else f"on the wall {names}"
+            lines.append(
+                f"    {climb['begin']:.2f} to {climb['end']:.2f} s: {climb['gain'] * 1e3:.2f} mm up to "
+                f"{climb['height'] * 1e3:.2f} mm {where} at {speed} mm/s, led by a {_leader(climb)} bead, "
+                f"{climb['size']} beads ({climb['large']} large)"
+                + ("" if climb["out_of_pile"] else "; it has hung on a wall since the pouring")
+            )
+        return lines
 
-    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
+    def rows_of(self, result: Mapping[str, Any]) -> Iterable[tuple[str, ...]]:
         """The same as rows of a table."""
-        return of_piles(result)
+        yield from self.rows
+        yield from ((f"of them {event}", f"events.{event}") for event in result["events"])
+        for number, climb in enumerate(result["climbs"]):
+            place = f"climbs.{number}"
+            name = f"climb {number + 1} ({' '.join(climb['walls'])}, led by a {_leader(climb)} bead)"
+            for what, unit in {"begin": "s", "end": "s", "gain": "m", "height": "m"}.items():
+                yield f"{name}: {what}", f"{place}.{what}", unit
+            yield f"{name}: speed", f"{place}.speed", "m/s", f"{place}.standard_error"
+            yield f"{name}: beads", f"{place}.size"
 
     def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
         """Cluster and track of each bead, the liquid in its bridges (m³), and whether it climbs."""
@@ -356,30 +388,8 @@ def names_of_walls(walls: tuple[int, ...], boundary: Boundary) -> str:
     return " ".join(boundary.walls[wall].name for wall in sorted(walls))
 
 
-def _lines(result: Mapping[str, Any]) -> list[str]:
-    surface, nuts = result["surface"], result["brazil_nut"]
-    lines = [
-        f"{result['case']}: {result['beads']} beads ({result['large']} large), {result['drive']}",
-        f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling",
-        f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
-        f"  segregation (z of large - z of small)/sum: {nuts['start']:.3f} at the start, {nuts['end']:.3f} at the end",
-        *_told_coordination(result["coordination"]),
-        f"  clusters   {result['clusters']} were free of the pile and held to a wall for a while"
-        + "".join(f", {count} {kind}" for kind, count in result["events"].items()),
-        f"  climbs     {len(result['climbs']) or 'none'}",
-    ]
-    for climb in result["climbs"]:
-        speed = "-" if climb["speed"] is None else f"{climb['speed'] * 1e3:.2f}"
-        names = " ".join(climb["walls"])
-        where = f"in the corner {names}" if len(climb["walls"]) > 1 else f"on the wall {names}"
-        leader = "large" if climb["leader_large"] else "small"
-        lines.append(
-            f"    {climb['begin']:.2f} to {climb['end']:.2f} s: {climb['gain'] * 1e3:.2f} mm up to "
-            f"{climb['height'] * 1e3:.2f} mm {where} at {speed} mm/s, led by a {leader} bead, "
-            f"{climb['size']} beads ({climb['large']} large)"
-            + ("" if climb["out_of_pile"] else "; it has hung on a wall since the pouring")
-        )
-    return lines
+def _leader(climb: Mapping[str, Any]) -> str:
+    return "large" if climb["leader_large"] else "small"
 
 
 def _told_coordination(found: Mapping[str, Any]) -> list[str]:

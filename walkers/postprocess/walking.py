@@ -16,12 +16,11 @@ import numpy.typing as npt
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
-from walkers.postprocess.analysis import Analysis, Columns, Described, Measured
+from walkers.postprocess.analysis import Analysis, Columns, Described
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, averages, gait, settled_samples, walk
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges, read_motion
-from walkers.postprocess.posture import describe_posture, posture_summary, postures, turned_over_at, ways
-from walkers.postprocess.quantities import Quantity, of_walkers
+from walkers.postprocess.posture import POSTURES, describe_posture, posture_summary, postures, turned_over_at, ways
 from walkers.postprocess.tables import WALKERS, described
 
 if TYPE_CHECKING:
@@ -80,12 +79,22 @@ class Walking(Analysis):
         "upright": "posture.upright",
         **{name: f"{name[:-2]}.{'bead' if 'rotation' in name else 'contact'}{name[-2:]}" for name in _DIMERS},
     }
+    rows = (
+        ("walkers", "walkers"),
+        ("of them steady", "steady"),
+        ("of them turned round by more than 90°", "turned_round"),
+        ("beads farther apart than a bridge reaches", "separated_fraction", "share"),
+        ("cycles driven", "cycles"),
+        ("of them to settle", "settling_cycles"),
+        ("dimensionless peak force Γ0", "gamma0"),
+        ("asymmetry sin δ", "sin_delta"),
+    )
 
     def applies(self, case: Case) -> bool:
         """Of walkers."""
         return bool(case.walkers)
 
-    def of(self, motion: Motion) -> Measured:
+    def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """Tables of all walkers; the result is of all of them, its contacts of the first make, and of each make."""
         groups, gaits, walks = motion.groups, [gait(one) for one in motion.groups], [walk(one) for one in motion.groups]
         rows = [_walker_columns(*one) for one in zip(groups, gaits, walks, strict=True)]
@@ -93,9 +102,9 @@ class Walking(Analysis):
         tables = {
             "trajectory": _stacked([_trajectory_columns(group, one) for group, one in zip(groups, gaits, strict=True)]),
             "walkers": walkers,
-            "bridges": bridge_columns(motion),
+            "bridges": _bridge_columns(motion),
         }
-        case = motion.case
+        case, known = motion.case, self.derived_of(motion.case)
         turned = [np.isfinite(row["turned_at"]) for row in rows]
         makes = [_summary(*one) for one in zip(rows, turned, strict=True)]
         summary = {
@@ -109,13 +118,13 @@ class Walking(Analysis):
             "settling_cycles": case.run.settling_cycles,
             "ended_early": motion.ended_early,
             "posture": _posture(groups, walkers) if case.goes_uphill else None,
-            **_of_dimer(case),
+            **{name: known.get(name) for name in ("gamma0", "sin_delta")},
         }
         if len(groups) > 1:
             summary["makes"] = [
                 {"radii": list(group.make.radii), **one} for group, one in zip(groups, makes, strict=True)
             ]
-        return Measured(tables, summary)
+        return tables, summary
 
     def derived_of(self, case: Case) -> dict[str, float]:
         """Of dimers; NaN where walkers are larger clusters."""
@@ -143,14 +152,31 @@ class Walking(Analysis):
         if any(result["open"].values()):
             shares = ", ".join(f"{name} {100 * result['open'][contact]:.1f} %" for contact, name in names.items())
             lines.append(f"  contacts open: {shares} of the time")
-        for make in result.get("makes", []):
-            radii = "/".join(f"{radius * 1e3:g}" for radius in make["radii"])
-            lines.append(f"  of {radii} mm  {_speed(make['velocity']['mean'])} mm/s; {_steady(make)}")
-        return lines
+        makes = result.get("makes", [])
+        return lines + [
+            f"  of {_radii(one)} mm  {_speed(one['velocity']['mean'])} mm/s; {_steady(one)}" for one in makes
+        ]
 
-    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
+    def rows_of(self, result: Mapping[str, Any]) -> Iterable[tuple[str, ...]]:
         """The same as rows of a table."""
-        return of_walkers(result)
+        first, second = ways(uphill=result["goes_uphill"])
+        yield "velocity along the heading, positive toward the large bead", "velocity", "m/s"
+        yield f"velocity of those that started facing {first}", "right_facing", "m/s"
+        yield f"velocity of those that started facing {second}", "left_facing", "m/s"
+        if result["turned_round"]:
+            yield "velocity of those that kept their heading", "kept_heading", "m/s"
+        yield "velocity along the drive axis", "axial_velocity.mean", "m/s"
+        yield "velocity across the drive axis", "lateral_velocity.mean", "m/s"
+        for bead in result["rotation"]:
+            yield f"rotation of {bead.replace('_', ' ')}, −R dφ/dt", f"rotation.{bead}", "m/s"
+        for family, told, unit in (("sliding", "sliding", "m/s"), ("open", "contact open", "share")):
+            for contact, name in result["contacts"].items():
+                yield f"{told}, {name}", f"{family}.{contact}", unit
+        yield "orientation at the end", "orientation_end", "rad"
+        for number, make in enumerate(result.get("makes", [])):
+            yield f"velocity of those of {_radii(make)} mm", f"makes.{number}.velocity", "m/s"
+        yield from ((f"walkers that are {posture}", f"posture.{posture}") for posture in POSTURES)
+        yield from self.rows
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What makes the velocity doubtful."""
@@ -169,6 +195,11 @@ class Walking(Analysis):
         from walkers.postprocess.figures import walk_figures
 
         return walk_figures(read_motion(directory).groups)
+
+
+def _radii(make: Mapping[str, Any]) -> str:
+    """Of the beads of a make, mm."""
+    return "/".join(f"{radius * 1e3:g}" for radius in make["radii"])
 
 
 def _stacked(parts: list[Columns]) -> Columns:
@@ -237,14 +268,8 @@ def _walker_columns(group: Group, motion: Gait, walked: Walk) -> Columns:
     }
 
 
-def bridge_columns(motion: Motion) -> Columns:
-    """Columns of the table ``bridges``, sorted by time, walker and contact.
-
-    Raises
-    ------
-    postprocess.dump.DumpError
-        If a dump cannot be read.
-    """
+def _bridge_columns(motion: Motion) -> Columns:
+    """Columns of the table ``bridges``, sorted by time, walker and contact."""
     contact_of = {
         (walker.beads[one] - motion.first_id, walker.beads[other] - motion.first_id): len(walker.beads) + number
         for walker in motion.walkers
@@ -345,13 +370,6 @@ def _contact_names(group: Group) -> dict[str, str]:
     names = [f"bead {bead}" for bead in range(1, count + 1)]
     names += ["bead on bead"] if len(pairs) == 1 else [f"beads {one + 1}-{other + 1}" for one, other in pairs]
     return {f"contact_{number}": name for number, name in enumerate(names, 1)}
-
-
-def _of_dimer(case: Case) -> dict[str, float | None]:
-    if len(case.walkers[0].radii) != 2:
-        return {"gamma0": None, "sin_delta": None}
-    dimer = dimer_of(case)
-    return {"gamma0": dimer.gamma0(case.drive.peak_acceleration), "sin_delta": dimer.sin_delta}
 
 
 def walkers_met(groups: Iterable[Group]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -54,10 +54,11 @@ class RunReport:
     id: str = "run"
     places: int = MOST_PLACES
     origins: tuple[Origin, ...] | None = None
-    result: dict[str, Any] = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "result", current_result(self.directory))
+    @cached_property
+    def result(self) -> dict[str, Any]:
+        """What the run gave."""
+        return current_result(self.directory)
 
     @cached_property
     def case(self) -> Case:
