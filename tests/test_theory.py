@@ -23,9 +23,8 @@ from walkers.postprocess.motion import Group
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import thresholds
-from walkers.theory.friction import Friction
 from walkers.theory.mathieu import Alignment, alignment, growth, is_stable, largest_stable_v
-from walkers.theory.motion import Walker, walk
+from walkers.theory.motion import Friction, Walker, walk
 from walkers.theory.prediction import alignment_of, describe_alignment, motion_of, threshold
 from walkers.theory.quasistatic import detachment, mass_asymmetry, mean_velocity
 from walkers.theory.sideways import time_to_turn

@@ -10,6 +10,7 @@ from statistics import fmean
 
 import numpy as np
 
+from walkers.inputs.loads import dimer_of
 from walkers.inputs.text import rendered
 from walkers.paper import dimers, published
 from walkers.paper.alignment import paper_drives
@@ -98,10 +99,7 @@ def _row(number: Published, value: Value) -> Row:
         unit=number.unit,
         published=number.value,
         measured=number.measured,
-        engine=_finite(value.engine),
-        low=_finite(value.low),
-        high=_finite(value.high),
-        theory=_finite(value.theory),
+        **{name: _finite(getattr(value, name)) for name in ("engine", "low", "high", "theory")},
         left_out=value.left_out,
         ratio=_finite(ours / number.value) if number.value else None,
         bounds=number.bounds,
@@ -134,7 +132,8 @@ def _found(number: Published, sources: Sources) -> Value:
         if not number.of:
             return _OTHERS[number.key](sources)
         if number.quantity == "gamma0":
-            return _exact(dimers.gamma0(dimers.of_point(number.of[0])))
+            case = dimers.of_point(number.of[0])
+            return _exact(dimer_of(case).gamma0(case.drive.peak_acceleration))
         tried = [_speed(point, number.quantity, sources) for point in number.of]
         if number.over:
             below = [_speed(point, number.quantity, sources) for point in number.over]
