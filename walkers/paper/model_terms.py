@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from pathlib import Path
 from statistics import fmean
 from typing import NamedTuple
@@ -56,10 +56,7 @@ ADDED = (
     Term("weaker or stronger bridges to the substrate", {"wall_bridge_factor": (0.5, 1.3)}),
     Term("weaker or stronger bridges between the beads", {"bead_bridge_factor": (0.5, 1.3)}),
     KAPPA,
-    Term(
-        "static friction above the kinetic",
-        {"static_ratio": (1.0, 2.5), "log10_stribeck_velocity": (-4.0, -1.5)},
-    ),
+    Term("static friction above the kinetic", {"static_ratio": (1.0, 2.5), "log10_stribeck_velocity": (-4.0, -1.5)}),
 )
 """Terms to be tried, one at a time and all together."""
 
@@ -142,7 +139,7 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[Point, float]]:
     """
     cases = walkers_of_the_paper()
     walkers = _walkers()
-    known = {**dict.fromkeys(("wall_bridge_factor", "bead_bridge_factor", "static_ratio"), 1.0), **parameters}
+    known = {**_NEUTRAL, "log10_kappa": -inf, **parameters}
     scale = np.array([[known["wall_bridge_factor"]]] * 2 + [[known["bead_bridge_factor"]]])
     on_slide = np.array([point.sweep == "fig4" for point in cases])
     wall = np.where(on_slide, known["friction_slide"], known["friction_wall"])
@@ -151,8 +148,8 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[Point, float]]:
     friction = Friction(
         kinetic=kinetic,
         static=kinetic * known["static_ratio"],
-        stribeck_velocity=10.0 ** known.get("log10_stribeck_velocity", -3.0),
-        linear=10.0 ** known["log10_kappa"] if "log10_kappa" in known else 0.0,
+        stribeck_velocity=10.0 ** known["log10_stribeck_velocity"],
+        linear=10.0 ** known["log10_kappa"],
     )
     resistances = walkers.resistances * 10.0 ** known["log10_viscosity_ratio"]
     motion = walk(

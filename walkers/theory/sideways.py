@@ -50,9 +50,8 @@ class _AxialMotion:
 
 def _axial_motion(case: Case, dimer: Dimer) -> _AxialMotion:
     """The axial motion of a case's walker, and the forces that go with it."""
-    walker, steps = Walker.of_case(case), _STEPS
+    walker, friction, steps = Walker.of_case(case), Friction.of_cases(case), _STEPS
     frequency, peak, steady = case.drive.frequency, case.drive.peak_acceleration, case.axial_gravity
-    friction = Friction.of_cases(case)
     motion = walk(walker, friction, frequency, peak, steady_acceleration=steady, steps_per_cycle=steps)
     after = motion.series[:, 0]
     before = np.roll(after, 1, axis=1)
