@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from math import nan
 from statistics import fmean
@@ -133,7 +133,8 @@ def _found(number: Published, sources: Sources) -> Value:
             return _OTHERS[number.key](sources)
         if number.quantity == "gamma0":
             case = dimers.of_point(number.of[0])
-            return _exact(dimer_of(case).gamma0(case.drive.peak_acceleration))
+            ours = dimer_of(case).gamma0(case.drive.peak_acceleration)
+            return Value(ours, ours, ours)
         tried = [_speed(point, number.quantity, sources) for point in number.of]
         if number.over:
             below = [_speed(point, number.quantity, sources) for point in number.over]
@@ -180,12 +181,8 @@ def _theory(point: Point, quantity: str) -> float:
 
 
 def _quotient(over: Value, under: Value) -> Value:
-    theory, left_out = over.theory / under.theory, over.left_out + under.left_out
-    return replace(_exact(over.engine / under.engine, theory), left_out=left_out)
-
-
-def _exact(value: float, theory: float = nan) -> Value:
-    return Value(value, value, value, theory)
+    ratio = over.engine / under.engine
+    return Value(ratio, ratio, ratio, over.theory / under.theory, over.left_out + under.left_out)
 
 
 def _threshold(sources: Sources) -> tuple[Value, Value]:

@@ -17,7 +17,6 @@ from statistics import fmean
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.inputs import library
 from walkers.inputs.case import Case
@@ -26,9 +25,8 @@ from walkers.paper import dimers
 from walkers.paper.published import FITTED, Point, Published
 from walkers.runner.files import write_json, write_text
 from walkers.theory.motion import Friction, Walker, walk
-from walkers.theory.quasistatic import translation
+from walkers.theory.quasistatic import FloatArray, translation
 
-FloatArray = npt.NDArray[np.float64]
 _CYCLES = 40
 _FREQUENCIES = (60.0, 90.0)
 _HOPELESS = 30.0
