@@ -29,9 +29,7 @@ from walkers.runner.plugin import plugin_of
 from walkers.sweeps.record import read_record
 from walkers.templates.deck import DECK_NAME, Segment, render_deck
 from walkers.templates.engine import ALONE
-from walkers.theory.friction import Friction
-from walkers.theory.motion import Walker, walk
-from walkers.theory.prediction import friction_of
+from walkers.theory.motion import Friction, Walker, walk
 
 _REPEATS = 3
 _STOCK_DECKS = Path(__file__).with_name("benchmark_decks.tar.xz")
@@ -133,7 +131,7 @@ def measure_theory() -> None:
     print("\n| friction | walkers a second |\n|---|---|")
     case, count = load_case("fig1b"), 1000
     wet, accelerations = Walker.of_case(case), np.linspace(5.0, 60.0, count)
-    dry, coulomb = replace(wet, resistances=np.zeros_like(wet.resistances)), friction_of(case)
+    dry, coulomb = replace(wet, resistances=np.zeros_like(wet.resistances)), Friction.of_cases(case)
     laws = {
         "the paper's, κ v F": (dry, Friction(linear=33.0)),
         "Coulomb and bridges": (wet, coulomb),

@@ -14,11 +14,11 @@ from walkers.paper.model_terms import (
     as_markdown,
     fit,
     speeds,
-    targets,
     values_of,
     walkers_of_the_paper,
     write_model_terms,
 )
+from walkers.paper.published import FITTED
 from walkers.runner.files import read_json
 from walkers.theory.prediction import motion_of
 
@@ -27,7 +27,7 @@ KNOWN = {"friction_wall": 0.25, "friction_slide": 0.2, "friction_bead": 0.12, "l
 
 def test_speeds_are_those_of_the_theory_beside_the_engine() -> None:
     """For a case with its bridges and friction the same velocity as `walkers theory` gives."""
-    point = targets()[-1].number.of[0]
+    point = FITTED[-1].of[0]
     assert point.name == "4a"
     bare = walkers_of_the_paper()[point]
     liquid = replace(bare.liquid, dynamic_viscosity=7.0 * bare.liquid.dynamic_viscosity)
@@ -43,8 +43,8 @@ def test_speeds_are_those_of_the_theory_beside_the_engine() -> None:
 
 def test_the_papers_law_alone_gives_its_figures_and_with_inertia_less_at_the_largest_asymmetry() -> None:
     """Of Fig. 4a and of the plateau it gives nothing."""
-    found = fit((KAPPA,), targets(), fixed=NOTHING_ELSE, generations=3)
-    published = {target.name: target.value for target in targets()}
+    found = fit((KAPPA,), fixed=NOTHING_ELSE, generations=3)
+    published = {number.fitted: number.si for number in FITTED}
     assert len(published) == 16
     assert found.parameters.keys() == {"log10_kappa"}
     assert not {"Fig. 2, 4 g", "Fig. 2, 6 g", "Fig. 3, 0.3/0.2 mm"} & set(found.missed)
@@ -56,9 +56,13 @@ def test_the_papers_law_alone_gives_its_figures_and_with_inertia_less_at_the_lar
 @pytest.mark.slow
 def test_what_the_theory_made_is_found_again_and_what_it_lacks_is_missed(tmp_path: Path) -> None:
     made = {**KNOWN, "static_ratio": 1.8, "log10_stribeck_velocity": -3.0}
-    wanted = targets()[:7]
+    wanted = FITTED[:7]
+    scales = [1.0 if one.over else 1e3 for one in wanted]  # as published, in mm/s
     dry, wet = (
-        [one._replace(value=value) for one, value in zip(wanted, values_of(known, wanted).values(), strict=True)]
+        [
+            replace(one, value=value * scale, deviation=one.si_deviation * scale)
+            for one, value, scale in zip(wanted, values_of(known, wanted).values(), scales, strict=True)
+        ]
         for known in (KNOWN, made)
     )
     alone = fit((), dry, generations=30)
@@ -68,8 +72,8 @@ def test_what_the_theory_made_is_found_again_and_what_it_lacks_is_missed(tmp_pat
     without, static = fit((), wet, generations=9), fit((ADDED[-1],), wet, generations=9)
     assert static.misfit < 0.5 * without.misfit
     assert set(static.parameters) == set(ALWAYS.ranges) | set(ADDED[-1].ranges)
-    full = [replace(one, values=dict(values_of(one.parameters, targets()))) for one in (without, static)]
+    full = [replace(one, values=dict(values_of(one.parameters, FITTED))) for one in (without, static)]
     paths = write_model_terms(full, tmp_path)
     assert [path.name for path in paths] == ["model_terms.json", "model_terms.md"]
     assert len(read_json(paths[0])["fits"]) == 2
-    assert as_markdown(full).count("\n| Fig.") == len(targets())
+    assert as_markdown(full).count("\n| Fig.") == len(FITTED)

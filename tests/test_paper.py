@@ -3,7 +3,6 @@
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,7 +14,6 @@ from PIL import Image
 from tests.conftest import call, run_shipped, shipped_sweep
 from tests.printed import letters, spoilt
 from walkers.inputs import load_case
-from walkers.inputs.errors import InputError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import read_toml
 from walkers.inputs.sweep import shipped_sweeps
@@ -92,7 +90,7 @@ def test_the_published_fits_are_the_papers_model() -> None:
 def test_all_drives_of_the_paper_are_stable() -> None:
     drives = paper_drives()
     assert len(drives) == 11
-    assert all(one.stable and one.v < published.LARGEST_V for one in drives.values())
+    assert all(one.stable and one.v < published.BY_KEY["mathieu"].si for one in drives.values())
     assert climber(large_bead_below=True).u == pytest.approx(-climber(large_bead_below=False).u)
     assert climber(large_bead_below=True).u > 0.0
 
@@ -113,11 +111,8 @@ def test_every_published_number_is_compared(sources: Sources) -> None:
     assert all(number.bounds is not None for number in published.COMPARED if number.value is None)
     agreeing, counted = count(rows, measured=True)
     assert counted == sum(row.measured for row in rows) - len(in_words)
-    either_way = [[replace(row, agrees=agrees) if row in in_words else row for row in rows] for agrees in (True, False)]
-    assert [count(one, measured=True) for one in either_way] == [(agreeing, counted)] * 2
-    agree, of = count(rows, measured=False)
-    assert of == 9
-    assert agree == 9
+    assert agreeing == sum(row.agrees for row in rows if row.measured and row not in in_words)
+    assert count(rows, measured=False) == (9, 9)
     contents = json.loads(json.dumps(as_dict(rows)))
     assert (contents["agree"], contents["of"], len(contents["numbers"])) == (agreeing, counted, len(rows))
     told = as_markdown(rows)
@@ -151,12 +146,9 @@ def test_figures_can_be_printed_and_say_what_they_were_made_from(sources: Source
     runs = sources.runs(*drawing.sweeps)
     figure = drawing.draw(sources)
     assert spoilt(figure) == []
-    assert (
-        letters(figure)
-        == list("abcd")[: {"fig1b": 3, "fig2": 3, "fig3": 0, "fig4": 2, "alignment": 4, "modes": 2}[name]]
-    )
+    panels = {"fig1b": 3, "fig2": 3, "fig3": 0, "fig4": 2, "alignment": 4, "modes": 2}[name]
+    assert letters(figure) == list("abcd")[:panels]
     paths = save_figure(figure, tmp_path / name, runs, ("png", "svg", "pdf"), drawing.title)
-    assert [path.name for path in paths] == [f"{name}.png", f"{name}.svg", f"{name}.pdf"]
     picture = Image.open(paths[0])
     assert picture.info["Source"].split() == list(dict.fromkeys(runs))
     text = "".join(ElementTree.parse(paths[1]).getroot().itertext())
@@ -288,15 +280,11 @@ def test_the_program_draws_what_is_asked_for(in_folder: Path, monkeypatch: pytes
     assert done.stdout.splitlines() == ["figures/fig4.png", "figures/fig4.svg"]
     done = call("figures", "--only", "fig4", "--format", "pdf", "-j", "1", check=True)
     assert done.stdout.splitlines() == ["figures/fig4.pdf"]
-    done = call("figures", "--only", "fig4", "--format", "jpeg")
-    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
-    assert "jpeg" in done.stderr
-    done = call("figures", "--only", "fig9")
-    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
-    assert "fig9" in done.stderr
     (in_folder / "file").write_text("mine")
-    done = call("figures", "--only", "fig4", "--to", "file")
-    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    for given in ("--only fig9", "--only fig4 --format jpeg", "--only fig4 --to file"):
+        done = call("figures", *given.split())
+        assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+        assert given.split()[-1] in done.stderr
     assert (in_folder / "file").read_text() == "mine"
 
 
@@ -306,11 +294,3 @@ def test_a_run_that_failed_is_left_out_and_told(tmp_path: Path) -> None:
     assert {failure.reason for failure in made.failures["fig3"]} == {"TimeLimitExceeded"}
     assert list(made.left_out) == ["fig3"]
     assert not made.files
-
-
-def test_unknown_figures_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="fig7"):
-        make_figures(tmp_path / "runs", tmp_path / "to", Options(1), only=["fig7"])
-    with pytest.raises(InputError, match="jpeg"):
-        make_figures(tmp_path / "runs", tmp_path / "to", Options(1), formats=["jpeg"])
-    assert not (tmp_path / "runs").exists()

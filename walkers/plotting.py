@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from walkers.theory.motion import FloatArray
+    from walkers.theory.quasistatic import FloatArray
 
 
 class LeftOutWarning(UserWarning):

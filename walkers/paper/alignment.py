@@ -127,6 +127,6 @@ def _chart(axes: Axes) -> None:
     for below, marker, label in ((True, "v", "climber, large bead below"), (False, "^", "climber, large bead above")):
         one = climber(below)
         axes.plot(one.v, one.u, marker, color="C4", ms=5, label=f"{label}: U = {one.u:.1g}")
-    axes.axvline(published.LARGEST_V, color="0.45", ls="-.", lw=0.8, label="paper's bound, 0.4")
+    axes.axvline(published.BY_KEY["mathieu"].si, color="0.45", ls="-.", lw=0.8, label="paper's bound, 0.4")
     axes.set(xlabel="V", ylabel="U", title="where small angles stay small (grey)", ylim=(-0.4, 1.4))
     legend_below(axes, ncols=2)

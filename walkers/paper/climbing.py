@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from walkers.postprocess.motion import Group
 
-FloatArray = npt.NDArray[np.float64]
 KINDS = ("climbs upright", "stays, upright", "slides down upright", "leans", "turns over")
 _MARKERS = ("^", "o", "v", "D", "X")
 _SHAPE = "clusters[0].arrangement"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from math import nan
 from statistics import fmean
 
 import numpy as np
 
+from walkers.inputs.loads import dimer_of
 from walkers.inputs.text import rendered
 from walkers.paper import dimers, published
 from walkers.paper.alignment import paper_drives
@@ -98,10 +99,7 @@ def _row(number: Published, value: Value) -> Row:
         unit=number.unit,
         published=number.value,
         measured=number.measured,
-        engine=_finite(value.engine),
-        low=_finite(value.low),
-        high=_finite(value.high),
-        theory=_finite(value.theory),
+        **{name: _finite(getattr(value, name)) for name in ("engine", "low", "high", "theory")},
         left_out=value.left_out,
         ratio=_finite(ours / number.value) if number.value else None,
         bounds=number.bounds,
@@ -134,7 +132,9 @@ def _found(number: Published, sources: Sources) -> Value:
         if not number.of:
             return _OTHERS[number.key](sources)
         if number.quantity == "gamma0":
-            return _exact(dimers.gamma0(dimers.of_point(number.of[0])))
+            case = dimers.of_point(number.of[0])
+            ours = dimer_of(case).gamma0(case.drive.peak_acceleration)
+            return Value(ours, ours, ours)
         tried = [_speed(point, number.quantity, sources) for point in number.of]
         if number.over:
             below = [_speed(point, number.quantity, sources) for point in number.over]
@@ -181,12 +181,8 @@ def _theory(point: Point, quantity: str) -> float:
 
 
 def _quotient(over: Value, under: Value) -> Value:
-    theory, left_out = over.theory / under.theory, over.left_out + under.left_out
-    return replace(_exact(over.engine / under.engine, theory), left_out=left_out)
-
-
-def _exact(value: float, theory: float = nan) -> Value:
-    return Value(value, value, value, theory)
+    ratio = over.engine / under.engine
+    return Value(ratio, ratio, ratio, over.theory / under.theory, over.left_out + under.left_out)
 
 
 def _threshold(sources: Sources) -> tuple[Value, Value]:

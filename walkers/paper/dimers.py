@@ -15,13 +15,10 @@ from walkers.paper.published import FIG4_PEAKS, GRAVITY, Point
 if TYPE_CHECKING:
     import pandas as pd
 
-FIG2 = "fig1b"
-"""The case whose beads, liquid and contacts Figs. 1b and 2 have."""
 
-
-def shipped(name: str = FIG2) -> Case:
-    """A shipped case."""
-    return load_case(name)
+def shipped() -> Case:
+    """The case whose beads, liquid and contacts Figs. 1b and 2 have."""
+    return load_case("fig1b")
 
 
 def symmetric(table: pd.DataFrame) -> pd.Series[bool]:
@@ -56,11 +53,6 @@ def of_point(point: Point) -> Case:
         large, small = point.radii
         return of_radii(shipped(), (large * 1e-3, small * 1e-3), 0.5)
     return driven(shipped(), point.frequency, [point.peak * GRAVITY])[0]
-
-
-def gamma0(case: Case) -> float:
-    """Γ0 of a case."""
-    return dimer_of(case).gamma0(case.drive.peak_acceleration)
 
 
 def described(case: Case) -> str:

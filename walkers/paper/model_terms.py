@@ -11,13 +11,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from pathlib import Path
 from statistics import fmean
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.inputs import library
 from walkers.inputs.case import Case
@@ -25,13 +24,10 @@ from walkers.inputs.text import rendered
 from walkers.paper import dimers
 from walkers.paper.published import FITTED, Point, Published
 from walkers.runner.files import write_json, write_text
-from walkers.theory.friction import Friction
-from walkers.theory.motion import Walker, walk
-from walkers.theory.quasistatic import translation
+from walkers.theory.motion import Friction, Walker, walk
+from walkers.theory.quasistatic import FloatArray, translation
 
-FloatArray = npt.NDArray[np.float64]
 _CYCLES = 40
-_DEVIATION = 0.15
 _FREQUENCIES = (60.0, 90.0)
 _HOPELESS = 30.0
 
@@ -58,10 +54,7 @@ ADDED = (
     Term("weaker or stronger bridges to the substrate", {"wall_bridge_factor": (0.5, 1.3)}),
     Term("weaker or stronger bridges between the beads", {"bead_bridge_factor": (0.5, 1.3)}),
     KAPPA,
-    Term(
-        "static friction above the kinetic",
-        {"static_ratio": (1.0, 2.5), "log10_stribeck_velocity": (-4.0, -1.5)},
-    ),
+    Term("static friction above the kinetic", {"static_ratio": (1.0, 2.5), "log10_stribeck_velocity": (-4.0, -1.5)}),
 )
 """Terms to be tried, one at a time and all together."""
 
@@ -79,34 +72,13 @@ NOTHING_ELSE = {
 """What leaves the paper's law alone, F∥ = κ v F, but integrated in time, with inertia."""
 
 
-class Target(NamedTuple):
-    """A published number as the theory is fitted to it: m/s or a ratio, and its error in the same."""
-
-    number: Published
-    value: float
-    deviation: float
-
-    @property
-    def name(self) -> str:
-        """Of the number."""
-        return self.number.fitted
-
-    def points(self) -> tuple[list[Point], list[Point]]:
-        """Walkers that it is a mean over, and those that it is a ratio to: at the ends of the range of frequencies."""
-        of, over = (
-            [one for one in points if one.frequency in _FREQUENCIES or len(points) == 1]
-            for points in (self.number.of, self.number.over)
-        )
-        return of, over
-
-
-def targets() -> list[Target]:
-    """The published numbers that tell of walkers on the axis."""
-    scales = [1.0 if number.over else 1e-3 for number in FITTED]
-    return [
-        Target(number, number.si, _DEVIATION * abs(number.si) if number.deviation is None else number.deviation * scale)
-        for number, scale in zip(FITTED, scales, strict=True)
-    ]
+def points_of(number: Published) -> tuple[list[Point], list[Point]]:
+    """Walkers that it is a mean over, and those that it is a ratio to: at the ends of the range of frequencies."""
+    of, over = (
+        [one for one in points if one.frequency in _FREQUENCIES or len(points) == 1]
+        for points in (number.of, number.over)
+    )
+    return of, over
 
 
 @dataclass(frozen=True)
@@ -139,7 +111,7 @@ def walkers_of_the_paper() -> dict[Point, Case]:
 
     Of Fig. 4b there are none: there contacts open in every cycle, and that is beyond the theory.
     """
-    points = [point for target in targets() for part in target.points() for point in part]
+    points = [point for number in FITTED for part in points_of(number) for point in part]
     return {point: _bare(dimers.of_point(point)) for point in points}
 
 
@@ -165,7 +137,7 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[Point, float]]:
     """
     cases = walkers_of_the_paper()
     walkers = _walkers()
-    known = {**dict.fromkeys(("wall_bridge_factor", "bead_bridge_factor", "static_ratio"), 1.0), **parameters}
+    known = {**_NEUTRAL, "log10_kappa": -inf, **parameters}
     scale = np.array([[known["wall_bridge_factor"]]] * 2 + [[known["bead_bridge_factor"]]])
     on_slide = np.array([point.sweep == "fig4" for point in cases])
     wall = np.where(on_slide, known["friction_slide"], known["friction_wall"])
@@ -174,8 +146,8 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[Point, float]]:
     friction = Friction(
         kinetic=kinetic,
         static=kinetic * known["static_ratio"],
-        stribeck_velocity=10.0 ** known.get("log10_stribeck_velocity", -3.0),
-        linear=10.0 ** known["log10_kappa"] if "log10_kappa" in known else 0.0,
+        stribeck_velocity=10.0 ** known["log10_stribeck_velocity"],
+        linear=10.0 ** known["log10_kappa"],
     )
     resistances = walkers.resistances * 10.0 ** known["log10_viscosity_ratio"]
     motion = walk(
@@ -198,27 +170,27 @@ def _walkers() -> Walker:
     return Walker.joined([Walker.of_case(case) for case in walkers_of_the_paper().values()])
 
 
-def values_of(parameters: Mapping[str, float], wanted: Sequence[Target]) -> dict[str, float]:
-    """What some parameters give of targets."""
+def values_of(parameters: Mapping[str, float], wanted: Sequence[Published]) -> dict[str, float]:
+    """What some parameters give of published numbers, m/s or ratios, by what they are called here."""
     found = speeds(parameters)
     values = {}
-    for target in wanted:
-        above, below = ([found[target.number.quantity][one] for one in points] for points in target.points())
+    for number in wanted:
+        above, below = ([found[number.quantity][one] for one in points] for points in points_of(number))
         value = fmean(above)
         if below:
             value = value / fmean(below) if fmean(below) else nan
-        values[target.name] = value
+        values[number.fitted] = value
     return values
 
 
-def _residuals(values: Mapping[str, float], wanted: Sequence[Target]) -> FloatArray:
-    residuals = np.array([(values[target.name] - target.value) / target.deviation for target in wanted])
+def _residuals(values: Mapping[str, float], wanted: Sequence[Published]) -> FloatArray:
+    residuals = np.array([(values[number.fitted] - number.si) / number.si_deviation for number in wanted])
     return np.where(np.isfinite(residuals), residuals, _HOPELESS)
 
 
 def fit(
     terms: Sequence[Term],
-    wanted: Sequence[Target],
+    wanted: Sequence[Published] = FITTED,
     *,
     fixed: Mapping[str, float] | None = None,
     begin: Mapping[str, float] | None = None,
@@ -232,7 +204,7 @@ def fit(
     terms
         Beside `ALWAYS`.
     wanted
-        What is to come out.
+        What is to come out, of `walkers.paper.published.FITTED`.
     fixed
         Parameters that are not searched for.
     begin
@@ -269,19 +241,19 @@ def fit(
         parameters=parameters,
         values={name: value if isfinite(value) else None for name, value in values.items()},
         met=len(wanted) - len(worst),
-        missed=[wanted[place].name for place in worst],
+        missed=[wanted[place].fitted for place in worst],
         misfit=float(found.fun),
     )
 
 
 def try_model_terms(*, seed: int = 1, generations: int = 80) -> list[Fit]:
     """The fit without any, with each term, with all of them, and of the paper's law alone."""
-    bare = fit((), targets(), seed=seed, generations=generations)
+    bare = fit((), seed=seed, generations=generations)
     # From where the others end: what has more parameters must not come out worse for want of generations.
-    added = [fit((one,), targets(), begin=bare.parameters, seed=seed, generations=generations) for one in ADDED]
+    added = [fit((one,), begin=bare.parameters, seed=seed, generations=generations) for one in ADDED]
     best = min(added, key=lambda one: one.misfit)
-    every = fit(ADDED, targets(), begin=best.parameters, seed=seed, generations=generations)
-    alone = fit((KAPPA,), targets(), fixed=NOTHING_ELSE, seed=seed, generations=generations)
+    every = fit(ADDED, begin=best.parameters, seed=seed, generations=generations)
+    alone = fit((KAPPA,), fixed=NOTHING_ELSE, seed=seed, generations=generations)
     named = (replace(every, name="all of these"), replace(alone, name="the paper's law alone, integrated"))
     return [bare, *added, *named]
 
@@ -289,19 +261,18 @@ def try_model_terms(*, seed: int = 1, generations: int = 80) -> list[Fit]:
 def write_model_terms(fits: Sequence[Fit], to: Path) -> list[Path]:
     """Write ``model_terms.json`` and ``model_terms.md``."""
     to.mkdir(parents=True, exist_ok=True)
-    write_json(
-        to / "model_terms.json", {"targets": [_told(one) for one in targets()], "fits": [asdict(one) for one in fits]}
-    )
+    told = {"targets": [_told(number) for number in FITTED], "fits": [asdict(one) for one in fits]}
+    write_json(to / "model_terms.json", told)
     write_text(to / "model_terms.md", as_markdown(fits))
     return [to / "model_terms.json", to / "model_terms.md"]
 
 
-def _told(target: Target) -> dict[str, object]:
-    of, over = ([point.name for point in points] for points in target.points())
-    told = {"name": target.name, "quantity": target.number.quantity.removesuffix("_1"), "of": of, "over": over}
-    return told | {"value": target.value, "deviation": target.deviation}
+def _told(number: Published) -> dict[str, object]:
+    of, over = ([point.name for point in points] for points in points_of(number))
+    told = {"name": number.fitted, "quantity": number.quantity.removesuffix("_1"), "of": of, "over": over}
+    return told | {"value": number.si, "deviation": number.si_deviation}
 
 
 def as_markdown(fits: Sequence[Fit]) -> str:
     """The fits as a table, and below it what they give."""
-    return rendered("walkers.paper", "model_terms.md.j2", fits=fits, targets=targets())
+    return rendered("walkers.paper", "model_terms.md.j2", fits=fits, numbers=FITTED)

@@ -14,7 +14,7 @@ from walkers.paper.sources import Sources
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, styled
 from walkers.postprocess.gait import gait, settled_samples
 from walkers.theory.prediction import MOVING, motion_of
-from walkers.theory.quasistatic import detachment, translation
+from walkers.theory.quasistatic import FloatArray, detachment, translation
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from walkers.postprocess.motion import Group
     from walkers.theory.motion import Motion
 
-FloatArray = npt.NDArray[np.float64]
 REST = 2e-6
 """A walker slower than this, m/s, is at rest."""
 SLIDES = 0.1
@@ -117,7 +116,7 @@ def _borders(axes: Axes, top: float) -> None:
     axes.plot(sines, end, ":", color="0.1", lw=1.6, label="paper's model, quasi-static ±Γ0/√2: detaches")
 
 
-def _borders_of(motion: Motion, gammas: npt.NDArray[np.float64]) -> dict[str, npt.NDArray[np.float64]]:
+def _borders_of(motion: Motion, gammas: FloatArray) -> dict[str, FloatArray]:
     """For each asymmetry the smallest Γ0 at which a walker moves, its large bead slides, a contact opens."""
     velocity = translation(motion.series)
     shares = [_share(*pair) for pair in zip(motion.series[0], velocity - motion.series[0], strict=True)]

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 GRAVITY = 9.8
 """The paper's g, m/s²."""
-PLATEAU = 6.0
-"""Peak acceleration in g at which the plateau of Fig. 2 begins; Γ0 ≈ 0.6."""
+_DEVIATION = 0.15
 FIG4_PEAKS = (2.0, 10.0)
 """Fig. 4a and b: peak acceleration, g."""
 
@@ -65,7 +64,7 @@ class Published:
     fitted
         What it is called among those that the theory is fitted to (`walkers.paper.model_terms`), if it is one.
     deviation
-        Its error there, in ``unit``; a share of it if None.
+        Its error there, in ``unit``; 15 % if None.
     compared
         Whether it is one of the comparison.
     """
@@ -89,6 +88,13 @@ class Published:
         """The value in SI units, to the digits that it was published with."""
         return float(f"{self.value or 0.0}e-3") if self.unit == "mm/s" else self.value or 0.0
 
+    @property
+    def si_deviation(self) -> float:
+        """Its error among those that the theory is fitted to, in SI units."""
+        if self.deviation is None:
+            return _DEVIATION * abs(self.si)
+        return self.deviation * (1.0 if self.over else 1e-3)
+
 
 def _points(given: Mapping[str, Any]) -> tuple[Point, ...]:
     large, small = given["radii"]
@@ -105,21 +111,15 @@ _FILE = tomllib.loads(Path(__file__).with_name("published.toml").read_text("utf-
 NUMBERS = tuple(_read(given, _FILE["reasons"]) for given in _FILE["numbers"])
 """Every number that the paper publishes of walkers, and others that follow from what it says."""
 COMPARED = tuple(number for number in NUMBERS if number.compared)
-_KEYS = {number.key: number for number in NUMBERS}
-FIT = {float(g): _KEYS[f"fig2_{g}g"].si for g in range(2, 7)}
+BY_KEY = {number.key: number for number in NUMBERS}
+FIT = {float(g): BY_KEY[f"fig2_{g}g"].si for g in range(2, 7)}
 """Fig. 2: the paper's fitted curve below the plateau, m/s, at peak accelerations in g."""
 FIG3_FIT = {one.of[0].radii: one.si for one in NUMBERS if one.key.startswith("fig3_") and one.value}
 """Fig. 3: the same curve at Γ0 = 0.5, m/s, by the radii in mm."""
-FIG4_VELOCITY = (_KEYS["fig4a_velocity"].si, _KEYS["fig4b_velocity"].si)
-"""Fig. 4a and b: mean velocity, m/s."""
-FIG4B_ROTATION = _KEYS["fig4b_rotation"].si
-"""Fig. 4b: mean rotation velocity of the large bead, m/s."""
-LARGEST_V = _KEYS["mathieu"].si
-"""|V| of all that the paper investigated is below; small angles stay small up to 0.45."""
 _FITTED = (
     *(f"fig2_{g}g" for g in range(2, 7)),
     *("fig2_plateau", "fig2_frequency_4g", "fig2_frequency", "fig2_rest"),
     *(number.key for number in NUMBERS if number.fitted and number.key.startswith(("fig3", "fig4"))),
 )
-FITTED = tuple(_KEYS[key] for key in _FITTED)
+FITTED = tuple(BY_KEY[key] for key in _FITTED)
 """Those that the theory is fitted to: of walkers on the axis whose contacts stay closed."""

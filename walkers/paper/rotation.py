@@ -71,8 +71,8 @@ def _handles(means: Mapping[str, Sequence[str]]) -> list[Line2D]:
 
 def _published(letter: str) -> dict[str, float]:
     """Published means of a panel, m/s."""
-    walker = {"walker": published.FIG4_VELOCITY["ab".index(letter)]}
-    return walker if letter == "a" else {**walker, "large bead": published.FIG4B_ROTATION}
+    keys = {"walker": f"fig4{letter}_velocity", "large bead": f"fig4{letter}_rotation"}
+    return {name: published.BY_KEY[key].si for name, key in keys.items() if key in published.BY_KEY}
 
 
 def _draw(axes: Axes, trajectory: Group) -> None:

@@ -34,12 +34,6 @@ _TOGETHER = "uncalibrated"
 _EXPERIMENT = ["dimers.radii[0]", "drive.frequency", "drive.peak_acceleration", "dimers.angle"]
 
 
-def steady_speed(run: str | Path) -> float:
-    """Mean velocity of a run's `walkers.postprocess.steady_state.steady_walkers`, m/s; NaN if there is none."""
-    kept = steady_walkers(run)
-    return float(kept["velocity"].mean()) if len(kept) else np.nan
-
-
 def misalignment(run: str | Path) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Angles of a run's walkers to the drive axis at the end, whichever way they face, degrees, each 0 to 90."""
     ends = np.degrees(read_table(run, "walkers")["orientation_end"].to_numpy())
@@ -47,16 +41,12 @@ def misalignment(run: str | Path) -> np.ndarray[tuple[int], np.dtype[np.float64]
     return angles
 
 
-def _astray(run: str | Path) -> float:
-    """Share of walkers that are off the axis in the end, per cent."""
-    return 100.0 * float((~on_axis(read_table(run, "walkers"))).mean())
-
-
 _MEASURES: Mapping[str, Callable[[str], float]] = {
-    "mm/s": lambda run: steady_speed(run) * 1e3,
-    "%": _astray,
+    "mm/s": lambda run: float(steady_walkers(run)["velocity"].mean()) * 1e3,
+    "%": lambda run: 100.0 * float((~on_axis(read_table(run, "walkers"))).mean()),
     "°": lambda run: float(misalignment(run).max()),
 }
+"""Mean velocity of those that are steady (NaN if none is), share of walkers off the axis in the end, largest angle."""
 
 
 class Observation(NamedTuple):

@@ -39,16 +39,9 @@ class Sources:
 
     def __init__(self, out: Path) -> None:
         self.out = out
-        self.table = lru_cache(maxsize=None)(self._table)
-        self.trajectory = lru_cache(maxsize=32)(self._trajectory)
-
-    def _table(self, sweep: str) -> pd.DataFrame:
-        """The table of a sweep, see `walkers.sweeps.table.load`, its run directories from where the process is."""
-        return load(self.out / sweep)
-
-    def _trajectory(self, run: str) -> Group:
-        """The motion of the (first) walkers in a run directory."""
-        return read_motion(run).groups[0]
+        self.table: Callable[[str], pd.DataFrame] = lru_cache(maxsize=None)(lambda sweep: load(out / sweep))
+        # The motion of the (first) walkers in a run directory.
+        self.trajectory: Callable[[str], Group] = lru_cache(maxsize=32)(lambda run: read_motion(run).groups[0])
 
     def finished(self, sweep: str) -> pd.DataFrame:
         """The points of a sweep that are finished.

@@ -66,8 +66,7 @@ def fig2(sources: Sources) -> Figure:
     dry.set_title("theory: Coulomb friction, dry")
     dry.locator_params(nbins=5)
     above = engine.secondary_xaxis(
-        "top",
-        functions=(lambda g: g * dimer.gamma0(published.GRAVITY), lambda x: x / dimer.gamma0(published.GRAVITY)),
+        "top", functions=(lambda g: g * dimer.gamma0(published.GRAVITY), lambda x: x / dimer.gamma0(published.GRAVITY))
     )
     above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
     engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction, bridges")

@@ -9,9 +9,8 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
-from walkers.theory.motion import FloatArray
 from walkers.theory.prediction import check_applies, motion_of
-from walkers.theory.quasistatic import FRICTION_OF_THE_PAPER, mean_velocity
+from walkers.theory.quasistatic import FRICTION_OF_THE_PAPER, FloatArray, mean_velocity
 
 MODEL, PAPER = "theory", f"paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
 """Coulomb friction with the resistance of bridges (`walkers.theory.prediction.motion_of`); the paper's own model, of

@@ -24,11 +24,12 @@ import numpy.typing as npt
 from scipy.special import mathieu_a, mathieu_b
 
 from walkers.physics.dimer import Dimer
-
-FloatArray = npt.NDArray[np.float64]
+from walkers.theory.quasistatic import FloatArray
 
 NEUTRAL = 1e-6
 """A growth per unit of ϑ, or a multiplier less one, that is the error of what is zero."""
+_BANDS = 6
+"""So many intervals of stability are looked at, from the lowest."""
 
 
 @dataclass(frozen=True)
@@ -94,16 +95,15 @@ def alignment(
     )
 
 
-def growth(u: float, v: float, damping: float = 0.0, steps: int = 128) -> float:
+def growth(u: float, v: float, damping: float = 0.0) -> float:
     """Largest growth rate of the solutions of d²ψ/dϑ² + 2β dψ/dϑ + [U - 4V cos 2ϑ] ψ = 0 (Floquet), per unit of ϑ.
 
     Parameters
     ----------
     u, v, damping
         U, V and β.
-    steps
-        In which a period of π is cut, U - 4V cos 2ϑ constant in each.
     """
+    steps = 128  # of a period of π, U - 4V cos 2ϑ constant in each
     theta = pi * (np.arange(steps) + 0.5) / steps
     slopes = np.zeros((steps, 2, 2))
     slopes[:, 0, 1], slopes[:, 1, 1] = 1.0, -2.0 * damping
@@ -122,7 +122,7 @@ def multipliers(slopes: FloatArray, step: float) -> npt.NDArray[np.complex128]:
     return found
 
 
-def is_stable(u: npt.ArrayLike, v: npt.ArrayLike, bands: int = 6) -> npt.NDArray[np.bool_]:
+def is_stable(u: npt.ArrayLike, v: npt.ArrayLike) -> npt.NDArray[np.bool_]:
     """Whether all solutions of the Mathieu equation are bounded.
 
     They are between the characteristic values a_n(q) and b_{n+1}(q) with q = 2V, a = U.
@@ -131,11 +131,9 @@ def is_stable(u: npt.ArrayLike, v: npt.ArrayLike, bands: int = 6) -> npt.NDArray
     ----------
     u, v
         U and V, of shapes that broadcast.
-    bands
-        How many intervals of stability are looked at, from the lowest.
     """
     a, q = np.broadcast_arrays(np.asarray(u, np.float64), 2.0 * np.abs(np.asarray(v, np.float64)))
-    inside = [(mathieu_a(n, q) < a) & (a < mathieu_b(n + 1, q)) for n in range(bands)]
+    inside = [(mathieu_a(n, q) < a) & (a < mathieu_b(n + 1, q)) for n in range(_BANDS)]
     stable: npt.NDArray[np.bool_] = np.any(inside, axis=0)
     return stable
 

@@ -24,8 +24,8 @@ import numpy.typing as npt
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
 from walkers.physics.dimer import Dimer
-from walkers.theory.friction import Friction
 from walkers.theory.quasistatic import (
+    FloatArray,
     forces_at_rest,
     inertia_matrix,
     normal_force_matrix,
@@ -33,11 +33,47 @@ from walkers.theory.quasistatic import (
     translation,
 )
 
-FloatArray = npt.NDArray[np.float64]
-
 STEPS_PER_CYCLE = 64
 """Within 0.01 mm/s of 1024 under Coulomb friction with the bridges' drag, 0.07 without (80 Hz, up to 11 g)."""
 CYCLES = 60
+
+
+@dataclass(frozen=True)
+class Friction:
+    """F∥ = F (μ(v) sign v + κ v) at each of the three contacts; at v = 0 whatever up to F μs holds it.
+
+    μ(v) = μk + (μs - μk) exp(-(v/vs)²), after Stribeck. Each is a number, or an array that broadcasts to (3, N) for N
+    parameter sets: contacts 1, 2 (beads on the substrate) and 3 (bead on bead). F is that of rigid beads; the engine's
+    Coulomb limit has the damping of the contact besides, which is nothing while beads neither approach nor part.
+
+    Attributes
+    ----------
+    kinetic
+        μk, Coulomb's coefficient.
+    static
+        μs; μk where it is None.
+    stribeck_velocity
+        vs, m/s.
+    linear
+        κ, s/m: the paper's law.
+    """
+
+    kinetic: npt.ArrayLike = 0.0
+    static: npt.ArrayLike | None = None
+    stribeck_velocity: float = 1e-3
+    linear: npt.ArrayLike = 0.0
+
+    @classmethod
+    def coulomb(cls, bead_wall: npt.ArrayLike, bead_bead: npt.ArrayLike) -> Friction:
+        """Coulomb's law with one coefficient on the substrate and one between the beads."""
+        wall, bead = np.broadcast_arrays(np.asarray(bead_wall, np.float64), np.asarray(bead_bead, np.float64))
+        return cls(kinetic=np.stack([wall, wall, bead]).reshape(3, -1))
+
+    @classmethod
+    def of_cases(cls, *cases: Case) -> Friction:
+        """Coulomb's law with each case's coefficients."""
+        found = [case.contact for case in cases]
+        return cls.coulomb([one.friction_bead_wall for one in found], [one.friction_bead_bead for one in found])
 
 
 @dataclass(frozen=True)
@@ -73,21 +109,20 @@ class Walker:
         return (self.radii[0] - self.radii[1]) / self.radii.sum(axis=0)  # type: ignore[no-any-return]
 
     @classmethod
-    def of_dimer(cls, dimer: Dimer, gravity: float = 0.0) -> Walker:
-        """The paper's walker: perfect wetting; on a substrate that gravity (m/s²) presses it to."""
-        weights = np.array([*dimer.masses, 0.0]) * gravity / dimer.capillary_scale
+    def of_dimer(cls, dimer: Dimer) -> Walker:
+        """The paper's walker: perfect wetting, no weight, dry."""
         return cls(
             radii=np.array(dimer.radii)[:, None],
             asymmetry=np.array([dimer.mass_asymmetry]),
             scale=np.array([dimer.capillary_scale / dimer.total_mass]),
             force_unit=np.array([dimer.capillary_scale]),
-            at_rest=(forces_at_rest(dimer.sin_delta) + weights)[:, None],
+            at_rest=forces_at_rest(dimer.sin_delta)[:, None],
             resistances=np.zeros((3, 3, 1)),
         )
 
     @classmethod
-    def of_case(cls, case: Case) -> Walker:
-        """A case's walker with the pulls and resistances that its bridges have in the engine, and its weight."""
+    def of_case(cls, case: Case, *, viscous: bool = True) -> Walker:
+        """A case's walker: its weight, and the pulls and (if viscous) resistances of its bridges in the engine."""
         dimer = dimer_of(case)
         forces = np.array(contact_loads(case).capillary) + np.array([*dimer.masses, 0.0]) * case.pressing_gravity
         first, second = dimer.radii
@@ -95,14 +130,12 @@ class Walker:
         resistances = np.array([resistances_at_rest(case, *pair) for pair in meeting]).T
         resistances[1, 2] *= -1.0 if first > second else 1.0  # that of the smaller bead as body 1
         at_rest = (forces / dimer.capillary_scale)[:, None]
-        return replace(cls.of_dimer(dimer), at_rest=at_rest, resistances=resistances[..., None])
+        return replace(cls.of_dimer(dimer), at_rest=at_rest, resistances=resistances[..., None] * viscous)
 
     @classmethod
     def joined(cls, walkers: Sequence[Walker]) -> Walker:
         """All walkers of several."""
-        return cls(
-            *(np.concatenate([getattr(one, field.name) for one in walkers], axis=-1) for field in fields(cls)),
-        )
+        return cls(*(np.concatenate([getattr(one, field.name) for one in walkers], axis=-1) for field in fields(cls)))
 
 
 @dataclass(frozen=True)

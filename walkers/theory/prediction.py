@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import hypot, pi
 from typing import Any
 
@@ -10,11 +9,10 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
-from walkers.theory.friction import Friction
 from walkers.theory.mathieu import Alignment, alignment, largest_stable_v
-from walkers.theory.motion import Motion, Walker, walk
+from walkers.theory.motion import Friction, Motion, Walker, walk
 from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, detachment, mean_velocity
-from walkers.theory.sideways import axial_motion_of, time_to_turn, turning_rate
+from walkers.theory.sideways import time_to_turn, turning_rate
 
 MOVING = 1e-6
 """A walker faster than this, m/s, moves."""
@@ -22,12 +20,6 @@ GROWS = 0.05
 """A rate, 1/s, above which small angles to the axis grow: half as large again in ten seconds."""
 _TRIALS = 33
 _ROUNDS = 3
-
-
-def friction_of(*cases: Case) -> Friction:
-    """Coulomb's law with each case's coefficients."""
-    contacts = [case.contact for case in cases]
-    return Friction.coulomb([one.friction_bead_wall for one in contacts], [one.friction_bead_bead for one in contacts])
 
 
 def motion_of(*cases: Case, viscous: bool = True) -> Motion:
@@ -47,17 +39,12 @@ def motion_of(*cases: Case, viscous: bool = True) -> Motion:
     """
     check_applies(*cases)
     return walk(
-        Walker.joined([_walker_of(case, viscous=viscous) for case in cases]),
-        friction_of(*cases),
+        Walker.joined([Walker.of_case(case, viscous=viscous) for case in cases]),
+        Friction.of_cases(*cases),
         [case.drive.frequency for case in cases],
         [case.drive.peak_acceleration for case in cases],
         steady_acceleration=[case.axial_gravity for case in cases],
     )
-
-
-def _walker_of(case: Case, *, viscous: bool) -> Walker:
-    walker = Walker.of_case(case)
-    return walker if viscous else replace(walker, resistances=np.zeros_like(walker.resistances))
 
 
 def check_applies(*cases: Case) -> None:
@@ -96,7 +83,7 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
     check_applies(case)
     if dimer_of(case).sin_delta == 0.0:
         return float("nan")
-    dimer, walker, friction = dimer_of(case), _walker_of(case, viscous=viscous), friction_of(case)
+    dimer, walker, friction = dimer_of(case), Walker.of_case(case, viscous=viscous), Friction.of_cases(case)
     low, high = 0.0, float(detachment(dimer.sin_delta).gamma)
     for _ in range(_ROUNDS):
         trials = np.linspace(low, high, _TRIALS)
@@ -178,7 +165,7 @@ def alignment_of(case: Case) -> dict[str, Any]:
     """
     drive = case.drive
     mathieu = pendulum_of(case)
-    rate = _turning_rate(case) if drive.peak_acceleration > 0.0 else None
+    rate = turning_rate(case) if drive.peak_acceleration > 0.0 else None
     return {
         "u": mathieu.u,
         "v": mathieu.v,
@@ -190,15 +177,6 @@ def alignment_of(case: Case) -> dict[str, Any]:
         "stands": None if rate is None else rate <= GROWS,
         "turns_over_after": None if rate is None or rate <= GROWS else time_to_turn(rate),
     }
-
-
-def _turning_rate(case: Case) -> float | None:
-    dimer, drive = dimer_of(case), (case.drive.frequency, case.drive.peak_acceleration)
-    walker, friction = Walker.of_case(case), friction_of(case)
-    axial = axial_motion_of(dimer, walker, friction, (*drive, case.axial_gravity))
-    if not axial.periodic:
-        return None
-    return turning_rate(axial, dimer, friction, drive, rolling_friction=case.contact.rolling_friction)
 
 
 def _number(value: float) -> float | None:

@@ -143,17 +143,13 @@ def translation(sliding: FloatArray) -> FloatArray:
     return velocity
 
 
-def mean_velocity(
-    gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike, friction: float = FRICTION_OF_THE_PAPER
-) -> FloatArray:
-    """Mean velocity for a quasi-static drive of ±Γ0/√2, from the matrices.
+def mean_velocity(gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike) -> FloatArray:
+    """Mean velocity for a quasi-static drive of ±Γ0/√2 under the paper's friction, from the matrices.
 
     Parameters
     ----------
     gamma0, sin_delta
         Γ0 and sin δ of beads of equal density, of shapes that broadcast.
-    friction
-        κ, s/m.
 
     Returns
     -------
@@ -168,7 +164,7 @@ def mean_velocity(
     for sign in (1.0, -1.0):
         parallel = sign * _QUASISTATIC * gamma[..., None] * unit
         normal = rest + np.einsum("...ij,...j->...i", matrix, parallel)
-        sliding = parallel / (friction * np.where(normal > 0.0, normal, np.nan))
+        sliding = parallel / (FRICTION_OF_THE_PAPER * np.where(normal > 0.0, normal, np.nan))
         sides.append(translation(np.moveaxis(sliding, -1, 0)))
     mean: FloatArray = (sides[0] + sides[1]) / 2.0
     return mean

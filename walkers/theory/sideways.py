@@ -13,71 +13,45 @@ from dataclasses import dataclass
 from math import log, pi, radians, sqrt, tan
 
 import numpy as np
-import numpy.typing as npt
 
+from walkers.inputs.case import Case
+from walkers.inputs.loads import dimer_of
 from walkers.physics.dimer import Dimer
-from walkers.theory.friction import Friction
 from walkers.theory.mathieu import NEUTRAL, multipliers
-from walkers.theory.motion import Walker, walk
-from walkers.theory.quasistatic import inertia_matrix, normal_force_matrix, rolling_matrix, translation
-
-FloatArray = npt.NDArray[np.float64]
+from walkers.theory.motion import Friction, Walker, walk
+from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
 _SLOWEST = 1e-4
 """A contact that slides more slowly, m/s, resists sideways sliding as much as one that slides at this."""
+_STEPS = 256
+"""Of a cycle."""
+_ANGLE = radians(1.0)
+"""The angle to the axis at which rolling friction is to act. It is the larger the smaller the angle, for while a bead's
+rolling along the axis reverses, only its rolling sideways is left."""
 
 
-def time_to_turn(rate: float, start: float = 1.0, end: float = 90.0) -> float:
-    """Seconds from one angle (degrees) to another at dψ/dt = rate sin ψ, in 1/s: ln(tan(ψ2/2)/tan(ψ1/2))/rate."""
-    return log(tan(radians(end) / 2.0) / tan(radians(start) / 2.0)) / rate
+def time_to_turn(rate: float) -> float:
+    """Seconds from 1° to 90° at dψ/dt = rate sin ψ, in 1/s: ln(tan(ψ2/2)/tan(ψ1/2))/rate."""
+    return log(tan(radians(90.0) / 2.0) / tan(_ANGLE / 2.0)) / rate
 
 
 @dataclass(frozen=True)
-class AxialMotion:
-    """The axial motion of a dimer through a cycle, as its sideways motion needs it.
+class _AxialMotion:
+    """The axial motion of a dimer through a cycle, as its sideways motion needs it; SI units, one value a step."""
 
-    Attributes
-    ----------
-    sliding : ndarray, shape (3, steps)
-        Sliding velocities at the contacts, m/s.
-    spin : ndarray, shape (2, steps)
-        Angular velocity of each bead about the horizontal across the axis, rad/s.
-    normal : ndarray, shape (3, steps)
-        Normal forces, N.
-    push : ndarray, shape (steps,)
-        Force along the axis by which the second bead pushes the first, N.
-    torque : ndarray, shape (2, steps)
-        On each bead from the other, N m, in the sense of `spin`.
-    resistances : ndarray, shape (3, 3)
-        S, C and Q of the bridges, as `walkers.theory.motion.Walker` has them.
-    periodic
-        Whether the motion repeats itself.
-    """
-
-    sliding: FloatArray
-    spin: FloatArray
-    normal: FloatArray
-    push: FloatArray
-    torque: FloatArray
-    resistances: FloatArray
+    sliding: FloatArray  # velocities at the three contacts
+    spin: FloatArray  # of each bead about the horizontal across the axis
+    normal: FloatArray  # forces at the three contacts
+    push: FloatArray  # force along the axis by which the second bead pushes the first
+    torque: FloatArray  # on each bead from the other, in the sense of its spin
+    resistances: FloatArray  # S, C and Q of the bridges, shape (3, 3)
     periodic: bool
 
 
-def axial_motion_of(
-    dimer: Dimer, walker: Walker, friction: Friction, drive: tuple[float, float, float], steps: int = 256
-) -> AxialMotion:
-    """The axial motion of a walker, and the forces that go with it.
-
-    Parameters
-    ----------
-    dimer, walker, friction
-        One and the same walker, as `walkers.theory.motion.walk` takes it.
-    drive
-        Frequency (Hz), peak acceleration and steady acceleration toward the small bead (m/s²).
-    steps
-        Of a cycle.
-    """
-    frequency, peak, steady = drive
+def _axial_motion(case: Case, dimer: Dimer) -> _AxialMotion:
+    """The axial motion of a case's walker, and the forces that go with it."""
+    walker, friction, steps = Walker.of_case(case), Friction.of_cases(case), _STEPS
+    frequency, peak, steady = case.drive.frequency, case.drive.peak_acceleration, case.axial_gravity
     motion = walk(walker, friction, frequency, peak, steady_acceleration=steady, steps_per_cycle=steps)
     after = motion.series[:, 0]
     before = np.roll(after, 1, axis=1)
@@ -93,7 +67,7 @@ def axial_motion_of(
     inertia = 2.0 / 5.0 * masses * radii**2
     on_wall = -parallel[:2]
     normal = walker.at_rest * dimer.capillary_scale + matrix @ parallel
-    return AxialMotion(
+    return _AxialMotion(
         sliding=sliding,
         spin=(along - sliding[:2]) / radii,
         normal=np.maximum(normal, 0.0),  # a contact that would open bears nothing
@@ -104,44 +78,28 @@ def axial_motion_of(
     )
 
 
-def turning_rate(
-    axial: AxialMotion,
-    dimer: Dimer,
-    friction: Friction,
-    drive: tuple[float, float],
-    *,
-    rolling_friction: float = 0.0,
-    angle: float = radians(1.0),
-) -> float:
-    """How fast small angles to the axis grow, 1/s; negative where they decay.
+def turning_rate(case: Case) -> float | None:
+    """How fast small angles to the axis grow, 1/s; negative where they decay, None if the motion is not periodic.
 
     Each contact resists sideways sliding by c = μF/|v|, for friction is against the direction of sliding, which is the
     axis but for a small angle, and its bridge as it does along the axis. Rolling friction resists sideways rolling by
-    μ F R/|ω| likewise.
+    μ F R/|ω| likewise, with the engine's model of constant torque; it is left out of the axial motion.
 
     Parameters
     ----------
-    axial
-        The axial motion (`axial_motion_of`).
-    dimer
-        The beads, the large one first.
-    friction
-        The contacts; Coulomb's.
-    drive
-        Frequency (Hz) and peak acceleration (m/s²).
-    rolling_friction
-        Of the engine's model of constant torque; it is left out of the axial motion.
-    angle
-        The angle to the axis, rad, at which rolling friction is to act. It is the larger the smaller the angle, for
-        while a bead's rolling along the axis reverses, only its rolling sideways is left.
+    case
+        Driven along the substrate.
     """
-    frequency, peak = drive
-    steps = axial.push.shape[0]
-    slopes = _sideways(axial, dimer, _sideways_drags(axial, friction))
-    if rolling_friction:
-        speed = 5.0 / 7.0 * peak / (2.0 * pi * frequency) * angle / sqrt(2.0)
-        slopes += _rolling(axial, dimer, rolling_friction, speed)
-    found = multipliers(slopes, 1.0 / (frequency * steps))
+    dimer, frequency, peak = dimer_of(case), case.drive.frequency, case.drive.peak_acceleration
+    axial = _axial_motion(case, dimer)
+    if not axial.periodic:
+        return None
+    kinetic = np.asarray(Friction.of_cases(case).kinetic)
+    slopes = _sideways(axial, dimer, kinetic * axial.normal / np.maximum(np.abs(axial.sliding), _SLOWEST))
+    if case.contact.rolling_friction:
+        speed = 5.0 / 7.0 * peak / (2.0 * pi * frequency) * _ANGLE / sqrt(2.0)
+        slopes += _rolling(axial, dimer, case.contact.rolling_friction, speed)
+    found = multipliers(slopes, 1.0 / (frequency * _STEPS))
     # Beads that spin against each other about their vertical axes, as two wheels in mesh, do so for ever.
     neutral = np.abs(found - 1.0).argmin()
     if abs(found[neutral] - 1.0) < NEUTRAL:
@@ -149,13 +107,7 @@ def turning_rate(
     return float(np.log(np.abs(found).max()) * frequency)
 
 
-def _sideways_drags(axial: AxialMotion, friction: Friction) -> FloatArray:
-    """Friction over sideways sliding velocity at each contact, N s/m, shape (3, steps)."""
-    drags: FloatArray = np.asarray(friction.kinetic) * axial.normal / np.maximum(np.abs(axial.sliding), _SLOWEST)
-    return drags
-
-
-def _sideways(axial: AxialMotion, dimer: Dimer, drags: FloatArray) -> FloatArray:
+def _sideways(axial: _AxialMotion, dimer: Dimer, drags: FloatArray) -> FloatArray:
     """The linear equations of sideways motion, shape (steps, 7, 7).
 
     Of ψ, then of each bead the velocity across the drive, then of each the spin about the drive, then about the
@@ -189,7 +141,7 @@ def _sideways(axial: AxialMotion, dimer: Dimer, drags: FloatArray) -> FloatArray
     return slopes
 
 
-def _rolling(axial: AxialMotion, dimer: Dimer, coefficient: float, speed: float) -> FloatArray:
+def _rolling(axial: _AxialMotion, dimer: Dimer, coefficient: float, speed: float) -> FloatArray:
     """What rolling friction adds to `_sideways`, where beads roll sideways at a speed (m/s, root mean square)."""
     radii, sine = np.array(dimer.radii), dimer.sin_delta
     cosine = sqrt(1.0 - sine**2)
