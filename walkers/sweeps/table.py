@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from math import nan
@@ -113,27 +114,17 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
 
 
 def encoded(frame: pd.DataFrame, form: str) -> bytes:
-    """A sweep's table as CSV (units in the head), JSON (with units and meanings) or parquet (units in the metadata).
-
-    Raises
-    ------
-    InputError
-        If there is no such form.
-    """
+    """A sweep's table as CSV (units in the head), JSON (with units and meanings) or parquet (units in the metadata)."""
+    units = frame.attrs["units"]
     if form == "csv":
-        units = frame.attrs["units"]
         heads = [with_unit(name, units[name]) for name in frame.columns]
         return str(frame.to_csv(index=False, header=heads)).encode()
-    if form == "json":
-        import json
-
-        # Not DataFrame.to_json, which rounds to decimals.
-        rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
-        contents = {"units": frame.attrs["units"], "meanings": frame.attrs["meanings"], "points": rows}
-        return (json.dumps(contents, indent=2, ensure_ascii=False) + "\n").encode()
     if form == "parquet":
         return _parquet(frame)
-    raise InputError("the form of a table", [Problem("", form, f"expected one of {', '.join(FORMATS)}")])
+    # Not DataFrame.to_json, which rounds to decimals.
+    rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
+    contents = {"units": units, "meanings": frame.attrs["meanings"], "points": rows}
+    return (json.dumps(contents, indent=2, ensure_ascii=False) + "\n").encode()
 
 
 def short_text(frame: pd.DataFrame) -> str:
