@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,14 +24,9 @@ def ensemble() -> Case:
     return replace(case, run=replace(case.run, cycles=10, settling_cycles=4, until_steady=False))
 
 
-def _started(case: Case, **changes: Any) -> Case:
-    """The case with its walkers started otherwise."""
-    return replace(case, walkers=(replace(case.walkers[0], **changes),))
-
-
 def test_walkers_of_an_ensemble_move_as_they_do_alone(trajectory: Callable[..., Group], ensemble: Case) -> None:
     together = trajectory(ensemble)
-    alone = trajectory(_started(ensemble, replicates=1))
+    alone = trajectory(replace(ensemble, walkers=(replace(ensemble.walkers[0], replicates=1),)))
     way_together = together.position[:, 0] - together.position[0, 0].mean(axis=0)
     way_alone = alone.position[:, 0] - alone.position[0, 0].mean(axis=0)
     assert np.abs(way_together - way_alone).max() < 3e-6 * np.abs(way_alone).max()

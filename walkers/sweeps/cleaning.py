@@ -52,8 +52,8 @@ class Cleaning:
     def as_text(self) -> str:
         """What goes, what of sweeps, what stays, and how much it is."""
         rows = [
-            [entry.name, _kind(entry), age_text(entry.age), bytes_text(_bytes(entry)), _why(entry)]
-            for entry in self.remove[:_MOST_LINES]
+            [one.name, "sweep" if one.is_sweep else one.status, age_text(one.age), bytes_text(_bytes(one)), _why(one)]
+            for one in self.remove[:_MOST_LINES]
         ]
         lines = [aligned(rows)] if rows else []
         if len(self.remove) > _MOST_LINES:
@@ -69,10 +69,6 @@ class Cleaning:
         kinds.update(["stale lock"] * len(self.locks))
         told = ", ".join(f"{number} {kind}{'s' if number > 1 else ''}" for kind, number in kinds.items())
         return "\n".join([*lines, f"{told or 'nothing'} to remove, {bytes_text(sum(map(_bytes, self.remove)))}"])
-
-
-def _kind(entry: Entry) -> str:
-    return "sweep" if entry.is_sweep else entry.status
 
 
 def _bytes(entry: Entry) -> int:

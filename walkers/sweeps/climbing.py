@@ -210,15 +210,15 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
         ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s).
     """
     usual = ClimbCriteria()
-    others = [(name, value) for name, values in VARIATIONS.items() for value in values if value != getattr(usual, name)]
     tried: dict[tuple[str, float | None], ClimbCriteria] = {("", None): usual}
-    tried |= {(name, value): replace(usual, **{name: value}) for name, value in others}
-    climbs: dict[tuple[str, float | None], list[list[tuple[float, bool]]]] = {one: [] for one in tried}
+    for name, values in VARIATIONS.items():
+        tried |= {(name, one): replace(usual, **{name: one}) for one in values if one != getattr(usual, name)}
+    climbs: dict[tuple[str, float | None], list[list[tuple[float, bool]]]] = {key: [] for key in tried}
     for run in runs:
         found = analyse(run)
-        for one, definition in tried.items():
+        for key, definition in tried.items():
             climbed = [climb for climb in classified(found, definition).climbs if climb.climbed]
-            climbs[one].append([(climb.speed, bool(found.motion.large[climb.leader])) for climb in climbed])
+            climbs[key].append([(climb.speed, bool(found.motion.large[climb.leader])) for climb in climbed])
     return [
         {
             "threshold": name,

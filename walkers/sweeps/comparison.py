@@ -12,11 +12,11 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.readable import differing, flattened, readable, readable_unit
 from walkers.runner.directory import case_of
 from walkers.sweeps.columns import result_columns, row_of
-from walkers.sweeps.factors import find_name, value_text
-from walkers.sweeps.figure_layout import default_column
+from walkers.sweeps.factors import find_name, value_text, with_unit
+from walkers.sweeps.figure_layout import ERRORS, default_column
 from walkers.sweeps.listing import aligned, with_error
 from walkers.sweeps.record import read_record, result_in
-from walkers.sweeps.table import load
+from walkers.sweeps.table import load, varied_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,7 +80,7 @@ class Pair:
         told = [with_error(value / size, error / size) for value, error in zip(self.values, self.errors, strict=True)]
         apart = f"{self.difference / size:+.3g}" if isfinite(self.difference) else "-"
         share = f"{self.standard_errors:+.3g}" if isfinite(self.standard_errors) else "-"
-        return [f"{self.quantity} ({unit})" if unit else self.quantity, *told, apart, share]
+        return [with_unit(self.quantity, unit), *told, apart, share]
 
 
 def parameters_text(names: Sequence[str], parameters: Mapping[str, tuple[Any, Any]]) -> str:
@@ -226,19 +226,16 @@ class SweepComparison:
 
     def as_text(self) -> str:
         """As text, in the usual units."""
-        parameters = parameters_text(self.names, self.parameters)
-        text = [parameters] if parameters else []
         quantity = self.points[0][1].cells()[0]
-        keys = [f"{key} ({unit})" if unit else key for key, unit in self.keys.items()]
-        head = [*keys, *(f"{name}: {quantity}" for name in self.names), "difference", "in standard errors"]
+        sides = [f"{name}: {quantity}" for name in self.names]
+        head = [*_with_units(self.keys), *sides, "difference", "in standard errors"]
         told = [[*map(value_text, at), *pair.cells()[1:]] for at, pair in self.points]
-        text.append(aligned([head, *told]))
         largest = max((pair for _, pair in self.points), key=lambda pair: abs(pair.difference))
         unit, size = readable_unit(largest.unit)
         line = f"{len(self.points)} points in both; largest difference {largest.difference / size:+.3g} {unit}".rstrip()
         if any(self.unmatched):
             line += f"; left out: {self.unmatched[0]} of {self.names[0]}, {self.unmatched[1]} of {self.names[1]}"
-        return "\n\n".join([*text, line])
+        return "\n\n".join(filter(None, [parameters_text(self.names, self.parameters), aligned([head, *told]), line]))
 
 
 def compare_sweeps(first: Path, second: Path, column: str | None = None) -> SweepComparison:
@@ -259,35 +256,33 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Swee
     records, source = (read_record(first), read_record(second)), f"{first}, {second}"
     units = dict(records[0].units)
     if units != dict(records[1].units):
-        told = " and ".join(_keys_text(record.units) for record in records)
-        raise InputError(
-            source, [Problem("", None, f"expected sweeps that vary the same keys in the same units: {told}")]
-        )
+        varied = " and ".join(", ".join(_with_units(record.units)) or "nothing" for record in records)
+        told = f"expected sweeps that vary the same keys in the same units: {varied}"
+        raise InputError(source, [Problem("", None, told)])
     tables = [load(directory) for directory in (first, second)]
     numbers = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
     column = find_name("--y", column, numbers) if column else default_column(tables[0])
-    both = _matched([table[table["status"] == "finished"] for table in tables], list(units))
+    both = _matched([table[table["status"] == "finished"] for table in tables], varied_columns(tables[0]))
     if both.empty:
         raise InputError(source, [Problem("", None, "have no finished point in common")])
     unit = tables[0].attrs["units"][column]
     rows = [{str(name): value for name, value in row.items()} for row in both.to_dict("records")]
-    parameters = different_parameters(*(case_of(Path(rows[0][f"run_{side}"])) for side in _SIDES))
+    names = records[0].name, records[1].name
     return SweepComparison(
-        names=(str(first), str(second)) if records[0].name == records[1].name else (records[0].name, records[1].name),
+        names=(str(first), str(second)) if names[0] == names[1] else names,
         keys=units,
         points=[(tuple(records[0].values[row["point_first"]]), _pair(column, unit, row)) for row in rows],
         unmatched=(len(tables[0]) - len(both), len(tables[1]) - len(both)),
-        parameters=parameters,
+        parameters=different_parameters(*(case_of(Path(rows[0][f"run_{side}"])) for side in _SIDES)),
     )
 
 
-def _keys_text(units: Mapping[str, str | None]) -> str:
-    return ", ".join(f"{key} ({unit})" if unit else key for key, unit in units.items()) or "nothing"
+def _with_units(units: Mapping[str, str | None]) -> list[str]:
+    return [with_unit(key, unit or "") for key, unit in units.items()]
 
 
-def _matched(tables: Sequence[pd.DataFrame], units: Sequence[str]) -> pd.DataFrame:
+def _matched(tables: Sequence[pd.DataFrame], keys: list[str]) -> pd.DataFrame:
     """The rows of two tables whose keys have the same values, the columns of both beside each other."""
-    keys = [name for name in tables[0].columns if name.partition("[")[0] in units]
     first, second = (table.astype(dict.fromkeys(keys, object)) for table in tables)
     how = {"on": keys} if keys else {"how": "cross"}
     return first.merge(second, suffixes=[f"_{side}" for side in _SIDES], **how)
@@ -295,7 +290,6 @@ def _matched(tables: Sequence[pd.DataFrame], units: Sequence[str]) -> pd.DataFra
 
 def _pair(column: str, unit: str, row: Mapping[str, Any]) -> Pair:
     values, errors = (
-        tuple(number_of(row.get(f"{name}_{side}")) for side in _SIDES)
-        for name in (column, "standard_error" if column == "velocity" else "")
+        tuple(number_of(row.get(f"{name}_{side}")) for side in _SIDES) for name in (column, ERRORS.get(column, ""))
     )
     return Pair(column, unit, (values[0], values[1]), (errors[0], errors[1]))

@@ -99,21 +99,13 @@ def _factors(columns: Mapping[str, list[Any]], units: Mapping[str, str | None]) 
         isinstance(one, (int, float)) and type(one) is not bool for column in columns.values() for one in column
     ):
         return [_category(columns, units)]
-    if all(_monotone(columns[first], columns[key]) for key in others):
-        unit = units[first] or ""
-        label = with_unit(readable_key(first), unit) + _with(others)
-        return [Factor(tuple(columns), label, [float(value) for value in columns[first]], True, unit=unit)]
-    return [
-        Factor(
-            (key,),
-            with_unit(readable_key(key), units[key] or ""),
-            list(map(float, values)),
-            True,
-            True,
-            units[key] or "",
-        )
-        for key, values in columns.items()
-    ]
+    together = all(_monotone(columns[first], columns[key]) for key in others)
+    found = []
+    for key, rest in [(first, others)] if together else [(key, []) for key in columns]:
+        unit = units[key] or ""
+        label = with_unit(readable_key(key), unit) + _with(rest)
+        found.append(Factor((key, *rest), label, list(map(float, columns[key])), True, not together, unit))
+    return found
 
 
 def _monotone(first: Sequence[float], second: Sequence[float]) -> bool:

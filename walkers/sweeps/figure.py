@@ -116,10 +116,8 @@ class _Colours:
 
 def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, colours: _Colours) -> None:
     """Means with their errors, joined by lines unless a theory's are there, and the theory's values."""
-    places, count = (
-        np.array(x.values if x.is_number else [x.levels.index(one) for one in x.values], float),
-        len(colours.levels),
-    )
+    places = np.array(x.values if x.is_number else [x.levels.index(one) for one in x.values], float)
+    count = len(colours.levels)
     for place, level in enumerate(colours.levels):
         rows = np.flatnonzero(here & (True if colours.factor is None or colours.norm else colours.factor.where(level)))
         rows = rows[np.argsort(places[rows], kind="stable")]

@@ -64,22 +64,24 @@ def drawn_column(table: pd.DataFrame, name: str, theory: Mapping[str, FloatArray
     InputError
         If it has no numbers.
     """
-    unit, size = readable_unit(table.attrs["units"].get(name, ""))
-    values = _numbers(table, name, "--y") / size
+    column, size = _of_numbers(table, name, "--y")
     errors = np.full(len(table), np.nan)
     if name in ERRORS:
         errors = table[ERRORS[name]].to_numpy(dtype=float, na_value=np.nan) / size
     predicted = {model: numbers / size for model, numbers in (theory or {}).items()}
-    return Drawn(with_unit(readable_key(name), unit), values, errors, predicted)
+    return Drawn(column.label, np.array(column.values), errors, predicted)
 
 
-def _numbers(table: pd.DataFrame, name: str, option: str) -> FloatArray:
+def _of_numbers(table: pd.DataFrame, name: str, option: str) -> tuple[Factor, float]:
+    """A column of numbers in its readable unit, and the size of that."""
     import pandas as pd
 
+    unit, size = readable_unit(table.attrs["units"].get(name, ""))
     values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float, na_value=np.nan)
     if len(table) and np.isnan(values).all():
         raise InputError(option, [Problem("", None, f'"{name}" has no number that could be drawn')])
-    return values
+    label = with_unit(readable_key(name), unit)
+    return Factor((name,), label, (values / size).tolist(), True, unit=unit), size
 
 
 def layout_of(
@@ -171,11 +173,9 @@ def _by_asymmetry(factor: Factor, table: pd.DataFrame) -> Factor | None:
 
 
 def _of_column(table: pd.DataFrame, name: str, option: str) -> Factor:
-    unit, size = readable_unit(table.attrs["units"].get(name, ""))
-    label = with_unit(readable_key(name), unit)
     if table[name].map(lambda value: isinstance(value, str)).all() and len(table):
-        return Factor((name,), label, list(table[name]), False)
-    return Factor((name,), label, (_numbers(table, name, option) / size).tolist(), True, unit=unit)
+        return Factor((name,), readable_key(name), list(table[name]), False)
+    return _of_numbers(table, name, option)[0]
 
 
 def _joined(factors: Sequence[Factor]) -> Factor:

@@ -17,14 +17,7 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.readable import agrees, flattened, has_key
 from walkers.inputs.units import Kind, parse_quantity
 from walkers.postprocess.analysis import RESULT_NAME
-from walkers.runner.directory import (
-    CASE_NAME,
-    FAILURE_NAME,
-    REPLACED,
-    UNFINISHED,
-    holds_unfinished,
-    is_run_name,
-)
+from walkers.runner.directory import CASE_NAME, FAILURE_NAME, REPLACED, UNFINISHED, holds_unfinished, is_run_name
 from walkers.runner.files import read_json
 from walkers.runner.locks import is_locked
 from walkers.runner.manifest import MANIFEST_NAME, check_unchanged

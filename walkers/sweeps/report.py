@@ -22,8 +22,8 @@ from walkers.postprocess.report.run import RunReport
 from walkers.postprocess.tables import read_table
 from walkers.sweeps.factors import value_text, with_unit
 from walkers.sweeps.figure_layout import DEFAULTS, ERRORS
-from walkers.sweeps.record import SweepRecord, read_record
-from walkers.sweeps.table import load
+from walkers.sweeps.record import read_record
+from walkers.sweeps.table import load, varied_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,10 +97,10 @@ def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARG
     rows = zip(frame["point"], frame["run"], frame["status"], strict=True)
     finished = {int(number): Path(run) for number, run, status in rows if status == "finished"}
     in_order = _spread_out(list(finished))
-    plot = _overview(frame, record)
+    plot = _overview(frame)
     carried = {} if plot is None else {"plots-sweep": packed_plots(plot)}
     curves = {number: _curves(finished[number]) for number in in_order[:_MOST_MULTIPLES]}
-    head, cells = _table(frame, record)
+    head, cells = _table(frame)
     values: dict[str, Any] = {
         "title": record.title or record.name,
         "name": record.name,
@@ -108,7 +108,7 @@ def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARG
         "rows": cells,
         "points": frame["point"].tolist(),
         "has_plot": plot is not None,
-        "multiples": _multiples(curves, frame, record),
+        "multiples": _multiples(curves, frame),
     }
     bare = fill("sweep.html.j2", "walkers.sweeps", runs={}, **values)
     room = largest - overhead() - len(bare.encode()) - sum(map(len, carried.values()))
@@ -135,14 +135,9 @@ def _spread_out(numbers: list[int]) -> list[int]:
     return list(order)
 
 
-def _varied(record: SweepRecord, frame: pd.DataFrame) -> list[str]:
-    """The columns of what varies."""
-    return [name for name in frame.columns if name.partition("[")[0] in record.units]
-
-
-def _table(frame: pd.DataFrame, record: SweepRecord) -> tuple[list[str], list[list[Cell]]]:
+def _table(frame: pd.DataFrame) -> tuple[list[str], list[list[Cell]]]:
     """Heads and rows of what varied, in the file's units, and what came out, in the usual ones."""
-    varied, units = _varied(record, frame), frame.attrs["units"]
+    varied, units = varied_columns(frame), frame.attrs["units"]
     results = [name for name in _SHOWN if name in frame and name not in varied]
     results = [name for name in results if name == "status" or frame[name].notna().any()]
     shown = {name: (units[name], 1.0) for name in varied} | {name: readable_unit(units[name]) for name in results}
@@ -167,10 +162,10 @@ def _cell(value: Any, size: float, error: Any) -> Cell:
     return Cell(rounded(number / size, error / size), number, rounded(error / size, error / size), float(error))
 
 
-def _overview(frame: pd.DataFrame, record: SweepRecord) -> Model | None:
+def _overview(frame: pd.DataFrame) -> Model | None:
     """What came out against the first number that varies; a colour for each value of what varies besides."""
     result = next((name for name in DEFAULTS if name in frame and frame[name].notna().any()), None)
-    varied, units = _varied(record, frame), frame.attrs["units"]
+    varied, units = varied_columns(frame), frame.attrs["units"]
     numeric = [name for name in varied if frame[name].map(type).isin((int, float)).all()]
     if result is None or not numeric:
         return None
@@ -205,7 +200,7 @@ def _curves(directory: Path) -> list[FloatArray]:
     return [np.stack([bed["time"], 1e3 * bed[name]]) for name in ("surface", "highest")]
 
 
-def _multiples(curves: Mapping[int, list[FloatArray]], frame: pd.DataFrame, record: SweepRecord) -> dict[str, Any]:
+def _multiples(curves: Mapping[int, list[FloatArray]], frame: pd.DataFrame) -> dict[str, Any]:
     """What the page needs to draw the small pictures, all on one scale."""
     every = [curve for one in curves.values() for curve in one]
     if not every:
@@ -219,20 +214,20 @@ def _multiples(curves: Mapping[int, list[FloatArray]], frame: pd.DataFrame, reco
         places = begin + (curve.T[:: -(-curve.shape[1] // _MOST_CORNERS)] - low) * size
         return " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
 
-    names = _names(frame, record)
+    names = _names(frame)
     pictures = [
         Multiple(number, names[number], list(zip(map(drawn, ones), cycle(COLOURS))))
         for number, ones in sorted(curves.items())
     ]
-    what = "height of the surface and of the highest bead" if "pile" in record.analyses else "distance walked"
+    what = "height of the surface and of the highest bead" if "climbs" in frame else "distance walked"
     scale = f"{what}, {low[1]:.3g} to {high[1]:.3g} mm, against time, {low[0]:.3g} to {high[0]:.3g} s"
     zero = f"{(begin - low * size)[1]:.1f}"
     return {"pictures": pictures, "scale": scale, "zero": zero, "wide": _WIDE, "tall": _TALL}
 
 
-def _names(frame: pd.DataFrame, record: SweepRecord) -> dict[int, str]:
+def _names(frame: pd.DataFrame) -> dict[int, str]:
     """What each point is, in words: the values that vary."""
-    units, varied = frame.attrs["units"], _varied(record, frame)
+    units, varied = frame.attrs["units"], varied_columns(frame)
     return {
         int(row["point"]): f"point {row['point']}: "
         + ", ".join(f"{value_text(row[name])} {units[name]}".strip() for name in varied)

@@ -23,10 +23,8 @@ def sweeps_in(directory: Path) -> list[Path]:
         return [directory]
     found = sorted(path.parent for path in directory.glob(f"*/{RECORD_NAME}"))
     if not found:
-        raise InputError(
-            str(directory),
-            [Problem("", None, f"neither a sweep's directory (with a {RECORD_NAME}) nor a folder of such")],
-        )
+        told = f"neither a sweep's directory (with a {RECORD_NAME}) nor a folder of such"
+        raise InputError(str(directory), [Problem("", None, told)])
     return found
 
 

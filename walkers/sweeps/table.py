@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from math import nan
@@ -11,15 +12,8 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.errors import InputError, Problem
 from walkers.runner.files import write_bytes
 from walkers.sweeps.columns import derived_columns, result_columns, row_of
-from walkers.sweeps.record import (
-    DamagedRunError,
-    PointState,
-    SweepRecord,
-    chains,
-    read_record,
-    result_in,
-    states,
-)
+from walkers.sweeps.factors import with_unit
+from walkers.sweeps.record import DamagedRunError, PointState, SweepRecord, chains, read_record, result_in, states
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,6 +35,8 @@ _LEFT_OUT = {
 """Columns that a table to look at leaves out."""
 
 FORMATS = ("csv", "parquet", "json")
+_VARIED = "varied"
+"""Meaning of the columns of what varies."""
 
 
 def load(directory: str | Path) -> pd.DataFrame:
@@ -89,8 +85,13 @@ def _varied(record: SweepRecord) -> dict[str, tuple[str, str]]:
     for place, (key, unit) in enumerate(record.units.items()):
         parts = max((len(values[place]) for values in record.values if isinstance(values[place], list)), default=0)
         names = [f"{key}[{part}]" for part in range(parts)] or [key]
-        columns |= dict.fromkeys(names, (unit or "", "varied"))
+        columns |= dict.fromkeys(names, (unit or "", _VARIED))
     return columns
+
+
+def varied_columns(frame: pd.DataFrame) -> list[str]:
+    """The columns of a sweep's table that have the keys that vary."""
+    return [name for name, meaning in frame.attrs["meanings"].items() if meaning == _VARIED]
 
 
 def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
@@ -113,27 +114,17 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
 
 
 def encoded(frame: pd.DataFrame, form: str) -> bytes:
-    """A sweep's table as CSV (units in the head), JSON (with units and meanings) or parquet (units in the metadata).
-
-    Raises
-    ------
-    InputError
-        If there is no such form.
-    """
+    """A sweep's table as CSV (units in the head), JSON (with units and meanings) or parquet (units in the metadata)."""
+    units = frame.attrs["units"]
     if form == "csv":
-        units = frame.attrs["units"]
-        heads = [f"{name} ({units[name]})" if units[name] else name for name in frame.columns]
+        heads = [with_unit(name, units[name]) for name in frame.columns]
         return str(frame.to_csv(index=False, header=heads)).encode()
-    if form == "json":
-        import json
-
-        # Not DataFrame.to_json, which rounds to decimals.
-        rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
-        contents = {"units": frame.attrs["units"], "meanings": frame.attrs["meanings"], "points": rows}
-        return (json.dumps(contents, indent=2, ensure_ascii=False) + "\n").encode()
     if form == "parquet":
         return _parquet(frame)
-    raise InputError("the form of a table", [Problem("", form, f"expected one of {', '.join(FORMATS)}")])
+    # Not DataFrame.to_json, which rounds to decimals.
+    rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
+    contents = {"units": units, "meanings": frame.attrs["meanings"], "points": rows}
+    return (json.dumps(contents, indent=2, ensure_ascii=False) + "\n").encode()
 
 
 def short_text(frame: pd.DataFrame) -> str:
@@ -145,7 +136,7 @@ def short_text(frame: pd.DataFrame) -> str:
     for name, unit in units.items():
         if name in shown and unit == "m/s" and name not in _INPUTS:
             shown[name], units[name] = shown[name].astype(float) * 1e3, "mm/s"
-    shown.columns = pd.Index([f"{name} ({units[name]})" if units.get(name) else name for name in shown.columns])
+    shown.columns = pd.Index([with_unit(name, units.get(name, "")) for name in shown.columns])
     return str(shown.to_string(index=False, float_format=lambda value: f"{value:.4g}", na_rep="-"))
 
 
@@ -200,7 +191,7 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
     if descent is None:
         raise InputError(str(directory), [Problem("", None, "the sweep has no descent, hence no thresholds")])
     frame = load(directory).set_index("point", drop=False)
-    others = [name for name in _varied(record) if name != descent.key]
+    others = [name for name in varied_columns(frame) if name != descent.key]
     rows = []
     for chain in chains(record):
         points = frame.loc[[number for number in chain if number in frame.index]]
@@ -212,7 +203,7 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
             row[f"gamma0_{name}"] = part.iloc[0]["gamma0"] if len(part) else nan
         rows.append(row)
     table, unit = pd.DataFrame(rows), record.units[descent.key] or ""
-    described = {name: (frame.attrs["units"][name], "varied") for name in others} | {
+    described = {name: (frame.attrs["units"][name], _VARIED) for name in others} | {
         "moving": (unit, f"last {descent.key} at which the walkers moved"),
         "gamma0_moving": ("", "dimensionless peak force Γ0 of moving"),
         "at_rest": (unit, f"first {descent.key} at which they did not"),
