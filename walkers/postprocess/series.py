@@ -88,12 +88,12 @@ def render_series(
     camera = replace(camera, high=np.array([right, high, camera.high[2]]))
     window = Window(motion, camera, _pixels(right - left, high - low))
     decimals = 2 if apart is None or apart >= 0.1 else 4
-    figure, panels = _panels(len(frames), right - left, high - low)
+    figure, panels = _panels(len(frames), right - left, high - low, rows=None if walker is None else len(frames))
     for panel, frame in zip(panels, frames, strict=True):
         picture = window.picture(motion.position[frame], chosen(frame))
         panel.imshow(picture, extent=(left, right, low, high), interpolation="antialiased")
         panel.set_title(f"{motion.time[frame]:.{decimals}f} s", fontsize=10)
-        panel.set_xlabel("x (mm)")
+        panel.set_xlabel("x (mm)" if walker is None or panel is panels[-1] else "")
         panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])
         panel.spines["right"].set_visible(sideways)  # as the left one, a wall
         panel.grid(visible=False)
@@ -137,8 +137,8 @@ def top_view(group: Group, walker: int, frame: int, along: tuple[float, float], 
     return picture
 
 
-def _panels(count: int, wide: float, tall: float) -> tuple[Figure, list[Axes]]:
-    """A figure with so many axes of one shape, given in mm, in as many rows as make them largest.
+def _panels(count: int, wide: float, tall: float, *, rows: int | None = None) -> tuple[Figure, list[Axes]]:
+    """A figure with so many axes of one shape, given in mm, in so many rows, or as many as make them largest.
 
     Their places are reckoned here: no layout of matplotlib's knows how large axes of a fixed aspect will be.
     """
@@ -149,7 +149,7 @@ def _panels(count: int, wide: float, tall: float) -> tuple[Figure, list[Axes]]:
         across, up = ((whole - edge) for whole, edge in zip(_PAGE, _EDGES, strict=True))
         return min(aspired, (across / ceil(count / rows) - _BESIDE) / wide, (up / rows - _BENEATH) / tall)
 
-    rows = max(range(1, count + 1), key=lambda rows: (inches(rows), -rows))
+    rows = rows or max(range(1, count + 1), key=lambda rows: (inches(rows), -rows))
     columns = ceil(count / rows)
     across, up = inches(rows) * wide + _BESIDE, inches(rows) * tall + _BENEATH
     size = (_EDGES[0] + columns * across, _EDGES[1] + rows * up)
@@ -167,8 +167,11 @@ def _panels(count: int, wide: float, tall: float) -> tuple[Figure, list[Axes]]:
 
 
 def _frames_evenly(motion: Motion, images: int) -> list[int]:
-    start = motion.first_driven
-    return [int(frame) for frame in np.unique(np.linspace(start, len(motion.time) - 1, images).round().astype(int))]
+    """Through the drive; at the same phase of it, if there are as many cycles, or walkers would seem to go back."""
+    start, cycle = motion.first_driven, motion.case.run.samples_per_cycle
+    cycles = (len(motion.time) - 1 - start) // cycle
+    every, steps = (cycle, cycles) if cycles >= images - 1 else (1, len(motion.time) - 1 - start)
+    return [start + every * int(step) for step in np.unique(np.linspace(0, steps, images).round())]
 
 
 def _frames_apart(motion: Motion, images: int, apart: float, directory: Path) -> list[int]:
