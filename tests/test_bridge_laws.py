@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import simpson, solve_bvp
+from scipy.sparse import coo_matrix
+from scipy.sparse.linalg import spsolve
 
 from walkers.check.bridge_laws import willett_simple
 from walkers.physics import rabinovich, reynolds, van_der_waals, willett, young_laplace
@@ -22,6 +23,7 @@ from walkers.physics.lubrication import normal_drag, tangential_drag
 from walkers.physics.matter import Liquid
 
 PAIRS = [(1.0, inf), (1.0, 1.0), (0.5, 1.0), (0.2, 1.0)]
+N = np.array([0.0, 0.0, 1.0])
 
 
 def surfaces(
@@ -114,31 +116,117 @@ def test_limits_between_spheres(ratio: float) -> None:
     assert on_2 == pytest.approx(pi * whole**3 * 4.0 * ratio**2 / (5.0 * whole**4), rel=1e-6)
 
 
-@pytest.mark.parametrize("pair", PAIRS)
-@pytest.mark.parametrize("wet", [1.02, 1.5, 5.0, 100.0])
-def test_the_matrix_by_collocation(pair: tuple[float, float], wet: float) -> None:
-    """The pressure f(r) cos θ of a unit tilt, by `solve_bvp`; the shear stress of sliding, by quadrature."""
-    gap, pair = 1.0, (1e3 * pair[0], 1e3 * pair[1])
-    reduced = 1.0 / (1.0 / pair[0] + 1.0 / pair[1])
-    edge = sqrt(2.0 * reduced * (wet - 1.0) * gap)
-    bend = 0.5 * (1.0 / pair[0] - 1.0 / pair[1])
-    r = np.geomspace(1e-3, 1.0, 400) * edge
+def moved(pair: tuple[float, float], gap: float, v: FloatArray, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """s and q of two bodies by the interface's definition; v and omega of shape (2, 3)."""
+    arms = np.array(pair)[:, None] + 0.5 * gap
+    relative = v[0] - v[1]
+    sliding = relative - (relative @ N) * N + np.cross(N, (arms * omega).sum(axis=0))
+    return sliding, np.cross(N, omega[0] - omega[1])
 
-    def height(r: FloatArray) -> FloatArray:
-        return gap + r**2 / (2.0 * reduced)
 
-    def slopes(r: FloatArray, y: FloatArray) -> FloatArray:  # of f and r H³ f'
-        return np.stack([y[1] / (r * height(r) ** 3), height(r) ** 3 * y[0] / r + 12.0 * r**2])
+def test_a_rigid_pair_feels_nothing() -> None:
+    pair, gap, spin = (1.0, 0.4), 0.03, np.array([0.3, -0.8, 1.1])
+    centres = np.array([(pair[0] + 0.5 * gap) * N, -(pair[1] + 0.5 * gap) * N]) + np.array([0.2, 0.5, -0.1])
+    v = np.array([0.1, 0.4, -0.2]) + np.cross(spin, centres)
+    sliding, rolling = moved(pair, gap, v, np.array([spin, spin]))
+    assert sliding == pytest.approx(np.zeros(3), abs=1e-15)
+    assert rolling == pytest.approx(np.zeros(3), abs=1e-15)
+    assert (v[0] - v[1]) @ N == pytest.approx(0.0, abs=1e-15)
 
-    found = solve_bvp(
-        slopes, lambda start, end: np.array([start[0], end[0]]), r, np.zeros((2, 400)), tol=1e-5, max_nodes=20_000
+
+def solved(pair: tuple[float, float], gap: float, edge: float, v: FloatArray, omega: FloatArray) -> FloatArray:
+    """Forces on both bodies and torques about their centres, (4, 3), of given motions, by finite volumes in r and θ.
+
+    Nothing of the law is in it: the flux is that of walls that move as their bodies do at each place of them.
+    """
+    rings, rays = 200, 64
+    dr, dt = edge / rings, 2.0 * pi / rays
+    r, t = np.meshgrid((np.arange(rings) + 0.5) * dr, (np.arange(rays) + 0.5) * dt, indexing="ij")
+    centres = np.array([(pair[0] + 0.5 * gap) * N, -(pair[1] + 0.5 * gap) * N])
+
+    def wall(body: int, r: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Places of a body's surface and its velocity there."""
+        rise = (0.5 * gap + r**2 / (2.0 * pair[body])) * (1.0 - 2.0 * body)
+        place = np.stack([r * np.cos(t), r * np.sin(t), rise], axis=-1)
+        return place, v[body] + np.cross(omega[body], place - centres[body])
+
+    def drawn(r: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The gap, and its height times the mean velocity of the walls."""
+        (one, u), (other, w) = wall(0, r, t), wall(1, r, t)
+        height = one[..., 2] - other[..., 2]
+        return height, 0.5 * height[..., None] * (u + w)
+
+    number = np.arange(rings * rays).reshape(rings, rays)
+    rows, columns, entries = [], [], []
+    source = np.zeros((rings, rays))
+
+    def couple(one: FloatArray, other: FloatArray, weight: FloatArray) -> None:
+        for a, b, sign in ((one, one, -1.0), (one, other, 1.0), (other, other, -1.0), (other, one, 1.0)):
+            rows.append(a.ravel())
+            columns.append(b.ravel())
+            entries.append(sign * weight.ravel())
+
+    # Faces across r: the innermost has no length, the outermost p = 0 half a cell away.
+    faces, at = np.meshgrid(np.arange(1, rings + 1) * dr, t[0], indexing="ij")
+    height, flux = drawn(faces, at)
+    through = (flux[..., 0] * np.cos(at) + flux[..., 1] * np.sin(at)) * faces * dt
+    weight = height**3 / 12.0 * faces * dt / dr
+    couple(number[:-1], number[1:], weight[:-1])
+    rows.append(number[-1])
+    columns.append(number[-1])
+    entries.append(-2.0 * weight[-1])
+    source += through - np.vstack([np.zeros(rays), through[:-1]])
+    # Faces across θ.
+    at, turned = r, t + 0.5 * dt
+    height, flux = drawn(at, turned)
+    through = (-flux[..., 0] * np.sin(turned) + flux[..., 1] * np.cos(turned)) * dr
+    couple(number, np.roll(number, -1, axis=1), height**3 / 12.0 * dr / (r * dt))
+    source += through - np.roll(through, 1, axis=1)
+    # The walls part, less what their slopes carry away.
+    (one, u), (other, w) = wall(0, r, t), wall(1, r, t)
+    slopes = [np.stack([-one[..., 0] / pair[0], -one[..., 1] / pair[0], np.ones_like(r)], axis=-1)]
+    slopes.append(np.stack([other[..., 0] / pair[1], other[..., 1] / pair[1], np.ones_like(r)], axis=-1))
+    area = r * dr * dt
+    source += ((u * slopes[0]).sum(-1) - (w * slopes[1]).sum(-1)) * area
+    system = coo_matrix((np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns)))).tocsr()
+    p = spsolve(system, source.ravel()).reshape(rings, rays)
+
+    dp_dr = np.gradient(np.vstack([np.roll(p[:1], rays // 2, axis=1), p, -p[-1:]]), dr, axis=0)[1:-1]
+    dp_dt = (np.roll(p, -1, axis=1) - np.roll(p, 1, axis=1)) / (2.0 * dt * r)
+    slope = np.stack(
+        [dp_dr * np.cos(t) - dp_dt * np.sin(t), dp_dr * np.sin(t) + dp_dt * np.cos(t), np.zeros_like(p)], axis=-1
     )
-    assert found.success
-    tilting = -pi * simpson(found.sol(r)[0] * r**2, x=r)
-    shear = 2.0 * pi * simpson(r / height(r), x=r)
-    expected = shear + bend**2 * tilting, -bend * tilting, tilting
-    volume = pi * reduced * ((wet * gap) ** 2 - gap**2)
-    assert matrix(surfaces(*pair, volume=volume, closest=0.0), gap) == pytest.approx(expected, rel=1e-3)
+    height = (one - other)[..., 2, None]
+    sheared = (u - w) / height * [1.0, 1.0, 0.0]
+    found = []
+    for sign, normal, place, centre in zip((1.0, -1.0), slopes, (one, other), centres, strict=True):
+        traction = sign * p[..., None] * normal - 0.5 * height * slope - sign * sheared
+        found.append((traction * area[..., None]).sum(axis=(0, 1)))
+        found.append((np.cross(place - centre, traction) * area[..., None]).sum(axis=(0, 1)))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("pair", [(1.0, 1.0), (1.0, 3.0), (1.0, 1e4)])
+def test_the_matrix_by_finite_volumes(pair: tuple[float, float]) -> None:
+    """Forces and torques on both bodies in any motion, signs included: the interface's, with this S, C, Q."""
+    gap, reduced = 1e-6, 1.0 / (1.0 / pair[0] + 1.0 / pair[1])
+    edge = sqrt(2.0 * reduced * 4.0 * gap)  # H_w = 5 h
+    volume = pi * reduced * ((5.0 * gap) ** 2 - gap**2)
+    given = surfaces(*pair, volume=volume, closest=0.0)
+    s, c, q = matrix(given, gap)
+    for seed, still in ((1, False), (2, True)):
+        v, omega = np.random.default_rng(seed).normal(size=(2, 2, 3)) * [1.0, 1.0, 0.0]
+        omega[1] /= pair[1]
+        if still:  # only rolling: sliding surfaces would hide it
+            v[0] = v[1] - np.cross(N, ((np.array(pair) + 0.5 * gap)[:, None] * omega).sum(axis=0))
+        sliding, rolling = moved(pair, gap, v, omega)
+        force, couple = -(s * sliding + c * rolling), -(c * sliding + q * rolling)
+        lever, turning = np.cross(N, force), np.cross(N, couple)
+        found = solved(pair, gap, edge, v, omega)
+        expected = [force, -pair[0] * lever - turning, -force, -pair[1] * lever + turning]
+        size = float(np.max(np.abs([force, couple])))
+        for one, other, lever_arm in zip(found, expected, (1.0, pair[0], 1.0, pair[1]), strict=True):
+            assert one[:2] == pytest.approx(other[:2], abs=0.015 * lever_arm * size)
 
 
 @pytest.mark.parametrize("pair", PAIRS)
