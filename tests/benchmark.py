@@ -23,7 +23,7 @@ import numpy as np
 
 from walkers.inputs import load_case
 from walkers.inputs.case import Case
-from walkers.runner import FinishedRun, find_engine
+from walkers.runner import find_engine
 from walkers.runner.directory import write_deck
 from walkers.runner.plugin import plugin_of
 from walkers.sweeps.record import read_record
@@ -120,10 +120,6 @@ def measure_figures(folder: Path) -> None:
     print(f"| of the 480 walkers of Fig. 2 | {sum(loops[name] for name in fig2):.1f} core-seconds |")
     again = _seconds([program, "figures", "--out", str(out), "--to", str(folder / "figures")], folder)
     print(f"| the same again, all runs finished | {again:.0f} s |")
-
-
-def _engine_loop(directory: Path) -> float:
-    return float(FinishedRun(directory).manifest["seconds"]["engine_loop"])
 
 
 def measure_theory() -> None:

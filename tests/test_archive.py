@@ -474,11 +474,7 @@ def _twin(parts: dict[str, bytes]) -> None:
         (_added("/etc/hostname"), 1, "  not listed /etc/hostname\n"),
         (_added("\x1b[2J"), 1, r"  not listed '\x1b[2J'"),
         (_twin, 1, "RESULT.JSON (another file or folder has its name)\n"),
-        (
-            lambda parts: parts.update({f"{_place(parts, 'result.json')}/inside": b""}),
-            1,
-            "result.json (another file or folder has its name)\n",
-        ),
+        (_folder_of_a_file, 1, "result.json (another file or folder has its name)\n"),
         (_added("sha256sums.txt", b"\n" * 1000), 2, "expected a checksum and a path"),
         (_added("sha256sums.txt", b"\xff"), 1, "  doubtful   sha256sums.txt (cannot be read"),
         (_added("sha256sums.txt", b"0" * 64 + b"  ../above\n"), 2, "expected a checksum and a path"),

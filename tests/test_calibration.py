@@ -33,8 +33,8 @@ from walkers.inputs.calibration import (
     SharedError,
     load_calibration,
     read_calibration,
-    shipped_calibrations,
 )
+from walkers.inputs.reading import shipped
 from walkers.sweeps.scheduler import Options
 
 FloatArray = npt.NDArray[np.float64]
@@ -549,7 +549,7 @@ def test_a_file_is_no_folder_to_write_into(command: str, tmp_path: Path) -> None
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-@pytest.mark.parametrize("name", shipped_calibrations())
+@pytest.mark.parametrize("name", shipped("calibration"))
 def test_shipped_calibrations_can_be_run(name: str) -> None:
     found = load_calibration(name)
     sweep = wave_sweep(found, Space(found.parameters).values(np.full((1, len(found.parameters)), 0.5)), name)

@@ -15,7 +15,7 @@ from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import law_of
 from walkers.postprocess import tabulate
 from walkers.postprocess.dump import BinaryDump, DumpError
-from walkers.postprocess.local_dump import read_local_dump
+from walkers.postprocess.local_dump import local_frames
 from walkers.runner import finished_run
 from walkers.runner.directory import FIRST_SEGMENT
 from walkers.runner.manifest import FileChanged
@@ -72,7 +72,7 @@ def test_what_is_no_dump_or_has_other_columns_is_refused(contents: bytes, beads:
     with pytest.raises(DumpError, match=r"other\.bin"):
         BinaryDump(tmp_path / "other.bin", BEAD_COLUMNS)
     with pytest.raises(DumpError, match=r"other\.bin"):
-        read_local_dump(tmp_path / "other.bin", ("x",))
+        list(local_frames(tmp_path / "other.bin", ("x",)))
 
 
 def test_bridges_of_a_walker_at_rest_carry_the_capillary_load(tmp_path: Path) -> None:

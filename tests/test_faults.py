@@ -27,8 +27,8 @@ from walkers.postprocess import read_result, tabulate
 from walkers.postprocess.analysis import current_result, describe_result
 from walkers.postprocess.drawing import new_figure, save_figure, styled
 from walkers.postprocess.dump import DumpError
-from walkers.postprocess.local_dump import local_frames, read_local_dump
-from walkers.postprocess.motion import read_motion
+from walkers.postprocess.local_dump import local_frames
+from walkers.postprocess.motion import read_bridges, read_motion
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, write_deck
 from walkers.runner.failures import DiskFull, EngineError, EngineFailure
@@ -112,22 +112,24 @@ def local_dump(run_directory: Callable[..., Path]) -> tuple[Path, tuple[str, ...
 
 def test_a_local_dump_is_read_whole_or_not_at_all(local_dump: tuple[Path, tuple[str, ...]], tmp_path: Path) -> None:
     path, columns = local_dump
-    steps, rows = read_local_dump(path, columns)
-    assert len(steps) == len(rows) == sum(len(frame) for _, frame in local_frames(path, columns)) == 7 * 2
+    assert sum(len(frame) for _, frame in local_frames(path, columns)) == 7 * 2
     whole = path.read_bytes()
     cut = tmp_path / "cut.txt"
     last_frame = whole.rindex(b"ITEM: TIMESTEP")
     for end in range(last_frame + 1, len(whole), 7):  # within the header, a row, a number, before the last newline
         cut.write_bytes(whole[:end])
         with pytest.raises(DumpError, match=r"cut\.txt"):
-            read_local_dump(cut, columns)
+            list(local_frames(cut, columns))
     cut.write_bytes(whole[:-1])
     with pytest.raises(DumpError, match=r"cut\.txt: ends within the frame"):
-        read_local_dump(cut, columns)
+        list(local_frames(cut, columns))
     cut.write_bytes(whole[:last_frame])
-    assert len(read_local_dump(cut, columns)[0]) == 6 * 2
-    with pytest.raises(DumpError, match=r"cut\.txt: holds 6 of 7 frames"):
-        read_local_dump(cut, columns, 7)
+    assert sum(len(frame) for _, frame in local_frames(cut, columns)) == 6 * 2
+    copy = shutil.copytree(path.parents[2], tmp_path / "run")
+    (copy / "manifest.json").unlink()
+    cut.replace(copy / FIRST_SEGMENT / path.name)
+    with pytest.raises(DumpError, match="its bridges hold 6 of 7 frames"):
+        list(read_bridges(read_motion(copy)))
 
 
 def test_nonsense_in_a_local_dump_is_told(local_dump: tuple[Path, tuple[str, ...]], tmp_path: Path) -> None:
@@ -138,7 +140,7 @@ def test_nonsense_in_a_local_dump_is_told(local_dump: tuple[Path, tuple[str, ...
         lines[9] = b" ".join([nonsense, *words[1:]])
         (tmp_path / "odd.txt").write_bytes(b"\n".join(lines))
         with pytest.raises(DumpError, match=r"odd\.txt: .*the frame of step 0"):
-            read_local_dump(tmp_path / "odd.txt", columns)
+            list(local_frames(tmp_path / "odd.txt", columns))
 
 
 # --- streams ----------------------------------------------------------------------------------------------------------

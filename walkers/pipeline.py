@@ -283,8 +283,8 @@ def locate(what: Case | str | Path, out: Path = DEFAULT_OUT) -> Place:
     Parameters
     ----------
     what
-        A directory, or its name in ``out`` (of a run alone or in an ensemble); a zip file; or a case (resolved, file or
-        shipped name), whose finished run with the installed engine is looked up there.
+        A directory, or its name in ``out``; a zip file; or a case (resolved, file or shipped name), whose finished run
+        with the installed engine is looked up there.
     out
         Folder of the run directories.
 
@@ -319,8 +319,6 @@ def _placed(name: str | Path, out: Path) -> Place | None:
         for kind, file in RECORDS.items():
             if (place / file).is_file():
                 return Place(place, kind)
-    if (run := _named(name, out)) is not None:
-        return Place(run, "run")
     if path.suffix == ".zip" and path.is_file():
         return Place(path, "archive")
     return Place(path, "folder") if path.is_dir() and str(name) not in shipped_cases() else None

@@ -24,7 +24,6 @@ from walkers.runner.manifest import checksum
 from walkers.sweeps.record import RECORD_NAME
 
 _COMPRESSED = (".parquet", ".png", ".mp4")
-_LEVEL = 6
 _CHUNK_BYTES = 1 << 20
 
 

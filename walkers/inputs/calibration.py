@@ -33,7 +33,7 @@ from walkers.inputs.changes import Value
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.inputs.messages import validated
-from walkers.inputs.reading import check_kind, find_input, read_toml, shipped
+from walkers.inputs.reading import check_kind, find_input, read_toml
 from walkers.inputs.schema import Number, Whole
 from walkers.inputs.units import ANGLE, SPEED, Kind, parse_quantity
 
@@ -172,11 +172,6 @@ class Calibration:
     def design(self) -> DesignTable:
         """Sizes of the waves and of the posterior."""
         return self.file.design
-
-
-def shipped_calibrations() -> dict[str, Path]:
-    """The calibrations that come with the project: name to file."""
-    return shipped("calibration")
 
 
 def load_calibration(calibration: str | Path) -> Calibration:

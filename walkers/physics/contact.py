@@ -7,17 +7,12 @@ limit is μ times the elastic repulsion, which carries the load of the bridge.
 
 from __future__ import annotations
 
-from math import log, pi, sqrt
+from math import sqrt
 
 
 def reduced_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
     """E* of two bodies of the same modulus, Pa."""
     return youngs_modulus / (2.0 * (1.0 - poissons_ratio**2))
-
-
-def reduced_shear_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
-    """G* of two bodies of the same modulus, Pa."""
-    return youngs_modulus / (4.0 * (1.0 + poissons_ratio) * (2.0 - poissons_ratio))
 
 
 def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -> float:
@@ -31,8 +26,3 @@ def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -
         R* in m, E* in Pa.
     """
     return float((3.0 * max(force, 0.0) / (4.0 * reduced_modulus * sqrt(reduced_radius))) ** (2.0 / 3.0))
-
-
-def damping_ratio(restitution: float) -> float:
-    """β of the damped Hertz contact that rebounds with a coefficient e, −ln e/√(ln²e + π²)."""
-    return -log(restitution) / sqrt(log(restitution) ** 2 + pi**2)

@@ -6,45 +6,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.postprocess.dump import DumpError, FloatArray
 
 _HEADER_LINES = 9
-
-
-def read_local_dump(
-    path: Path, columns: tuple[str, ...], number: int | None = None
-) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Read all rows of a local dump.
-
-    Parameters
-    ----------
-    path
-        The text file.
-    columns
-        Names of its columns.
-    number
-        Of its frames, where that is known.
-
-    Returns
-    -------
-    steps : ndarray of int64, shape (rows,)
-        Step of each row's frame.
-    rows : ndarray, shape (rows, columns)
-
-    Raises
-    ------
-    DumpError
-        As for `local_frames`, or if frames are missing.
-    """
-    frames = list(local_frames(path, columns))
-    if number is not None and len(frames) != number:
-        raise DumpError(f"{path}: holds {len(frames)} of {number} frames")
-    steps = np.repeat(
-        np.array([step for step, _ in frames], dtype=np.int64), [len(rows) for _, rows in frames] if frames else 0
-    )
-    return steps, np.concatenate([np.empty((0, len(columns))), *(rows for _, rows in frames)])
 
 
 def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, FloatArray]]:

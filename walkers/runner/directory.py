@@ -24,7 +24,7 @@ from walkers.inputs.case import Case
 from walkers.physics.laws import source_sha256
 from walkers.runner.binary import Engine
 from walkers.runner.failures import DiskFull, OutputGone
-from walkers.runner.files import fsync_path, read_json, settle, write_json
+from walkers.runner.files import fsync_path, read_json, write_json
 from walkers.runner.launch import EngineReport
 from walkers.runner.manifest import FORMAT, MANIFEST_NAME, check_unchanged
 from walkers.templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck, Segment
@@ -143,10 +143,8 @@ def finished_places(out: Path) -> dict[str, Path]:
     return {place.name: place for place in places if not place.name.endswith((UNFINISHED, REPLACED))}
 
 
-def move_into_place(made: Path, place: Path, *, settled: bool = False) -> None:
-    """Give a directory that has been made its name, safe on disk, in exchange for one that has it already."""
-    if not settled:
-        settle(made)
+def move_into_place(made: Path, place: Path) -> None:
+    """Give a directory that has been made, and is safe on disk, its name, in exchange for one that has it already."""
     recover(place)
     replaced = _aside(place)
     if place.exists():

@@ -60,9 +60,8 @@ def write_json(path: Path, contents: Mapping[str, Any], *, at_once: bool = True)
     write_bytes(path, (json.dumps(contents, indent=2, ensure_ascii=False) + "\n").encode("utf-8"), at_once=at_once)
 
 
-def settle(directory: Path) -> None:
-    """Put a directory and all that is in it on the disk, so that its new name outlives a loss of power."""
-    del directory
+def settle() -> None:
+    """Put all that was written on the disk, so that a directory's new name outlives a loss of power."""
     os.sync()  # in a hundredth of the time that its files take one by one
 
 

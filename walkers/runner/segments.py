@@ -167,7 +167,7 @@ class OpenRun:
             if not self.case.run.in_one:
                 _check_restart(new / RESTART_NAME, deck)
             record = write_segment_record(new, segment, report, _rms_velocity(new))
-            settle(new)
+            settle()
             new.rename(place)
             fsync_path(place.parent)
         # The restart before the last one is kept, should the last one prove bad.
@@ -187,6 +187,7 @@ class OpenRun:
         rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
         settling = {"drive_from": start, "settled": rest[-1] if rest else None, "segments": len(self.done)}
         write_json(self.directory / MANIFEST_NAME, {**record, **settling}, at_once=False)
+        settle()
         move_into_place(self.directory, self.place)
         return FinishedRun(self.place)
 

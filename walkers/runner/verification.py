@@ -205,11 +205,10 @@ def listed_by(manifest: Mapping[str, Any]) -> Listed:
 
 
 def verify_run(directory: Path) -> Verification:
-    """Compare the files of a run directory, or of an ensemble's, with its manifest.
+    """Compare the files of a run directory with its manifest.
 
     Passed is what has all files of the manifest as they were, and none else but what was made from them since
-    (`made_since`) and the case file that an archive puts beside it. The runs of an ensemble have manifests of their
-    own.
+    (`made_since`) and the case file that an archive puts beside it.
 
     Parameters
     ----------

@@ -152,9 +152,9 @@ def _make_together(
                 _tabulate(incomplete / name)
                 said = manifest(cases[name], name, engine, report, started=started, directory=incomplete / name)
                 write_json(incomplete / name / MANIFEST_NAME, {**said, **own}, at_once=False)
-            settle(incomplete)
+            settle()
             for name in done:
-                move_into_place(incomplete / name, out / name, settled=True)
+                move_into_place(incomplete / name, out / name)
     finally:
         shutil.rmtree(incomplete, ignore_errors=True)
     for name in done:  # what was left of a run that was once made alone, and killed
