@@ -103,7 +103,7 @@ clean: ## Remove the environment and caches, never the runs
 
 .PHONY: setup
 setup: engine .venv/ready ## Install what is missing: liggghts and what compiles its contact model (apt-get), and .venv
-	@.venv/bin/python -c "from walkers.runner.plugin import main; main()"
+	@.venv/bin/python -c "from walkers.runner.binary import compile_model; compile_model()"
 
 # As root, through sudo, or with one message for whoever is root. $(1): packages, $(2): what they are for.
 define debian

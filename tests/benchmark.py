@@ -24,8 +24,8 @@ import numpy as np
 from walkers.inputs import load_case
 from walkers.inputs.case import Case
 from walkers.runner import find_engine
+from walkers.runner.binary import plugin_of
 from walkers.runner.directory import write_deck
-from walkers.runner.plugin import plugin_of
 from walkers.sweeps.record import read_record
 from walkers.templates.deck import DECK_NAME, Segment, render_deck
 from walkers.templates.engine import ALONE

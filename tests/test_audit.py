@@ -35,9 +35,8 @@ from walkers.check.lines import Line, Verdict
 from walkers.check.scenes import SCENES, law, prescribed, second_engine
 from walkers.inputs import InputError
 from walkers.physics.bridge import Surfaces
-from walkers.runner import binary, plugin
-from walkers.runner.audits import AuditRecord, read_audit, write_audit
-from walkers.runner.binary import find_engine
+from walkers.runner import binary
+from walkers.runner.binary import AuditRecord, find_engine, read_audit, write_audit
 from walkers.runner.directory import FinishedRun
 from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
 
@@ -56,7 +55,7 @@ def report(once: Callable[[str, Callable[[Path], object]], Path]) -> AuditReport
 @pytest.fixture
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user's cache of the test's own, with the contact model that is compiled already."""
-    kept = plugin.plugin_of(find_engine())
+    kept = binary.plugin_of(find_engine())
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "cache" / "granular-walkers").mkdir(parents=True)
     shutil.copy(kept, tmp_path / "cache" / "granular-walkers")
@@ -110,8 +109,7 @@ def test_a_wrong_contact_model_is_found(wrong: str, own_cache: Path, monkeypatch
     text = (sources / "bridge.cpp").read_text()
     assert text.count(right) == 1
     (sources / "bridge.cpp").write_text(text.replace(right, other))
-    for module in (binary, plugin):
-        monkeypatch.setattr(module, "SOURCES", sources)
+    monkeypatch.setattr(binary, "SOURCES", sources)
     binary._identity.cache_clear()
     try:
         report = run_audit(["scenes"])

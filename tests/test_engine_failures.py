@@ -39,6 +39,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.readable import differing, flattened
 from walkers.inputs.reading import read_toml, shipped_cases
 from walkers.runner import find_engine, open_run
+from walkers.runner.binary import plugin_of
 from walkers.runner.directory import run_name
 from walkers.runner.failures import (
     BeadsLost,
@@ -56,7 +57,6 @@ from walkers.runner.failures import (
     TimeLimitExceeded,
 )
 from walkers.runner.launch import Progress, postponed_interrupts
-from walkers.runner.plugin import plugin_of
 from walkers.templates import Deck, render_deck
 from walkers.templates.deck import Segment
 

@@ -12,9 +12,9 @@ import pytest
 from tests.conftest import LONG, PROGRAM, SHORT, document, engines_in, make_case, to_toml, wait_for
 from walkers import run as run_case
 from walkers.runner import find_engine, launch
+from walkers.runner.binary import plugin_of
 from walkers.runner.directory import write_deck
 from walkers.runner.failures import EngineNeverStarted
-from walkers.runner.plugin import plugin_of
 from walkers.templates.deck import render_deck
 from walkers.templates.engine import ALONE
 

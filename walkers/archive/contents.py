@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import json
+import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.runner.directory import CASE_NAME, FinishedRun, name_of
-from walkers.runner.manifest import MANIFEST_NAME
+from walkers.runner.files import json_bytes
+from walkers.runner.manifest import MANIFEST_NAME, checksum
 from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_record, states
 
 RUNS = "runs"
@@ -40,24 +41,17 @@ _MEANINGS = {
 _GIVEN = ("case", "the case as it was given, with the values that were put beside it")
 _SWEEP = ("record", "the sweep as it was given")
 _REST = ("output", "what else the engine wrote")
-_MEDIA = {
-    ".json": "application/json",
-    ".toml": "application/toml",
-    ".parquet": "application/vnd.apache.parquet",
-    ".csv": "text/csv",
-    ".html": "text/html",
-}
-_TEXT = (".lig", ".txt", ".log")
 
 
 @dataclass(frozen=True)
 class Item:
-    """A file of an archive: path there, source or contents, SHA-256 if known, role and meaning if its name has none."""
+    """A file of an archive: path there, source or contents, SHA-256, role (as in the crate's actions) and meaning."""
 
     place: str
     source: Path | bytes
-    sha256: str | None = None
-    told: tuple[str, str] | None = None
+    sha256: str
+    role: str = ""
+    meaning: str = ""
 
     @property
     def name(self) -> str:
@@ -65,34 +59,20 @@ class Item:
         return self.place.rpartition("/")[2]
 
     @property
-    def role(self) -> str:
-        """``case``, ``deck``, ``dump``, ``output``, ``table``, ``result`` or ``record``."""
-        return (self.told or _told(self.name))[0]
-
-    @property
-    def meaning(self) -> str:
-        """What it is."""
-        return (self.told or _told(self.name))[1]
-
-    @property
-    def media_type(self) -> str:
-        """By its suffix."""
-        suffix = Path(self.name).suffix
-        return _MEDIA.get(suffix, "text/plain" if suffix in _TEXT else "application/octet-stream")
-
-    @property
     def size(self) -> int:
         """Bytes."""
         return len(self.source) if isinstance(self.source, bytes) else self.source.stat().st_size
 
 
-def _told(name: str) -> tuple[str, str]:
-    stem, _, suffix = name.rpartition(".")
-    if name in _MEANINGS:
-        return _MEANINGS[name]
-    if suffix == "parquet":
-        return "table", f"table {stem}; units and meanings of its columns are in the field metadata"
-    return _REST
+def item(place: str, source: Path | bytes, sha256: str | None = None, told: tuple[str, str] | None = None) -> Item:
+    """A file of an archive; its checksum, role and meaning (``told``) if left out by its contents and its name."""
+    name = place.rpartition("/")[2]
+    if name.endswith(".parquet"):
+        table = name.removesuffix(".parquet")
+        told = told or ("table", f"table {table}; units and meanings of its columns are in the field metadata")
+    if sha256 is None:
+        sha256 = hashlib.sha256(source).hexdigest() if isinstance(source, bytes) else checksum(source)
+    return Item(place, source, sha256, *_MEANINGS.get(name, told or _REST))
 
 
 @dataclass(frozen=True)
@@ -121,7 +101,7 @@ class Contents:
     name: str
     title: str
     runs: Sequence[PackedRun]
-    sweep: Sequence[Item] = field(default=())
+    sweep: Sequence[Item] = ()
     record: SweepRecord | None = None
 
     @property
@@ -135,66 +115,50 @@ class Contents:
         return max(str(run.manifest["finished"]) for run in self.runs)
 
 
-def contents_of_run(directory: Path, *, dumps: bool = True) -> Contents:
-    """What the archive of a finished run holds; with ``dumps`` false not what its tables were made from."""
-    run = _run(directory, dumps)
-    title = FinishedRun(directory).case.title
-    return Contents(run.name, title, [run])
-
-
-def contents_of_sweep(directory: Path, *, dumps: bool = True) -> Contents:
-    """What the archive of a sweep holds.
+def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
+    """What the archive of a finished run or of a sweep holds; with ``dumps`` false not what tables were made from.
 
     Raises
     ------
     InputError
-        If it is no sweep, or points of it are not finished.
+        If points of a sweep are not finished.
     """
-    record = read_record(directory)
-    found = states(record)
-    open_points = [state for state in found if state.status not in ("finished", "not needed")]
-    if open_points:
-        told = f"{len(open_points)} of {len(found)} points are not finished; see: walkers status {directory}"
-        raise InputError(str(directory), [Problem("", None, told)])
-    places = list(dict.fromkeys(state.directory for state in found if state.directory is not None))
-    return Contents(
-        name_of(record.directory.name),
-        record.title,
-        [_run(place, dumps) for place in places],
-        _sweep_items(record),
-        record,
-    )
-
-
-def _sweep_items(record: SweepRecord) -> list[Item]:
     from walkers.sweeps.table import encoded, load
 
+    if not (directory / RECORD_NAME).is_file():
+        run = _packed(directory, dumps)
+        return Contents(run.name, FinishedRun(directory).case.title, [run])
+    record = read_record(directory)
+    found = states(record)
+    unfinished = sum(state.status not in ("finished", "not needed") for state in found)
+    if unfinished:
+        told = f"{unfinished} of {len(found)} points are not finished; see: walkers status {directory}"
+        raise InputError(str(directory), [Problem("", None, told)])
+    runs = list(dict.fromkeys(state.directory for state in found if state.directory is not None))
     name = name_of(record.directory.name)
-    place = f"{RUNS}/{name}"
-    table = load(record.directory)
+    place, table = f"{RUNS}/{name}", load(record.directory)
     table["run"] = [f"{RUNS}/{Path(one).name}" if one else "" for one in table["run"]]  # not where this machine has it
-    items = [Item(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)]
-    items += [Item(f"{place}/table.{form}", encoded(table, form)) for form in ("csv", "parquet")]
+    items = [item(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)]
+    items += [item(f"{place}/table.{form}", encoded(table, form)) for form in ("csv", "parquet")]
     if record.file:
-        items.append(Item(f"{place}/{name}.toml", _toml(record.file), told=_SWEEP))
-    return items
+        items.append(item(f"{place}/{name}.toml", _toml(record.file), told=_SWEEP))
+    return Contents(name, record.title, [_packed(run, dumps) for run in runs], items, record)
 
 
-def _run(directory: Path, dumps: bool) -> PackedRun:
+def _packed(directory: Path, dumps: bool) -> PackedRun:
     """The files that a manifest names, the manifest, and the case as it was given, if that is known."""
     run = FinishedRun(directory)
     manifest, case, place = run.manifest, run.case, f"{RUNS}/{directory.resolve().name}"
-    before, sums = set(manifest.get("left_out", ())), manifest.get("sha256", {})
-    names = [name for name in manifest["files"] if name not in before]
-    items = [Item(f"{place}/{name}", directory / name, sums.get(name)) for name in names]
-    left_out = [name for name, item in zip(names, items, strict=True) if item.role == "dump" and not dumps]
+    before, sums = set(manifest.get("left_out", ())), manifest["sha256"]
+    named = {name: item(f"{place}/{name}", directory / name, sums.get(name)) for name in manifest["files"]}
+    left_out = {name for name, one in named.items() if name in before or (one.role == "dump" and not dumps)}
     said: Path | bytes = directory / MANIFEST_NAME
-    if left_out:
-        manifest["left_out"] = sorted(before.union(left_out))
-        said = (json.dumps(manifest, indent=2, ensure_ascii=False) + "\n").encode("utf-8")
-        items = [item for item in items if item.role != "dump"]
-    given = [Item(f"{place}/{name_of(case.name)}.toml", _toml(case.document), told=_GIVEN)] if case.document else []
-    return PackedRun(directory.resolve(), place, manifest, [*given, Item(f"{place}/{MANIFEST_NAME}", said), *items])
+    if left_out - before:
+        manifest["left_out"] = sorted(left_out)
+        said = json_bytes(manifest)
+    items = [item(f"{place}/{name_of(case.name)}.toml", _toml(case.document), told=_GIVEN)] if case.document else []
+    items += [item(f"{place}/{MANIFEST_NAME}", said), *(one for name, one in named.items() if name not in left_out)]
+    return PackedRun(directory.resolve(), place, manifest, items)
 
 
 def _toml(tables: Any) -> bytes:

@@ -8,142 +8,155 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from walkers.archive.citation import LICENCES, PAPER, PAPER_PROPERTIES, Author
 from walkers.archive.contents import Contents, Item, PackedRun
 from walkers.runner.provenance import PROJECT
 
 if TYPE_CHECKING:
     from rocrate.model.entity import Entity
-    from rocrate.rocrate import ROCrate
 
 METADATA_NAME = "ro-crate-metadata.json"
 PREVIEW_NAME = "ro-crate-preview.html"
 VERSION = "1.1"
 """Of RO-Crate: the one that the profile extends."""
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
-_TERMS = {"sha256": "http://schema.org/sha256"}
-"""Younger than that version's context."""
 ENGINE_HOME = "https://github.com/CFDEMproject/LIGGGHTS-PUBLIC"
+PAPER = "https://doi.org/10.48550/arXiv.1003.1623"
+_PAPER_PROPERTIES = {
+    "name": "Self-assembled granular walkers",
+    "author": "Z. S. Khan, A. Steinberger, R. Seemann, S. Herminghaus",
+    "datePublished": "2010",
+    "identifier": PAPER,
+    "url": "https://arxiv.org/abs/1003.1623",
+}
+LICENCES = {
+    "CC-BY-4.0": ("https://creativecommons.org/licenses/by/4.0/", "Creative Commons Attribution 4.0 International"),
+    "CC0-1.0": ("https://creativecommons.org/publicdomain/zero/1.0/", "Creative Commons Zero 1.0 Universal"),
+    "CC-BY-SA-4.0": (
+        "https://creativecommons.org/licenses/by-sa/4.0/",
+        "Creative Commons Attribution Share Alike 4.0 International",
+    ),
+    "BSD-3-Clause": ("https://opensource.org/license/bsd-3-clause", 'BSD 3-Clause "New" or "Revised" License'),
+}
+"""By their SPDX identifiers: addresses and names."""
+_MEDIA = {
+    ".json": "application/json",
+    ".toml": "application/toml",
+    ".parquet": "application/vnd.apache.parquet",
+    ".csv": "text/csv",
+    ".html": "text/html",
+    **dict.fromkeys((".lig", ".txt", ".log"), "text/plain"),
+}
 
 
-def describe_crate(
-    contents: Contents, sums: Mapping[str, str], authors: Sequence[Author], licence: str
-) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Author:
+    """Somebody who made the runs: name, and ORCID (``0000-0002-1825-0097``) or None."""
+
+    name: str
+    orcid: str | None = None
+
+
+def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) -> dict[str, Any]:
     """The metadata of an archive.
 
     Parameters
     ----------
     contents
         What it holds.
-    sums
-        From the places of its files to their SHA-256.
     authors
         Of the runs.
     licence
-        Key of `walkers.archive.citation.LICENCES`.
+        Key of `LICENCES`.
 
     Returns
     -------
     dict
         JSON-LD. Dated by the last of the runs, not by the day: the same runs give the same archive.
     """
-    from rocrate.rocrate import ROCrate
-
-    crate = ROCrate(version=VERSION)
-    crate.metadata.extra_terms.update(_TERMS)
-    root = crate.root_dataset
-    root["datePublished"] = _moment(contents.finished)
-    root["name"] = f"{contents.name}: {contents.title}".rstrip(": ")
-    root["description"] = _what(contents)
-    address, name = LICENCES[licence]
-    root["license"] = _entity(crate, address, {"@type": "CreativeWork", "name": name, "identifier": licence})
-    root["conformsTo"] = _entity(
-        crate, PROFILE, {"@type": "CreativeWork", "name": "Process Run Crate", "version": PROFILE.rpartition("/")[2]}
-    )
-    root["citation"] = _entity(crate, PAPER, PAPER_PROPERTIES)
-    people = [_person(crate, author) for author in authors]
-    if people:
-        root["author"] = people
-    about = {"@type": "CreativeWork", "name": "What this is, for people", "encodingFormat": "text/html"}
-    _entity(crate, PREVIEW_NAME, {**about, "about": {"@id": "./"}})
-    described = _Described(crate, sums, people)
-    for item in contents.sweep:
-        described.file(item)
-    for run in contents.runs:
-        described.run(run)
-    actions = [action for run in contents.runs for action in described.actions(run)]
-    if contents.record is not None:
-        last = contents.runs[-1].manifest
-        results = [item for run in contents.runs for item in run.with_role("result")]
-        record, tables = ([item for item in contents.sweep if (item.role == "table") == table] for table in (0, 1))
-        actions.append(
-            described.action(
-                f"#{contents.name}-table",
-                f"Table of the sweep {contents.name}",
-                "The results of the runs, put into one table, one row per point.",
-                described.program(last),
-                (record + results, tables),
-                (None, contents.finished),
-            )
-        )
-    root["mentions"] = actions
-    metadata: dict[str, Any] = crate.metadata.generate()
-    for entity in metadata["@graph"]:  # what is one is no list, by the specification
-        entity.update({key: one[0] for key, one in entity.items() if isinstance(one, list) and len(one) == 1})
-    return metadata
-
-
-def as_bytes(metadata: Mapping[str, Any]) -> bytes:
-    """The metadata as its file has it."""
-    return (json.dumps(metadata, indent=2, ensure_ascii=False) + "\n").encode("utf-8")
-
-
-def _what(contents: Contents) -> str:
+    made = _Crate()
+    root = made.crate.root_dataset
     runs = "A run" if contents.record is None else f"The {len(contents.runs)} runs of a sweep"
     left_out = any("left_out" in run.manifest for run in contents.runs)
-    return (
+    address, name = LICENCES[licence]
+    root["datePublished"] = _moment(contents.finished)
+    root["name"] = f"{contents.name}: {contents.title}".rstrip(": ")
+    root["description"] = (
         f"{runs} of wet granular walkers, simulated by the discrete element method with LIGGGHTS through {PROJECT}: "
         "cases, decks, what the engine wrote, and the tables and results made from that."
         + (" The dumps that the tables were made from are left out." if left_out else "")
     )
-
-
-def _entity(crate: ROCrate, identifier: str, properties: Mapping[str, Any]) -> Entity:
-    """A contextual entity, once."""
-    from rocrate.model.contextentity import ContextEntity
-
-    there = crate.get(identifier)
-    return there if there is not None else crate.add(ContextEntity(crate, identifier, properties=dict(properties)))
-
-
-def _person(crate: ROCrate, author: Author) -> Entity:
-    identifier = f"https://orcid.org/{author.orcid}" if author.orcid else f"#{quote(author.name)}"
-    return _entity(crate, identifier, {"@type": "Person", "name": author.name})
+    root["license"] = made.entity(address, "CreativeWork", name=name, identifier=licence)
+    profile = {"name": "Process Run Crate", "version": PROFILE.rpartition("/")[2]}
+    root["conformsTo"] = made.entity(PROFILE, "CreativeWork", **profile)
+    root["citation"] = made.entity(PAPER, "ScholarlyArticle", **_PAPER_PROPERTIES)
+    for author in authors:
+        identifier = f"https://orcid.org/{author.orcid}" if author.orcid else f"#{quote(author.name)}"
+        made.people.append(made.entity(identifier, "Person", name=author.name))
+    if made.people:
+        root["author"] = list(made.people)
+    about = {"name": "What this is, for people", "encodingFormat": "text/html", "about": {"@id": "./"}}
+    made.entity(PREVIEW_NAME, "CreativeWork", **about)
+    for one in contents.sweep:
+        made.file(one)
+    for run in contents.runs:
+        told = f"Run directory of the case {run.manifest['name']}, finished {run.manifest['finished']}"
+        folder = made.crate.add_dataset(None, f"{run.place}/", properties={"name": run.name, "description": told})
+        folder["hasPart"] = [made.file(one) for one in run.items]
+    root["mentions"] = [action for run in contents.runs for action in made.actions(run)]
+    if contents.record is not None:
+        results = [one for run in contents.runs for one in run.with_role("result")]
+        table = made.action(
+            (f"#{contents.name}-table", f"Table of the sweep {contents.name}"),
+            "The results of the runs, put into one table, one row per point.",
+            made.program(contents.runs[-1].manifest),
+            [*(one for one in contents.sweep if one.role != "table"), *results],
+            [one for one in contents.sweep if one.role == "table"],
+            (None, contents.finished),
+        )
+        root["mentions"] = [*root["mentions"], table]
+    metadata: dict[str, Any] = made.crate.metadata.generate()
+    for entity in metadata["@graph"]:  # what is one is no list, by the specification
+        entity.update({key: one[0] for key, one in entity.items() if isinstance(one, list) and len(one) == 1})
+    return metadata
 
 
 def _moment(iso: str) -> str:
     return iso.removesuffix("Z") + "+00:00"
 
 
-class _Described:
-    """A crate that is being described."""
+class _Crate:
+    """A crate that is being described: its entities, of which files and people are referred to."""
 
-    def __init__(self, crate: ROCrate, sums: Mapping[str, str], people: Sequence[Entity]) -> None:
-        self.crate, self.sums, self.people = crate, sums, people
+    def __init__(self) -> None:
+        from rocrate.rocrate import ROCrate
+
+        self.crate = ROCrate(version=VERSION)
+        self.crate.metadata.extra_terms["sha256"] = "http://schema.org/sha256"  # younger than that version's context
+        self.people: list[Entity] = []
         self.files: dict[str, Entity] = {}
+
+    def entity(self, identifier: str, kind: str, /, **properties: Any) -> Entity:
+        """A contextual entity, once."""
+        from rocrate.model.contextentity import ContextEntity
+
+        there = self.crate.get(identifier)
+        made = ContextEntity(self.crate, identifier, properties={"@type": kind, **properties})
+        return there if there is not None else self.crate.add(made)
 
     def file(self, item: Item) -> Entity:
         """A file of the archive, a table with its columns."""
         properties: dict[str, Any] = {
             "name": item.name,
             "description": item.meaning,
-            "encodingFormat": item.media_type,
+            "encodingFormat": _MEDIA.get(Path(item.name).suffix, "application/octet-stream"),
             "contentSize": str(item.size),
-            "sha256": self.sums[item.place],
+            "sha256": item.sha256,
         }
         if item.name.endswith(".parquet"):
             properties["variableMeasured"] = self._columns(item)
@@ -155,77 +168,67 @@ class _Described:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        table = item.name.removesuffix(".parquet")
-        entities = []
+        table, entities = item.name.removesuffix(".parquet"), []
         for field in pq.read_schema(pa.BufferReader(item.source) if isinstance(item.source, bytes) else item.source):
             told = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
-            properties = {"@type": "PropertyValue", "name": field.name, "description": told.get("meaning", "")}
-            if told.get("unit"):
-                properties["unitText"] = told["unit"]
-            entities.append(_entity(self.crate, f"#{quote(f'{table}.{field.name}')}", properties))
+            unit = {"unitText": told["unit"]} if told.get("unit") else {}
+            identifier, properties = (
+                f"#{quote(f'{table}.{field.name}')}",
+                {"description": told.get("meaning", ""), **unit},
+            )
+            entities.append(self.entity(identifier, "PropertyValue", name=field.name, **properties))
         return entities
-
-    def run(self, run: PackedRun) -> None:
-        """A run's folder, and its files."""
-        told = f"Run directory of the case {run.manifest['name']}, finished {run.manifest['finished']}"
-        entity = self.crate.add_dataset(None, f"{run.place}/", properties={"name": run.name, "description": told})
-        entity["hasPart"] = [self.file(item) for item in run.items]
 
     def actions(self, run: PackedRun) -> list[Entity]:
         """What made the files of a run."""
         manifest, name = run.manifest, run.name
-        began, ended = str(manifest["started"]), str(manifest["finished"])
-        program = self.program(manifest)
-        cases, decks = run.with_role("case"), run.with_role("deck")
+        program, again = self.program(manifest), manifest.get("tabulated")
+        cases, decks, dumps = run.with_role("case"), run.with_role("deck"), run.with_role("dump")
         others = int(manifest.get("shared_deck", {}).get("runs", 1)) - 1
         company = f", together with {others} other cases" if others else ""
         deck = self.action(
-            f"#{name}-deck",
-            f"Deck of {name}",
+            (f"#{name}-deck", f"Deck of {name}"),
             f"The case resolved, and the deck of it rendered{company}.",
             program,
-            (cases, decks),
-            (None, began),
+            cases,
+            decks,
+            (None, manifest["started"]),
         )
         engine = self.action(
-            f"#{name}-engine",
-            f"Engine's run of {name}",
+            (f"#{name}-engine", f"Engine's run of {name}"),
             "The engine's run of the deck: the motion of the beads, step by step.",
-            self.engine(manifest),
-            (decks, run.with_role("dump", "output")),
-            (began, ended),
+            self._engine(manifest["engine"]),
+            decks,
+            run.with_role("dump", "output"),
+            (manifest["started"], manifest["finished"]),
         )
-        again = manifest.get("tabulated")
-        read = [*cases, *run.with_role("dump"), *(item for item in run.items if item.name == "layout.json")]
         tables = self.action(
-            f"#{name}-tables",
-            f"Tables of {name}",
+            (f"#{name}-tables", f"Tables of {name}"),
             "The dumps analysed: tables and result.",
             self.program(again) if again else program,
-            (read, run.with_role("table", "result")),
-            (None, str(again["date"]) if again else ended),
+            [*cases, *dumps, *(one for one in run.items if one.name == "layout.json")],
+            run.with_role("table", "result"),
+            (None, again["date"] if again else manifest["finished"]),
         )
         return [deck, engine, tables]
 
     def action(
         self,
-        identifier: str,
-        name: str,
+        named: tuple[str, str],
         description: str,
         instrument: Entity,
-        files: tuple[Iterable[Item], Iterable[Item]],
+        read: Sequence[Item],
+        gave: Sequence[Item],
         times: tuple[str | None, str],
     ) -> Entity:
         """What a program read and gave, and when (begin, if known, and end)."""
-        read, gave = ([self.files[item.place] for item in some] for some in files)
-        began, ended = times
+        (identifier, name), (began, ended) = named, times
         properties: dict[str, Any] = {
-            "@type": "CreateAction",
             "name": name,
             "description": description,
             "instrument": instrument,
-            "object": read,
-            "result": gave,
+            "object": [self.files[item.place] for item in read],
+            "result": [self.files[item.place] for item in gave],
             "endTime": _moment(ended),
             "actionStatus": "http://schema.org/CompletedActionStatus",
         }
@@ -233,34 +236,29 @@ class _Described:
             properties["startTime"] = _moment(began)
         if self.people:
             properties["agent"] = list(self.people)
-        return _entity(self.crate, identifier, properties)
+        return self.entity(identifier, "CreateAction", **properties)
 
-    def engine(self, manifest: Mapping[str, Any]) -> Entity:
+    def _engine(self, engine: Mapping[str, Any]) -> Entity:
         """LIGGGHTS, by its binary."""
-        version, sha256 = manifest["engine"]["version"], manifest["engine"]["sha256"]
         told = "Discrete element method. The SHA-256 is over those of the executable and its libliggghts."
-        more = {"url": ENGINE_HOME, "sha256": sha256, "description": told}
-        return self._software(f"{ENGINE_HOME}#{sha256[:12]}", "LIGGGHTS", version, **more)
+        more = {"url": ENGINE_HOME, "sha256": engine["sha256"], "description": told}
+        return self._software(f"{ENGINE_HOME}#{engine['sha256'][:12]}", "LIGGGHTS", engine["version"], **more)
 
     def program(self, made_by: Mapping[str, Any]) -> Entity:
         """Our own, with Python and the packages, as a manifest names them."""
-        version, commit, python = made_by["granular_walkers"], made_by.get("commit"), made_by.get("python")
-        packages = dict(made_by.get("packages", {}))
+        version, commit, python = (made_by[key] for key in ("granular_walkers", "commit", "python"))
+        packages, python_home = dict(made_by["packages"]), "https://www.python.org/"
         homes = {name: f"https://pypi.org/project/{name}/{one}/" for name, one in packages.items()}
         needed = [self._software(home, name, packages[name], url=home) for name, home in homes.items()]
-        if python:
-            home = "https://www.python.org/"
-            needed.append(self._software(f"{home}#{python}", "Python", python, url=home))
+        needed.append(self._software(f"{python_home}#{python}", "Python", python, url=python_home))
         identity = json.dumps([version, commit, python, packages], sort_keys=True)
-        more = {"softwareRequirements": needed} if needed else {}
         return self._software(
             f"#{PROJECT}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}",
             PROJECT,
             f"{version}, commit {commit}" if commit else version,
             description="Cases, decks, runs and analyses of wet granular walkers.",
-            **more,
+            softwareRequirements=needed,
         )
 
-    def _software(self, identifier: str, name: str, version: str, **more: Any) -> Entity:
-        properties = {"@type": "SoftwareApplication", "name": name, "softwareVersion": version, **more}
-        return _entity(self.crate, identifier, properties)
+    def _software(self, identifier: str, name: str, version: str, /, **more: Any) -> Entity:
+        return self.entity(identifier, "SoftwareApplication", name=name, softwareVersion=version, **more)

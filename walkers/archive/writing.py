@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import re
 import shlex
 import time
 import zipfile
-from calendar import timegm
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
-from walkers.archive.citation import LICENCES, PAPER, Author
-from walkers.archive.contents import Contents, Item, contents_of_run, contents_of_sweep
-from walkers.archive.crate import METADATA_NAME, PREVIEW_NAME, as_bytes, describe_crate
+from walkers.archive.contents import Contents, Item, contents_of, item
+from walkers.archive.crate import LICENCES, METADATA_NAME, PAPER, PREVIEW_NAME, Author, describe_crate
 from walkers.archive.verification import SUMS_NAME, verify
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.postprocess.report.page import fill
-from walkers.runner.files import beside
-from walkers.runner.manifest import checksum
-from walkers.sweeps.record import RECORD_NAME
+from walkers.runner.files import beside, json_bytes
 
-_COMPRESSED = (".parquet", ".png", ".mp4")
+_STORED = ("/", ".parquet", ".png", ".mp4")
+"""Ends of names that are not compressed: folders, and what is already."""
 _CHUNK_BYTES = 1 << 20
 
 
@@ -33,16 +30,9 @@ class ArchiveRefused(WalkersError):
 
 @dataclass(frozen=True)
 class ArchiveOptions:
-    """How an archive is made.
+    """How an archive is made: with what the engine wrote of the motion or without; by whom; under which of `LICENCES`.
 
-    Attributes
-    ----------
-    dumps
-        Whether what the engine wrote of the motion goes in; tables and results do in any case.
-    authors
-        Of the runs.
-    licence
-        Key of `walkers.archive.citation.LICENCES`.
+    Tables and results go in in any case.
     """
 
     dumps: bool = True
@@ -76,22 +66,25 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
     """
     directory, options = Path(directory), options or ArchiveOptions()
     _check(options)
-    found = [one for one in verify(directory) if not one.of_points]  # `contents_of_sweep` asks for all points
+    found = [one for one in verify(directory) if not one.of_points]  # `contents_of` asks for all points
     if not all(one.passed for one in found):
         told = "\n".join(one.describe() for one in found if not one.passed)
         raise ArchiveRefused(f"{directory} is not archived, for it is not what it was:\n{told}")
-    is_sweep = (directory / RECORD_NAME).is_file()
-    contents = (contents_of_sweep if is_sweep else contents_of_run)(directory, dumps=options.dumps)
+    contents = contents_of(directory, dumps=options.dumps)
     to = Path(f"{contents.name}.zip") if to is None else to
     if to.suffix != ".zip" or to.is_dir():
         raise InputError("--to", [Problem("", None, f"expected the name of a .zip file, not {to}")])
-    sums = {item.place: item.sha256 or _sum(item) for item in contents.items}
-    metadata = as_bytes(describe_crate(contents, sums, options.authors, options.licence))
-    described = [Item(METADATA_NAME, metadata), Item(PREVIEW_NAME, _preview(contents, options))]
-    sums |= {item.place: _sum(item) for item in described}
-    listing = "".join(f"{one}  {place}\n" for place, one in sums.items()).encode("utf-8")
-    with beside(to) as new:
-        _write_zip(new, [*described, Item(SUMS_NAME, listing), *contents.items], sums, _moment(contents.finished))
+    metadata = json_bytes(describe_crate(contents, options.authors, options.licence))
+    described = [item(METADATA_NAME, metadata), item(PREVIEW_NAME, _preview(contents, options))]
+    sums = "".join(f"{one.sha256}  {one.place}\n" for one in [*contents.items, *described])
+    moment = time.strptime(contents.finished, "%Y-%m-%dT%H:%M:%SZ")[:6]  # of all files, for the same bytes again
+    with beside(to) as new, zipfile.ZipFile(new, "w") as archive:
+        items = [*described, item(SUMS_NAME, sums.encode("utf-8")), *contents.items]
+        folders = [f"{parent}/" for one in items for parent in reversed(Path(one.place).parents) if parent != Path()]
+        for place in dict.fromkeys(folders):
+            archive.writestr(_info(place, moment), b"")
+        for one in items:
+            _write(archive, one, moment)
     return to
 
 
@@ -117,50 +110,24 @@ def _is_orcid(text: str) -> bool:
     return "0123456789X"[(12 - total % 11) % 11] == text[-1]
 
 
-def _sum(item: Item) -> str:
-    return hashlib.sha256(item.source).hexdigest() if isinstance(item.source, bytes) else checksum(item.source)
-
-
-def _moment(iso: str) -> tuple[int, ...]:
-    """A time of a manifest as zip files have them: no time zone, every other second."""
-    return time.gmtime(timegm(time.strptime(iso, "%Y-%m-%dT%H:%M:%SZ")))[:6]
-
-
-def _write_zip(path: Path, items: Sequence[Item], sums: Mapping[str, str], moment: tuple[int, ...]) -> None:
-    """Write the files, all of one time, and see that each is what it was when it was summed."""
-    folders = dict.fromkeys(
-        f"{parent}/" for item in items for parent in reversed(Path(item.place).parents) if str(parent) != "."
-    )
-    with zipfile.ZipFile(path, "w") as archive:
-        for place in folders:
-            archive.writestr(_info(place, moment), b"")
-        for item in items:
-            with archive.open(_info(item.place, moment), "w", force_zip64=item.size >= zipfile.ZIP64_LIMIT) as file:
-                written = _copy(item, file)
-            if written != sums.get(item.place, written):
-                raise ArchiveRefused(f"{item.source!s} changed while it was archived")
-
-
 def _info(place: str, moment: tuple[int, ...]) -> zipfile.ZipInfo:
     info = zipfile.ZipInfo(place, moment)  # type: ignore[arg-type]
-    stored = place.endswith(("/", *_COMPRESSED))
-    info.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
+    info.compress_type = zipfile.ZIP_STORED if place.endswith(_STORED) else zipfile.ZIP_DEFLATED
     info.create_system = 3
     info.external_attr = (0o40755 << 16 | 0x10) if place.endswith("/") else 0o100644 << 16
     return info
 
 
-def _copy(item: Item, file: IO[bytes]) -> str:
-    """Write an item into an archive; its SHA-256."""
-    if isinstance(item.source, bytes):
-        file.write(item.source)
-        return hashlib.sha256(item.source).hexdigest()
+def _write(archive: zipfile.ZipFile, item: Item, moment: tuple[int, ...]) -> None:
+    """Write a file, and see that it is what it was when it was summed."""
     digest = hashlib.sha256()
-    with item.source.open("rb") as source:
+    source = io.BytesIO(item.source) if isinstance(item.source, bytes) else item.source.open("rb")
+    with source, archive.open(_info(item.place, moment), "w", force_zip64=item.size >= zipfile.ZIP64_LIMIT) as file:
         while chunk := source.read(_CHUNK_BYTES):
             digest.update(chunk)
             file.write(chunk)
-    return digest.hexdigest()
+    if digest.hexdigest() != item.sha256:
+        raise ArchiveRefused(f"{item.place} changed while it was archived")
 
 
 def _preview(contents: Contents, options: ArchiveOptions) -> bytes:
@@ -168,13 +135,13 @@ def _preview(contents: Contents, options: ArchiveOptions) -> bytes:
     from walkers.postprocess.analysis import describe_result, read_result
     from walkers.sweeps.table import load, short_text
 
+    first = contents.runs[0]
     if contents.record is None:
-        result = "\n".join(describe_result(Path(run.place), read_result(run.directory)) for run in contents.runs)
+        result = describe_result(Path(first.place), read_result(first.directory))
     else:
         table = load(contents.record.directory)
         table["run"] = [Path(one).name for one in table["run"]]
         result = short_text(table)
-    first = contents.runs[0]
     given = next((item for item in first.items if item.name.endswith(".toml")), None)
     text = fill(
         "preview.html.j2",

@@ -16,8 +16,7 @@ from walkers.check.bench import Bench
 from walkers.check.lines import Line, Verdict
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
-from walkers.runner.audits import AuditRecord, write_audit
-from walkers.runner.binary import Engine, find_engine
+from walkers.runner.binary import AuditRecord, Engine, find_engine, write_audit
 
 CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
     "scenes": scenes.scene_lines,

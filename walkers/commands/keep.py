@@ -144,7 +144,7 @@ def archive(
     licence: Licence = "CC-BY-4.0",
 ) -> None:
     """Pack a run, or a sweep with its runs, into an RO-Crate: cases, decks, dumps, tables, checksums, versions."""
-    from walkers.archive.citation import Author
+    from walkers.archive.crate import Author
     from walkers.archive.writing import ArchiveOptions, write_archive
     from walkers.pipeline import locate
 

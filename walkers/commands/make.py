@@ -101,9 +101,8 @@ class _By(TypedDict):
 def deck(case: Case, settings: Set = None, to: DeckFolder = None) -> None:
     """Print the LIGGGHTS deck of a case (of a run in segments, the first), or write it with its files."""
     from walkers.inputs.errors import InputError, Problem
-    from walkers.runner.binary import find_engine
+    from walkers.runner.binary import find_engine, plugin_of, run_script
     from walkers.runner.directory import write_deck
-    from walkers.runner.plugin import plugin_of, run_script
     from walkers.templates.deck import DECK_NAME, RUN_NAME, render_deck
 
     made = render_deck(load(case, settings))

@@ -1,1 +1,1 @@
-"""The contact model ``cohesion bridge``, C++ that `walkers.runner.plugin` compiles and the engine loads (README.md)."""
+"""The contact model ``cohesion bridge``, C++ that `walkers.runner.binary` compiles and the engine loads (README.md)."""

@@ -1,24 +1,47 @@
-"""The engine's binary: where it is and what exactly it is."""
+"""The engine: its binary and what exactly it is, the contact model that it loads, and what audits found of it.
+
+The contact model of decks is a shared library, compiled where it is first needed and kept in the user's cache, like the
+records of audits. The engine's binary interface is that of its very package: headers and library are those of this
+machine, and only the version that the model was written for is served.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import mmap
 import os
 import re
+import shlex
 import shutil
 import subprocess
-from dataclasses import dataclass
+import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
-from walkers.runner.failures import EngineMissing
+from platformdirs import user_cache_path
+
+from walkers.runner.failures import ContactModelMissing, EngineFailure, EngineMissing, OtherEngine
+from walkers.runner.files import read_json, write_json
+from walkers.templates.deck import DECK_NAME, OUTPUT_NAME
+from walkers.templates.engine import AUDITED_VERSION
 
 ENGINE_VARIABLE = "WALKERS_ENGINE"
 SOURCES = Path(str(files("walkers.engine")))
-MODEL = ("bridge.cpp", "table.h")
-"""Folder and files of the contact model that decks need (`walkers.runner.plugin`)."""
+_MODEL = ("bridge.cpp", "table.h")
+"""The contact model's sources."""
+_PACKAGES = ("g++", "libliggghts-dev", "libopenmpi-dev")
+_HEADERS = Path("/usr/include/liggghts")
+# Without -march the numbers are the same on all machines of an architecture: no fused operations. -O3 does not reorder.
+_OPTIONS = (
+    *("-shared", "-fPIC", "-std=gnu++11", "-O3", "-fno-math-errno"),
+    *("-DNDEBUG", "-DOMPI_SKIP_MPICXX", "-Wall", "-Wextra"),
+)
 _BANNER = re.compile(rb"\(Version ([^,\n]+),")
+_VERSION = re.compile(rb"LIGGGHTS[\w-]* [\d.]+(?=, compiled)")
 _LIBRARY = re.compile(r"libliggghts\S* => (\S+)")
 
 
@@ -63,13 +86,13 @@ def find_engine(wanted: str | None = None) -> Engine:
 @lru_cache(maxsize=8)
 def _identity(path: Path, _modified: int) -> str:
     digest = hashlib.sha256()
-    for part in [*parts_of(path), *(SOURCES / name for name in MODEL)]:
+    for part in [*_parts_of(path), *(SOURCES / name for name in _MODEL)]:
         with part.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())
     return digest.hexdigest()
 
 
-def parts_of(path: Path) -> tuple[Path, ...]:
+def _parts_of(path: Path) -> tuple[Path, ...]:
     """An executable and the ``libliggghts`` that it loads: Debian's is a front of 18 kB."""
     listing = subprocess.run(["ldd", str(path)], capture_output=True, text=True, errors="replace", check=False).stdout
     return path, *(Path(match) for match in _LIBRARY.findall(listing))
@@ -79,3 +102,151 @@ def version_in(output: bytes) -> str | None:
     """The version that a banner in the engine's output names, such as ``LIGGGHTS-PUBLIC 3.8.0``; None without one."""
     match = _BANNER.search(output)
     return match.group(1).decode("utf-8", "replace").strip() if match else None
+
+
+# --- the contact model ------------------------------------------------------------------------------------------------
+
+
+def plugin_of(engine: Engine) -> Path:
+    """The contact model for an engine, compiled if it never was.
+
+    Raises
+    ------
+    OtherEngine
+        If the engine is another version than the one that the model was written for.
+    ContactModelMissing
+        If it cannot be compiled: what is missing, or what the compiler says.
+    """
+    fingerprint = hashlib.sha256("\0".join(_OPTIONS).encode())
+    for name in _MODEL:
+        fingerprint.update((SOURCES / name).read_bytes())
+    for library in sorted(Path("/usr/lib").glob("*/libliggghts.so.3")):  # another file after an upgrade
+        fingerprint.update(f"{library.resolve()} {library.stat().st_mtime_ns} {library.stat().st_size}".encode())
+    place = user_cache_path("granular-walkers") / f"bridge-{fingerprint.hexdigest()[:16]}.so"
+    if set(str(place)) & set(": "):
+        raise ContactModelMissing(f"{place} has a space or a colon, which the system's loader takes for a separator")
+    _check_version(engine)
+    if not place.is_file():
+        _compile(place)
+    return place
+
+
+@lru_cache(maxsize=8)
+def _check_version(engine: Engine) -> None:
+    """Refuse a binary that says to be another version; of one that does not say it, the banner is looked at later."""
+    for part in _parts_of(engine.path):
+        with part.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as contents:
+            version = said[0].decode() if (said := _VERSION.search(contents)) else AUDITED_VERSION
+        if version != AUDITED_VERSION:
+            raise OtherEngine(engine.path, version)
+
+
+def _compile(place: Path) -> None:
+    compiler, mpi = shutil.which("g++"), shutil.which("mpicxx")
+    if compiler is None or mpi is None or not _HEADERS.is_dir():
+        raise ContactModelMissing(
+            f"it is compiled once; install what that needs: apt-get install {' '.join(_PACKAGES)}"
+        )
+    asked = subprocess.run([mpi, "--showme:incdirs"], capture_output=True, text=True, check=False)
+    included = [option for folder in (str(_HEADERS), *asked.stdout.split()) for option in ("-isystem", folder)]
+    linked = [f"-Wl,--version-script={SOURCES / 'bridge.map'}", "-Wl,-Bsymbolic", "-l:libliggghts.so.3"]
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=place.parent) as folder:
+            made = Path(folder) / place.name
+            command = [compiler, *_OPTIONS, f"-I{SOURCES}", *included, str(SOURCES / "bridge.cpp"), "-o", str(made)]
+            done = subprocess.run([*command, *linked], capture_output=True, text=True, errors="replace", check=False)
+            if done.returncode:
+                said = next((line for line in done.stderr.splitlines() if "error" in line), "nothing")
+                raise ContactModelMissing(f"the compiler says: {said}")
+            made.replace(place)
+    except OSError as error:
+        raise ContactModelMissing(f"{place} cannot be written ({error})") from error
+
+
+def run_script(plugin: Path, ranks: int) -> str:
+    """A shell script that runs a deck by hand: the model is loaded into the engine, its output goes to a file."""
+    parallel = f"mpirun -n {ranks} " if ranks > 1 else ""
+    return (
+        f'# Runs {DECK_NAME} with the contact model "cohesion bridge", which is loaded into liggghts.\n'
+        f"exec {parallel}env LD_PRELOAD={shlex.quote(str(plugin))} liggghts -in {DECK_NAME} > {OUTPUT_NAME}\n"
+    )
+
+
+def compile_model() -> None:
+    """Compile the model for the engine that is installed: ``make setup``."""
+    try:
+        plugin_of(find_engine())
+    except EngineFailure as failure:
+        raise SystemExit(f"walkers: {failure}") from failure
+
+
+# --- audits -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class AuditRecord:
+    """Outcome of an audit of a binary.
+
+    Attributes
+    ----------
+    engine, version
+        Hash of the binary (`Engine.sha256`); what its banner says.
+    scope
+        ``full`` or ``quick``.
+    lines, failures, skipped
+        How many lines the audit had, those that failed, and how many could not be measured for want of a program.
+    date
+        UTC, ISO 8601.
+    """
+
+    engine: str
+    version: str
+    scope: str
+    lines: int
+    failures: tuple[str, ...]
+    skipped: int
+    date: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether no line failed."""
+        return not self.failures
+
+    def summary(self) -> Mapping[str, Any]:
+        """What a run's manifest says of it."""
+        return {name: getattr(self, name) for name in ("scope", "passed", "lines", "skipped", "date")}
+
+
+def _record_of(engine: str, scope: str) -> Path:
+    return user_cache_path("granular-walkers") / "audits" / f"{engine}.{scope}.json"
+
+
+def read_audit(engine: str) -> AuditRecord | None:
+    """The record of a binary, by its hash: one that failed if there is one, else the full one, else the quick one.
+
+    None if the binary was never audited or its records cannot be read.
+    """
+    known = []
+    for scope in ("full", "quick"):
+        try:
+            values = read_json(_record_of(engine, scope))
+            known.append(AuditRecord(**{**values, "failures": tuple(values["failures"])}))
+        except (OSError, ValueError, KeyError, TypeError):
+            continue
+    return min(known, key=lambda record: record.passed, default=None)
+
+
+def write_audit(record: AuditRecord) -> None:
+    """Keep a record. A full audit replaces a quick one, for it holds all of its lines; a quick one stands beside it.
+
+    Raises
+    ------
+    OSError
+        If the user's cache cannot be written.
+    """
+    place = _record_of(record.engine, record.scope)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    write_json(place, asdict(record))
+    if record.scope == "full":
+        _record_of(record.engine, "quick").unlink(missing_ok=True)

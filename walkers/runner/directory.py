@@ -9,6 +9,7 @@ While it is made, the file ``<name>-<hash>.lock`` is locked, also by the engine 
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -40,6 +41,9 @@ REPLACED = ".replaced"
 _LONGEST_NAME = 80
 
 
+# --- names ------------------------------------------------------------------------------------------------------------
+
+
 def run_name(case: Case, engine: Engine) -> str:
     """Name of a run's directory: the case's name and 12 hex digits over resolved case, engine and the decks' version.
 
@@ -68,9 +72,26 @@ def run_place(case: Case, engine: Engine, out: Path) -> Path:
     return out / run_name(case, engine)
 
 
+def unfinished(place: Path) -> Path:
+    """Where the run of a place is made."""
+    return place.with_name(place.name + UNFINISHED)
+
+
+def holds_unfinished(directory: Path) -> bool:
+    """Whether a directory has what that of an unfinished run has: its case, or nothing but what is there before it."""
+    try:
+        names = {path.name for path in directory.iterdir()}
+    except OSError:  # not ours to read
+        return False
+    return CASE_NAME in names or all(name in (SEGMENTS, FAILURE_NAME) or name.startswith(".case.") for name in names)
+
+
+# --- reading ----------------------------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True)
 class FinishedRun:
-    """A run that has its manifest."""
+    """A run that has its manifest: its directory, and what that holds."""
 
     directory: Path
 
@@ -118,15 +139,6 @@ def layout_of(segment: Path) -> Layout:
     return Layout.from_dict(read_json(segment / LAYOUT_NAME))
 
 
-def write_segment_record(
-    directory: Path, segment: Segment, report: EngineReport, rms_velocity: float | None = None
-) -> dict[str, Any]:
-    """Write what a segment is and what it took into its directory, and return it."""
-    record = {**vars(segment), **vars(report), "root_mean_square_velocity": rms_velocity}
-    write_json(directory / SEGMENT_NAME, record, at_once=False)
-    return record
-
-
 def segment_directories(directory: Path) -> list[Path]:
     """The whole segments of a run, in their order."""
     return sorted(path for path in (directory / SEGMENTS).glob("[0-9]*") if not path.suffix)
@@ -143,63 +155,7 @@ def finished_places(out: Path) -> dict[str, Path]:
     return {place.name: place for place in places if not place.name.endswith((UNFINISHED, REPLACED))}
 
 
-def move_into_place(made: Path, place: Path) -> None:
-    """Give a directory that has been made, and is safe on disk, its name, in exchange for one that has it already."""
-    recover(place)
-    replaced = _aside(place)
-    if place.exists():
-        place.rename(replaced)
-    made.rename(place)
-    fsync_path(place.parent)
-    shutil.rmtree(replaced, ignore_errors=True)
-
-
-def _aside(place: Path) -> Path:
-    return place.with_name(place.name + REPLACED)
-
-
-def unfinished(place: Path) -> Path:
-    """Where the run of a place is made."""
-    return place.with_name(place.name + UNFINISHED)
-
-
-def recover(place: Path) -> None:
-    """Undo a replacement that was interrupted between its two renames; end one that was interrupted after them."""
-    replaced = _aside(place)
-    if not replaced.exists():
-        return
-    if place.exists():
-        shutil.rmtree(replaced)
-    else:
-        replaced.rename(place)
-
-
-def holds_unfinished(directory: Path) -> bool:
-    """Whether a directory has what that of an unfinished run has: its case, or nothing but what is there before it."""
-    try:
-        names = {path.name for path in directory.iterdir()}
-    except OSError:  # not ours to read
-        return False
-    begun = {SEGMENTS, FAILURE_NAME}
-    return CASE_NAME in names or all(name in begun or name.startswith(".case.") for name in names)
-
-
-@contextmanager
-def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
-    """Turn the system's word for a full disk into a `DiskFull`, of a removed directory into an `OutputGone`.
-
-    So many bytes are still to be written.
-    """
-    import errno
-
-    try:
-        yield
-    except OSError as error:
-        if error.errno == errno.ENOENT and not incomplete.exists():
-            raise OutputGone(incomplete) from error
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
-            raise
-        raise DiskFull(needed, shutil.disk_usage(incomplete.parent).free, incomplete) from error
+# --- writing ----------------------------------------------------------------------------------------------------------
 
 
 def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
@@ -221,8 +177,53 @@ def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
     write_json(directory / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
 
 
+def write_segment_record(
+    directory: Path, segment: Segment, report: EngineReport, rms_velocity: float | None = None
+) -> dict[str, Any]:
+    """Write what a segment is and what it took into its directory, and return it."""
+    record = {**vars(segment), **vars(report), "root_mean_square_velocity": rms_velocity}
+    write_json(directory / SEGMENT_NAME, record, at_once=False)
+    return record
+
+
 def record_failure(incomplete: Path, failure: Exception) -> None:
     """Leave word of a failure in the directory of an unfinished run."""
     said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
     with suppress(OSError):  # a full disk: the message reaches the user all the same
         write_json(incomplete / FAILURE_NAME, said)
+
+
+@contextmanager
+def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
+    """Turn the system's word for a full disk, to which so many bytes are still to be written, into a `DiskFull`.
+
+    And that for a directory that was removed into an `OutputGone`.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno == errno.ENOENT and not incomplete.exists():
+            raise OutputGone(incomplete) from error
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        raise DiskFull(needed, shutil.disk_usage(incomplete.parent).free, incomplete) from error
+
+
+def move_into_place(made: Path, place: Path) -> None:
+    """Give a directory that has been made, and is safe on disk, its name, in exchange for one that has it already."""
+    recover(place)
+    replaced = place.with_name(place.name + REPLACED)
+    if place.exists():
+        place.rename(replaced)
+    made.rename(place)
+    fsync_path(place.parent)
+    shutil.rmtree(replaced, ignore_errors=True)
+
+
+def recover(place: Path) -> None:
+    """Undo a replacement that was interrupted between its two renames; end one that was interrupted after them."""
+    replaced = place.with_name(place.name + REPLACED)
+    if not place.exists() and replaced.exists():
+        replaced.rename(place)
+    elif replaced.exists():
+        shutil.rmtree(replaced)

@@ -1,29 +1,24 @@
-"""Every way in which a run is known to fail: what it is called, how it is seen, what the user is told.
+"""Every way in which a run is known to fail, and what it is called.
 
 The engine's own signs are unreliable (an ERROR line without an exit status, an exit status without a line, silence), so
-each failure is recognised by what it leaves behind. `walkers.runner.launch` raises them.
+each failure is recognised by what it leaves behind, mostly in `walkers.runner.launch`.
 """
 
 from __future__ import annotations
 
 import platform
-import signal
 from collections.abc import Sequence
-from math import isfinite
 from pathlib import Path
 
 from walkers.inputs.errors import WalkersError
-
-INSTALL_COMMAND = "sudo apt-get install liggghts"
+from walkers.templates.engine import AUDITED_VERSION
 
 
 class EngineFailure(WalkersError):
     """Root of the failures of a run; ``directory`` is where its remains are, ``lost`` the number of beads lost."""
 
-    lost = 0
-
-    def __init__(self, message: str, directory: Path | None = None) -> None:
-        self.directory = directory
+    def __init__(self, message: str, directory: Path | None = None, *, lost: int = 0) -> None:
+        self.directory, self.lost = directory, lost
         super().__init__(f"{message} (see {directory})" if directory else message)
 
     @property
@@ -36,17 +31,14 @@ class EngineMissing(EngineFailure):
     """There is no liggghts to run. Seen before anything is written."""
 
     def __init__(self, wanted: str) -> None:
-        super().__init__(
-            f"no engine: {wanted} is not an executable file on this machine; install it with: {INSTALL_COMMAND}"
-        )
+        told = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
+        super().__init__(f"no engine: {wanted} {told}")
 
 
 class OtherEngine(EngineFailure):
-    """The engine is another version than the one that the contact model was written for. Seen before it starts."""
+    """The engine is another version than the one that the contact model was written for."""
 
     def __init__(self, path: Path, version: str | None) -> None:
-        from walkers.templates.engine import AUDITED_VERSION
-
         super().__init__(
             f"{path} is {version or 'no LIGGGHTS that names its version'}: decks need a contact model that is written "
             f"for {AUDITED_VERSION}, as Debian packages it"
@@ -77,81 +69,37 @@ class ProgramDiffers(EngineFailure):
 class EngineNeverStarted(EngineFailure):
     """The engine ended before it named its version: nothing was done. It is tried again before this is raised."""
 
-    def __init__(self, last_words: str, directory: Path) -> None:
-        super().__init__(f"the engine never started: {last_words}", directory)
-
 
 class EngineError(EngineFailure):
-    """The engine stopped with an ERROR line, or with a non-zero status and none. The line is quoted."""
-
-    def __init__(self, line: str, directory: Path) -> None:
-        self.line = line
-        super().__init__(f"the engine stopped: {line}", directory)
+    """The engine stopped with an ERROR line, which is quoted, or with a non-zero status and none."""
 
 
 class EngineKilled(EngineFailure):
     """A signal ended the engine: a crash of its own (SIGSEGV), or somebody's kill."""
 
-    def __init__(self, number: int, directory: Path) -> None:
-        self.signal = number
-        try:
-            name = signal.Signals(number).name
-        except ValueError:
-            name = f"signal {number}"
-        super().__init__(f"the engine was ended by {name}", directory)
-
 
 class EngineSilent(EngineFailure):
     """The engine wrote nothing for too long, neither into its log nor into its dump, and was ended."""
-
-    def __init__(self, silence: float, step: int, steps: int, directory: Path) -> None:
-        super().__init__(
-            f"the engine wrote nothing for {silence:g} s (run.silence) after step {step} of {steps}, and was ended",
-            directory,
-        )
 
 
 class LogTooLong(EngineFailure):
     """The engine's log grew beyond all that a deck has it write, and the engine was ended. The log is cut there."""
 
-    def __init__(self, limit: float, step: int, directory: Path) -> None:
-        super().__init__(
-            f"the engine's log grew beyond {limit / 1e6:g} MB (run.log_limit) after step {step}, and it was ended",
-            directory,
-        )
-
 
 class MissingFrames(EngineFailure):
-    """The engine ended without complaint but its dump is short."""
-
-    def __init__(self, found: float, expected: int, directory: Path) -> None:
-        super().__init__(f"the engine wrote {int(found)} of {expected} frames and reported no error", directory)
+    """The engine ended without complaint but a dump is short."""
 
 
 class BeadsLost(EngineFailure):
     """Beads left the simulation box. Seen in the number of atoms, which the engine prints every cycle."""
 
-    def __init__(self, lost: int, step: int, directory: Path) -> None:
-        self.lost = lost
-        super().__init__(
-            f"{lost} bead(s) left the simulation box before step {step}: walkers went further than the box is wide (a "
-            "larger dimers.spacing or a shorter run keeps them in), or a pile's beads left over the rim",
-            directory,
-        )
-
 
 class BlowUp(EngineFailure):
     """A bead is faster than the drive can make it, or its speed is no number: most often too large a time step."""
 
-    def __init__(self, speed: float, fastest: float, step: int, directory: Path) -> None:
-        seen = f"moves at {speed:.3g} m/s" if isfinite(speed) else "has a speed or position that is no number"
-        if speed <= fastest:
-            seen = "left the box at a time step beyond its limits"
-        super().__init__(
-            f"blow-up: a bead {seen} after step {step}, "
-            f"the drive cannot give more than {fastest:.3g} m/s; most often the time step is too large",
-            directory,
-        )
+
+class TimeLimitExceeded(EngineFailure):
+    """The run took longer than it was allowed to."""
 
 
 class DiskFull(EngineFailure):
@@ -167,13 +115,6 @@ class OutputGone(EngineFailure):
 
     def __init__(self, directory: Path) -> None:
         super().__init__(f"{directory} was removed while it was written")
-
-
-class TimeLimitExceeded(EngineFailure):
-    """The run took longer than it was allowed to."""
-
-    def __init__(self, limit: float, step: int, steps: int, directory: Path) -> None:
-        super().__init__(f"time limit of {limit:g} s reached at step {step} of {steps}", directory)
 
 
 class WalkersMet(EngineFailure):

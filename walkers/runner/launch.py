@@ -13,24 +13,11 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
-from walkers.runner.binary import Engine, version_in
-from walkers.runner.failures import (
-    BeadsLost,
-    BlowUp,
-    DiskFull,
-    EngineError,
-    EngineKilled,
-    EngineNeverStarted,
-    EngineSilent,
-    LogTooLong,
-    MissingFrames,
-    OtherEngine,
-    TimeLimitExceeded,
-)
-from walkers.runner.plugin import plugin_of, run_script
+from walkers.runner import failures
+from walkers.runner.binary import Engine, plugin_of, run_script, version_in
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME, Deck
 from walkers.templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, RANKS, STEP_VARIABLES
 
@@ -39,6 +26,8 @@ _POLL_SECONDS = 0.05
 _MORTAL = ("setpriv", "--pdeathsig", "KILL")
 # Whoever died before that was asked of the kernel is not noticed by it: then the parent is another one by now.
 _UNLESS_ORPHAN = ("sh", "-c", '[ "$PPID" = "$0" ] && exec "$@"')
+# Unless told otherwise mpirun refuses root, more ranks than cores, and binds all decks to the same cores.
+_TOGETHER = ("mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n")
 # Where there is but a loopback nobody reaches mpirun, which listens on every address that it sees, whatever it is told.
 _LOOPBACK_ALONE = ("sh", "-c", 'PATH="$PATH:/usr/sbin:/sbin" ip link set lo up && exec "$@"', "sh")
 _UNSHARED = (("unshare", "--net"), ("unshare", "--net", "--map-current-user", "--keep-caps"))
@@ -54,6 +43,7 @@ _SPARE_BYTES = 64 * 1024
 _TEMPORARY_BYTES = 16_000_000
 """In TMPDIR, of mpirun and its processes: with 6 MB they wait for each other without end."""
 _STATUS_LINE = re.compile(rb"^ *(\d+) +(\d+) +(\S+)((?: +[-+.\w]+){6}) *$", re.MULTILINE)
+"""Step, atoms, speed of the fastest bead (m/s), and the beads' bounds (m: x, x, y, y, z, z)."""
 _ERROR_LINE = re.compile(rb"^.*\bERROR\b.*$", re.MULTILINE)
 _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
 
@@ -126,31 +116,51 @@ def launch(
     EngineFailure
         One of the failures of `walkers.runner.failures`; the engine and its children have ended by then.
     """
+    ranks, temporary = deck.layout.ranks, Path(os.environ.get("TMPDIR", "/tmp"))
     check_room(directory, deck.layout.bead_dump_bytes)
-    temporary = Path(os.environ.get("TMPDIR", "/tmp"))
-    if deck.layout.ranks > 1 and temporary.is_dir():
+    if ranks > 1 and temporary.is_dir():
         check_room(temporary, _TEMPORARY_BYTES)
     plugin = plugin_of(engine)
-    (directory / RUN_NAME).write_text(run_script(plugin, deck.layout.ranks), encoding="utf-8")
-    start = partial(_start, directory, engine, plugin, deck.layout.ranks, keep_open)
-    for _ in range(starts - 1):
-        with suppress(EngineNeverStarted):
-            return _watched(_Watch(deck, directory, engine.path), start, on_progress, time_limit)
-        time.sleep(_PAUSE_SECONDS)
-    return _watched(_Watch(deck, directory, engine.path), start, on_progress, time_limit)
+    (directory / RUN_NAME).write_text(run_script(plugin, ranks), encoding="utf-8")
+    command = [*_before(ranks), "env", f"LD_PRELOAD={plugin}", str(engine.path), "-log", "none", "-in", DECK_NAME]
+    while True:
+        starts -= 1
+        try:
+            return _watched(_Watch(deck, directory, engine.path), command, on_progress, time_limit, keep_open)
+        except failures.EngineNeverStarted:
+            if not starts:
+                raise
+            time.sleep(_PAUSE_SECONDS)
+
+
+def check_room(folder: Path, needed: int) -> None:
+    """Raise `DiskFull` unless so many bytes, and some more, are free where a folder is."""
+    free = shutil.disk_usage(folder).free
+    if free < needed + _SPARE_BYTES:
+        raise failures.DiskFull(needed, free, folder)
 
 
 def _watched(
     watch: _Watch,
-    start: Callable[[], subprocess.Popen[bytes]],
+    command: Sequence[str],
     on_progress: Callable[[Progress], None] | None,
     time_limit: float | None,
+    keep_open: Sequence[int],
 ) -> EngineReport:
     """Start an engine and watch it to its end."""
     process = None
     try:
-        with postponed_interrupts():
-            process = start()
+        with postponed_interrupts(), (watch.directory / OUTPUT_NAME).open("wb") as output:
+            process = subprocess.Popen(
+                command,
+                cwd=watch.directory,
+                env=_environment(watch.layout.ranks),
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                pass_fds=tuple(keep_open),
+            )
         while process.poll() is None:
             try:
                 process.wait(_POLL_SECONDS)
@@ -163,62 +173,34 @@ def _watched(
         if process is not None:
             _end(process)
             watch.cut_log()
-    wall_seconds = time.perf_counter() - watch.begin
-    watch.end()
-    watch.check(None)
-    return _verdict(watch, process.returncode, wall_seconds)
+    return watch.verdict(process.returncode)
 
 
-def check_room(folder: Path, needed: int) -> None:
-    """Raise `DiskFull` unless so many bytes, and some more, are free where a folder is."""
-    free = shutil.disk_usage(folder).free
-    if free < needed + _SPARE_BYTES:
-        raise DiskFull(needed, free, folder)
-
-
-def _start(
-    directory: Path, engine: Engine, plugin: Path, ranks: int, keep_open: Sequence[int]
-) -> subprocess.Popen[bytes]:
-    # Unless told otherwise mpirun refuses root, more ranks than cores, and binds all decks to the same cores.
+def _before(ranks: int) -> tuple[str, ...]:
+    """What starts the engine, so that it ends with its launcher, in as many processes, off the network if several."""
     mortal = _MORTAL if shutil.which(_MORTAL[0]) else ()
     unless_orphan = (*_UNLESS_ORPHAN, str(os.getpid())) if mortal else ()
-    together = ("mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), *mortal)
-    parallel, apart = (together, _off_the_network()) if ranks > 1 else ((), ())
-    loading = ("env", f"LD_PRELOAD={plugin}")
-    command = [*apart, *mortal, *unless_orphan, *parallel, *loading, str(engine.path), "-log", "none", "-in", DECK_NAME]
-    with (directory / OUTPUT_NAME).open("wb") as output:
-        return subprocess.Popen(
-            command,
-            cwd=directory,
-            env=_environment(ranks),
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            pass_fds=tuple(keep_open),
-        )
+    if ranks == 1:
+        return (*mortal, *unless_orphan)
+    return (*_off_the_network(), *mortal, *unless_orphan, *_TOGETHER, str(ranks), *mortal)
 
 
 @cache
 def _off_the_network() -> tuple[str, ...]:
     """What starts a program where there is no network but the loopback; nothing where the system lets nobody do so."""
     for unshared in _UNSHARED:
-        with suppress(OSError):
-            prefix = (*unshared, *_LOOPBACK_ALONE)
-            if not subprocess.run(
-                [*prefix, "true"], stdin=subprocess.DEVNULL, capture_output=True, check=False
-            ).returncode:
-                return prefix
+        prefix = (*unshared, *_LOOPBACK_ALONE)
+        with suppress(OSError, subprocess.CalledProcessError):
+            subprocess.run([*prefix, "true"], stdin=subprocess.DEVNULL, capture_output=True, check=True)
+            return prefix
     return ()
 
 
 def _environment(ranks: int) -> dict[str, str]:
     # What a user has Open MPI do on a cluster, such as by which network to meet, may leave no way on one machine.
-    inherited = {
-        name: value
-        for name, value in os.environ.items()
-        if name not in STEP_VARIABLES and not name.startswith("OMPI_MCA_")
-    }
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith("OMPI_MCA_")}
+    for name in STEP_VARIABLES:
+        inherited.pop(name, None)
     return {**inherited, **(RANKS if ranks > 1 else ALONE)}
 
 
@@ -258,23 +240,151 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-@dataclass(frozen=True)
-class _Status:
-    """A line of the engine's status: step, atoms, fastest bead (m/s) and the beads' bounds (m: x, x, y, y, z, z)."""
+class _Watch:
+    """Reads the engine's output as it grows, keeps of it what is asked for later, and raises what is wrong."""
 
-    step: int
-    atoms: int
-    speed: float
-    bounds: tuple[float, ...]
+    def __init__(self, deck: Deck, directory: Path, engine: Path) -> None:
+        self.deck, self.layout, self.directory, self.engine = deck, deck.layout, directory, engine
+        self.begin = self.looked = time.perf_counter()
+        self.log = directory / OUTPUT_NAME
+        self.step = 0
+        self.clearance: float | None = None  # from the outermost bead to the box at that step, m
+        self.version: str | None = None
+        self.failure: failures.EngineFailure | None = None
+        self.error = self.last_line = self.rest = b""
+        self.loop_seconds = math.nan
+        self.read = self.grown = 0
+        self.silent = 0.0
 
-    def clearance(self, box: tuple[Sequence[float], Sequence[float]]) -> float:
-        """Distance from the outermost bead to the nearest face of the box, m."""
-        lower, upper = box
-        sides = zip(lower, upper, self.bounds[::2], self.bounds[1::2], strict=True)
-        return min(min(low - floor, ceiling - high) for floor, ceiling, low, high in sides)
+    @property
+    def elapsed(self) -> float:
+        return time.perf_counter() - self.begin
+
+    @property
+    def progress(self) -> Progress:
+        return Progress(self.step, self.layout.steps, self.step * self.layout.time_step, self.elapsed, self.step)
+
+    @property
+    def written(self) -> int:
+        """Bytes of the beads' dump."""
+        dump = self.directory / self.layout.bead_dump
+        return dump.stat().st_size if dump.exists() else 0
+
+    def look(self) -> None:
+        """Take in what the engine has written since the last look, as far as its log may go, or how long it has not."""
+        with self.log.open("rb") as output:
+            output.seek(self.read)
+            while self.read <= self.deck.log_limit and (chunk := output.read(_CHUNK_BYTES)):
+                self.read += len(chunk)
+                whole, newline, self.rest = (self.rest + chunk).rpartition(b"\n")
+                self._take_in(whole + newline)
+                self.rest = self.rest[:_CHUNK_BYTES]  # a line without end
+        now, grown = time.perf_counter(), self.read + self.written
+        self.silent = 0.0 if grown != self.grown else self.silent + min(now - self.looked, _LONGEST_LOOK)
+        self.looked, self.grown = now, grown
+
+    def cut_log(self) -> None:
+        """Cut a log that became too long before its engine had ended."""
+        with suppress(OSError):  # a folder that is gone
+            if self.log.stat().st_size > self.deck.log_limit:
+                os.truncate(self.log, int(self.deck.log_limit))
+
+    def _take_in(self, lines: bytes) -> None:
+        self.version = self.version or version_in(lines)
+        if not self.error and (error := _ERROR_LINE.search(lines)):
+            self.error = error[0].strip()
+        for match in _STATUS_LINE.finditer(lines):
+            bounds = [float(one) for one in match[4].split()]
+            failure = self._judge(int(match[1]), int(match[2]), float(match[3]), bounds)
+            self.failure = self.failure or failure
+        if loops := _LOOP_TIME.findall(lines):
+            self.loop_seconds = float(loops[-1])
+        if words := lines.strip():
+            self.last_line = words.rsplit(b"\n", 1)[-1]
+
+    def _judge(self, step: int, atoms: int, speed: float, bounds: Sequence[float]) -> failures.EngineFailure | None:
+        """What a status line tells of the beads, given the one before."""
+        fastest, lost = self.deck.fastest, self.layout.atoms - atoms
+        seconds, clearance = (step - self.step) * self.layout.time_step, self.clearance
+        sides = zip(*self.deck.box, bounds[::2], bounds[1::2], strict=True)
+        self.clearance = min(min(low - floor, ceiling - high) for floor, ceiling, low, high in sides)
+        self.step = step
+        if not speed <= fastest:
+            return self._blow_up(speed)
+        if lost <= 0:
+            return None
+        if self.deck.beyond_limits:
+            return self._blow_up(0.0)
+        # A bead that has left the box since the last line was at least as fast as this.
+        if clearance is not None and clearance / seconds > fastest:
+            return self._blow_up(clearance / seconds)
+        told = (
+            f"{lost} bead(s) left the simulation box before step {step}: walkers went further than the box is wide (a "
+            "larger dimers.spacing or a shorter run keeps them in), or a pile's beads left over the rim"
+        )
+        return failures.BeadsLost(told, self.directory, lost=lost)
+
+    def _blow_up(self, speed: float) -> failures.BlowUp:
+        seen = f"moves at {speed:.3g} m/s" if math.isfinite(speed) else "has a speed or position that is no number"
+        if speed <= self.deck.fastest:
+            seen = "left the box at a time step beyond its limits"
+        return failures.BlowUp(
+            f"blow-up: a bead {seen} after step {self.step}, the drive cannot give more than "
+            f"{self.deck.fastest:.3g} m/s; most often the time step is too large",
+            self.directory,
+        )
+
+    def check(self, time_limit: float | None = None) -> None:
+        """Raise the failure that shows while the engine runs, if any."""
+        deck, after = self.deck, f"after step {self.step}"
+        if self.version not in (None, AUDITED_VERSION):
+            raise failures.OtherEngine(self.engine, self.version)
+        if self.failure is not None:
+            raise self.failure
+        if self.read > deck.log_limit:
+            told = f"the engine's log grew beyond {deck.log_limit / 1e6:g} MB (run.log_limit) {after}, and it was ended"
+            raise failures.LogTooLong(told, self.directory)
+        if self.silent > deck.silence:
+            told = f"the engine wrote nothing for {deck.silence:g} s (run.silence) {after} of {self.layout.steps}"
+            raise failures.EngineSilent(f"{told}, and was ended", self.directory)
+        if time_limit is not None and self.elapsed > time_limit:
+            told = f"time limit of {time_limit:g} s reached at step {self.step} of {self.layout.steps}"
+            raise failures.TimeLimitExceeded(told, self.directory)
+        missing = self.layout.bead_dump_bytes - self.written
+        free = shutil.disk_usage(self.directory).free
+        if missing > 0 and free < _SPARE_BYTES:
+            raise failures.DiskFull(missing, free, self.directory)
+
+    def verdict(self, status: int) -> EngineReport:
+        """Judge a run that has ended: raise its failure or report what it took."""
+        wall_seconds, layout = self.elapsed, self.layout
+        self.look()
+        self._take_in(self.rest)  # the last line may lack its end
+        self.check()
+        words = f", last words: {_text(self.last_line)}" if self.last_line else ", without a word"
+        if status > 0 and self.version is None and not self.error.startswith(b"ERROR"):
+            raise failures.EngineNeverStarted(f"the engine never started: exit status {status}{words}", self.directory)
+        if POSITION_IS_NO_NUMBER.encode() in self.error:
+            raise self._blow_up(math.nan)
+        if self.error:
+            raise failures.EngineError(f"the engine stopped: {_text(self.error)}", self.directory)
+        if status < 0:
+            known = -status in set(signal.Signals)
+            name = signal.Signals(-status).name if known else f"signal {-status}"
+            raise failures.EngineKilled(f"the engine was ended by {name}", self.directory)
+        if status > 0:
+            raise failures.EngineError(f"the engine stopped: exit status {status}{words}", self.directory)
+        frames_of_beads = self.written / layout.bead_dump_bytes * layout.frames
+        dumps = (layout.pair_bridge_dump, layout.wall_bridge_dump)
+        frames_of_bridges = [(_complete_frames(self.directory / name), layout.bridge_frames) for name in dumps]
+        for frames, expected in [(frames_of_beads, layout.frames), *frames_of_bridges]:
+            if frames != expected:
+                told = f"the engine wrote {int(frames)} of {expected} frames and reported no error"
+                raise failures.MissingFrames(told, self.directory)
+        return EngineReport(self.version or "unknown", wall_seconds, self.loop_seconds, layout.steps)
 
 
-def complete_local_frames(path: Path) -> int:
+def _complete_frames(path: Path) -> int:
     """Number of complete frames of a local dump: the last one counts only with all of its rows."""
     text = path.read_bytes() if path.exists() else b""
     frames = text.count(b"ITEM: TIMESTEP")
@@ -282,149 +392,6 @@ def complete_local_frames(path: Path) -> int:
     # Nine lines of header, the fourth being the number of rows, then the rows, each ended by a newline.
     whole = len(last) > 9 and last[3].isdigit() and len(last) - 10 == int(last[3])
     return frames if whole or not frames else frames - 1
-
-
-class _Watch:
-    """Reads the engine's output as it grows, and keeps of it what is asked for later."""
-
-    def __init__(self, deck: Deck, directory: Path, engine: Path) -> None:
-        self.deck = deck
-        self.directory = directory
-        self.engine = engine
-        self.begin = time.perf_counter()
-        self.status: _Status | None = None
-        self.failure: BlowUp | BeadsLost | None = None
-        self.version: str | None = None
-        self.error: bytes | None = None
-        self.loop_seconds = math.nan
-        self.last_line = b""
-        self._read = 0
-        self._rest = b""
-        self._looked = self.begin
-        self._silent = 0.0
-        self._grown = 0
-
-    @property
-    def step(self) -> int:
-        return self.status.step if self.status else 0
-
-    @property
-    def progress(self) -> Progress:
-        layout = self.deck.layout
-        elapsed = time.perf_counter() - self.begin
-        return Progress(self.step, layout.steps, self.step * layout.time_step, elapsed, self.step)
-
-    def look(self) -> None:
-        """Take in what the engine has written since the last look, as far as its log may go."""
-        with self._log.open("rb") as output:
-            output.seek(self._read)
-            while self._read <= self.deck.log_limit and (chunk := output.read(_CHUNK_BYTES)):
-                self._read += len(chunk)
-                whole, newline, self._rest = (self._rest + chunk).rpartition(b"\n")
-                self._take_in(whole + newline)
-                if len(self._rest) > _CHUNK_BYTES:  # a line without end
-                    self._rest = b""
-        self._listen()
-
-    def _listen(self) -> None:
-        """How long the engine has written nothing."""
-        now, grown = time.perf_counter(), self._read + self.written
-        self._silent = 0.0 if grown != self._grown else self._silent + min(now - self._looked, _LONGEST_LOOK)
-        self._looked, self._grown = now, grown
-
-    def cut_log(self) -> None:
-        """Cut a log that became too long before its engine had ended."""
-        with suppress(OSError):  # a folder that is gone
-            if self._log.stat().st_size > self.deck.log_limit:
-                os.truncate(self._log, int(self.deck.log_limit))
-
-    def end(self) -> None:
-        """Take in the last line, which may lack its end."""
-        self.look()
-        self._take_in(self._rest)
-
-    def _take_in(self, lines: bytes) -> None:
-        self.version = self.version or version_in(lines)
-        if self.error is None and (error := _ERROR_LINE.search(lines)):
-            self.error = error[0].strip()
-        for match in _STATUS_LINE.finditer(lines):
-            status = _Status(int(match[1]), int(match[2]), float(match[3]), tuple(map(float, match[4].split())))
-            self.failure = self.failure or self._judge(status)
-            self.status = status
-        if loops := _LOOP_TIME.findall(lines):
-            self.loop_seconds = float(loops[-1])
-        if words := lines.strip():
-            self.last_line = words.rsplit(b"\n", 1)[-1]
-
-    def _judge(self, status: _Status) -> BlowUp | BeadsLost | None:
-        """What a status line tells of the beads, given the one before."""
-        fastest = self.deck.fastest
-        if not status.speed <= fastest:
-            return BlowUp(status.speed, fastest, status.step, self.directory)
-        lost = self.deck.layout.atoms - status.atoms
-        if lost <= 0:
-            return None
-        if self.deck.beyond_limits:
-            return BlowUp(0.0, fastest, status.step, self.directory)
-        if self.status is not None:
-            # A bead that has left the box since the last line was at least this fast.
-            seconds = (status.step - self.status.step) * self.deck.layout.time_step
-            needed = self.status.clearance(self.deck.box) / seconds
-            if needed > fastest:
-                return BlowUp(needed, fastest, status.step, self.directory)
-        return BeadsLost(lost, status.step, self.directory)
-
-    def check(self, time_limit: float | None) -> None:
-        """Raise the failure that shows while the engine runs, if any."""
-        if self.version not in (None, AUDITED_VERSION):
-            raise OtherEngine(self.engine, self.version)
-        if self.failure is not None:
-            raise self.failure
-        if self._read > self.deck.log_limit:
-            raise LogTooLong(self.deck.log_limit, self.step, self.directory)
-        if self._silent > self.deck.silence:
-            raise EngineSilent(self.deck.silence, self.step, self.deck.layout.steps, self.directory)
-        if time_limit is not None and time.perf_counter() - self.begin > time_limit:
-            raise TimeLimitExceeded(time_limit, self.step, self.deck.layout.steps, self.directory)
-        missing = self.deck.layout.bead_dump_bytes - self.written
-        free = shutil.disk_usage(self.directory).free
-        if missing > 0 and free < _SPARE_BYTES:
-            raise DiskFull(missing, free, self.directory)
-
-    @property
-    def _log(self) -> Path:
-        return self.directory / OUTPUT_NAME
-
-    @property
-    def written(self) -> int:
-        dump = self.directory / self.deck.layout.bead_dump
-        return dump.stat().st_size if dump.exists() else 0
-
-
-def _verdict(watch: _Watch, status: int, wall_seconds: float) -> EngineReport:
-    """Judge a run that has ended: raise its failure or report what it took."""
-    layout, directory = watch.deck.layout, watch.directory
-    if status > 0 and watch.version is None and not (watch.error or b"").startswith(b"ERROR"):
-        raise EngineNeverStarted(_ending(status, watch.last_line), directory)
-    if watch.error is not None:
-        if POSITION_IS_NO_NUMBER.encode() in watch.error:
-            raise BlowUp(math.nan, watch.deck.fastest, watch.step, directory)
-        raise EngineError(_text(watch.error), directory)
-    if status < 0:
-        raise EngineKilled(-status, directory)
-    if status > 0:
-        raise EngineError(_ending(status, watch.last_line), directory)
-    if watch.written != layout.bead_dump_bytes:
-        raise MissingFrames(watch.written / layout.bead_dump_bytes * layout.frames, layout.frames, directory)
-    for name in (layout.pair_bridge_dump, layout.wall_bridge_dump):
-        found = complete_local_frames(directory / name)
-        if found != layout.bridge_frames:
-            raise MissingFrames(found, layout.bridge_frames, directory)
-    return EngineReport(watch.version or "unknown", wall_seconds, watch.loop_seconds, layout.steps)
-
-
-def _ending(status: int, last_line: bytes) -> str:
-    return f"exit status {status}" + (f", last words: {_text(last_line)}" if last_line else ", without a word")
 
 
 def _text(line: bytes) -> str:

@@ -11,17 +11,16 @@ import fcntl
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-_SUFFIX = ".lock"
 _LOOK_SECONDS = 0.01
 _PATIENCE_SECONDS = 2.0
 """Before locks are taken for another's: engines whose launcher was killed end within a fraction of a second."""
 
 
 def _lock_file(place: Path) -> Path:
-    return place.with_name(place.name + _SUFFIX)
+    return place.with_name(f"{place.name}.lock")
 
 
 @contextmanager
@@ -43,8 +42,7 @@ def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
     try:
         # In the order of their names, so that of two who want the same places one gets them rather than each a half.
         for place in sorted(set(places)):
-            descriptor = _lock(_lock_file(place), end)
-            if descriptor is not None:
+            if (descriptor := _lock(_lock_file(place), end)) is not None:
                 ours[place] = descriptor
         yield ours
     finally:
@@ -59,28 +57,24 @@ def _lock(file: Path, end: float) -> int | None:
         descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if os.path.samestat(os.fstat(descriptor), file.stat()):
-                return descriptor
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(descriptor), file.stat()):
+                    return descriptor
         except BlockingIOError:
             if time.monotonic() > end:
                 os.close(descriptor)
                 return None
             time.sleep(_LOOK_SECONDS)
-        except FileNotFoundError:
-            pass
         os.close(descriptor)
 
 
 def is_locked(place: Path) -> bool:
     """Whether somebody is making the run whose place this is."""
     try:
-        descriptor = os.open(_lock_file(place), os.O_RDONLY)
+        with _lock_file(place).open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except FileNotFoundError:
         return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return True
-    finally:
-        os.close(descriptor)
     return False

@@ -13,11 +13,9 @@ from typing import Any
 
 from walkers.inputs.case import Case
 from walkers.inputs.errors import WalkersError
-from walkers.runner.audits import read_audit
-from walkers.runner.binary import Engine
+from walkers.runner.binary import Engine, plugin_of, read_audit
 from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import EngineReport
-from walkers.runner.plugin import plugin_of
 from walkers.runner.provenance import software
 from walkers.templates.deck import CONTENT_VERSION
 
@@ -44,11 +42,8 @@ def manifest(
     """
     finished = time.time()
     audit, plugin = read_audit(engine.sha256), plugin_of(engine)
-    files = {
-        path.relative_to(directory).as_posix(): path.stat().st_size
-        for path in sorted(directory.rglob("*"))
-        if path.is_file()
-    }
+    paths = [path for path in sorted(directory.rglob("*")) if path.is_file()]
+    files = {path.relative_to(directory).as_posix(): path.stat().st_size for path in paths}
     return {
         "format": FORMAT,
         "status": "finished",
@@ -61,7 +56,7 @@ def manifest(
             "audit": audit.summary() if audit else None,
         },
         "deck_version": CONTENT_VERSION,
-        "contact_model": {"path": str(plugin), "sha256": checksums(plugin.parent, [plugin.name])[plugin.name]},
+        "contact_model": {"path": str(plugin), "sha256": checksum(plugin)},
         **_made_by(),
         "host": platform.node(),
         "platform": platform.platform(),
@@ -77,6 +72,16 @@ def manifest(
         "files": files,
         "sha256": checksums(directory, files),
     }
+
+
+def _made_by() -> dict[str, Any]:
+    ours = software()
+    versions = {"granular_walkers": ours.version, "commit": ours.commit}
+    return {**versions, "python": ours.python, "packages": ours.packages}
+
+
+def _iso(seconds: float) -> str:
+    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))
 
 
 def checksums(directory: Path, names: Iterable[str]) -> dict[str, str]:
@@ -127,10 +132,10 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
         If the manifest, or a file, cannot be read.
     """
     try:
-        contents = read_json(directory / MANIFEST_NAME)
+        sums = _sums(read_json(directory / MANIFEST_NAME), directory)
     except FileNotFoundError:
         return True
-    wanted = {name: one for name, one in _sums(contents, directory).items() if name in names}
+    wanted = {name: sums[name] for name in names if name in sums}
     for name, now in checksums(directory, wanted).items():
         if now != wanted[name]:
             told = "is not what it was when the run was finished; what else is not: walkers verify"
@@ -144,48 +149,30 @@ def _sums(contents: dict[str, Any], directory: Path) -> dict[str, str]:
     return sums
 
 
-def record_tables(directory: Path, names: Iterable[str]) -> None:
+def forget_tables(directory: Path, names: Collection[str]) -> None:
+    """Say no more in the manifest of a finished run what files are that are about to be made anew."""
+    _change(directory, names, anew=False)
+
+
+def record_tables(directory: Path, names: Collection[str]) -> None:
     """Say in the manifest of a finished run that files were made anew from its dumps: by what, when, what they are now.
 
     Between `forget_tables` and this, the manifest says nothing of them: who is killed there leaves no false alarm.
-
-    Parameters
-    ----------
-    directory
-        A run directory; nothing is done if its run is not finished.
-    names
-        Of the files.
     """
-    if not (directory / MANIFEST_NAME).is_file():
-        return
-    contents = read_json(directory / MANIFEST_NAME)
-    sums = checksums(directory, names)
-    contents.setdefault("files", {}).update({name: (directory / name).stat().st_size for name in sums})
-    _sums(contents, directory).update(sums)
-    contents["tabulated"] = {**_made_by(), "date": _iso(time.time()), "files": list(sums)}
-    write_json(directory / MANIFEST_NAME, contents)
+    _change(directory, names, anew=True)
 
 
-def forget_tables(directory: Path, names: Collection[str]) -> None:
-    """Say no more in the manifest of a finished run what files are that are about to be made anew."""
+def _change(directory: Path, names: Collection[str], *, anew: bool) -> None:
+    """Change what a manifest says of some files; nothing is done if the run is not finished."""
     if not (directory / MANIFEST_NAME).is_file():
         return
     contents = read_json(directory / MANIFEST_NAME)
     sums = _sums(contents, directory)
-    if not sums.keys().isdisjoint(names):
-        contents["sha256"] = {name: one for name, one in sums.items() if name not in names}
+    known = [name for name in names if sums.pop(name, None)]
+    if anew:
+        now = checksums(directory, names)
+        sums.update(now)
+        contents.setdefault("files", {}).update({name: (directory / name).stat().st_size for name in now})
+        contents["tabulated"] = {**_made_by(), "date": _iso(time.time()), "files": list(now)}
+    if anew or known:
         write_json(directory / MANIFEST_NAME, contents)
-
-
-def _made_by() -> dict[str, Any]:
-    made_by = software()
-    return {
-        "granular_walkers": made_by.version,
-        "commit": made_by.commit,
-        "python": made_by.python,
-        "packages": made_by.packages,
-    }
-
-
-def _iso(seconds: float) -> str:
-    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))

@@ -19,25 +19,15 @@ from pathlib import Path
 PROJECT = "granular-walkers"
 COMMIT_NAME = "commit.txt"
 """In a wheel that was built in a checkout: its commit."""
-CHANGED = "+changes"
 _PATIENCE_SECONDS = 20.0
 
 
 @dataclass(frozen=True)
 class Software:
-    """What makes runs.
+    """What makes runs: versions of the project, of Python and of the packages that it requires, by name.
 
-    Attributes
-    ----------
-    version
-        Of this project; ``not installed`` where it runs without having been installed.
-    commit
-        Of the checkout that it runs from or was built in, with ``+changes`` if files that git knows had been changed;
-        None if that is not known.
-    python
-        Version of the interpreter.
-    packages
-        From the names of the packages that the project requires to their versions.
+    ``commit`` is that of the checkout that it runs from or was built in, with ``+changes`` if files that git knows had
+    been changed; None if that is not known.
     """
 
     version: str
@@ -54,7 +44,15 @@ def software() -> Software:
     except metadata.PackageNotFoundError:
         version, required = "not installed", []
     needed = [match[0] for one in required if "extra ==" not in one and (match := re.match(r"[\w.-]+", one))]
-    return Software(version, _commit(), platform.python_version(), _versions(needed))
+    packages = {}
+    for name in needed:
+        with suppress(metadata.PackageNotFoundError):
+            packages[name] = metadata.version(name)
+    package = Path(__file__).resolve().parents[1]
+    commit = commit_of(package.parent)
+    if commit is None and (package / COMMIT_NAME).is_file():
+        commit = (package / COMMIT_NAME).read_text("utf-8").strip() or None
+    return Software(version, commit, platform.python_version(), packages)
 
 
 def look_ahead() -> None:
@@ -71,7 +69,7 @@ def commit_of(checkout: Path) -> str | None:
         return None
     # Not of another repository that a hook of git speaks for; and nothing is written, for many may ask at once.
     ours = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
-    command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", f"--dirty={CHANGED}"]
+    command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty=+changes"]
     try:
         done = subprocess.run(
             command,
@@ -80,25 +78,9 @@ def commit_of(checkout: Path) -> str | None:
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            check=False,
+            check=True,
             timeout=_PATIENCE_SECONDS,
         )
     except (OSError, subprocess.SubprocessError):  # no git here, or a file system that does not answer
         return None
-    return done.stdout.strip() or None if done.returncode == 0 else None
-
-
-def _commit() -> str | None:
-    package = Path(__file__).resolve().parents[1]
-    try:
-        return commit_of(package.parent) or (package / COMMIT_NAME).read_text("utf-8").strip() or None
-    except OSError:
-        return None
-
-
-def _versions(names: list[str]) -> dict[str, str]:
-    found = {}
-    for name in names:
-        with suppress(metadata.PackageNotFoundError):
-            found[name] = metadata.version(name)
-    return found
+    return done.stdout.strip() or None

@@ -54,6 +54,8 @@ from walkers.templates.deck import (
 
 _LEAST_BYTES = 150
 """Of a restart file, an atom: whole ones had 300 to 580."""
+_RMS_VELOCITY = re.compile(rb"^root mean square velocity (\S+)", re.MULTILINE)
+"""Of the beads, by mass, m/s; decks that let them come to rest have it printed."""
 
 
 class DamagedSegment(WalkersError):
@@ -81,7 +83,7 @@ class OpenRun:
     directory: Path
     place: Path
     locks: Sequence[int]
-    done: list[dict[str, Any]] = field(default_factory=list)
+    done: list[dict[str, Any]]
     started: float = field(default_factory=time.time)
 
     def make(
@@ -115,23 +117,18 @@ class OpenRun:
         for cycles in self.case.run.attempts:
             case = self.case.for_cycles(cycles)
             if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
-                self._forget()  # an attempt for fewer cycles
-            while (segment := self.next_segment(case)) is not None:
+                for directory in segment_directories(self.directory):  # an attempt for fewer cycles
+                    shutil.rmtree(directory)
+                self.done.clear()
+            while (segment := self._next_segment(case)) is not None:
                 tell = _teller(case, segment, on_progress, begun, made) if on_progress else None
                 self._make(segment, render(case, segment), tell, time_limit)
                 made += segment.end - segment.begin
             if cycles < self.case.run.cycles and is_steady(self.directory):
                 return
 
-    def _forget(self) -> None:
-        """Remove the segments that are there."""
-        for directory in segment_directories(self.directory):
-            shutil.rmtree(directory)
-        self.done.clear()
-
-    def next_segment(self, case: Case | None = None) -> Segment | None:
+    def _next_segment(self, case: Case) -> Segment | None:
         """The segment that is to be made next, of the run or an attempt at it; None after the last one."""
-        case = case or self.case
         if not self.done:
             return first_segment(case)
         begin, start = int(self.done[-1]["end"]), self._drive_from()
@@ -153,37 +150,43 @@ class OpenRun:
     def _make(
         self, segment: Segment, deck: Deck, tell: Callable[[Progress], None] | None, time_limit: float | None
     ) -> None:
-        number = len(self.done)
-        place = self.directory / SEGMENTS / f"{number:04d}"
-        new = place.with_name(place.name + ".new")
+        folder, number = self.directory / SEGMENTS, len(self.done)
+        new, before = folder / f"{number:04d}.new", folder / f"{number - 1:04d}"
         shutil.rmtree(new, ignore_errors=True)
         with room_on_disk(new, deck.layout.bead_dump_bytes):
             new.mkdir()
-            write_deck(deck, new, new.with_name(f"{number - 1:04d}") if number else None)
+            write_deck(deck, new, before if number else None)
             if segment.begin:
-                shutil.copyfile(new.with_name(f"{number - 1:04d}") / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
+                shutil.copyfile(before / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
             report = launch(deck, new, self.engine, on_progress=tell, time_limit=time_limit, keep_open=self.locks)
             (new / PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
-            if not self.case.run.in_one:
-                _check_restart(new / RESTART_NAME, deck)
-            record = write_segment_record(new, segment, report, _rms_velocity(new))
+            restart = new / RESTART_NAME
+            size = restart.stat().st_size if restart.exists() else 0
+            if (
+                not self.case.run.in_one and size < _LEAST_BYTES * deck.layout.atoms
+            ):  # at which the engine does not look
+                raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
+            velocities = _RMS_VELOCITY.findall((new / OUTPUT_NAME).read_bytes())
+            record = write_segment_record(new, segment, report, float(velocities[-1]) if velocities else None)
             settle()
-            new.rename(place)
-            fsync_path(place.parent)
+            new.rename(folder / f"{number:04d}")
+            fsync_path(folder)
         # The restart before the last one is kept, should the last one prove bad.
         if number > 1:
-            (place.with_name(f"{number - 2:04d}") / RESTART_NAME).unlink(missing_ok=True)
+            (folder / f"{number - 2:04d}" / RESTART_NAME).unlink(missing_ok=True)
         self.done.append(record)
 
     def finish(self) -> FinishedRun:
         """Write the manifest, last, and move the directory to its place."""
         start = self._drive_from() or 0
-        seconds = [sum(segment[name] for segment in self.done) for name in ("wall_seconds", "loop_seconds")]
-        report = EngineReport(self.done[0]["version"], seconds[0], seconds[1], int(self.done[-1]["end"]))
+        wall_seconds, loop_seconds = (
+            sum(segment[name] for segment in self.done) for name in ("wall_seconds", "loop_seconds")
+        )
+        report = EngineReport(self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"]))
         record = manifest(
             self.case, self.place.name, self.engine, report, started=self.started, directory=self.directory
         )
-        record["seconds"]["total"] = max(record["seconds"]["total"], seconds[0])  # of all calls that it took
+        record["seconds"]["total"] = max(record["seconds"]["total"], wall_seconds)  # of all calls that it took
         rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
         settling = {"drive_from": start, "settled": rest[-1] if rest else None, "segments": len(self.done)}
         write_json(self.directory / MANIFEST_NAME, {**record, **settling}, at_once=False)
@@ -216,14 +219,7 @@ def _teller(
 
 @contextmanager
 def open_run(case: Case, engine: Engine, out: Path) -> Iterator[OpenRun]:
-    """Make a run in a directory of its own, or go on with it.
-
-    Parameters
-    ----------
-    case, engine
-        What determines the run.
-    out
-        Folder of the run directories; made if need be.
+    """Make a run in a directory of its own in a folder, or go on with it.
 
     Yields
     ------
@@ -259,7 +255,12 @@ def open_locked(
     try:
         with room_on_disk(directory):
             (directory / SEGMENTS).mkdir(parents=True, exist_ok=True)
-            _clear(directory)
+            # What an earlier call left beside its whole segments: tables, and parts of files and segments.
+            for path in (*directory.iterdir(), *(directory / SEGMENTS).glob("*.new")):
+                if path.is_file():
+                    path.unlink()
+                elif path.name != SEGMENTS:
+                    shutil.rmtree(path)
             write_json(directory / CASE_NAME, case.as_dict(), at_once=False)
             done = [_read_segment(path) for path in segment_directories(directory)]
             yield OpenRun(case, engine, directory, place, locks, done)
@@ -268,15 +269,6 @@ def open_locked(
     except (WalkersError, OSError) as failure:
         record_failure(directory, failure)
         raise
-
-
-def _clear(directory: Path) -> None:
-    """Remove what an earlier call left of a run beside its whole segments: tables, and parts of files and segments."""
-    for path in (*directory.iterdir(), *(directory / SEGMENTS).glob("*.new")):
-        if path.is_dir() and path.name != SEGMENTS:
-            shutil.rmtree(path)
-        elif path.is_file():
-            path.unlink()
 
 
 def _read_segment(directory: Path) -> dict[str, Any]:
@@ -288,15 +280,3 @@ def _read_segment(directory: Path) -> dict[str, Any]:
     except (OSError, ValueError, KeyError, TypeError) as error:
         message = f"{directory} is damaged ({error}): delete {directory.parent.parent} to have the run made again"
         raise DamagedSegment(message) from error
-
-
-def _check_restart(restart: Path, deck: Deck) -> None:
-    size = restart.stat().st_size if restart.exists() else 0
-    if size < _LEAST_BYTES * deck.layout.atoms:  # the engine does not look whether there was room for it
-        raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
-
-
-def _rms_velocity(directory: Path) -> float | None:
-    """Root mean square velocity of the beads at the end of a segment, by mass, m/s, if the deck has it printed."""
-    lines = re.findall(rb"^root mean square velocity (\S+)", (directory / OUTPUT_NAME).read_bytes(), re.MULTILINE)
-    return float(lines[-1]) if lines else None

@@ -13,7 +13,7 @@ from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import printable
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics.capillary import capillary_force_limit_at_wall
-from walkers.physics.time_step import TimeStepLimits, auto_fractions
+from walkers.physics.time_step import auto_fractions
 from walkers.runner.cost import predicted_seconds
 
 
@@ -25,28 +25,31 @@ def summarise(case: Case) -> dict[str, Any]:
     dict
         ``case`` (resolved), ``drive`` (its largest harmonic, the sum of all), ``beads`` (numbers, mass, liquid),
         ``dimer`` (M, R̄, Γ0, sin δ, μ; of dimers), ``contacts`` (forces, bridges, overlaps of each make of walkers),
-        ``time_step`` (limits, the chosen step and its share of each), ``run`` (steps, samples, predicted seconds).
+        ``time_step`` (limits, None where one does not apply, the chosen step, its share of each and that of
+        ``"auto"``), ``run`` (steps, samples, predicted seconds).
     """
-    run, radii = case.run, case.all_radii
-    volume = sum(4.0 / 3.0 * pi * radius**3 for radius in radii)
-    large = sum(radius > case.border for radius in radii)
+    run, drive, limits = case.run, case.drive, limits_of(case).as_dict()
+    volume = sum(4.0 / 3.0 * pi * radius**3 for radius in case.all_radii)
+    large = sum(radius > case.border for radius in case.all_radii)
+    known = library.material(case.material) if case.material in library.materials() else None
     summary: dict[str, Any] = {
         "case": case.as_dict(),
-        "drive": {
-            "peak_acceleration": case.drive.peak_acceleration,
-            "amplitude": case.drive.amplitude,
-            "peak_velocity": case.drive.peak_velocity,
-        },
+        "drive": {name: getattr(drive, name) for name in ("peak_acceleration", "amplitude", "peak_velocity")},
         "beads": {
-            "small": len(radii) - large,
+            "small": len(case.all_radii) - large,
             "large": large,
             "mass": volume * case.density,
             "volume": volume,
             "liquid": volume * case.liquid.volume_fraction,
-            "stiffness_ratio": _stiffness_ratio(case),
+            "stiffness_ratio": case.contact.youngs_modulus / known["youngs_modulus"].value if known else None,
         },
         "contacts": [contact for walkers in case.walkers for contact in _contacts(case, walkers)],
-        "time_step": _step_against(run.time_step, limits_of(case), loose=case.loose),
+        "time_step": {
+            "step": run.time_step,
+            "limits": {name: limit if isfinite(limit) else None for name, limit in limits.items()},
+            "share": {name: run.time_step / limit for name, limit in limits.items()},
+            "auto": dict(auto_fractions(loose=case.loose)),
+        },
         "run": {
             "steps_per_cycle": run.steps_per_cycle,
             "steps": run.steps,
@@ -63,7 +66,7 @@ def summarise(case: Case) -> dict[str, Any]:
             "masses": list(dimer.masses),
             "total_mass": dimer.total_mass,
             "mean_radius": dimer.mean_radius,
-            "gamma0": dimer.gamma0(case.drive.peak_acceleration),
+            "gamma0": dimer.gamma0(drive.peak_acceleration),
             "sin_delta": dimer.sin_delta,
             "mass_asymmetry": dimer.mass_asymmetry,
         }
@@ -89,46 +92,50 @@ def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
     ]
 
 
-def _step_against(time_step: float, limits: TimeStepLimits, *, loose: bool) -> dict[str, Any]:
-    """A time step (s) with the limits, None where one does not apply, its share of each, and that of ``"auto"``."""
-    known = limits.as_dict()
-    return {
-        "step": time_step,
-        "limits": {name: limit if isfinite(limit) else None for name, limit in known.items()},
-        "share": {name: time_step / limit for name, limit in known.items()},
-        "auto": dict(auto_fractions(loose=loose)),
-    }
-
-
-def _stiffness_ratio(case: Case) -> float | None:
-    """Young's modulus of the simulation over that of the beads' material."""
-    if case.material not in library.materials():
-        return None
-    return case.contact.youngs_modulus / library.material(case.material)["youngs_modulus"].value
-
-
 def describe(summary: dict[str, Any]) -> str:
     """The summary as text."""
-    lines = [_text_of_case(summary["case"]), _text_of_beads(summary["beads"])]
-    if "dimer" in summary:
-        lines.append(_text_of_dimer(summary["dimer"]))
-    lines.append(_text_of_drive(summary))
+    beads, drive, dimer = summary["beads"], summary["drive"], summary.get("dimer")
+    ratio = beads["stiffness_ratio"]
+    softened = f"; {1 / ratio:.3g} times softer than their material" if ratio else ""
+    lines = [
+        *_text_of_case(summary["case"]),
+        f"beads      {beads['small']} small and {beads['large']} large, {beads['mass'] * 1e6:.4g} mg, "
+        f"{beads['volume'] * 1e9:.4g} µL with {beads['liquid'] * 1e9:.3g} µL of liquid{softened}",
+    ]
+    if dimer:
+        lines.append(
+            f"dimer      M = {dimer['total_mass'] * 1e6:.4g} mg, mean radius {dimer['mean_radius'] * 1e3:.4g} mm, "
+            f"sin δ = {dimer['sin_delta']:.4g}, μ = {dimer['mass_asymmetry']:.4g}, Γ0 = {dimer['gamma0']:.4g}"
+        )
+        if dimer["sin_delta"] < 0:
+            lines.append("           bead 1 is the smaller one")
+    lines.append(
+        f"drive      a0 = {drive['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g "
+        f"(the paper's, {ACCELERATION_OF_ONE_G:g} m/s²; gravity is {summary['case']['gravity']:g} m/s²), "
+        f"amplitude {drive['amplitude'] * 1e3:.4g} mm, peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
+    )
     if summary["contacts"]:
-        lines.append(_text_of_contacts(summary["contacts"]))
-    return "\n".join([*lines, _text_of_step(summary)])
+        lines.append("contact                capillary force   4πγR limit   bridge    rupture   overlap at rest")
+    for contact in summary["contacts"]:
+        limit = contact["capillary_force_limit"]
+        lines.append(
+            f"  {contact['contact']:20} {contact['capillary_force'] * 1e6:11.4g} µN "
+            f"{f'{limit * 1e6:.4g} µN' if limit else '-':>12} {contact['bridge_volume'] * 1e12:8.3g} nL "
+            f"{contact['rupture_distance'] * 1e6:6.3g} µm {contact['overlap_at_rest'] * 1e9:10.4g} nm"
+        )
+    return "\n".join([*lines, *_text_of_run(summary["time_step"], summary["run"])])
 
 
-def _text_of_case(case: dict[str, Any]) -> str:
-    """A resolved case, one line per value: its key, the value in the units of a case file, where it comes from."""
-    lines = [printable(f"{case['name']}: {case['title']}").rstrip(": ")]
-    table = None
+def _text_of_case(case: dict[str, Any]) -> list[str]:
+    """A resolved case, a line for each value: its key, the value in the units of a case file, where it comes from."""
+    lines, table = [printable(f"{case['name']}: {case['title']}").rstrip(": ")], None
     for one in case["recorded"]:
         within, _, key = one["key"].rpartition(".")
         if within != table:
             table = within
             lines.append(f"  [{table}]")
         lines.append(f"    {key:24} {one['text']:24} {_whence(one)}".rstrip())
-    return "\n".join(lines)
+    return lines
 
 
 def _whence(one: dict[str, Any]) -> str:
@@ -144,46 +151,8 @@ def _whence(one: dict[str, Any]) -> str:
     return (f"{origin}: {source}" if source else origin) + ends
 
 
-def _text_of_beads(beads: dict[str, Any]) -> str:
-    ratio = beads["stiffness_ratio"]
-    softened = f"; {1 / ratio:.3g} times softer than their material" if ratio else ""
-    return (
-        f"beads      {beads['small']} small and {beads['large']} large, {beads['mass'] * 1e6:.4g} mg, "
-        f"{beads['volume'] * 1e9:.4g} µL with {beads['liquid'] * 1e9:.3g} µL of liquid{softened}"
-    )
-
-
-def _text_of_dimer(dimer: dict[str, Any]) -> str:
-    order = "" if dimer["sin_delta"] >= 0 else "\n           bead 1 is the smaller one"
-    return (
-        f"dimer      M = {dimer['total_mass'] * 1e6:.4g} mg, mean radius {dimer['mean_radius'] * 1e3:.4g} mm, "
-        f"sin δ = {dimer['sin_delta']:.4g}, μ = {dimer['mass_asymmetry']:.4g}, Γ0 = {dimer['gamma0']:.4g}{order}"
-    )
-
-
-def _text_of_drive(summary: dict[str, Any]) -> str:
-    drive = summary["drive"]
-    return (
-        f"drive      a0 = {drive['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g "
-        f"(the paper's, {ACCELERATION_OF_ONE_G:g} m/s²; gravity is {summary['case']['gravity']:g} m/s²), "
-        f"amplitude {drive['amplitude'] * 1e3:.4g} mm, peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
-    )
-
-
-def _text_of_contacts(contacts: list[dict[str, Any]]) -> str:
-    lines = ["contact                capillary force   4πγR limit   bridge    rupture   overlap at rest"]
-    for contact in contacts:
-        limit = contact["capillary_force_limit"]
-        lines.append(
-            f"  {contact['contact']:20} {contact['capillary_force'] * 1e6:11.4g} µN "
-            f"{f'{limit * 1e6:.4g} µN' if limit else '-':>12} {contact['bridge_volume'] * 1e12:8.3g} nL "
-            f"{contact['rupture_distance'] * 1e6:6.3g} µm {contact['overlap_at_rest'] * 1e9:10.4g} nm"
-        )
-    return "\n".join(lines)
-
-
-def _text_of_step(summary: dict[str, Any]) -> str:
-    step, run = summary["time_step"], summary["run"]
+def _text_of_run(step: dict[str, Any], run: dict[str, Any]) -> list[str]:
+    """The time step against its limits, the length of the run and its cost."""
     lines = [f"time step  {step['step'] * 1e6:.5g} µs, {run['steps_per_cycle']} a cycle"]
     for name, limit in step["limits"].items():
         shown = f"{limit * 1e6:.4g} µs" if limit is not None else "none"
@@ -197,4 +166,4 @@ def _text_of_step(summary: dict[str, Any]) -> str:
         f"run        {most}{run['steps']} steps, {run['simulated_seconds']:.4g} s simulated{segments}, "
         f"{run['samples']} samples, about {cost}"
     )
-    return "\n".join(lines)
+    return lines

@@ -1,14 +1,14 @@
-"""Whether the files of a finished run are what they were when it was finished."""
+"""Whether files are what a list of their checksums says: those of a finished run, or of an archive."""
 
 from __future__ import annotations
 
-import os
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, NoReturn
 
+from walkers.inputs.errors import shortened
+from walkers.inputs.text import printable
 from walkers.runner.directory import CASE_NAME, SEGMENTS
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
@@ -19,7 +19,6 @@ _SHOWN = (
 )
 """Suffixes of pictures, films, pages, files for ParaView (with their script) and exports: the program writes them on
 demand and never reads them again."""
-_MOST_LINES = 1000
 _LONGEST_NAME = 300
 
 
@@ -33,16 +32,9 @@ class Verification:
         Of the run or the archive.
     intact
         How many files are what they were.
-    changed, missing
-        Names of those that differ and that are gone.
-    unlisted
-        Names of those that are there, that no list has, and that are not of the kinds of ``since``.
-    doubtful
-        Names of those that cannot be compared, or on which the lists disagree, each with the reason in brackets.
-    since
-        Names of what was made from the run since (`made_since`): no result rests on it.
-    unread
-        Lists that are what they were, and too large to be compared with the others, each with the reason in brackets.
+    told
+        Names of the others: ``changed`` and ``missing`` ones; those ``not listed``; what is ``doubtful``, with the
+        reason in brackets; and what was ``made since`` from the run (`made_since`): no result rests on it.
     left_out
         How many were left out of an archive on purpose.
     of_points
@@ -51,41 +43,66 @@ class Verification:
 
     name: str
     intact: int
-    changed: tuple[str, ...] = ()
-    missing: tuple[str, ...] = ()
-    unlisted: tuple[str, ...] = ()
-    doubtful: tuple[str, ...] = ()
-    since: tuple[str, ...] = ()
-    unread: tuple[str, ...] = ()
+    told: Mapping[str, Sequence[str]]
     left_out: int = 0
     of_points: bool = False
 
     @property
     def passed(self) -> bool:
         """Whether all that is listed is what it was, and nothing else is there that a result could rest on."""
-        return not (self.changed or self.missing or self.unlisted or self.doubtful)
+        return not any(names for kind, names in self.told.items() if kind != "made since")
 
     def describe(self) -> str:
         """The outcome, and a line for each file that is not what it was, or is not listed."""
         told = f"{self.name}: {self.intact} {'points have their run' if self.of_points else 'files are what they were'}"
-        if self.left_out:
-            told += f", {self.left_out} left out of the archive"
-        kinds = {
-            **{"changed": self.changed, "missing": self.missing, "not listed": self.unlisted},
-            **{"doubtful": self.doubtful, "not read": self.unread, "made since": _by_folder(self.since)},
-        }
-        return "\n".join([told, *(line for word, names in kinds.items() for line in _lines(word, names))])
+        left_out = f", {self.left_out} left out of the archive" if self.left_out else ""
+        # Whoever made an archive chose its names, and may have put escape sequences into them.
+        lines = [
+            f"  {kind:<10} {printable(shortened(name, _LONGEST_NAME))}"
+            for kind, names in self.told.items()
+            for name in names
+        ]
+        return "\n".join([told + left_out, *lines])
 
 
-def _lines(word: str, names: Collection[str]) -> list[str]:
-    lines = [f"  {word:<10} {_shown(name)}" for name in list(names)[:_MOST_LINES]]
-    return [*lines, f"  {word:<10} {len(names) - _MOST_LINES} more"] if len(names) > _MOST_LINES else lines
+def compare(
+    name: str,
+    listed: Mapping[str, str],
+    now: Mapping[str, str],
+    there: Iterable[str],
+    *,
+    added: Callable[[str], bool],
+    left_out: Collection[str] = (),
+    doubtful: Sequence[str] = (),
+) -> Verification:
+    """Compare files with a list.
 
-
-def _shown(name: str) -> str:
-    """A name as it may be printed: whoever made an archive chose it, and may have put escape sequences into it."""
-    short = name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}…"
-    return short if short.isprintable() else ascii(short)
+    Parameters
+    ----------
+    name
+        Of what holds them.
+    listed, now
+        SHA-256 of files, as the list has them and, of those of them that can be read, as they are.
+    there
+        Names of all that is there.
+    added
+        Whether a name that is not listed may have been added since.
+    left_out
+        Names on the list that need not be there.
+    doubtful
+        What else is wrong, each with its reason.
+    """
+    changed = [one for one, checksum in now.items() if checksum != listed[one]]
+    others = sorted(set(there).difference(listed))
+    told = {
+        "changed": changed,
+        "missing": [one for one in listed if one not in now and one not in left_out],
+        "not listed": [one for one in others if not added(one)],
+        "doubtful": doubtful,
+        "made since": _by_folder(one for one in others if added(one)),
+    }
+    absent = sum(one in listed and one not in now for one in left_out)
+    return Verification(name, len(now) - len(changed), told, left_out=absent)
 
 
 def _by_folder(names: Iterable[str]) -> list[str]:
@@ -97,111 +114,26 @@ def _by_folder(names: Iterable[str]) -> list[str]:
 
 
 def made_since(name: str) -> bool:
-    """Whether a file that no list has counts as made from a run: by its name it is nothing that a result rests on.
+    """Whether what no list has counts as made from a run: by its relative path it is nothing that a result rests on.
 
     These are pictures, films, pages, files for ParaView, exports (by their suffixes), and hidden files. Nothing in
     ``segments`` is among them: each folder there is taken for a part of the run.
-
-    Parameters
-    ----------
-    name
-        Path relative to the run, or to what the run is in.
     """
     path = PurePosixPath(name)
     hidden = any(part.startswith(".") and part != ".." for part in path.parts)
     return SEGMENTS not in path.parts and (hidden or path.suffix.lower() in _SHOWN)
 
 
-def is_within(name: object) -> bool:
-    """Whether a name of a list is a plain path to something below the folder that the list is for."""
-    return (
-        isinstance(name, str)
-        and name not in ("", ".")
-        and not name.startswith("/")
-        and ".." not in name.split("/")
-        and PurePosixPath(name).as_posix() == name
-    )
-
-
-def files_below(folder: Path, without: Collection[str] = ()) -> list[str]:
-    """Relative paths of all that is in a folder: files, folders that are empty (with a slash), links to folders.
-
-    Parameters
-    ----------
-    folder
-        Links to folders in it are not followed.
-    without
-        Names of folders in it that are not looked into.
-
-    Raises
-    ------
-    OSError
-        If a folder cannot be read.
-    """
-    found: list[str] = []
-
-    def fail(error: OSError) -> NoReturn:
-        raise error
-
-    for place, folders, names in os.walk(folder, onerror=fail):
-        here = Path(place)
-        if here == folder:
-            folders[:] = [name for name in folders if name not in without]
-        links = [name for name in folders if (here / name).is_symlink()]
-        found += [(here / name).relative_to(folder).as_posix() for name in (*names, *links)]
-        if here != folder and not names and not folders:
-            found.append(f"{here.relative_to(folder).as_posix()}/")
+def files_below(folder: Path) -> list[str]:
+    """Relative paths of all that is in a folder: files, folders that are empty (with a slash), links to folders."""
+    found = []
+    for path in folder.rglob("*"):
+        name = path.relative_to(folder).as_posix()
+        if path.is_symlink() or not path.is_dir():
+            found.append(name)
+        elif not any(path.iterdir()):
+            found.append(f"{name}/")
     return sorted(found)
-
-
-@dataclass(frozen=True)
-class Listed:
-    """What a manifest says of the files beside it.
-
-    Attributes
-    ----------
-    sizes
-        Of the files, bytes.
-    sums
-        Their SHA-256.
-    left_out
-        Those that an archive was made without.
-    case_file
-        What an archive calls the case as it was given, beside the manifest.
-    """
-
-    sizes: Mapping[str, Any]
-    sums: Mapping[str, Any]
-    left_out: frozenset[str]
-    case_file: str
-
-    @property
-    def names(self) -> list[str]:
-        """Of all files that it lists."""
-        return list(dict.fromkeys([*self.sizes, *self.sums]))
-
-
-def listed_by(manifest: Mapping[str, Any]) -> Listed:
-    """Read what a manifest says of files.
-
-    Raises
-    ------
-    ValueError, TypeError, AttributeError
-        If it is no manifest, or names what is not below its folder.
-    """
-    lacking = [key for key in ("name", "files", "sha256") if key not in manifest]
-    if lacking:
-        raise ValueError(f"expected the key {lacking[0]}")
-    listed = Listed(
-        {**manifest["files"]},
-        {**manifest["sha256"]},
-        frozenset(manifest.get("left_out", ())),
-        f"{manifest['name']}.toml",
-    )
-    outside = [name for name in listed.names if not is_within(name)]
-    if outside:
-        raise ValueError(f"expected paths below it, found {_shown(outside[0])!r}")
-    return listed
 
 
 def verify_run(directory: Path) -> Verification:
@@ -217,35 +149,14 @@ def verify_run(directory: Path) -> Verification:
     """
     name = directory.resolve().name
     try:
-        listed = listed_by(read_json(directory / MANIFEST_NAME))
-        return _verified(name, directory, listed)
-    except FileNotFoundError as error:
-        return Verification(name, 0, missing=(Path(error.filename or MANIFEST_NAME).name,))
-    except (OSError, ValueError, TypeError, AttributeError) as error:
-        return Verification(name, 0, doubtful=(f"{MANIFEST_NAME} (it, or what it names, cannot be read: {error})",))
-
-
-def _verified(run: str, directory: Path, listed: Listed) -> Verification:
-    names, sizes, sums = listed.names, listed.sizes, listed.sums
-    there = {name: (directory / name).stat().st_size for name in names if (directory / name).is_file()}
-    # What has another size is not read: it may be of any size by now.
-    whole = [name for name, size in there.items() if size == sizes.get(name, size)]
-    now = checksums(directory, [name for name in whole if name in sums])
-    changed = {name for name in there if name not in whole or (name in now and now[name] != sums[name])}
-    odd = [name for name in names if (name in sizes) != (name in sums)]
-    gone = [name for name in names if name not in there and name not in listed.left_out]
-    if CASE_NAME not in names and not (directory / CASE_NAME).is_file():
-        gone.append(CASE_NAME)
-    known = {*names, MANIFEST_NAME}
-    others = [name for name in files_below(directory) if name not in known]
-    since = [name for name in others if made_since(name) or name == listed.case_file]
-    return Verification(
-        name=run,
-        intact=len(there.keys() - changed - set(odd)),
-        changed=tuple(name for name in there if name in changed),
-        missing=tuple(gone),
-        unlisted=tuple(name for name in others if name not in since),
-        doubtful=tuple(f"{name} ({MANIFEST_NAME} has its size or its checksum, not both)" for name in odd),
-        since=tuple(since),
-        left_out=len(listed.left_out.intersection(names) - there.keys()),
-    )
+        contents = read_json(directory / MANIFEST_NAME)
+        listed = {CASE_NAME: "", **contents["sha256"]}  # which every run has
+        beside, left_out = f"{contents['name']}.toml", set(contents.get("left_out", ()))
+        there = files_below(directory)
+        now = checksums(directory, [one for one in there if one in listed and (directory / one).is_file()])
+    except FileNotFoundError:
+        return Verification(name, 0, {"missing": [MANIFEST_NAME]})
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        return Verification(name, 0, {"doubtful": [f"{MANIFEST_NAME} (it, or what it names, cannot be read: {error})"]})
+    there.remove(MANIFEST_NAME)
+    return compare(name, listed, now, there, added=lambda one: made_since(one) or one == beside, left_out=left_out)

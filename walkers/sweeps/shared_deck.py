@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from walkers.inputs.case import Case
-from walkers.runner.audits import read_audit
-from walkers.runner.binary import Engine
+from walkers.runner.binary import Engine, read_audit
 from walkers.runner.directory import (
     CASE_NAME,
     FIRST_SEGMENT,
