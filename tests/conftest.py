@@ -31,7 +31,11 @@ from walkers.inputs.sweep import expand, shipped_sweeps
 from walkers.main import main
 from walkers.postprocess.gait import Walk, walk
 from walkers.postprocess.motion import Group, read_motion
+from walkers.runner.binary import Engine
+from walkers.runner.directory import run_place
 from walkers.runner.failures import RunBusy
+from walkers.runner.locks import locked
+from walkers.runner.segments import OpenRun, open_locked
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
 
@@ -91,6 +95,15 @@ def document(**changes: Any) -> dict[str, Any]:
 def make_case(**changes: Any) -> Case:
     """`document`, resolved."""
     return resolve_case(document(**changes), name="test")
+
+
+@contextmanager
+def open_run(case: Case, engine: Engine, out: Path) -> Iterator[OpenRun]:
+    """A run that is being made in a folder, to be made with other decks or to be left unfinished."""
+    out.mkdir(parents=True, exist_ok=True)
+    place = run_place(case, engine, out)
+    with locked([place]) as ours, open_locked(case, engine, place, list(ours.values())) as run:
+        yield run
 
 
 @pytest.fixture(scope="session")

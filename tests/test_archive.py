@@ -309,28 +309,25 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("command", "message"),
     [
-        (("--to", "run.tar"), "--to: expected the name of a .zip file"),
-        (("--to", "nowhere/run.zip"), "No such file"),
-        (("--licence", "MINE"), "--licence: expected one of CC-BY-4.0"),
-        (("--author", " "), "--author: expected a name"),
-        (("--orcid", "0000-0002-1825-0097"), "--orcid: expected an --author for each"),
-        (("--author", "N", "--orcid", "0000-0002-1825-0098"), "--orcid: expected an ORCID"),
+        ("archive {run} --to run.tar", "--to: expected the name of a .zip file"),
+        ("archive {run} --to nowhere/run.zip", "No such file"),
+        ("archive {run} --licence MINE", "--licence: expected one of CC-BY-4.0"),
+        ("archive {run} --author=", "--author: expected a name"),
+        ("archive {run} --orcid 0000-0002-1825-0097", "--orcid: expected an --author for each"),
+        ("archive {run} --author N --orcid 0000-0002-1825-0098", "--orcid: expected an ORCID"),
+        ("archive runs", "expected a run directory"),
+        ("verify runs", "expected a run directory"),
+        ("result {archive}", "an archive: unpack it"),
+        ("table {archive}", "not a sweep: expected a folder"),
+        ("status {archive}", "neither a sweep's"),
     ],
 )
-def test_options_that_make_no_sense(run: Path, tmp_path: Path, options: tuple[str, ...], message: str) -> None:
-    refused = call("archive", str(run), *options, folder=tmp_path)
-    assert (refused.returncode, message in refused.stderr) == (2, True), refused.stderr
+def test_what_cannot_be_packed_or_read(run: Path, whole: Path, tmp_path: Path, command: str, message: str) -> None:
+    done = call(*command.format(run=run, archive=whole).split(), folder=tmp_path)
+    assert (done.returncode, message in done.stderr, done.stderr.count("\n")) == (2, True, 1), done.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["runs"]
-
-
-def test_what_is_no_run(run: Path, tmp_path: Path) -> None:
-    unfinished = run.rename(run.with_name(f"{run.name}.incomplete"))
-    (unfinished / "manifest.json").unlink()
-    for command in ("archive", "verify"):
-        refused = call(command, str(unfinished), folder=tmp_path)
-        assert (refused.returncode, "expected a run directory" in refused.stderr) == (2, True)
 
 
 def test_a_file_that_changes_while_it_is_archived(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -428,14 +425,3 @@ def test_zip_files_that_were_damaged(whole: Path, tmp_path: Path) -> None:
     assert "encrypted" in _verified(archive, 2)[0]
     archive.write_bytes(contents[: len(contents) // 2])
     assert "not a zip file that can be read" in _verified(archive, 2)[0]
-
-
-@pytest.mark.parametrize(
-    ("command", "told"),
-    [("result", "an archive: unpack it"), ("table", "not a sweep: expected a folder"), ("status", "neither a sweep's")],
-)
-def test_archives_are_unpacked_for_all_else(whole: Path, tmp_path: Path, command: str, told: str) -> None:
-    shutil.copy(whole, tmp_path / "run.zip")
-    done = call(command, "run.zip", folder=tmp_path)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert done.stderr.startswith(f"walkers: run.zip: {told}")

@@ -22,7 +22,7 @@ import numpy.typing as npt
 import pytest
 
 import walkers
-from tests.conftest import PROGRAM, call, engines_in, to_toml, wait_for
+from tests.conftest import PROGRAM, call, engines_in, open_run, to_toml, wait_for
 from tests.printed import spoilt
 from walkers.inputs import Case, InputError, load_case, resolve_case, shipped_cases
 from walkers.inputs.sweep import expand
@@ -34,7 +34,6 @@ from walkers.postprocess.tables import TABLES
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
 from walkers.runner.failures import EngineError, EngineKilled, RunBusy
-from walkers.runner.segments import open_run
 from walkers.sweeps.climbing import describe_climbs, piles_in, summarise_climbs, survival
 from walkers.sweeps.record import states
 from walkers.sweeps.run import plan_sweep, run_sweep

@@ -1,18 +1,23 @@
-"""Run directories: named by what determines them, finished by their manifest only."""
+"""Run directories: named by what determines them, finished by their manifest only, gone on with after any death."""
 
 from __future__ import annotations
 
 import json
 import os
+import random
+import shutil
 import signal
 import subprocess
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tests.conftest import (
+    BRIEF,
     LONG,
     PROGRAM,
     SHORT,
@@ -20,50 +25,173 @@ from tests.conftest import (
     document,
     engines_in,
     make_case,
+    open_run,
     to_toml,
     wait_for,
 )
 from walkers import find_run
 from walkers import run as run_case
 from walkers.inputs import InputError
-from walkers.runner import FinishedRun, Progress, find_engine, finished_run, open_run, run_name
-from walkers.runner.directory import FIRST_SEGMENT
+from walkers.runner import FinishedRun, Progress, find_engine, finished_run, run_name
+from walkers.runner.directory import FIRST_SEGMENT, finished_places
 from walkers.runner.failures import RunBusy
+from walkers.runner.locks import is_locked, locked
 from walkers.templates import render_deck
 
+PATIENCE_OF_LOCKS = "walkers.runner.locks._PATIENCE_SECONDS"
 
-def _name(**changes: object) -> str:
-    return run_name(make_case(**changes), find_engine())
+
+def _toml(folder: Path, **run: object) -> str:
+    file = folder / "test.toml"
+    file.write_text(to_toml(document(run=run or SHORT)))
+    return str(file)
+
+
+def _forked(work: Callable[[], object]) -> int:
+    """Do something in a process of its own, which spares it the imports; its number."""
+    child = os.fork()
+    if child:
+        return child
+    with suppress(BaseException):
+        work()
+    os._exit(0)
+
+
+# --- what is there ----------------------------------------------------------------------------------------------------
+
+
+def test_the_name_depends_on_what_determines_the_run() -> None:
+    def name(**changes: object) -> str:
+        return run_name(make_case(**changes), find_engine())
+
+    names = {
+        name(),
+        name(drive={"peak_acceleration": "4.01 g"}),
+        name(run={"seed": 2}),
+        name(contact={"rolling_friction": 0.001}),
+        name(run={"cycles": 61}),
+        name(drive={"frame": "lab"}),
+    }
+    assert len(names) == 6
+    assert name(title="another title") == name()
+    other = replace(find_engine(), sha256="0" * 64)
+    assert run_name(make_case(), other) != name()
+    long = run_name(make_case().renamed("a b/" * 100), other)
+    assert len(long) < 100
+    assert "/" not in long
+
+
+def test_contents_of_a_run_directory(tmp_path: Path) -> None:
+    """And the deck can be run by hand, with the same numbers."""
+    case = make_case(run=SHORT)
+    run = finished_run(run_case(case, tmp_path / "runs").directory)
+    assert run is not None
+    assert {path.name for path in run.directory.iterdir()} == {
+        *("case.json", "manifest.json", "result.json", "segments"),
+        *("trajectory.parquet", "walkers.parquet", "bridges.parquet"),
+    }
+    assert {path.name for path in (run.directory / "segments").iterdir()} == {"0000"}
+    assert {path.name for path in (run.directory / FIRST_SEGMENT).iterdir()} == {
+        *("layout.json", "walker.lig", "bridges.txt", "engine.log", "segment.json", "run.sh"),
+        *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
+    }
+    assert run.case == case
+    assert run.layout == render_deck(case).layout
+    manifest = run.manifest
+    assert (manifest["status"], manifest["steps"]) == ("finished", case.run.steps)
+    assert manifest["steps_per_second"] > 0
+    assert manifest["engine"]["sha256"] == find_engine().sha256
+    assert {"host", "started", "finished", "seconds"} <= set(manifest)
+    by_hand = tmp_path / "byhand"
+    call("deck", _toml(tmp_path), "--to", str(by_hand), check=True)
+    subprocess.run(["sh", "run.sh"], cwd=by_hand, check=True)
+    assert (by_hand / "beads.bin").read_bytes() == (run.directory / FIRST_SEGMENT / "beads.bin").read_bytes()
+
+
+def test_a_run_is_found_by_its_directory_or_its_case(in_folder: Path) -> None:
+    case_file = _toml(in_folder)
+    first, second = (json.loads(call("run", case_file, "--json", check=True).stdout) for _ in range(2))
+    assert (first["cached"], second["cached"]) == (False, True)
+    assert first["velocity"] == second["velocity"]
+    for named in (first["run"], Path(first["run"]).name, case_file):
+        assert find_run(named).directory == Path(first["run"])
+        assert f"{first['velocity']['mean'] * 1e3:.3f}" in call("result", str(named), check=True).stdout
+
+
+@pytest.mark.parametrize("damage", ["result.json", "walkers.parquet", "bridges.parquet"])
+def test_damaged_tables_are_made_anew(tmp_path: Path, damage: str) -> None:
+    case = make_case(run=SHORT)
+    outcome = run_case(case, tmp_path)
+    result, path = outcome.result, outcome.directory / damage
+    for contents in (None, b"{", b"[]"):
+        path.unlink()
+        if contents is not None:
+            path.write_bytes(contents)
+        assert run_case(case, tmp_path).result == result
+        find_run(outcome.directory)
+        assert path.stat().st_size > 100
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "case.json", "segments/0000/layout.json", "segments/0000/beads.bin"])
+def test_a_run_without_its_description_is_told(tmp_path: Path, name: str) -> None:
+    directory = run_case(make_case(run=SHORT), tmp_path / "runs").directory
+    (directory / name).unlink()
+    with pytest.raises(InputError, match=Path(name).name if name != "manifest.json" else "not a finished run"):
+        find_run(directory)
+
+
+def test_a_cut_dump_is_drawn_as_far_as_it_goes(tmp_path: Path) -> None:
+    directory = run_case(make_case(run={"cycles": 8, "settling_cycles": 2}), tmp_path / "runs").directory
+    dump = directory / FIRST_SEGMENT / "beads.bin"
+    os.truncate(dump, dump.stat().st_size // 2)
+    for command in ("plot", "vtk", "result"):
+        done = call(command, str(directory), check=True)
+        assert "walkers: warning:" in done.stderr
+        assert "is incomplete" in done.stderr
+    os.truncate(dump, 1000)
+    (directory / "result.json").unlink()
+    done = call("plot", str(directory))
+    assert (done.returncode, "Traceback" in done.stderr) == (2, False)
+    assert f"walkers: {directory}: the run cannot be read" in done.stderr
+
+
+@pytest.mark.parametrize("out", ["test.toml/x", "/proc/x"])
+def test_places_that_cannot_be_written(in_folder: Path, out: str) -> None:
+    done = call("run", _toml(in_folder), "--out", out)
+    assert (done.returncode, "Traceback" in done.stderr) == (2, False)
+    assert done.stderr.startswith("walkers: ")
+
+
+# --- again, and on ----------------------------------------------------------------------------------------------------
 
 
 def test_a_finished_run_is_run_again_by_force_only(tmp_path: Path) -> None:
+    """One by force that fails leaves the old one."""
     case = make_case(run=SHORT)
     first = run_case(case, tmp_path)
     again = run_case(case, tmp_path)
     assert (first.cached, again.cached) == (False, True)
     assert again.result == first.result
     dump = first.directory / FIRST_SEGMENT / "beads.bin"
-    with dump.open("rb") as before:  # as long as it is open no other file gets its number
-        assert os.path.samestat(os.fstat(before.fileno()), dump.stat())
-        assert not run_case(case, tmp_path, force=True).cached
-        assert not os.path.samestat(os.fstat(before.fileno()), dump.stat())
-    assert [path.name for path in tmp_path.iterdir()] == [first.directory.name]
 
-
-def test_a_forced_run_that_fails_leaves_the_old_one(tmp_path: Path) -> None:
     def interrupt(_: object) -> None:
         raise KeyboardInterrupt
 
-    case = make_case(run=SHORT)
-    run_case(case, tmp_path)
-    with pytest.raises(KeyboardInterrupt):
-        run_case(case, tmp_path, force=True, progress=interrupt)
-    assert run_case(case, tmp_path).cached
+    with dump.open("rb") as before:  # as long as it is open no other file gets its number
+        with pytest.raises(KeyboardInterrupt):
+            run_case(case, tmp_path, force=True, progress=interrupt)
+        assert run_case(case, tmp_path).cached
+        assert os.path.samestat(os.fstat(before.fileno()), dump.stat())
+        contents = dump.read_bytes()
+        assert not run_case(case, tmp_path, force=True).cached
+        assert not os.path.samestat(os.fstat(before.fileno()), dump.stat())
+    assert dump.read_bytes() == contents, "the same to the last bit"
+    assert [path.name for path in tmp_path.iterdir()] == [first.directory.name]
 
 
 def test_an_interrupted_run_goes_on_after_its_last_whole_segment(tmp_path: Path) -> None:
     """Walkers of six cycles in segments of two; what comes out is what a run without an interrupt gives."""
-    case = make_case(run={**SHORT, "segment": "25 ms"})
+    case = make_case(run={**SHORT, "segment": "25 ms", "time_step": "1 us"})
     two_cycles = case.run.steps // 3
 
     def interrupt(progress: Progress) -> None:
@@ -92,67 +220,52 @@ def test_an_interrupted_run_goes_on_after_its_last_whole_segment(tmp_path: Path)
     assert outcome.result == straight.result
 
 
-def test_the_name_depends_on_what_determines_the_run() -> None:
-    names = {
-        _name(),
-        _name(drive={"peak_acceleration": "4.01 g"}),
-        _name(run={"seed": 2}),
-        _name(contact={"rolling_friction": 0.001}),
-        _name(run={"cycles": 61}),
-        _name(drive={"frame": "lab"}),
-    }
-    assert len(names) == 6
-    assert _name(title="another title") == _name()
-    other = replace(find_engine(), sha256="0" * 64)
-    assert run_name(make_case(), other) != _name()
-    long = run_name(make_case().renamed("a b/" * 100), other)
-    assert len(long) < 100
-    assert "/" not in long
-
-
-def test_contents_of_a_run_directory(tmp_path: Path) -> None:
+def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     case = make_case(run=SHORT)
-    run = finished_run(run_case(case, tmp_path).directory)
-    assert run is not None
-    assert {path.name for path in run.directory.iterdir()} == {
-        *("case.json", "manifest.json", "result.json", "segments"),
-        *("trajectory.parquet", "walkers.parquet", "bridges.parquet"),
-    }
-    assert {path.name for path in (run.directory / "segments").iterdir()} == {"0000"}
-    assert {path.name for path in (run.directory / FIRST_SEGMENT).iterdir()} == {
-        *("layout.json", "walker.lig", "bridges.txt", "engine.log", "segment.json", "run.sh"),
-        *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
-    }
-    assert run.case == case
-    assert run.layout == render_deck(case).layout
-    manifest = run.manifest
-    assert manifest["status"] == "finished"
-    assert manifest["steps"] == case.run.steps
-    assert manifest["steps_per_second"] > 0
-    assert manifest["engine"]["sha256"] == find_engine().sha256
-    assert {"host", "started", "finished", "seconds"} <= set(manifest)
+    stamp = FinishedRun(run_case(case, tmp_path).directory).manifest["finished"]
+    # It is not there at the first look, but at the second, after the run has been locked.
+    answers = iter([None])
+    monkeypatch.setattr("walkers.runner.directory.finished_run", lambda place: next(answers, finished_run(place)))
+    outcome = run_case(case, tmp_path)
+    assert outcome.cached
+    assert not list(answers)  # the first look has been
+    assert FinishedRun(outcome.directory).manifest["finished"] == stamp
+    assert not list(tmp_path.glob("*.incomplete"))
 
 
-def test_the_deck_of_a_run_can_be_run_by_hand(tmp_path: Path) -> None:
-    made = run_case(make_case(run=SHORT), tmp_path / "runs")
-    call("deck", _toml(tmp_path), "--to", str(tmp_path / "byhand"), check=True)
-    by_hand = tmp_path / "byhand"
-    subprocess.run(["sh", "run.sh"], cwd=by_hand, check=True)
-    assert (by_hand / "beads.bin").read_bytes() == (made.directory / FIRST_SEGMENT / "beads.bin").read_bytes()
+def test_a_crash_within_a_replacement_leaves_no_trace(tmp_path: Path) -> None:
+    """Between its two renames the old run is put back; after them it goes, and is no run meanwhile."""
+    case = make_case(run=BRIEF)
+    place = run_case(case, tmp_path).directory
+    left = place.with_name(place.name + ".replaced")
+    place.rename(left)
+    with open_run(case, find_engine(), tmp_path):
+        assert finished_run(place) is not None
+    shutil.copytree(place, left)
+    assert finished_places(tmp_path) == {place.name: place}
+    assert run_case(case, tmp_path).cached
+    assert run_case(case, tmp_path, force=True).directory == place
+    assert not left.exists()
 
 
-def _toml(folder: Path) -> str:
-    file = folder / "test.toml"
-    file.write_text(to_toml(document(run=SHORT)))
-    return str(file)
+# --- locks and kills --------------------------------------------------------------------------------------------------
+
+
+def test_a_lock_that_somebody_has_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(PATIENCE_OF_LOCKS, 0.1)
+    with locked([tmp_path / "x"]) as ours, locked([tmp_path / "x", tmp_path / "y"]) as theirs:
+        assert (list(ours), list(theirs)) == ([tmp_path / "x"], [tmp_path / "y"])
+        assert is_locked(tmp_path / "x")
+    assert not is_locked(tmp_path / "x")
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_engine_that_outlives_its_launcher_keeps_others_away(
     front: Callable[[str], str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The kernel ends an engine whose launcher dies, but not the engine's own children."""
-    monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 0.5)
-    (in_folder / "test.toml").write_text(to_toml(document(run=LONG)))
+    monkeypatch.setattr(PATIENCE_OF_LOCKS, 0.5)
+    _toml(in_folder, **LONG)
     engine = front('liggghts "$@"\nexit 0')
     program = subprocess.Popen([PROGRAM, "run", "test.toml", "--engine", engine], stderr=subprocess.DEVNULL)
     begun = "runs/*.incomplete/segments/0000.new/beads.bin"
@@ -171,73 +284,50 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(
         pass
 
 
-def test_a_run_is_found_by_its_directory_or_its_case(in_folder: Path) -> None:
-    case_file = _toml(in_folder)
-    first, second = (json.loads(call("run", case_file, "--json", check=True).stdout) for _ in range(2))
-    assert (first["cached"], second["cached"]) == (False, True)
-    assert first["velocity"] == second["velocity"]
-    for named in (first["run"], Path(first["run"]).name, case_file):
-        assert find_run(named).directory == Path(first["run"])
-        assert f"{first['velocity']['mean'] * 1e3:.3f}" in call("result", str(named), check=True).stdout
-
-
-def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    case = make_case(run=SHORT)
-    stamp = FinishedRun(run_case(case, tmp_path).directory).manifest["finished"]
-    # It is not there at the first look, but at the second, after the run has been locked.
-    answers = iter([None])
-    monkeypatch.setattr("walkers.runner.directory.finished_run", lambda place: next(answers, finished_run(place)))
-    outcome = run_case(case, tmp_path)
-    assert outcome.cached
-    assert not list(answers)  # the first look has been
-    assert FinishedRun(outcome.directory).manifest["finished"] == stamp
+@pytest.mark.parametrize("kills", [6, pytest.param(50, marks=pytest.mark.slow)])
+def test_after_each_kill_the_next_call_runs(tmp_path: Path, kills: int) -> None:
+    """The launcher is killed before, at and after the birth of its engine; whoever calls then gets the run."""
+    draw = random.Random(14)
+    for kill in range(kills):
+        case = make_case(run={**BRIEF, "cycles": 100, "seed": kill})
+        child = _forked(lambda case=case: run_case(case, tmp_path, force=True))  # type: ignore[misc]
+        if kill % 2:
+            wait_for(lambda: engines_in(tmp_path))
+        else:
+            time.sleep(draw.uniform(0.0, 0.4))
+        os.kill(child, signal.SIGKILL)
+        outcome = run_case(case, tmp_path)
+        os.waitpid(child, 0)
+        assert finished_run(outcome.directory) is not None
+        assert not is_locked(outcome.directory)
+    wait_for(lambda: not engines_in(tmp_path))
     assert not list(tmp_path.glob("*.incomplete"))
+    assert not list(tmp_path.glob("*.lock"))
 
 
-@pytest.mark.parametrize("damage", ["result.json", "walkers.parquet", "bridges.parquet", "trajectory.parquet"])
-def test_damaged_tables_are_made_anew(tmp_path: Path, damage: str) -> None:
-    case = make_case(run=SHORT)
-    outcome = run_case(case, tmp_path)
-    result, path = outcome.result, outcome.directory / damage
-    for contents in (None, b"", b"{", b"[]"):
-        path.unlink()
-        if contents is not None:
-            path.write_bytes(contents)
-        assert run_case(case, tmp_path).result == result
-        find_run(outcome.directory)
-        assert path.stat().st_size > 100
+def test_no_engine_is_orphaned_by_a_kill_at_its_birth(tmp_path: Path) -> None:
+    """Decks that would run for minutes: an engine that its launcher's death did not reach would still be there."""
+    case, draw = make_case(run=LONG), random.Random(3)
+    for kill in range(20):
+        folder = tmp_path / str(kill)
+        child = _forked(lambda folder=folder: run_case(case, folder))  # type: ignore[misc]
+        wait_for(lambda folder=folder: list(folder.glob("*.incomplete/segments/0000.new/engine.log")))  # type: ignore[misc]
+        time.sleep(draw.uniform(0.0, 0.02))  # the fork, setpriv, sh and the engine follow within that time
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    wait_for(lambda: not engines_in(tmp_path))
+    time.sleep(0.5)  # one that was still being born
+    assert not engines_in(tmp_path)
 
 
-@pytest.mark.parametrize("name", ["manifest.json", "case.json", "segments/0000/layout.json", "segments/0000/beads.bin"])
-def test_a_run_without_its_description_is_told(tmp_path: Path, name: str) -> None:
-    directory = run_case(make_case(run=SHORT), tmp_path / "runs").directory
-    (directory / name).unlink()
-    with pytest.raises(InputError, match=Path(name).name if name != "manifest.json" else "not a finished run"):
-        find_run(directory)
-
-
-def test_a_cut_dump_is_drawn_as_far_as_it_goes(tmp_path: Path) -> None:
-    directory = run_case(make_case(run={"cycles": 8, "settling_cycles": 2}), tmp_path / "runs").directory
-    dump = directory / FIRST_SEGMENT / "beads.bin"
-    dump.write_bytes(dump.read_bytes()[: dump.stat().st_size // 2])
-    for command in ("plot", "vtk", "result"):
-        done = call(command, str(directory), check=True)
-        assert "walkers: warning:" in done.stderr
-        assert "is incomplete" in done.stderr
-    dump.write_bytes(dump.read_bytes()[:1000])
-    (directory / "result.json").unlink()
-    done = call("plot", str(directory))
-    assert done.returncode == 2
-    assert "Traceback" not in done.stderr
-    assert f"walkers: {directory}: the run cannot be read" in done.stderr
-
-
-@pytest.mark.parametrize(
-    "arguments", [["run", "test.toml", "--out", "test.toml/x"], ["run", "test.toml", "--out", "/proc/x"]]
-)
-def test_places_that_cannot_be_written(in_folder: Path, arguments: list[str]) -> None:
-    _toml(in_folder)
-    done = call(*arguments)
-    assert done.returncode == 2
-    assert "Traceback" not in done.stderr
-    assert done.stderr.startswith("walkers: ")
+def test_nohup_outlives_a_closed_terminal(in_folder: Path) -> None:
+    _toml(in_folder, **LONG)
+    command = ["nohup", PROGRAM, "run", "test.toml"]
+    program = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    engines = wait_for(lambda: engines_in(in_folder))
+    program.send_signal(signal.SIGHUP)
+    time.sleep(0.3)
+    assert engines_in(in_folder) == engines
+    program.terminate()
+    assert program.wait() == 143
+    assert not engines_in(in_folder)

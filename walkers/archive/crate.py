@@ -79,47 +79,28 @@ def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) 
     dict
         JSON-LD. Dated by the last of the runs, not by the day: the same runs give the same archive.
     """
-    made = _Crate()
-    root = made.crate.root_dataset
-    runs = "A run" if contents.record is None else f"The {len(contents.runs)} runs of a sweep"
-    left_out = any("left_out" in run.manifest for run in contents.runs)
-    address, name = LICENCES[licence]
-    root["datePublished"] = _moment(contents.finished)
-    root["name"] = f"{contents.name}: {contents.title}".rstrip(": ")
-    root["description"] = (
-        f"{runs} of wet granular walkers, simulated by the discrete element method with LIGGGHTS through {PROJECT}: "
-        "cases, decks, what the engine wrote, and the tables and results made from that."
-        + (" The dumps that the tables were made from are left out." if left_out else "")
-    )
-    root["license"] = made.entity(address, "CreativeWork", name=name, identifier=licence)
-    profile = {"name": "Process Run Crate", "version": PROFILE.rpartition("/")[2]}
-    root["conformsTo"] = made.entity(PROFILE, "CreativeWork", **profile)
-    root["citation"] = made.entity(PAPER, "ScholarlyArticle", **_PAPER_PROPERTIES)
-    for author in authors:
-        identifier = f"https://orcid.org/{author.orcid}" if author.orcid else f"#{quote(author.name)}"
-        made.people.append(made.entity(identifier, "Person", name=author.name))
-    if made.people:
-        root["author"] = list(made.people)
-    about = {"name": "What this is, for people", "encodingFormat": "text/html", "about": {"@id": "./"}}
-    made.entity(PREVIEW_NAME, "CreativeWork", **about)
+    made = _Crate(authors)
     for one in contents.sweep:
         made.file(one)
     for run in contents.runs:
         told = f"Run directory of the case {run.manifest['name']}, finished {run.manifest['finished']}"
         folder = made.crate.add_dataset(None, f"{run.place}/", properties={"name": run.name, "description": told})
         folder["hasPart"] = [made.file(one) for one in run.items]
-    root["mentions"] = [action for run in contents.runs for action in made.actions(run)]
+    actions = [action for run in contents.runs for action in made.actions(run)]
     if contents.record is not None:
         results = [one for run in contents.runs for one in run.with_role("result")]
         table = made.action(
-            (f"#{contents.name}-table", f"Table of the sweep {contents.name}"),
+            f"#{contents.name}-table",
+            f"Table of the sweep {contents.name}",
             "The results of the runs, put into one table, one row per point.",
             made.program(contents.runs[-1].manifest),
             [*(one for one in contents.sweep if one.role != "table"), *results],
             [one for one in contents.sweep if one.role == "table"],
             (None, contents.finished),
         )
-        root["mentions"] = [*root["mentions"], table]
+        actions.append(table)
+    made.describe_root(contents, licence)
+    made.crate.root_dataset["mentions"] = actions
     metadata: dict[str, Any] = made.crate.metadata.generate()
     for entity in metadata["@graph"]:  # what is one is no list, by the specification
         entity.update({key: one[0] for key, one in entity.items() if isinstance(one, list) and len(one) == 1})
@@ -133,13 +114,16 @@ def _moment(iso: str) -> str:
 class _Crate:
     """A crate that is being described: its entities, of which files and people are referred to."""
 
-    def __init__(self) -> None:
+    def __init__(self, authors: Sequence[Author]) -> None:
         from rocrate.rocrate import ROCrate
 
         self.crate = ROCrate(version=VERSION)
         self.crate.metadata.extra_terms["sha256"] = "http://schema.org/sha256"  # younger than that version's context
-        self.people: list[Entity] = []
         self.files: dict[str, Entity] = {}
+        self.people = []
+        for author in authors:
+            identifier = f"https://orcid.org/{author.orcid}" if author.orcid else f"#{quote(author.name)}"
+            self.people.append(self.entity(identifier, "Person", name=author.name))
 
     def entity(self, identifier: str, kind: str, /, **properties: Any) -> Entity:
         """A contextual entity, once."""
@@ -149,8 +133,33 @@ class _Crate:
         made = ContextEntity(self.crate, identifier, properties={"@type": kind, **properties})
         return there if there is not None else self.crate.add(made)
 
+    def describe_root(self, contents: Contents, licence: str) -> None:
+        """What the archive is, under which licence, by whom, and after which paper."""
+        runs = "A run" if contents.record is None else f"The {len(contents.runs)} runs of a sweep"
+        left_out = any("left_out" in run.manifest for run in contents.runs)
+        address, name = LICENCES[licence]
+        profile = {"name": "Process Run Crate", "version": PROFILE.rpartition("/")[2]}
+        root = self.crate.root_dataset
+        root["datePublished"] = _moment(contents.finished)
+        root["name"] = f"{contents.name}: {contents.title}".rstrip(": ")
+        root["description"] = (
+            f"{runs} of wet granular walkers, simulated by the discrete element method with LIGGGHTS through {PROJECT}"
+            ": cases, decks, what the engine wrote, and the tables and results made from that."
+            + (" The dumps that the tables were made from are left out." if left_out else "")
+        )
+        root["license"] = self.entity(address, "CreativeWork", name=name, identifier=licence)
+        root["conformsTo"] = self.entity(PROFILE, "CreativeWork", **profile)
+        root["citation"] = self.entity(PAPER, "ScholarlyArticle", **_PAPER_PROPERTIES)
+        if self.people:
+            root["author"] = list(self.people)
+        about = {"name": "What this is, for people", "encodingFormat": "text/html", "about": {"@id": "./"}}
+        self.entity(PREVIEW_NAME, "CreativeWork", **about)
+
     def file(self, item: Item) -> Entity:
         """A file of the archive, a table with its columns."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
         properties: dict[str, Any] = {
             "name": item.name,
             "description": item.meaning,
@@ -159,62 +168,60 @@ class _Crate:
             "sha256": item.sha256,
         }
         if item.name.endswith(".parquet"):
-            properties["variableMeasured"] = self._columns(item)
+            columns = properties["variableMeasured"] = []
+            table, source = item.name.removesuffix(".parquet"), item.source
+            for field in pq.read_schema(pa.BufferReader(source) if isinstance(source, bytes) else source):
+                told = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+                column = {"name": field.name, "description": told.get("meaning", "")}
+                if told.get("unit"):
+                    column["unitText"] = told["unit"]
+                columns.append(self.entity(f"#{quote(f'{table}.{field.name}')}", "PropertyValue", **column))
         # Without a source: the archive is written by ourselves, this is its description.
         entity = self.files[item.place] = self.crate.add_file(None, item.place, properties=properties)
         return entity
 
-    def _columns(self, item: Item) -> list[Entity]:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        table, entities = item.name.removesuffix(".parquet"), []
-        for field in pq.read_schema(pa.BufferReader(item.source) if isinstance(item.source, bytes) else item.source):
-            told = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
-            unit = {"unitText": told["unit"]} if told.get("unit") else {}
-            identifier, properties = (
-                f"#{quote(f'{table}.{field.name}')}",
-                {"description": told.get("meaning", ""), **unit},
-            )
-            entities.append(self.entity(identifier, "PropertyValue", name=field.name, **properties))
-        return entities
-
     def actions(self, run: PackedRun) -> list[Entity]:
         """What made the files of a run."""
         manifest, name = run.manifest, run.name
-        program, again = self.program(manifest), manifest.get("tabulated")
-        cases, decks, dumps = run.with_role("case"), run.with_role("deck"), run.with_role("dump")
+        began, ended, again = manifest["started"], manifest["finished"], manifest.get("tabulated")
+        cases, decks = run.with_role("case"), run.with_role("deck")
+        layouts = [one for one in run.items if one.name == "layout.json"]
         others = int(manifest.get("shared_deck", {}).get("runs", 1)) - 1
         company = f", together with {others} other cases" if others else ""
-        deck = self.action(
-            (f"#{name}-deck", f"Deck of {name}"),
-            f"The case resolved, and the deck of it rendered{company}.",
-            program,
-            cases,
-            decks,
-            (None, manifest["started"]),
-        )
-        engine = self.action(
-            (f"#{name}-engine", f"Engine's run of {name}"),
-            "The engine's run of the deck: the motion of the beads, step by step.",
-            self._engine(manifest["engine"]),
-            decks,
-            run.with_role("dump", "output"),
-            (manifest["started"], manifest["finished"]),
-        )
-        tables = self.action(
-            (f"#{name}-tables", f"Tables of {name}"),
-            "The dumps analysed: tables and result.",
-            self.program(again) if again else program,
-            [*cases, *dumps, *(one for one in run.items if one.name == "layout.json")],
-            run.with_role("table", "result"),
-            (None, again["date"] if again else manifest["finished"]),
-        )
-        return [deck, engine, tables]
+        return [
+            self.action(
+                f"#{name}-deck",
+                f"Deck of {name}",
+                f"The case resolved, and the deck of it rendered{company}.",
+                self.program(manifest),
+                cases,
+                decks,
+                (None, began),
+            ),
+            self.action(
+                f"#{name}-engine",
+                f"Engine's run of {name}",
+                "The engine's run of the deck: the motion of the beads, step by step.",
+                self.engine(manifest["engine"]),
+                decks,
+                run.with_role("dump", "output"),
+                (began, ended),
+            ),
+            self.action(
+                f"#{name}-tables",
+                f"Tables of {name}",
+                "The dumps analysed: tables and result.",
+                self.program(again or manifest),
+                [*cases, *run.with_role("dump"), *layouts],
+                run.with_role("table", "result"),
+                (None, again["date"] if again else ended),
+            ),
+        ]
 
     def action(
         self,
-        named: tuple[str, str],
+        identifier: str,
+        name: str,
         description: str,
         instrument: Entity,
         read: Sequence[Item],
@@ -222,7 +229,7 @@ class _Crate:
         times: tuple[str | None, str],
     ) -> Entity:
         """What a program read and gave, and when (begin, if known, and end)."""
-        (identifier, name), (began, ended) = named, times
+        began, ended = times
         properties: dict[str, Any] = {
             "name": name,
             "description": description,
@@ -238,7 +245,7 @@ class _Crate:
             properties["agent"] = list(self.people)
         return self.entity(identifier, "CreateAction", **properties)
 
-    def _engine(self, engine: Mapping[str, Any]) -> Entity:
+    def engine(self, engine: Mapping[str, Any]) -> Entity:
         """LIGGGHTS, by its binary."""
         told = "Discrete element method. The SHA-256 is over those of the executable and its libliggghts."
         more = {"url": ENGINE_HOME, "sha256": engine["sha256"], "description": told}
@@ -247,11 +254,12 @@ class _Crate:
     def program(self, made_by: Mapping[str, Any]) -> Entity:
         """Our own, with Python and the packages, as a manifest names them."""
         version, commit, python = (made_by[key] for key in ("granular_walkers", "commit", "python"))
-        packages, python_home = dict(made_by["packages"]), "https://www.python.org/"
-        homes = {name: f"https://pypi.org/project/{name}/{one}/" for name, one in packages.items()}
-        needed = [self._software(home, name, packages[name], url=home) for name, home in homes.items()]
-        needed.append(self._software(f"{python_home}#{python}", "Python", python, url=python_home))
-        identity = json.dumps([version, commit, python, packages], sort_keys=True)
+        home, needed = "https://www.python.org/", []
+        for name, one in made_by["packages"].items():
+            page = f"https://pypi.org/project/{name}/{one}/"
+            needed.append(self._software(page, name, one, url=page))
+        needed.append(self._software(f"{home}#{python}", "Python", python, url=home))
+        identity = json.dumps([version, commit, python, made_by["packages"]], sort_keys=True)
         return self._software(
             f"#{PROJECT}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}",
             PROJECT,

@@ -16,9 +16,9 @@ from urllib.parse import unquote
 
 from walkers.archive.crate import METADATA_NAME, PREVIEW_NAME
 from walkers.inputs.errors import InputError, Problem
+from walkers.runner.directory import Verification, compare, files_below, made_since, verify_run
 from walkers.runner.files import json_object
 from walkers.runner.manifest import MANIFEST_NAME
-from walkers.runner.verification import Verification, compare, files_below, made_since, verify_run
 from walkers.sweeps.record import PARSL, RECORD_NAME, read_record, states
 
 SUMS_NAME = "sha256sums.txt"
@@ -34,7 +34,7 @@ def verify(path: Path) -> list[Verification]:
 
     All that is listed must be there and unchanged, and nothing else be there. What was made from finished runs since,
     and is read by nobody, is named and no failure: pictures, films, pages, files for ParaView, exports and hidden files
-    (`walkers.runner.verification.made_since`), but in a zip file, which is written whole. The lists of an archive
+    (`walkers.runner.directory.made_since`), but in a zip file, which is written whole. The lists of an archive
     (its checksums, its RO-Crate, the manifests of its runs) must agree. A sweep's directory is held to the same rule;
     its record has a checksum in archives only.
 

@@ -7,17 +7,14 @@ from walkers.runner.binary import Engine, find_engine
 from walkers.runner.directory import FinishedRun, finished_run, run_name
 from walkers.runner.failures import EngineFailure
 from walkers.runner.launch import Progress, launch
-from walkers.runner.segments import OpenRun, open_run
 
 __all__ = [
     "Engine",
     "EngineFailure",
     "FinishedRun",
-    "OpenRun",
     "Progress",
     "find_engine",
     "finished_run",
     "launch",
-    "open_run",
     "run_name",
 ]

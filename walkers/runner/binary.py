@@ -47,16 +47,7 @@ _LIBRARY = re.compile(r"libliggghts\S* => (\S+)")
 
 @dataclass(frozen=True)
 class Engine:
-    """A liggghts binary.
-
-    Attributes
-    ----------
-    path
-        The executable.
-    sha256
-        Of the executable, of the ``libliggghts`` that it loads, where it is a thin front, and of the sources of the
-        contact model.
-    """
+    """A liggghts binary: its path, and the SHA-256 of it, of the library that it loads and of the contact model."""
 
     path: Path
     sha256: str
@@ -186,18 +177,10 @@ def compile_model() -> None:
 
 @dataclass(frozen=True)
 class AuditRecord:
-    """Outcome of an audit of a binary.
+    """Outcome of an audit of a binary, which ``engine`` names by its hash and ``version`` by its banner.
 
-    Attributes
-    ----------
-    engine, version
-        Hash of the binary (`Engine.sha256`); what its banner says.
-    scope
-        ``full`` or ``quick``.
-    lines, failures, skipped
-        How many lines the audit had, those that failed, and how many could not be measured for want of a program.
-    date
-        UTC, ISO 8601.
+    ``scope`` is ``full`` or ``quick``, ``lines`` the number of lines of which ``failures`` failed and so many were
+    ``skipped`` for want of a program.
     """
 
     engine: str

@@ -50,18 +50,9 @@ _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is.
+    """How far a run is: steps of the drive, done and in all; simulated time, s; wall time of this call, s.
 
-    Attributes
-    ----------
-    step, steps
-        Of the drive, done and in all.
-    simulated
-        Time, s.
-    elapsed, made
-        Wall time of this call, s, and the steps that were made in it.
-    resting
-        Whether the beads still come to rest before the drive.
+    ``made`` are the steps that were made in this call; ``resting`` says that the beads still come to rest.
     """
 
     step: int
@@ -96,12 +87,8 @@ def launch(
 
     Parameters
     ----------
-    deck
-        The deck; its files are in ``directory`` already.
-    directory
-        Working directory of the engine; its output goes to ``engine.log`` there.
-    engine
-        The binary.
+    deck, directory, engine
+        The deck, whose files are in the directory already; where the engine works and writes its log; the binary.
     on_progress
         Called a few times a second.
     time_limit
@@ -148,13 +135,18 @@ def _watched(
     keep_open: Sequence[int],
 ) -> EngineReport:
     """Start an engine and watch it to its end."""
+    # What a user has Open MPI do on a cluster, such as by which network to meet, may leave no way on one machine.
+    ours = {name: value for name, value in os.environ.items() if not name.startswith("OMPI_MCA_")}
+    environment = {**ours, **(RANKS if watch.layout.ranks > 1 else ALONE)}
+    for name in STEP_VARIABLES:
+        environment.pop(name, None)
     process = None
     try:
         with postponed_interrupts(), (watch.directory / OUTPUT_NAME).open("wb") as output:
             process = subprocess.Popen(
                 command,
                 cwd=watch.directory,
-                env=_environment(watch.layout.ranks),
+                env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
@@ -194,14 +186,6 @@ def _off_the_network() -> tuple[str, ...]:
             subprocess.run([*prefix, "true"], stdin=subprocess.DEVNULL, capture_output=True, check=True)
             return prefix
     return ()
-
-
-def _environment(ranks: int) -> dict[str, str]:
-    # What a user has Open MPI do on a cluster, such as by which network to meet, may leave no way on one machine.
-    inherited = {name: value for name, value in os.environ.items() if not name.startswith("OMPI_MCA_")}
-    for name in STEP_VARIABLES:
-        inherited.pop(name, None)
-    return {**inherited, **(RANKS if ranks > 1 else ALONE)}
 
 
 @contextmanager

@@ -29,16 +29,9 @@ _MOST_THREADS = 4
 def manifest(
     case: Case, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path
 ) -> dict[str, Any]:
-    """What the manifest of a run says.
+    """What the manifest of a run says, all of whose files are in its directory but this one.
 
-    Parameters
-    ----------
-    case, name, engine, report
-        What was run, what the run is called, by what it was made and what that took.
-    started
-        Seconds since the epoch.
-    directory
-        The run directory, all of its files written but this one.
+    The run was ``started`` so many seconds after the epoch, and took the engine what its report says.
     """
     finished = time.time()
     audit, plugin = read_audit(engine.sha256), plugin_of(engine)
@@ -110,19 +103,12 @@ class FileChanged(WalkersError, ValueError):
 
 
 def check_unchanged(directory: Path, names: Collection[str]) -> bool:
-    """Refuse files of a finished run that are not what its manifest says.
-
-    Parameters
-    ----------
-    directory
-        A run directory, finished or not.
-    names
-        Of files in it.
+    """Refuse files of a finished run that are not what its manifest says; of an unfinished run nothing is said.
 
     Returns
     -------
     bool
-        Whether nothing is left to be said of them; of an unfinished run nothing is said.
+        Whether the manifest says something of all of them.
 
     Raises
     ------

@@ -28,16 +28,13 @@ from walkers.runner.directory import (
     record_failure,
     recover,
     room_on_disk,
-    run_place,
     segment_directories,
     unfinished,
     write_deck,
     write_segment_record,
 )
-from walkers.runner.failures import RunBusy
 from walkers.runner.files import fsync_path, read_json, settle, write_json
 from walkers.runner.launch import EngineReport, Progress, launch
-from walkers.runner.locks import locked
 from walkers.runner.manifest import MANIFEST_NAME, manifest
 from walkers.runner.provenance import look_ahead
 from walkers.templates.deck import (
@@ -64,18 +61,9 @@ class DamagedSegment(WalkersError):
 
 @dataclass
 class OpenRun:
-    """A run that is being made, or gone on with, in a directory of its own beside its final place.
+    """A run that is being made, or gone on with, in a directory of its own beside its final place (`open_locked`).
 
-    Attributes
-    ----------
-    case, engine
-        What determines it.
-    directory, place
-        Where it is made and where it belongs.
-    locks
-        File descriptors that the engine inherits.
-    done
-        What the segments that are whole say of themselves.
+    ``done`` is what the segments that are whole say of themselves.
     """
 
     case: Case
@@ -94,23 +82,16 @@ class OpenRun:
         render: Callable[[Case, Segment], Deck] = render_deck,
         is_steady: Callable[[Path], bool] = lambda _: False,
     ) -> None:
-        """Make the segments that are missing.
+        """Make the segments that are missing; if the engine fails, those before stay.
 
         Parameters
         ----------
-        on_progress
-            Called a few times a second.
-        time_limit
-            Wall time in s for each segment.
+        on_progress, time_limit
+            Of each segment, as in `walkers.runner.launch.launch`.
         render
             What makes their decks.
         is_steady
             Of a run that is driven until its walkers are steady: whether they are, as its directory shows.
-
-        Raises
-        ------
-        EngineFailure
-            If the engine fails; the segments before stay.
         """
         begun, made = time.perf_counter(), 0
         look_ahead()
@@ -218,8 +199,19 @@ def _teller(
 
 
 @contextmanager
-def open_run(case: Case, engine: Engine, out: Path) -> Iterator[OpenRun]:
-    """Make a run in a directory of its own in a folder, or go on with it.
+def open_locked(
+    case: Case, engine: Engine, place: Path, locks: Sequence[int], *, anew: bool = False
+) -> Iterator[OpenRun]:
+    """Make a run, whose place its caller has locked, in a directory of its own, or go on with it.
+
+    Parameters
+    ----------
+    case, engine
+        What determines the run.
+    place, locks
+        Where it belongs, and the descriptors of its locks, which the engine inherits.
+    anew
+        Whether what there is of an earlier call goes first.
 
     Yields
     ------
@@ -229,25 +221,9 @@ def open_run(case: Case, engine: Engine, out: Path) -> Iterator[OpenRun]:
 
     Raises
     ------
-    RunBusy
-        If another process is making the same run.
     DiskFull
         If there is no room even for the deck.
     """
-    place = run_place(case, engine, out)
-    out.mkdir(parents=True, exist_ok=True)
-    with locked([place]) as ours:
-        if place not in ours:
-            raise RunBusy(unfinished(place))
-        with open_locked(case, engine, place, list(ours.values())) as run:
-            yield run
-
-
-@contextmanager
-def open_locked(
-    case: Case, engine: Engine, place: Path, locks: Sequence[int], *, anew: bool = False
-) -> Iterator[OpenRun]:
-    """`open_run` for somebody who has locked the place already; ``anew`` drops what there is of an earlier call."""
     directory = unfinished(place)
     recover(place)
     if anew:
