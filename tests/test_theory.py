@@ -23,11 +23,10 @@ from walkers.postprocess.motion import Group
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import thresholds
-from walkers.theory.mathieu import Alignment, alignment, growth, is_stable, largest_stable_v
+from walkers.theory.mathieu import Alignment, alignment, growth, is_stable, largest_stable_v, time_to_turn
 from walkers.theory.motion import Friction, Walker, walk
 from walkers.theory.prediction import alignment_of, describe_alignment, motion_of, threshold
 from walkers.theory.quasistatic import detachment, mass_asymmetry, mean_velocity
-from walkers.theory.sideways import time_to_turn
 
 RUBY = Dimer((0.3e-3, 0.2e-3), 4000.0, 19.2e-3)
 RUBY_COSINE = float(np.sqrt(1.0 - RUBY.sin_delta**2))
