@@ -13,7 +13,7 @@ from walkers.inputs import load_case, resolve_case, shipped_cases
 from walkers.inputs.boundary import Box, Cylinder
 from walkers.templates import render_deck
 from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_shared_deck, settling_steps
-from walkers.templates.placement import place
+from walkers.templates.scene import place
 
 
 @pytest.fixture(scope="module")
