@@ -1,4 +1,7 @@
-"""A calibration from its file to its outcome: waves, emulators, posterior, and the engine's word on what it says."""
+"""A calibration from its file to its outcome: waves, emulators, posterior, and the engine's word on what it says.
+
+A wave is sets of the free parameters run through all experiments: a sweep like any other.
+"""
 
 from __future__ import annotations
 
@@ -7,22 +10,34 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import numpy.typing as npt
 from scipy.stats import norm
 
-from walkers.calibration.emulator import LARGEST, Emulators, fit_emulators
+from walkers.calibration.emulator import LARGEST, Emulators, FloatArray, Space, fit_emulators, spread_out
 from walkers.calibration.posterior import Density, Posterior, sample_posterior
-from walkers.calibration.waves import FloatArray, Space, Wave, run_wave, spread_out, wave_sweep
-from walkers.inputs.calibration import Calibration
+from walkers.inputs.axes import flatten
+from walkers.inputs.calibration import QUANTITIES, Calibration, Speed
 from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.schema import ALTERNATIVES
+from walkers.inputs.sweep import Sweep, expand
+from walkers.paper.sensitivity import misalignment
 from walkers.paper.sources import ProgressOf
+from walkers.postprocess.steady_state import steady_walkers, together
+from walkers.postprocess.tables import read_table
 from walkers.runner.failures import BeadsLost, BlowUp
 from walkers.runner.files import read_json, write_json
+from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Failure, Options
+from walkers.sweeps.table import load
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+_DIGITS = 9
+_LEAST_SPEED = 5e-5
 _PARENTS, _NEAR, _TRIED = 5, 0.06, 4000
 """How many of the best sets a wave looks around, how far (of the ranges), and how many sets it thinks of."""
 MISSING_MISFIT = float(np.log1p(30.0**2))
@@ -36,6 +51,91 @@ FINAL = frozenset(failure.__name__ for failure in (BeadsLost, BlowUp))
 
 class CalibrationStopped(WalkersError):
     """Points of a wave are missing, for no fault of their parameters: what follows would be built on sand."""
+
+
+@dataclass(frozen=True)
+class Wave:
+    """P parameter sets and what the engine made of them."""
+
+    unit: FloatArray  # the sets, in the unit cube, shape (P, D)
+    seen: dict[str, FloatArray]  # by quantity, shape (P, number of experiments), SI units and degrees
+    outcome: FloatArray  # each observation, shape (P, K); NaN where there is none
+    table: pd.DataFrame  # the sweep's, P times the number of experiments long
+    failures: list[Failure]  # of its points
+
+
+def wave_sweep(
+    calibration: Calibration, values: FloatArray, name: str, extra: Mapping[str, Mapping[str, Any]] | None = None
+) -> Sweep:
+    """The sweep of a wave: every parameter set (P, D) with every experiment, set by set.
+
+    Experiments may have ``extra`` keys in these runs alone.
+
+    Raises
+    ------
+    InputError
+        If a key of the calibration is none of a case.
+    """
+    points = []
+    for row in values:
+        for label, keys in calibration.experiments.items():
+            more = (extra or {}).get(label, {})
+            replaced = {other for key in more for other in ALTERNATIVES.get(key, ())}
+            point = {**{key: value for key, value in keys.items() if key not in replaced}, **more}
+            for parameter, value in zip(calibration.parameters, row, strict=True):
+                if label in parameter.experiments:
+                    digits = f"{value:.{_DIGITS}g}"
+                    given = f"{digits} {parameter.unit}" if parameter.unit else float(digits)
+                    point |= dict.fromkeys(parameter.keys, given)
+            points.append(point)
+    settings = flatten(calibration.file.set, lambda _: False)
+    document = {
+        "title": calibration.file.title,
+        "case": calibration.file.case,
+        # What the runs have beside it, such as twice the cycles, stands in for what is set.
+        "set": {key: value for key, value in settings.items() if key not in points[0]},
+        "zip": [{key: [point[key] for point in points] for key in points[0]}],
+    }
+    sweep = expand(document, source=calibration.source, name=name, folder=calibration.folder)
+    if "dimers" not in sweep.document:
+        problem = Problem("case", f'"{calibration.file.case}"', "expected a case of dimers")
+        raise InputError(calibration.source, [problem])
+    return sweep
+
+
+def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path, options: Options, **how: Any) -> Wave:
+    """Run what is missing of the sweep of a wave (P, D); the rest is as for `walkers.sweeps.run.run_sweep`."""
+    record, failures = run_sweep(sweep, out, options, **how)
+    table, labels = load(record.directory), list(calibration.experiments)
+    seen = _seen(table, len(labels))
+
+    def mean(quantity: str, chosen: list[str]) -> FloatArray:
+        return np.asarray(seen[quantity][:, [labels.index(label) for label in chosen]].mean(axis=1))
+
+    columns = []
+    for one in calibration.observations:
+        value = mean(one.quantity, one.of)
+        if one.over:  # a ratio of two speeds says nothing where the lower one is none
+            below = mean(one.quantity, one.over)
+            value = value / np.where(np.abs(below) > _LEAST_SPEED, below, np.nan)
+        columns.append(value)
+    return Wave(unit, seen, np.stack(columns, axis=1), table, failures)
+
+
+def _seen(table: pd.DataFrame, experiments: int) -> dict[str, FloatArray]:
+    """Quantities of each run of a wave's table; NaN where there is none, or the run failed.
+
+    Speeds are means over the walkers that are some until the end (`walkers.postprocess.steady_state.steady_walkers`).
+    """
+    rows: list[dict[str, float]] = []
+    for run, status in zip(table["run"], table["status"], strict=True):
+        rows.append(dict.fromkeys(QUANTITIES, np.nan))
+        if status == "finished":
+            kept = steady_walkers(run)
+            rows[-1] |= {name: float(kept[name].mean()) for name in get_args(Speed)}
+            if together(read_table(run, "walkers")).all():
+                rows[-1]["misalignment"] = float(misalignment(run).max())
+    return {name: np.reshape([row[name] for row in rows], (-1, experiments)) for name in QUANTITIES}
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Emulators: what the engine would give between the sets that were run, with an error, and where it gives anything."""
+"""Emulators: what the engine would give between parameter sets that were run, with an error, and where it would."""
 
 from __future__ import annotations
 
@@ -6,15 +6,19 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.distance import cdist
 from scipy.special import log_expit
+from scipy.stats import norm, qmc
 
-from walkers.calibration.waves import BoolArray, FloatArray
-from walkers.inputs.calibration import Observation
+from walkers.inputs.calibration import Observation, Parameter
 
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 _FOLDS = 10
 _FEW = 20
 _LEAST = 5
@@ -24,6 +28,66 @@ either way, and the same for all parameters."""
 _EXTREME = 3.0
 LARGEST = 12.0
 """Of the transformed residuals: beyond, sinh overflows and nobody asks."""
+
+
+@dataclass(frozen=True)
+class Space:
+    """D free parameters, in the order of the coordinates of the unit cube; logarithms where a parameter says so."""
+
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def dimensions(self) -> int:
+        """D."""
+        return len(self.parameters)
+
+    @cached_property
+    def logarithmic(self) -> BoolArray:
+        """Which parameters are scaled by their logarithms, shape (D,)."""
+        return np.array([one.log for one in self.parameters])
+
+    @cached_property
+    def _ends(self) -> FloatArray:
+        """Of the ranges, scaled, shape (2, D)."""
+        return self._scaled(np.array([one.range for one in self.parameters], np.float64).T)
+
+    def _scaled(self, values: FloatArray) -> FloatArray:
+        return np.asarray(np.log(values, out=np.array(values, np.float64), where=self.logarithmic))
+
+    def values(self, unit: FloatArray) -> FloatArray:
+        """Values of the parameters at points of the unit cube, shape (..., D)."""
+        scaled = self._ends[0] + np.asarray(unit) * (self._ends[1] - self._ends[0])
+        return np.asarray(np.exp(scaled, out=scaled, where=self.logarithmic))
+
+    def unit(self, values: FloatArray) -> FloatArray:
+        """Points of the unit cube at values of the parameters, shape (..., D)."""
+        return np.asarray((self._scaled(values) - self._ends[0]) / (self._ends[1] - self._ends[0]))
+
+    def log_prior(self, unit: FloatArray) -> FloatArray:
+        """Logarithm of the density that is assumed beforehand, but for a constant, shape (...); -inf outside."""
+        unit = np.asarray(unit)
+        total = np.where(np.all((unit >= 0.0) & (unit <= 1.0), axis=-1), 0.0, -np.inf)
+        scaled = self._scaled(self.values(unit))
+        for place, one in enumerate(self.parameters):
+            if one.normal is not None:
+                mean, deviation = one.normal
+                total = total + norm.logpdf(scaled[..., place], np.log(mean) if one.log else mean, deviation)
+        return total
+
+    def design(self, points: int, seed: int) -> FloatArray:
+        """A space-filling first wave, shape (points, D): a scrambled Sobol sequence (`scipy.stats.qmc`)."""
+        sampler = qmc.Sobol(self.dimensions, rng=np.random.default_rng(seed))
+        return np.asarray(sampler.random_base2(int(np.ceil(np.log2(points))))[:points], dtype=np.float64)
+
+
+def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatArray:
+    """So many of some candidates (C, D), each the farthest from those before it and from points that are taken."""
+    distance = cdist(candidates, taken).min(axis=1, initial=np.inf)
+    chosen: list[int] = []
+    for _ in range(min(points, len(candidates))):
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(candidates - candidates[chosen[-1]], axis=1))
+    return candidates[chosen]
 
 
 def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:

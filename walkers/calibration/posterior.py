@@ -9,8 +9,7 @@ import numpy as np
 from scipy.special import logsumexp, ndtr, softmax
 from scipy.stats import multivariate_normal
 
-from walkers.calibration.emulator import LARGEST, Emulators
-from walkers.calibration.waves import FloatArray, Space
+from walkers.calibration.emulator import LARGEST, Emulators, FloatArray, Space
 from walkers.inputs.calibration import Observation, SharedError
 
 LEAST_SAMPLES = 400.0

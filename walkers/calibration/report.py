@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.calibration.emulator import transformed
+from walkers.calibration.calibrate import Outcome
+from walkers.calibration.emulator import FloatArray, Space, transformed
 from walkers.calibration.posterior import LEAST_SAMPLES, Posterior
-from walkers.calibration.waves import FloatArray, Space, seen_in
 from walkers.inputs.calibration import QUANTITIES, Parameter
 from walkers.inputs.text import rendered
 from walkers.inputs.units import SPEED
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from walkers.calibration.calibrate import Outcome
     from walkers.inputs.calibration import Band
 
 RECORD_NAME = "calibration.json"
@@ -290,10 +289,7 @@ def _band(axes: Axes, band: Band, found: Outcome) -> None:
     chosen = [labels.index(one) for one in band.of]
     where = best.table[band.against].to_numpy()[chosen]
     order = np.argsort(where)
-    many, alone = (
-        seen_in(found.calibration, wave.table, {band.quantity})[band.quantity][:, chosen] * 1e3
-        for wave in (found.predictive, best)
-    )
+    many, alone = (wave.seen[band.quantity][:, chosen] * 1e3 for wave in (found.predictive, best))
     seen = order[np.isfinite(many[:, order]).any(axis=0)]
     low, high = (of(many[:, seen], axis=0) for of in (np.nanmin, np.nanmax))
     axes.fill_between(where[seen], low, high, color="C0", alpha=0.3, lw=0, label="engine over the posterior")

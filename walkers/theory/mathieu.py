@@ -61,8 +61,13 @@ class Alignment:
 
     @property
     def growth(self) -> float:
-        """How fast small angles grow, per unit of ϑ; times πf per second."""
-        return growth(self.u, self.v, self.damping)
+        """How fast (Floquet) small angles grow at most, per unit of ϑ; times πf per second."""
+        steps = 128  # of a period of π, U - 4V cos 2ϑ constant in each
+        theta = pi * (np.arange(steps) + 0.5) / steps
+        slopes = np.zeros((steps, 2, 2))
+        slopes[:, 0, 1], slopes[:, 1, 1] = 1.0, -2.0 * self.damping
+        slopes[:, 1, 0] = 4.0 * self.v * np.cos(2.0 * theta) - self.u
+        return float(np.log(np.abs(_multipliers(slopes, pi / steps)).max()) / pi)
 
 
 def alignment(
@@ -97,16 +102,6 @@ def alignment(
         peak_acceleration * per_acceleration / 4.0,
         5.0 / 7.0 * rolling_resistance / moment / (2.0 * pi * frequency),
     )
-
-
-def growth(u: float, v: float, damping: float = 0.0) -> float:
-    """Largest growth rate (Floquet) of solutions of d²ψ/dϑ² + 2β dψ/dϑ + [U - 4V cos 2ϑ] ψ = 0, per unit of ϑ."""
-    steps = 128  # of a period of π, U - 4V cos 2ϑ constant in each
-    theta = pi * (np.arange(steps) + 0.5) / steps
-    slopes = np.zeros((steps, 2, 2))
-    slopes[:, 0, 1], slopes[:, 1, 1] = 1.0, -2.0 * damping
-    slopes[:, 1, 0] = 4.0 * v * np.cos(2.0 * theta) - u
-    return float(np.log(np.abs(_multipliers(slopes, pi / steps)).max()) / pi)
 
 
 def _multipliers(slopes: FloatArray, step: float) -> npt.NDArray[np.complex128]:

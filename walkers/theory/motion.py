@@ -112,31 +112,19 @@ class Walker:
 
 @dataclass(frozen=True)
 class Motion:
-    """Means over the last cycle of N walkers, m/s.
+    """Means over the last cycle of N walkers, m/s; over the later half of all cycles where it does not repeat itself.
 
-    Attributes
-    ----------
-    velocity : ndarray, shape (N,)
-        Of the walker, positive toward the large bead; NaN where a contact opened, for there the model does not hold,
-        and where the forces have no solution (the paper's law does not beyond some Γ0).
-    rotation, sliding : ndarray, shape (2, N) and (3, N)
-        Rotation velocities -R dφ/dt of the beads; sliding velocities at the contacts.
-    smallest_normal_force : ndarray, shape (3, N)
-        Of each contact through the last cycle, in units of 4πγR̄; below zero it would have opened.
-    periodic, solved : ndarray of bool, shape (N,)
-        Whether the last two cycles agree within 1 µm/s (means are over the later half of all cycles where they do not),
-        and whether forces that obey the law of friction were found all the way.
-    series : ndarray, shape (3, N, steps)
-        Sliding velocities through the last cycle, at the ends of its steps.
+    The velocity, positive toward the large bead, is NaN where a contact opened, for there the model does not hold, and
+    where the forces have no solution (the paper's law does not beyond some Γ0).
     """
 
-    velocity: FloatArray
-    rotation: FloatArray
-    sliding: FloatArray
-    smallest_normal_force: FloatArray
-    periodic: npt.NDArray[np.bool_]
-    solved: npt.NDArray[np.bool_]
-    series: FloatArray
+    velocity: FloatArray  # shape (N,)
+    rotation: FloatArray  # velocities -R dφ/dt of the beads, shape (2, N)
+    sliding: FloatArray  # at the contacts, shape (3, N)
+    smallest_normal_force: FloatArray  # of each contact in that cycle, in units of 4πγR̄, shape (3, N)
+    periodic: npt.NDArray[np.bool_]  # whether the last two cycles agree within 1 µm/s, shape (N,)
+    solved: npt.NDArray[np.bool_]  # whether forces that obey the law of friction were found all the way, shape (N,)
+    series: FloatArray  # sliding velocities through that cycle, at the ends of its steps, shape (3, N, steps)
 
     @property
     def opened(self) -> npt.NDArray[np.bool_]:

@@ -89,7 +89,6 @@ def predict(case: Case) -> dict[str, Any]:
     gamma0 = dimer.gamma0(case.drive.peak_acceleration)
     end = detachment(dimer.sin_delta)
     linear = float(mean_velocity(gamma0, dimer.sin_delta))
-    models = {name: motion_of(case, viscous=viscous) for name, viscous in (("coulomb", False), ("viscous", True))}
     return {
         "gamma0": gamma0,
         "sin_delta": dimer.sin_delta,
@@ -98,14 +97,15 @@ def predict(case: Case) -> dict[str, Any]:
             "velocity": _number(linear),
             "reason": None if np.isfinite(linear) else f"{CONTACTS[int(end.contact)]} would open",
         },
-        **{name: _told(case, motion, viscous=name == "viscous") for name, motion in models.items()},
+        "coulomb": _told(case, viscous=False),
+        "viscous": _told(case, viscous=True),
         "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},
         "alignment": alignment_of(case),
     }
 
 
-def _told(case: Case, motion: Motion, *, viscous: bool) -> dict[str, Any]:
-    reason = None
+def _told(case: Case, *, viscous: bool) -> dict[str, Any]:
+    motion, reason = motion_of(case, viscous=viscous), None
     if not motion.solved[0]:
         reason = "the forces have no solution"
     elif not motion.periodic[0]:

@@ -48,14 +48,11 @@ def integrate(
 
     Returns
     -------
-    mean : ndarray, shape (3, N)
-        Sliding velocities in the mean over the last cycle, m/s.
-    least : ndarray, shape (3, N)
-        Smallest normal forces in it.
-    repeated : ndarray of bool, shape (N,)
-        Whether the last two cycles agree; where they do not, means are over the later half of all cycles.
-    solved : ndarray of bool, shape (N,)
-        Whether friction forces that obey the law were found at every step.
+    mean, least : ndarray, shape (3, N)
+        Over the last cycle sliding velocities (m/s) in the mean, and the smallest normal forces.
+    repeated, solved : ndarray of bool, shape (N,)
+        Whether the last two cycles agree (where they do not, means are over the later half of all), and whether
+        friction forces that obey the law were found at every step.
     series : ndarray, shape (N, steps, 3)
         Sliding velocities through the last cycle.
     """
