@@ -23,8 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from walkers.calibration.calibrate import calibrate
-from walkers.calibration.figures import draw
-from walkers.calibration.report import rows_of, write_tables
+from walkers.calibration.report import write_outcome
 from walkers.check.validate import validate
 from walkers.inputs.axes import flatten
 from walkers.inputs.calibration import load_calibration
@@ -104,10 +103,8 @@ def _validation(out: Path, docs: Path) -> None:
 
 def _calibration(out: Path, docs: Path) -> None:
     found = calibrate(load_calibration("ruby"), out, Options(cores_here()))
-    rows = rows_of(found)
-    write_tables(found, rows, out / "ruby")
-    draw(found, rows, out / "ruby")
-    for name in ("bands", "corner", "predictions", "sobol"):
+    write_outcome(found, out / "ruby")
+    for name in ("bands", "corner", "predictions"):
         shutil.copy(out / "ruby" / f"{name}.png", docs / "figures" / f"calibration-{name}.png")
     shutil.copy(out / "ruby" / "calibration.md", docs / "figures" / "calibration.md")
 
@@ -138,7 +135,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
         _validation,
     ),
     "calibration": Illustration(
-        tuple(f"figures/calibration-{name}.png" for name in ("bands", "corner", "predictions", "sobol")),
+        tuple(f"figures/calibration-{name}.png" for name in ("bands", "corner", "predictions")),
         _calibrated,
         _calibration,
     ),

@@ -18,7 +18,7 @@ from walkers.inputs.arrangements import ARRANGEMENTS
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads
 from walkers.postprocess.meetings import groups_of
-from walkers.templates.placement import place
+from walkers.templates.scene import place
 from walkers.theory.prediction import describe, predict
 
 MM_PER_S = 1e-3

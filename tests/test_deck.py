@@ -3,82 +3,19 @@
 import re
 from dataclasses import replace
 from hashlib import sha256
-from itertools import combinations_with_replacement
-from math import inf
 
 import pytest
 
 from tests.conftest import document, make_case
 from walkers.inputs import load_case, resolve_case, shipped_cases
-from walkers.inputs.boundary import Box, Cylinder
+from walkers.inputs.boundary import Cylinder
 from walkers.templates import render_deck
 from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_shared_deck, settling_steps
-from walkers.templates.placement import place
-
-
-@pytest.fixture(scope="module")
-def deck() -> str:
-    return render_deck(load_case("fig1b")).text
+from walkers.templates.scene import place
 
 
 def _lines(deck: str, start: str) -> list[list[str]]:
     return [line.split() for line in deck.splitlines() if line.startswith(start)]
-
-
-def test_the_walls_stand_once_and_contacts_have_the_tables(deck: str) -> None:
-    assert _walls(deck).startswith("fix walls all wall/bridge type 2 plane 0.0 0.0 0.0 0.0 0.0 1.0 shaken")
-    (pair,) = _lines(deck, "pair_style")
-    assert pair[-2:] == ["table", "bridges.txt"]
-
-
-def test_each_two_surfaces_that_may_meet_have_a_table() -> None:
-    cases = [
-        make_case(),
-        make_case(liquid={"volume_fraction": 0.02}),
-        make_case(dimers={"radii": ["0.4 mm", "0.2 mm"]}),
-    ]
-    tables = _lines(render_shared_deck(cases).files["bridges.txt"], "bridge")
-    met = {(int(one), int(two), float(radius), float(other)) for _, one, two, radius, other in tables}
-    assert len(met) == len(tables)
-    radii = {1: (2e-4, 3e-4, 4e-4), 2: (2e-4, 3e-4)}
-    walls = {(kind, 3, radius, inf) for kind, sizes in radii.items() for radius in sizes}
-    pairs = {(kind, kind, *pair) for kind, sizes in radii.items() for pair in combinations_with_replacement(sizes, 2)}
-    assert met == walls | pairs
-
-
-def _walls(deck: str) -> str:
-    """The command of the walls' fix on one line."""
-    (command,) = re.findall(r"^fix +walls .*", deck.replace("&\n", " "), flags=re.MULTILINE)
-    return " ".join(str(command).split())
-
-
-def test_walls_are_planes_and_cylinders_as_the_boundary_has_them() -> None:
-    across = "-0.002 0.0 0.0 1.0 0.0 0.0", "0.002 0.0 0.0 -1.0 0.0 0.0"
-    along = "0.0 -0.002 0.0 0.0 1.0 0.0", "0.0 0.002 0.0 0.0 -1.0 0.0"
-    boundaries = {
-        Box(material="glass", width=4e-3, height=2e-2): " ".join(f"plane {one}" for one in across + along),
-        Cylinder(material="glass", width=4e-3, height=2e-2): "cylinder 0.0 0.0 0.002",
-    }
-    for boundary, sides in boundaries.items():
-        deck = render_deck(replace(load_case("pile-ci"), boundary=boundary), Segment(0, 1000, None)).text
-        assert _walls(deck) == f"fix walls all wall/bridge type 2 plane 0.0 0.0 0.0 0.0 0.0 1.0 {sides}"
-
-
-def test_beads_start_with_the_substrate_in_the_laboratory_frame() -> None:
-    case = make_case(drive={"frame": "lab"})
-    deck = render_deck(case).text
-    velocities = _lines(deck, "velocity")
-    assert [(line[1], float(line[3])) for line in velocities] == [("all", case.drive.peak_velocity)]
-    assert _walls(deck).endswith("begin 0 frame lab")
-
-
-def test_the_container_frame_has_walls_at_rest() -> None:
-    case = make_case()
-    deck, wave = render_deck(case).text, case.drive.harmonics[0]
-    assert not _lines(deck, "velocity")
-    assert _walls(deck).endswith(f"shaken {wave.amplitude!r} 0.0 0.0 {wave.frequency} 0.0 begin 0 frame walls")
-    (gravity,) = [line for line in _lines(deck, "fix") if line[1] == "gravity"]
-    assert gravity[2:5] == ["all", "gravity", "9.81"]
 
 
 def test_rolling_friction_is_left_out_where_there_is_none() -> None:

@@ -150,8 +150,9 @@ def test_a_calibrations_title_is_no_line_of_its_report(name: str) -> None:
             "best": {"a": 1.0}, "intervals": {"a": (0.0, 1.0, 2.0)}, "words": {"a": ""}, "observations": [row],
             "discrepancies": {text: 1.0}, "emulators_within_two_errors": 1.0, "emulators_checked": 1,
             "feasible": {"seen": 1.0, "expected": 1.0}, "posterior": weights, "held_out_posteriors": {text: weights},
+            "settings": {"parameters": {"a": {"range": (0.0, 1.0)}}},
         }  # fmt: skip
-        given = {"ranges": {"a": (0.0, 1.0)}, "trials": [text], "samples": 1, "least": 1.0, "narrow": 0.5}
+        given = {"samples": 1, "least": 1.0, "narrow": 0.5}
         return rendered("walkers.calibration", "report.md.j2", found=found, discrepancies=[(0.0, 1.0, 2.0)], **given)
 
     plain, odd = told("plain").split("\n"), told(HOSTILE[name])

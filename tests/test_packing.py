@@ -10,7 +10,7 @@ from walkers.inputs.sweep import load_sweep
 from walkers.sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, makespan, pack, unfinished_parts
 from walkers.templates import render_deck
 from walkers.templates.deck import render_shared_deck
-from walkers.templates.sharing import sharing_key
+from walkers.templates.scene import sharing_key
 
 STEP = {"time_step": "2 us"}
 

@@ -19,7 +19,6 @@ from scipy.spatial.transform import Rotation
 import walkers
 from tests.conftest import call, document, make_case, to_toml
 from tests.test_pile import HALF, small
-from walkers.calibration.page import report_calibration
 from walkers.inputs.sweep import expand
 from walkers.postprocess import read_motion
 from walkers.postprocess.analysis import current_result
@@ -270,46 +269,6 @@ def test_the_command_finds_what_a_name_means(walked_run: Path, swept: Path, tmp_
     nothing = call("report", str(tmp_path), "--to", str(to))
     assert (nothing.returncode, nothing.stderr.count("\n")) == (2, 1)
     assert "not a finished run" in nothing.stderr
-
-
-def test_a_calibration_and_its_report(tmp_path: Path) -> None:
-    """Two parameters, two speeds, four sets of two cycles: nothing to be believed, and the report says so."""
-    file = tmp_path / "small.toml"
-    given: dict[str, Any] = {
-        "title": HOSTILE,
-        "case": "fig1b",
-        "set": {"dimers": {"replicates": 1}, "run": {"cycles": 3, "settling_cycles": 1, "samples_per_cycle": 8}},
-        "parameters": {
-            "friction": {"keys": ["contact.friction.bead_wall", "contact.friction.bead_bead"], "range": [0.08, 0.2]},
-            "drag": {"keys": ["liquid.viscosity_ratio"], "range": [0.5, 2.0]},
-        },
-        "experiments": {"slow": {"drive.peak_acceleration": "3 g"}, "fast": {"drive.peak_acceleration": "6 g"}},
-        "design": {"waves": [4], "predictive": 2, "points": 100},
-    }
-    lines = "".join(
-        f'[[observations]]\nname = "{name}"\ngroup = "v"\nof = ["{name}"]\n'
-        f'value = "{speed} mm/s"\ndeviation = "0.3 mm/s"\n'
-        for name, speed in (("slow", 1), ("fast", 3))
-    )
-    file.write_text(to_toml(given) + lines)
-    call("calibrate", str(file), "--out", str(tmp_path / "runs"), check=True)
-    to = tmp_path / "report.html"
-    told = call("report", "small", "--out", str(tmp_path / "runs"), "--to", str(to), check=True)
-    assert told.stdout == f"{to}\n"
-    record = json.loads((tmp_path / "runs" / "small" / "calibration.json").read_text())
-    page = Page(to)
-    keys = check_numbers(page, record)
-    assert {"best.friction", "intervals.drag.1", "observations.0.value", "observations.1.emulator"} <= keys
-    assert page.title == HOSTILE
-    assert HOSTILE in page.words
-    assert sum(one.startswith("data:image/png;base64,") for one in page.references) == 3
-    assert "contact.friction.bead_wall, contact.friction.bead_bead" in page.words
-    assert record["posterior"]["converged"] or "has not converged" in page.words
-    assert to.stat().st_size < LARGEST
-    # What is no calibration any more is told in a line.
-    (tmp_path / "runs" / "small" / "calibration.json").write_text("{}")
-    with pytest.raises(walkers.inputs.InputError, match="no calibration that can be shown"):
-        report_calibration(tmp_path / "runs" / "small", to)
 
 
 def test_runs_show_themselves(walked_run: Path, tmp_path: Path) -> None:

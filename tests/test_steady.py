@@ -25,7 +25,7 @@ from walkers.runner import find_engine
 from walkers.runner.directory import FIRST_SEGMENT
 from walkers.runner.launch import Progress
 from walkers.sweeps.shared_deck import make_runs
-from walkers.templates.sharing import sharing_key
+from walkers.templates.scene import sharing_key
 
 
 def _until_steady(**changes: Any) -> Case:

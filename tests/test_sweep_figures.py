@@ -20,8 +20,7 @@ from walkers.runner.directory import case_of
 from walkers.sweeps.factors import factors_of
 from walkers.sweeps.figure_layout import layout_of
 from walkers.sweeps.record import SweepRecord
-from walkers.theory.columns import MODEL, PAPER, predicted_column
-from walkers.theory.prediction import predict
+from walkers.theory.prediction import MODEL, PAPER, predict, predicted_column
 
 
 def _panels(figure: Figure) -> list[Axes]:

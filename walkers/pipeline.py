@@ -262,7 +262,7 @@ def _load_postprocess() -> None:
 
 _NO_RUN = {
     "folder": "not a finished run: expected a folder with a manifest.json",
-    "calibration": "a calibration's outcome: walkers report takes it",
+    "calibration": "a calibration's outcome: its report is calibration.md",
     "sweep": "a sweep's directory: walkers plot, table and status take it, this takes one of its runs",
     "archive": "an archive: unpack it and give a run or a sweep in it; walkers verify takes it as it is",
 }

@@ -82,7 +82,7 @@ def sweep_figure(
     log
         Which axes are logarithmic: ``x``, ``y`` or ``xy``.
     theory
-        Draw the theory's predictions at the points (`walkers.theory.columns.predicted_column`) too.
+        Draw the theory's predictions at the points (`walkers.theory.prediction.predicted_column`) too.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def _listed(counts: Mapping[str, int]) -> str:
 
 def _predicted(done: pd.DataFrame, column: str) -> dict[str, FloatArray]:
     from walkers.runner.directory import case_of
-    from walkers.theory.columns import predicted_column
+    from walkers.theory.prediction import predicted_column
 
     predicted, reasons = predicted_column([case_of(Path(run)) for run in done["run"]], column)
     for reason, number in reasons.items():

@@ -1,4 +1,4 @@
-"""Reports to mail, of whatever a directory holds: a run, a sweep or a calibration."""
+"""Reports to mail, of whatever a directory holds: a run or a sweep."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from walkers.pipeline import DEFAULT_OUT, find_run, locate
 
 
 def report(what: str | Path, to: Path | None = None, out: Path = DEFAULT_OUT) -> Path:
-    """Write the report of a run, a sweep or a calibration: one HTML file that needs no network.
+    """Write the report of a run or a sweep: one HTML file that needs no network.
 
     Parameters
     ----------
@@ -34,15 +34,12 @@ def report(what: str | Path, to: Path | None = None, out: Path = DEFAULT_OUT) ->
     >>> walkers.report(walkers.run("fig1b", tmp).directory, tmp / "fig1b.html").name
     'fig1b.html'
     """
-    from walkers.calibration.page import report_calibration
     from walkers.postprocess.report.page import check_report
     from walkers.sweeps.report import report_sweep
 
     if to is not None:
         check_report(to)
     place = locate(what, out)
-    if place.kind == "calibration":
-        return report_calibration(place.path, to)
     if place.kind == "sweep":
         return report_sweep(place.path, to)
     return find_run(what, out).report(to)

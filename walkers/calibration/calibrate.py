@@ -1,4 +1,7 @@
-"""A calibration from its file to its outcome: waves, emulators, posterior, and the engine's word on what it says."""
+"""A calibration from its file to its outcome: waves, emulators, posterior, and the engine's word on what it says.
+
+A wave is sets of the free parameters run through all experiments: a sweep like any other.
+"""
 
 from __future__ import annotations
 
@@ -6,27 +9,35 @@ from collections.abc import Callable, Collection, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
-from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import numpy.typing as npt
 from scipy.stats import norm
 
-from walkers.calibration.emulator import LARGEST, Emulators, fit_emulators
-from walkers.calibration.posterior import Posterior, sample_posterior
-from walkers.calibration.sensitivity import sobol_indices
-from walkers.calibration.space import Space, spread_out
-from walkers.calibration.waves import Wave, run_wave, wave_sweep
-from walkers.inputs.calibration import Calibration
+from walkers.calibration.emulator import LARGEST, Emulators, FloatArray, Space, fit_emulators, spread_out
+from walkers.calibration.posterior import Density, Posterior, sample_posterior
+from walkers.inputs.axes import flatten
+from walkers.inputs.calibration import QUANTITIES, Calibration, Speed
 from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.schema import ALTERNATIVES
+from walkers.inputs.sweep import Sweep, expand
+from walkers.paper.sensitivity import misalignment
 from walkers.paper.sources import ProgressOf
+from walkers.postprocess.steady_state import steady_walkers, together
+from walkers.postprocess.tables import read_table
 from walkers.runner.failures import BeadsLost, BlowUp
 from walkers.runner.files import read_json, write_json
+from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Failure, Options
+from walkers.sweeps.table import load
 
-FloatArray = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    import pandas as pd
+
+_DIGITS = 9
+_LEAST_SPEED = 5e-5
 _PARENTS, _NEAR, _TRIED = 5, 0.06, 4000
 """How many of the best sets a wave looks around, how far (of the ranges), and how many sets it thinks of."""
 MISSING_MISFIT = float(np.log1p(30.0**2))
@@ -43,83 +54,119 @@ class CalibrationStopped(WalkersError):
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What came out of a calibration.
+class Wave:
+    """P parameter sets and what the engine made of them."""
 
-    Attributes
-    ----------
-    calibration, space
-        What was calibrated.
-    unit : ndarray, shape (P, D)
-        All sets of all waves, in the unit cube.
-    outcome : ndarray, shape (P, K)
-        What the engine made of them; NaN where there was nothing to observe.
-    emulators, posterior
-        Of all waves and of all observations.
-    held_out
-        Posteriors of the observations that each trial of the file leaves.
-    predictive
-        The engine at samples of the posterior, that of the highest density first.
-    checks
-        The engine at the best set that was run: as in the waves (``best``), with half the time step (``half-step``),
-        and for twice as long (``twice-as-long``).
-    sobol : ndarray, shape (K, D)
-        `walkers.calibration.sensitivity.sobol_indices`.
-    failures
-        Points that failed, by sweep.
+    unit: FloatArray  # the sets, in the unit cube, shape (P, D)
+    seen: dict[str, FloatArray]  # by quantity, shape (P, number of experiments), SI units and degrees
+    outcome: FloatArray  # each observation, shape (P, K); NaN where there is none
+    table: pd.DataFrame  # the sweep's, P times the number of experiments long
+    failures: list[Failure]  # of its points
+
+
+def wave_sweep(
+    calibration: Calibration, values: FloatArray, name: str, extra: Mapping[str, Mapping[str, Any]] | None = None
+) -> Sweep:
+    """The sweep of a wave: every parameter set (P, D) with every experiment, set by set.
+
+    Experiments may have ``extra`` keys in these runs alone.
+
+    Raises
+    ------
+    InputError
+        If a key of the calibration is none of a case.
     """
+    points = []
+    for row in values:
+        for label, keys in calibration.experiments.items():
+            more = (extra or {}).get(label, {})
+            replaced = {other for key in more for other in ALTERNATIVES.get(key, ())}
+            point = {**{key: value for key, value in keys.items() if key not in replaced}, **more}
+            for parameter, value in zip(calibration.parameters, row, strict=True):
+                if label in parameter.experiments:
+                    digits = f"{value:.{_DIGITS}g}"
+                    given = f"{digits} {parameter.unit}" if parameter.unit else float(digits)
+                    point |= dict.fromkeys(parameter.keys, given)
+            points.append(point)
+    settings = flatten(calibration.file.set, lambda _: False)
+    document = {
+        "title": calibration.file.title,
+        "case": calibration.file.case,
+        # What the runs have beside it, such as twice the cycles, stands in for what is set.
+        "set": {key: value for key, value in settings.items() if key not in points[0]},
+        "zip": [{key: [point[key] for point in points] for key in points[0]}],
+    }
+    sweep = expand(document, source=calibration.source, name=name, folder=calibration.folder)
+    if "dimers" not in sweep.document:
+        problem = Problem("case", f'"{calibration.file.case}"', "expected a case of dimers")
+        raise InputError(calibration.source, [problem])
+    return sweep
+
+
+def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path, options: Options, **how: Any) -> Wave:
+    """Run what is missing of the sweep of a wave (P, D); the rest is as for `walkers.sweeps.run.run_sweep`."""
+    record, failures = run_sweep(sweep, out, options, **how)
+    table, labels = load(record.directory), list(calibration.experiments)
+    seen = _seen(table, len(labels))
+
+    def mean(quantity: str, chosen: list[str]) -> FloatArray:
+        return np.asarray(seen[quantity][:, [labels.index(label) for label in chosen]].mean(axis=1))
+
+    columns = []
+    for one in calibration.observations:
+        value = mean(one.quantity, one.of)
+        if one.over:  # a ratio of two speeds says nothing where the lower one is none
+            below = mean(one.quantity, one.over)
+            value = value / np.where(np.abs(below) > _LEAST_SPEED, below, np.nan)
+        columns.append(value)
+    return Wave(unit, seen, np.stack(columns, axis=1), table, failures)
+
+
+def _seen(table: pd.DataFrame, experiments: int) -> dict[str, FloatArray]:
+    """Quantities of each run of a wave's table; NaN where there is none, or the run failed.
+
+    Speeds are means over the walkers that are some until the end (`walkers.postprocess.steady_state.steady_walkers`).
+    """
+    rows: list[dict[str, float]] = []
+    for run, status in zip(table["run"], table["status"], strict=True):
+        rows.append(dict.fromkeys(QUANTITIES, np.nan))
+        if status == "finished":
+            kept = steady_walkers(run)
+            rows[-1] |= {name: float(kept[name].mean()) for name in get_args(Speed)}
+            if together(read_table(run, "walkers")).all():
+                rows[-1]["misalignment"] = float(misalignment(run).max())
+    return {name: np.reshape([row[name] for row in rows], (-1, experiments)) for name in QUANTITIES}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came out of a calibration."""
 
     calibration: Calibration
     space: Space
-    unit: FloatArray
-    outcome: FloatArray
-    emulators: Emulators
+    unit: FloatArray  # all sets of all waves, in the unit cube, shape (P, D)
+    emulators: Emulators  # of all waves and of all observations, as the posterior is
     posterior: Posterior
-    held_out: dict[str, Posterior]
-    predictive: Wave
-    checks: dict[str, Wave]
-    sobol: FloatArray
-    failures: dict[str, list[Failure]]
-
-    @property
-    def best(self) -> dict[str, float]:
-        """The set with which the engine gives most observations: parameter to value, in the parameter's unit."""
-        values = self.space.values(self.checks["best"].unit[0])
-        return dict(zip([one.name for one in self.space.parameters], map(float, values), strict=True))
-
-    def _repr_html_(self) -> str:
-        """The tables in a notebook: parameters, observations beside predictions, posteriors."""
-        from walkers.calibration.page import outcome_html
-
-        return outcome_html(self)
+    held_out: dict[str, Posterior]  # of the observations that each trial of the file leaves
+    predictive: Wave  # the engine at samples of the posterior, that of the highest density first
+    checks: dict[str, Wave]  # at the best set that was run: as in the waves, with half the time step, for twice as long
+    failures: dict[str, list[Failure]]  # points that failed, by sweep
 
 
 def calibrate(
-    calibration: Calibration,
-    out: Path,
-    options: Options,
-    *,
-    engine: str | None = None,
-    allow_failed_audit: bool = False,
-    progress_of: ProgressOf | None = None,
+    calibration: Calibration, out: Path, options: Options, *, progress_of: ProgressOf | None = None, **how: Any
 ) -> Outcome:
     """Calibrate, or go on with it: what is finished is not run again.
 
     Parameters
     ----------
-    calibration
-        From `walkers.inputs.calibration.load_calibration`.
+    calibration, options, how
+        From `walkers.inputs.calibration.load_calibration`; as for `walkers.sweeps.run.run_sweep`.
     out
-        Folder of the run directories; each wave is a sweep there, and the designs are kept in a folder of the
+        Folder of the run directories; each wave is a sweep there, and its design is kept in a folder of the
         calibration's name.
-    options, engine, allow_failed_audit
-        As for `walkers.sweeps.run.run_sweep`.
     progress_of
         As for `walkers.paper.sources.make_sources`.
-
-    Returns
-    -------
-    Outcome
 
     Raises
     ------
@@ -130,31 +177,22 @@ def calibrate(
     runner.EngineFailure
         If there is no engine, or its audit failed.
     """
-    check_ranges(calibration)
+    _check_ranges(calibration)
     space, design = Space(calibration.parameters), calibration.design
     folder, failures = out / calibration.name, {}
     folder.mkdir(parents=True, exist_ok=True)
 
     def run(name: str, unit: FloatArray, extra: Mapping[str, Mapping[str, Any]] | None = None) -> Wave:
-        sweep = f"{calibration.name}-{name}"
-        with progress_of(sweep) if progress_of else nullcontext() as advance:
-            wave, failed = run_wave(
-                calibration,
-                unit,
-                sweep,
-                out,
-                replace(options, final=FINAL),
-                extra=extra,
-                engine=engine,
-                allow_failed_audit=allow_failed_audit,
-                on_progress=advance,
-            )
-        if failed:
-            failures[sweep] = failed
-        undone = [failure for failure in failed if failure.reason not in FINAL]
+        sweep = wave_sweep(calibration, space.values(unit), f"{calibration.name}-{name}", extra)
+        with progress_of(sweep.name) if progress_of else nullcontext() as advance:
+            final = replace(options, final=FINAL)
+            wave = run_wave(calibration, unit, sweep, out, final, on_progress=advance, **how)
+        if wave.failures:
+            failures[sweep.name] = wave.failures
+        undone = [failure for failure in wave.failures if failure.reason not in FINAL]
         if undone or not wave.table["status"].isin(("finished", "failed")).all():
             told = undone[0].message if undone else "another process is running them"
-            raise CalibrationStopped(f"{sweep}: points are missing ({told}); call again to go on")
+            raise CalibrationStopped(f"{sweep.name}: points are missing ({told}); call again to go on")
         return wave
 
     unit, outcome = np.zeros((0, space.dimensions)), np.zeros((0, len(calibration.observations)))
@@ -166,48 +204,32 @@ def calibrate(
         unit, outcome = np.concatenate([unit, sets]), np.concatenate([outcome, wave.outcome])
         filling = filling or len(sets)
     emulators = fit_emulators(unit, outcome, calibration.observations, design.seed, filling)
-    sample = partial(_posterior, calibration, emulators)
-    posterior = sample()
-    seen = sha256(posterior.unit.tobytes() + posterior.log_density.tobytes())
-    draw, follows = partial(_drawn, posterior, design.predictive), f"{seen.hexdigest()} {design.predictive}"
-    drawn = _kept(folder / "predictive.json", _determinants(calibration, 0), draw, follows)
+    posterior = _posterior(calibration, emulators)
+    # The sample of the highest density, and others evenly through the samples.
+    every = np.linspace(0, len(posterior.unit) - 1, design.predictive - 1).round().astype(int)
+    drawn = np.concatenate([posterior.best[None], posterior.unit[every]])
     predictive = run("predictive", drawn)
     ranked = np.concatenate([unit, drawn])[ranking(calibration, np.concatenate([outcome, predictive.outcome]))]
     within = ((ranked > _END) & (ranked < 1.0 - _END)).all(axis=1)
     best = ranked[within][:1] if within.any() else ranked[:1]
+    held_out = {name: _posterior(calibration, emulators, groups) for name, groups in calibration.file.held_out.items()}
     extras = _finer_and_longer(calibration, space.values(best))
-    return Outcome(
-        calibration,
-        space,
-        unit,
-        outcome,
-        emulators,
-        posterior,
-        held_out={name: sample(groups) for name, groups in calibration.file.held_out.items()},
-        predictive=predictive,
-        checks={name: run(name, best, extra) for name, extra in extras.items()},
-        sobol=sobol_indices(emulators, space, design.seed),
-        failures=failures,
-    )
+    checks = {name: run(name, best, extra) for name, extra in extras.items()}
+    return Outcome(calibration, space, unit, emulators, posterior, held_out, predictive, checks, failures)
 
 
 def _posterior(calibration: Calibration, emulators: Emulators, held_out: Collection[str] = ()) -> Posterior:
-    space, design = Space(calibration.parameters), calibration.design
-    shared = calibration.file.shared_errors
-    return sample_posterior(emulators, space, design.points, design.seed, held_out, shared_errors=shared)
+    density = Density(emulators, Space(calibration.parameters), held_out, calibration.file.shared_errors)
+    return sample_posterior(density, calibration.design.points, calibration.design.seed)
 
 
-def check_ranges(calibration: Calibration) -> None:
+def _check_ranges(calibration: Calibration) -> None:
     """Refuse parameters whose ranges go beyond what a case takes, before anything is written or run.
 
-    Raises
-    ------
-    InputError
-        If the experiments cannot be had at either end of all ranges, or at a guess.
+    Cases are made at either end of all ranges and at the guesses.
     """
     ends = Space(calibration.parameters).values(np.array([[0.0], [1.0]]) * np.ones(len(calibration.parameters)))
-    guesses = np.reshape(np.array(calibration.guesses, np.float64), (-1, len(calibration.parameters)))
-    sweep = wave_sweep(calibration, np.concatenate([ends, guesses]), calibration.name)
+    sweep = wave_sweep(calibration, np.concatenate([ends, _guesses(calibration)]), calibration.name)
     try:
         for _ in sweep.cases():
             pass
@@ -221,20 +243,21 @@ def check_ranges(calibration: Calibration) -> None:
         raise
 
 
+def _guesses(calibration: Calibration) -> FloatArray:
+    return np.reshape(np.array(calibration.guesses, np.float64), (-1, len(calibration.parameters)))
+
+
 def _determinants(calibration: Calibration, wave: int) -> dict[str, Any]:
-    """What the parameter sets of a wave (from 1; of none: 0) were drawn from, beside what the engine said before."""
+    """What the parameter sets of a wave (from 1) were drawn from, beside what the engine said before."""
     parameters = {one.name: [*one.range, one.log, one.unit] for one in calibration.parameters}
-    if not wave:
-        return {"parameters": parameters}
     seed, guesses = calibration.design.seed, [list(guess) for guess in calibration.guesses]
     return {"parameters": parameters, "seed": seed, "guesses": guesses, "waves": calibration.design.waves[:wave]}
 
 
-def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArray], follows: str = "") -> FloatArray:
+def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArray]) -> FloatArray:
     """The parameter sets of a wave, as written down before, or made and written down.
 
-    A calibration that goes on must not depend on whether the libraries would draw the same points again. What
-    ``follows`` from something else is made anew where that has changed.
+    A calibration that goes on must not depend on whether the libraries would draw the same points again.
     """
     if path.exists():
         try:
@@ -253,102 +276,67 @@ def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArra
                     "drawn again (runs that fit are kept), take the change back, or give another --out"
                 )
                 raise InputError(str(path), [Problem(key, None, told)])
-        if kept.get("follows", "") == follows:
-            return unit
+        return unit
     unit = make()
-    write_json(path, {**determinants, "follows": follows, "unit": unit.tolist()})
+    write_json(path, {**determinants, "unit": unit.tolist()})
     return unit
 
 
-def first_wave(calibration: Calibration, space: Space) -> FloatArray:
-    """The guesses, and sets that fill the ranges, shape (G + P, D)."""
-    guesses = space.unit(np.reshape(np.array(calibration.guesses, np.float64), (-1, space.dimensions)))
-    filling = space.design(calibration.design.waves[0], calibration.design.seed)
-    return np.concatenate([np.clip(guesses, 0.0, 1.0), filling])
-
-
 def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, points: int, filling: int) -> FloatArray:
-    """The first wave, or one where the posterior is and around the best sets that were run, shape (P, D).
+    """Sets (P, D) of a wave: the guesses and sets that fill the ranges, or where the posterior and the best sets are.
 
     Parameters
     ----------
-    calibration
-        What is calibrated.
-    unit : ndarray, shape (N, D)
-        The sets that were run, in the unit cube; none for the first wave.
-    outcome : ndarray, shape (N, K)
-        What the engine made of them.
-    points
-        P.
+    calibration, points
+        What is calibrated; P (the first wave has the guesses besides).
+    unit, outcome : ndarray, shape (N, D) and (N, K)
+        The sets that were run, in the unit cube, and what the engine made of them; none for the first wave.
     filling
-        How many of the sets were the first wave.
+        How many of them were the first wave.
     """
     space, seed = Space(calibration.parameters), calibration.design.seed
     if not len(unit):
-        return first_wave(calibration, space)
+        guesses = np.clip(space.unit(_guesses(calibration)), 0.0, 1.0)
+        return np.concatenate([guesses, space.design(points, seed)])
     emulators = fit_emulators(unit, outcome, calibration.observations, seed, filling)
     posterior = _posterior(calibration, emulators)
     samples, places = np.unique(posterior.unit, axis=0, return_index=True)
     likely = samples[np.argsort(posterior.log_density[places])[::-1]][: len(samples) // 2]
     draw = np.random.default_rng([seed, len(unit)])
-    # A quarter where the posterior is high, far from each other; half around the best sets that were run, for there the
-    # engine is known to be good; the others wherever the posterior is, to find what is missing.
+    # A quarter where the posterior is high, far from each other; half around and between the best sets that were run,
+    # for there the engine is known to be good; the others wherever the posterior is, to find what is missing.
     few = points // 4
     among = spread_out(likely[: 20 * points], few, unit)
     parents = unit[ranking(calibration, outcome)[:_PARENTS]]
-    near = _promising(emulators, parents, points - 2 * few, unit, draw)
+    shares = draw.dirichlet(np.full(len(parents), 0.5), _TRIED)
+    tried = np.clip(shares @ parents + draw.normal(0.0, _NEAR, (_TRIED, space.dimensions)), 0.0, 1.0)
+    wanted = points - 2 * few
+    near = spread_out(tried[np.argsort(_expected_misfit(emulators, tried))[: 4 * wanted]], wanted, unit)
     beyond = draw.choice(samples, few, replace=len(samples) < few)
     return np.concatenate([among, near, beyond])
 
 
-def _promising(
-    emulators: Emulators, parents: FloatArray, points: int, taken: FloatArray, draw: np.random.Generator
-) -> FloatArray:
-    """Of many sets around and between some those of which least misfit is expected, not too near each other.
-
-    The misfit of an observation that may not be made is `MISSING_MISFIT`, as in `ranking`.
-    """
-    shares = draw.dirichlet(np.full(len(parents), 0.5), _TRIED)
-    tried = np.clip(shares @ parents + draw.normal(0.0, _NEAR, (_TRIED, parents.shape[1])), 0.0, 1.0)
-    own = [place for place, one in enumerate(emulators.observations) if not one.derived]
-    expected = _expected_misfit(emulators.of(own), tried)
-    return spread_out(tried[np.argsort(expected)[: 4 * points]], points, taken)
-
-
 def _expected_misfit(emulators: Emulators, unit: FloatArray) -> FloatArray:
-    """Σ ln(1 + r²) as the emulators expect it at points (N, D), shape (N,)."""
-    mean, deviation = emulators.predict(unit)
+    """The misfit of `ranking` as the emulators expect it at points (N, D), shape (N,)."""
+    own = [place for place, one in enumerate(emulators.each) if not one.observation.derived]
+    mean, deviation = emulators.predict(unit, own)
     transformed = np.clip(mean[..., None] + deviation[..., None] * _QUANTILES, -LARGEST, LARGEST)
     misfit = np.log1p(np.sinh(transformed) ** 2).mean(axis=2)
-    made = emulators.feasibility.probability(unit)
+    made = emulators.feasible(unit)[:, own]
     return np.asarray((made * misfit + (1.0 - made) * MISSING_MISFIT).sum(axis=1))
 
 
-def _drawn(posterior: Posterior, points: int) -> FloatArray:
-    """The sample of the highest density, and so many others, evenly through the samples."""
-    every = np.linspace(0, len(posterior.unit) - 1, points - 1).round().astype(int)
-    return np.concatenate([posterior.best[None], posterior.unit[every]])
-
-
 def ranking(calibration: Calibration, outcome: FloatArray) -> npt.NDArray[np.int64]:
-    """Places of sets that were run: those first that give most observations within their deviations, shape (P,).
+    """Places of sets by their outcome (P, K): those first that give most observations within their deviations.
 
     Those that are derived from others do not count. Of several sets that with the least misfit Σ ln(1 + r²), r in
     standard deviations; the logarithm keeps an observation that none of them gives from deciding. One that could not be
     made is not given, and its misfit is `MISSING_MISFIT`. It is the engine's own word: emulators err most where they
     hope most.
-
-    Parameters
-    ----------
-    calibration
-        Whose observations.
-    outcome : ndarray, shape (P, K)
-        What the engine made of each set; NaN where there was nothing to observe.
     """
-    value = np.array([one.value for one in calibration.observations])
-    deviation = np.array([one.deviation for one in calibration.observations])
-    own = np.array([not one.derived for one in calibration.observations])
-    residual = ((outcome - value) / deviation)[:, own]
+    own = [place for place, one in enumerate(calibration.observations) if not one.derived]
+    value, deviation = np.array([(one.value, one.deviation) for one in calibration.observations])[own].T
+    residual = (outcome[:, own] - value) / deviation
     given = (np.abs(residual) <= 1.0).sum(axis=1)
     misfit = np.where(np.isnan(residual), MISSING_MISFIT, np.log1p(residual**2)).sum(axis=1)
     return np.lexsort((misfit, -given))
@@ -356,9 +344,8 @@ def ranking(calibration: Calibration, outcome: FloatArray) -> npt.NDArray[np.int
 
 def _finer_and_longer(calibration: Calibration, values: FloatArray) -> dict[str, dict[str, dict[str, Any]]]:
     """What the runs of a set have beside it: nothing; half of their time steps; twice their cycles."""
-    cases = list(wave_sweep(calibration, values, "check").cases())
-    finer, longer = {}, {}
-    for label, case in zip(calibration.experiments, cases, strict=True):
-        finer[label] = {"run.time_step": f"{case.run.time_step / 2.0 * 1e6:.6g} us"}
-        longer[label] = {"run.cycles": 2 * case.run.cycles}
+    cases = wave_sweep(calibration, values, "check").cases()
+    runs = {label: case.run for label, case in zip(calibration.experiments, cases, strict=True)}
+    finer = {label: {"run.time_step": f"{run.time_step / 2.0 * 1e6:.6g} us"} for label, run in runs.items()}
+    longer = {label: {"run.cycles": 2 * run.cycles} for label, run in runs.items()}
     return {"best": {}, "half-step": finer, "twice-as-long": longer}

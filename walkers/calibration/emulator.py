@@ -1,19 +1,24 @@
-"""Emulators: what the engine would give, interpolated between the sets that were run, with an error."""
+"""Emulators: what the engine would give between parameter sets that were run, with an error, and where it would."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.distance import cdist
+from scipy.special import log_expit
+from scipy.stats import norm, qmc
 
-from walkers.calibration.feasibility import Feasibility, fit_feasibility
-from walkers.inputs.calibration import Observation
+from walkers.inputs.calibration import Observation, Parameter
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 _FOLDS = 10
 _FEW = 20
 _LEAST = 5
@@ -23,6 +28,66 @@ either way, and the same for all parameters."""
 _EXTREME = 3.0
 LARGEST = 12.0
 """Of the transformed residuals: beyond, sinh overflows and nobody asks."""
+
+
+@dataclass(frozen=True)
+class Space:
+    """D free parameters, in the order of the coordinates of the unit cube; logarithms where a parameter says so."""
+
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def dimensions(self) -> int:
+        """D."""
+        return len(self.parameters)
+
+    @cached_property
+    def logarithmic(self) -> BoolArray:
+        """Which parameters are scaled by their logarithms, shape (D,)."""
+        return np.array([one.log for one in self.parameters])
+
+    @cached_property
+    def _ends(self) -> FloatArray:
+        """Of the ranges, scaled, shape (2, D)."""
+        return self._scaled(np.array([one.range for one in self.parameters], np.float64).T)
+
+    def _scaled(self, values: FloatArray) -> FloatArray:
+        return np.asarray(np.log(values, out=np.array(values, np.float64), where=self.logarithmic))
+
+    def values(self, unit: FloatArray) -> FloatArray:
+        """Values of the parameters at points of the unit cube, shape (..., D)."""
+        scaled = self._ends[0] + np.asarray(unit) * (self._ends[1] - self._ends[0])
+        return np.asarray(np.exp(scaled, out=scaled, where=self.logarithmic))
+
+    def unit(self, values: FloatArray) -> FloatArray:
+        """Points of the unit cube at values of the parameters, shape (..., D)."""
+        return np.asarray((self._scaled(values) - self._ends[0]) / (self._ends[1] - self._ends[0]))
+
+    def log_prior(self, unit: FloatArray) -> FloatArray:
+        """Logarithm of the density that is assumed beforehand, but for a constant, shape (...); -inf outside."""
+        unit = np.asarray(unit)
+        total = np.where(np.all((unit >= 0.0) & (unit <= 1.0), axis=-1), 0.0, -np.inf)
+        scaled = self._scaled(self.values(unit))
+        for place, one in enumerate(self.parameters):
+            if one.normal is not None:
+                mean, deviation = one.normal
+                total = total + norm.logpdf(scaled[..., place], np.log(mean) if one.log else mean, deviation)
+        return total
+
+    def design(self, points: int, seed: int) -> FloatArray:
+        """A space-filling first wave, shape (points, D): a scrambled Sobol sequence (`scipy.stats.qmc`)."""
+        sampler = qmc.Sobol(self.dimensions, rng=np.random.default_rng(seed))
+        return np.asarray(sampler.random_base2(int(np.ceil(np.log2(points))))[:points], dtype=np.float64)
+
+
+def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatArray:
+    """So many of some candidates (C, D), each the farthest from those before it and from points that are taken."""
+    distance = cdist(candidates, taken).min(axis=1, initial=np.inf)
+    chosen: list[int] = []
+    for _ in range(min(points, len(candidates))):
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(candidates - candidates[chosen[-1]], axis=1))
+    return candidates[chosen]
 
 
 def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:
@@ -37,33 +102,18 @@ def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:
 class Emulator:
     """One observation as a function of the parameters: a Gaussian process of the transformed residual.
 
-    It knows the sets alone in which there was something to observe (`walkers.calibration.feasibility`).
-
-    Attributes
-    ----------
-    observation
-        What it gives.
-    process
-        scikit-learn's, fitted; None if too few sets were feasible.
-    error_inflation
-        By how much its standard deviations are too small, from cross-validation in the later waves; at least 1.
-    error
-        Root mean square of the cross-validated error, in the transformed residual; NaN if too few sets were feasible.
-    explained
-        Share of the variance that is explained in cross-validation; NaN if too few sets were feasible.
-    sets
-        Number of the sets that it knows.
+    What is said of its errors is from cross-validation.
     """
 
     observation: Observation
-    process: Any
-    error_inflation: float
-    error: float
-    explained: float
-    sets: int
+    sets: int  # that it knows: those in which there was something to observe
+    process: Any = None  # scikit-learn's, fitted; None if these were too few
+    error_inflation: float = 1.0  # by how much its standard deviations are too small in the later waves; at least 1
+    error: float = np.nan  # root mean square, of the transformed residual
+    explained: float = np.nan  # share of the variance
 
     def predict(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Transformed residual and its standard deviation, widened by ``error_inflation``: shape (N,)."""
+        """Transformed residual and its standard deviation, widened by ``error_inflation``, at points (N, D)."""
         if self.process is None:
             return np.zeros(len(unit)), np.full(len(unit), _UNKNOWN)
         with warnings.catch_warnings():
@@ -72,56 +122,63 @@ class Emulator:
         return mean, deviation * self.error_inflation
 
     def draw(self, unit: FloatArray, normal: FloatArray) -> FloatArray:
-        """The observation as it may be at points (N, D), SI units and degrees: shape (N,).
-
-        Parameters
-        ----------
-        unit : ndarray, shape (N, D)
-        normal : ndarray, shape (N,)
-            Standard normal numbers, one a point.
-        """
+        """The observation as it may be at points (N, D), SI units and degrees; ``normal`` are N standard numbers."""
         mean, deviation = self.predict(unit)
         residual = np.sinh(np.clip(mean + deviation * normal, -LARGEST, LARGEST))
         return np.asarray(self.observation.value + self.observation.deviation * residual)
-
-    def value(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The observation (median) and half of the width that holds 68 % at points (N, D): shape (N,)."""
-        low, middle, high = (self.draw(unit, np.full(len(unit), sigmas)) for sigmas in (-1.0, 0.0, 1.0))
-        return middle, (high - low) / 2.0
 
 
 @dataclass(frozen=True)
 class Emulators:
     """The engine, as far as sets that were run tell of it: K observations, and whether they can be made.
 
-    Attributes
-    ----------
-    each
-        One an observation.
-    feasibility
-        Of all observations.
-    correlation : ndarray, shape (K, K)
-        Of the emulators' errors, for observations share runs and sets; from cross-validation, shrunk toward none.
+    Observations that are missing in the same sets are one of E events: they need the same walkers.
     """
 
-    each: tuple[Emulator, ...]
-    feasibility: Feasibility
-    correlation: FloatArray
+    each: tuple[Emulator, ...]  # one an observation
+    correlation: FloatArray  # of their errors, shape (K, K), for observations share runs and sets; shrunk toward none
+    event: npt.NDArray[np.int64]  # which one an observation needs, shape (K,)
+    missing: BoolArray  # sets that were run in which an event did not come about, shape (P, E)
+    classifiers: tuple[Any, ...]  # E Gaussian processes; None of an event that came about in all sets, or in none
 
-    @property
-    def observations(self) -> list[Observation]:
-        """What they give."""
-        return [one.observation for one in self.each]
-
-    def predict(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Transformed residuals and their standard deviations, shape (N, K)."""
-        mean, deviation = zip(*(one.predict(unit) for one in self.each), strict=True)
+    def predict(self, unit: FloatArray, places: Sequence[int] | None = None) -> tuple[FloatArray, FloatArray]:
+        """Transformed residuals of all observations (or those at some places) and their standard deviations, (N, K)."""
+        chosen = range(len(self.each)) if places is None else places
+        mean, deviation = zip(*(self.each[one].predict(unit) for one in chosen), strict=True)
         return np.stack(mean, axis=1), np.stack(deviation, axis=1)
 
-    def of(self, places: list[int]) -> Emulators:
-        """Those of some observations; their events are still those of all."""
-        feasibility = replace(self.feasibility, event=self.feasibility.event[places])
-        return Emulators(tuple(self.each[one] for one in places), feasibility, self.correlation[np.ix_(places, places)])
+    def log_probabilities(self, unit: FloatArray) -> FloatArray:
+        """Logarithms of the probabilities of the events at points (N, D), shape (N, E).
+
+        The mean of the logistic function over the normal latent one, by MacKay's approximation
+        (doi 10.1162/neco.1992.4.5.720).
+        """
+        latent = np.empty((len(unit), len(self.classifiers)))
+        for place, (one, missing) in enumerate(zip(self.classifiers, self.missing.T, strict=True)):
+            if one is None:  # Laplace's rule of succession
+                latent[:, place] = np.log(((~missing).sum() + 1.0) / (missing.sum() + 1.0))
+            else:
+                mean, variance = one.latent_mean_and_variance(unit)
+                latent[:, place] = mean / np.sqrt(1.0 + np.pi / 8.0 * np.maximum(variance, 0.0))
+        return np.asarray(log_expit(latent))
+
+    def feasible(self, unit: FloatArray) -> FloatArray:
+        """Probabilities that each observation can be made, at points (N, D), shape (N, K)."""
+        return np.asarray(np.exp(self.log_probabilities(unit))[:, self.event])
+
+    def needed(self, places: Sequence[int]) -> list[int]:
+        """Events that some of the observations need, each once, and none that others imply.
+
+        An event that fails just where others fail (a ratio needs the walkers of both its speeds) says nothing that
+        these do not say; counted again it would weigh twice.
+        """
+        events, kept = dict.fromkeys(self.event[list(places)].tolist()), []
+        for one in events:
+            own, others = self.missing[:, one], [self.missing[:, other] for other in events if other != one]
+            within = [other for other in others if not (other & ~own).any()]
+            if not within or not np.array_equal(np.any(within, axis=0), own):
+                kept.append(one)
+        return kept
 
 
 def fit_emulators(
@@ -131,87 +188,82 @@ def fit_emulators(
 
     Parameters
     ----------
-    unit : ndarray, shape (P, D)
-        The sets that were run, in the unit cube.
-    outcome : ndarray, shape (P, K)
-        What they gave; NaN where there was nothing to observe.
-    observations
-        K of them.
-    seed
-        Of the restarts of the fit.
+    unit, outcome : ndarray, shape (P, D) and (P, K)
+        The sets that were run, in the unit cube, and what they gave; NaN where there was nothing to observe.
+    observations, seed
+        K of them; of the restarts of the fit.
     filling
         Number of the sets that fill the range. Errors are judged by the sets after them, if there are enough: these are
         where the posterior is, and there walkers are more than elsewhere on the verge of something.
     """
-    later = np.arange(len(unit)) >= filling
-    fitted = [_fitted(unit, outcome[:, k], observation, seed, later) for k, observation in enumerate(observations)]
-    return Emulators(
-        tuple(emulator for emulator, _ in fitted),
-        fit_feasibility(unit, outcome, seed),
-        _correlation(np.stack([miss for _, miss in fitted], axis=1)),
-    )
+    from sklearn.covariance import LedoitWolf
+
+    fitted = [_fitted(unit, outcome[:, k], one, seed, filling) for k, one in enumerate(observations)]
+    # An error that is not known counts as none, which keeps the matrix positive; one of many deviations counts as
+    # three, lest one set decide.
+    errors = np.clip(np.stack([errors for _, errors in fitted], axis=1), -_EXTREME, _EXTREME)
+    size = np.sqrt(np.mean(errors**2, axis=0))
+    correlation = LedoitWolf(assume_centered=True).fit(errors / np.where(size > 0.0, size, 1.0)).covariance_
+    np.fill_diagonal(correlation, 1.0)
+    missing, event = np.unique(np.isnan(outcome), axis=1, return_inverse=True)
+    classifiers = tuple(_classifier(unit, ~column, seed) for column in missing.T)
+    return Emulators(tuple(one for one, _ in fitted), correlation, event.reshape(-1), missing, classifiers)
 
 
 def _fitted(
-    unit: FloatArray, outcome: FloatArray, observation: Observation, seed: int, later: npt.NDArray[np.bool_]
+    unit: FloatArray, outcome: FloatArray, observation: Observation, seed: int, filling: int
 ) -> tuple[Emulator, FloatArray]:
     """An emulator, and its cross-validated errors in stated standard errors, shape (P,); 0 where there is no value."""
-    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.base import clone
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
-    from threadpoolctl import threadpool_limits
+    from sklearn.model_selection import KFold
 
     made, errors = np.isfinite(outcome), np.zeros(len(outcome))
-    if made.sum() < _LEAST:
-        return Emulator(observation, None, 1.0, np.nan, np.nan, int(made.sum())), errors
+    sets = int(made.sum())
+    if sets < _LEAST:
+        return Emulator(observation, sets), errors
     wanted, known = transformed(outcome[made], observation), unit[made]
     scales = np.full(unit.shape[1], 0.7)
     kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(scales, (5e-2, 2e1), nu=2.5) + WhiteKernel(1e-2, (1e-6, 1.0))
     process = GaussianProcessRegressor(kernel, normalize_y=True, n_restarts_optimizer=1, random_state=seed)
-    with warnings.catch_warnings(), threadpool_limits(1):  # matrices are small: threads would wait for each other
-        warnings.simplefilter("ignore", ConvergenceWarning)  # a scale at its bound: no influence
+    predicted, deviation = np.zeros(sets), np.zeros(sets)
+    with _quietly():
         process.fit(known, wanted)
-        predicted, deviation = _cross_validated(process, known, wanted, seed)
+        for others, fold in KFold(min(_FOLDS, sets), shuffle=True, random_state=seed).split(known):
+            partial = clone(process).set_params(kernel=process.kernel_, optimizer=None)
+            partial.fit(known[others], wanted[others])
+            predicted[fold], deviation[fold] = partial.predict(known[fold], return_std=True)
     miss = wanted - predicted
     errors[made] = miss / deviation
-    judged = made & later if (made & later).sum() >= _FEW else made
-    spread = float(np.var(wanted))
-    emulator = Emulator(
-        observation,
-        process,
-        error_inflation=max(1.0, float(np.sqrt(np.mean(errors[judged] ** 2)))),
-        error=float(np.sqrt(np.mean(miss**2))),
-        explained=1.0 - float(np.mean(miss**2)) / spread if spread > 0.0 else 1.0,
-        sets=int(made.sum()),
-    )
-    return emulator, errors
+    later = made & (np.arange(len(unit)) >= filling)
+    judged = later if later.sum() >= _FEW else made
+    inflation = max(1.0, float(np.sqrt(np.mean(errors[judged] ** 2))))
+    square, spread = float(np.mean(miss**2)), float(np.var(wanted))
+    explained = 1.0 - square / spread if spread > 0.0 else 1.0
+    return Emulator(observation, sets, process, inflation, float(np.sqrt(square)), explained), errors
 
 
-def _correlation(errors: FloatArray) -> FloatArray:
-    """Correlation of errors (P, K) about zero, shrunk as by Ledoit and Wolf (doi 10.1016/S0047-259X(03)00096-4).
+def _classifier(unit: FloatArray, made: BoolArray, seed: int) -> Any:
+    """Of an event that came about in some sets."""
+    from sklearn.gaussian_process import GaussianProcessClassifier
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
-    An error that is not known counts as none, which keeps the matrix positive; one of many deviations counts as three,
-    lest one set decide.
-    """
-    from sklearn.covariance import ledoit_wolf_shrinkage
-
-    clipped = np.clip(errors, -_EXTREME, _EXTREME)
-    size = np.sqrt(np.mean(clipped**2, axis=0))
-    standard = clipped / np.where(size > 0.0, size, 1.0)
-    left = 1.0 - ledoit_wolf_shrinkage(standard, assume_centered=True) if standard.any() else 0.0
-    found = left * standard.T @ standard / len(standard)
-    np.fill_diagonal(found, 1.0)
-    return np.asarray(found)
+    if made.all() or not made.any():
+        return None
+    # The constant kernel is the uncertainty of the share of feasible sets over the whole range: with few failures
+    # most of the range is feasible, not half of it, as without. Scales below a tenth of the range cannot be learned.
+    kernel = ConstantKernel(4.0, (1e-1, 1e2)) * Matern(np.full(unit.shape[1], 1.0), (1e-1, 2e1), nu=2.5)
+    with _quietly():
+        return GaussianProcessClassifier(kernel + ConstantKernel(4.0, "fixed"), random_state=seed).fit(unit, made)
 
 
-def _cross_validated(process: Any, unit: FloatArray, wanted: FloatArray, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Mean and standard deviation at each run from those of other folds, with the kernel that all of them gave."""
-    from sklearn.base import clone
-    from sklearn.model_selection import KFold
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """Fit in one thread, for matrices are small, and without warnings of scales at a bound, which have no influence."""
+    from sklearn.exceptions import ConvergenceWarning
+    from threadpoolctl import threadpool_limits
 
-    mean, deviation = np.zeros(len(wanted)), np.zeros(len(wanted))
-    for others, fold in KFold(min(_FOLDS, len(wanted)), shuffle=True, random_state=seed).split(unit):
-        partial = clone(process).set_params(kernel=process.kernel_, optimizer=None)
-        partial.fit(unit[others], wanted[others])
-        mean[fold], deviation[fold] = partial.predict(unit[fold], return_std=True)
-    return mean, deviation
+    with warnings.catch_warnings(), threadpool_limits(1):
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        yield

@@ -6,15 +6,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
-from scipy.special import logsumexp, ndtr
+from scipy.special import logsumexp, ndtr, softmax
+from scipy.stats import multivariate_normal
 
-from walkers.calibration.emulator import Emulators
-from walkers.calibration.likelihood import log_likelihood, observation_covariance
-from walkers.calibration.space import Space
-from walkers.inputs.calibration import SharedError
+from walkers.calibration.emulator import LARGEST, Emulators, FloatArray, Space
+from walkers.inputs.calibration import Observation, SharedError
 
-FloatArray = npt.NDArray[np.float64]
 LEAST_SAMPLES = 400.0
 """A posterior is known well enough if its points are worth more than so many independent samples."""
 _ROUNDS = 8
@@ -28,37 +25,101 @@ _DISCREPANCY = 0.5
 have little, but one may have much without bending all parameters toward it."""
 _MOST = 0.998
 """Probability of the prior beyond which a discrepancy, then of 160 deviations, does not grow."""
+_NEWTON_STEPS, _CONVERGED = 40, 1e-4
+_LEAST_DEVIATION = 1e-3
+
+
+def observation_covariance(observations: Sequence[Observation], shared: Mapping[str, SharedError]) -> FloatArray:
+    """Covariance of the published numbers' errors, each in its own standard deviations, shape (K, K).
+
+    δ_jk + Σ s (1 − δ_jk) over the shared errors that both j and k have, s their share of the variance.
+    """
+    covariance = np.eye(len(observations))
+    for error in shared.values():
+        has = np.array([one.name in error.observations for one in observations])
+        covariance += error.share * (np.outer(has, has) & ~np.eye(len(has), dtype=bool))
+    return covariance
+
+
+def log_likelihood(
+    mean: FloatArray, deviation: FloatArray, correlation: FloatArray, shared: FloatArray, discrepancy: FloatArray
+) -> FloatArray:
+    """Logarithm of the density of residuals of zero, but for ½ K ln 2π, shape (N,).
+
+    ln ∫ N(sinh z; 0, C) N(z; m, Σ) dz, z the transformed residuals (`walkers.calibration.emulator.transformed`), by
+    Laplace's approximation, −ψ(z) − ½ ln |C| − ½ ln |Σ| − ½ ln |∇∇ψ| at the z where
+
+        ψ(z) = ½ sinh(z)ᵀ C⁻¹ sinh(z) + ½ (z − m)ᵀ Σ⁻¹ (z − m)
+
+    is least. To linearise at m instead would make the hopeless cheap: no residual would be more than 1/deviation errors
+    off.
+
+    Parameters
+    ----------
+    mean, deviation : ndarray, shape (N, K)
+        Of the transformed residuals, by the emulators: m, and the roots of the diagonal of Σ.
+    correlation : ndarray, shape (K, K)
+        Of the emulators' errors: that of Σ.
+    shared : ndarray, shape (K, K)
+        Covariance of the observations' errors, in their standard deviations (`observation_covariance`).
+    discrepancy : ndarray, shape (N, K)
+        What no parameters explain, in the same; C is ``shared`` with its squares added to the diagonal.
+    """
+    mean, deviation = np.clip(mean, -LARGEST, LARGEST), np.maximum(deviation, _LEAST_DEVIATION)
+    covariance = shared + _diagonal(discrepancy**2)
+    of_numbers: FloatArray = np.asarray(np.linalg.inv(covariance), np.float64)
+    of_engine = np.linalg.inv(correlation) / deviation[:, :, None] / deviation[:, None, :]
+    z = _mode(mean, of_numbers, of_engine)
+    sinh, cosh, away = np.sinh(z), np.cosh(z), z - mean
+    weight = _times(of_numbers, sinh)
+    hessian = of_engine + of_numbers * cosh[:, :, None] * cosh[:, None, :] + _diagonal(sinh * weight)
+    sign, curvature = np.linalg.slogdet(hessian)
+    misfit = np.sum(sinh * weight + away * _times(of_engine, away), axis=1)
+    spread = np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(correlation)[1] + 2.0 * np.log(deviation).sum(axis=1)
+    total = -0.5 * (misfit + curvature + spread)
+    return np.where((sign > 0.0) & np.isfinite(total), total, -np.inf)  # else there is no minimum
+
+
+def _mode(mean: FloatArray, of_numbers: FloatArray, of_engine: FloatArray) -> FloatArray:
+    """Where ψ is least, by Newton's steps.
+
+    They are of one at most, which is what Newton's are where sinh is an exponential, and take of the curvature what is
+    positive, so that all are downhill.
+    """
+    z, left = mean.copy(), np.arange(len(mean))
+    for _ in range(_NEWTON_STEPS):
+        sinh, cosh = np.sinh(z[left]), np.cosh(z[left])
+        weight = _times(of_numbers[left], sinh)
+        slope = cosh * weight + _times(of_engine[left], z[left] - mean[left])
+        hessian = of_engine[left] + of_numbers[left] * cosh[:, :, None] * cosh[:, None, :]
+        hessian += _diagonal(np.maximum(sinh * weight, 0.0))
+        step = np.clip(np.linalg.solve(hessian, slope[:, :, None])[:, :, 0], -1.0, 1.0)
+        z[left] -= step
+        left = left[np.abs(step).max(axis=1) >= _CONVERGED]
+        if not len(left):
+            break
+    return z
+
+
+def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
+
+
+def _diagonal(rows: FloatArray) -> FloatArray:
+    return np.asarray(rows[:, :, None] * np.eye(rows.shape[1]))
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """S samples of equal weight.
+    """S samples of equal weight, of points with other weights w."""
 
-    Attributes
-    ----------
-    unit : ndarray, shape (S, D)
-        In the unit cube.
-    discrepancy : ndarray, shape (S, G)
-        Of each group, in standard deviations of its observations: what no parameters explain.
-    log_density : ndarray, shape (S,)
-        But for a constant.
-    groups
-        G names; those that were held out have no discrepancy of their own.
-    best : ndarray, shape (D,)
-        The point of the highest density.
-    points
-        How many the samples were taken from, by their weights w.
-    effective_samples
-        (Σ w)²/Σ w²: so many independent samples the points are worth.
-    """
-
-    unit: FloatArray
-    discrepancy: FloatArray
-    log_density: FloatArray
-    groups: tuple[str, ...]
-    best: FloatArray
+    unit: FloatArray  # in the unit cube, shape (S, D)
+    discrepancy: FloatArray  # of each group, in deviations of its observations: what no parameters explain, (S, G)
+    log_density: FloatArray  # but for a constant, shape (S,)
+    groups: tuple[str, ...]  # G names; those that were held out have no discrepancy of their own
+    best: FloatArray  # the point of the highest density, shape (D,)
     points: int
-    effective_samples: float
+    effective_samples: float  # (Σ w)²/Σ w²: so many independent samples the points are worth
 
     @property
     def converged(self) -> bool:
@@ -67,25 +128,9 @@ class Posterior:
 
 
 class Density:
-    """Log density of the parameters and of the groups' discrepancies, in coordinates of which all numbers are allowed.
+    """Log density of D parameters and of the G groups' discrepancies, in coordinates of which all numbers are allowed.
 
-    Parameters
-    ----------
-    emulators
-        Of all observations.
-    space
-        Of the parameters.
-    held_out
-        Groups of observations that are not used.
-    shared_errors
-        Of the calibration's file.
-
-    Attributes
-    ----------
-    groups
-        Names of the G groups that are used.
-    dimensions
-        D + G.
+    Groups that are held out are not used.
     """
 
     def __init__(
@@ -95,14 +140,15 @@ class Density:
         held_out: Collection[str] = (),
         shared_errors: Mapping[str, SharedError] | None = None,
     ) -> None:
-        observations = emulators.observations
-        used = [k for k, one in enumerate(observations) if one.group not in held_out and not one.derived]
-        self.groups = tuple(dict.fromkeys(observations[k].group for k in used))
+        known = [one.observation for one in emulators.each]
+        self._used = [k for k, one in enumerate(known) if one.group not in held_out and not one.derived]
+        observations = [known[k] for k in self._used]
+        self.groups = tuple(dict.fromkeys(one.group for one in observations))
         self.dimensions = space.dimensions + len(self.groups)
-        self._space, self._emulators = space, emulators.of(used)
-        self._events = emulators.feasibility.needed(used)
-        self._group = np.array([self.groups.index(observations[k].group) for k in used])
-        self._shared = observation_covariance(self._emulators.observations, shared_errors or {})
+        self._space, self._emulators, self._events = space, emulators, emulators.needed(self._used)
+        self._group = np.array([self.groups.index(one.group) for one in observations])
+        self._shared = observation_covariance(observations, shared_errors or {})
+        self._correlation = emulators.correlation[np.ix_(self._used, self._used)]
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """At points (N, D + G), shape (N,)."""
@@ -112,10 +158,10 @@ class Density:
         unit, discrepancy = self.places(points)
         # What is uniform in the cube, or half-Cauchy, is standard normal in these coordinates.
         total: FloatArray = self._space.log_prior(unit) - 0.5 * np.sum(points**2, axis=1)
-        mean, deviation = self._emulators.predict(unit)
-        total += log_likelihood(mean, deviation, self._emulators.correlation, self._shared, discrepancy[:, self._group])
+        mean, deviation = self._emulators.predict(unit, self._used)
+        total += log_likelihood(mean, deviation, self._correlation, self._shared, discrepancy[:, self._group])
         # What was published was seen, of walkers that walked.
-        total += self._emulators.feasibility.log_probabilities(unit)[:, self._events].sum(axis=1)
+        total += self._emulators.log_probabilities(unit)[:, self._events].sum(axis=1)
         return total
 
     def places(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -125,76 +171,38 @@ class Density:
         return uniform[:, :count], _DISCREPANCY * np.tan(0.5 * np.pi * np.minimum(uniform[:, count:], _MOST))
 
 
-def sample_posterior(
-    emulators: Emulators,
-    space: Space,
-    points: int,
-    seed: int,
-    held_out: Collection[str] = (),
-    *,
-    shared_errors: Mapping[str, SharedError] | None = None,
-) -> Posterior:
+def sample_posterior(density: Density, points: int, seed: int) -> Posterior:
     """Weigh points by importance: those of the prior first, then, while few of them weigh anything, others nearer.
 
-    Later rounds are normal with the mean and covariance of the points weighed so far; all points are weighed over the
-    mixture of what all rounds were drawn from (Cornuet et al. 2012, doi 10.1111/j.1467-9469.2011.00756.x).
-
-    Parameters
-    ----------
-    emulators, space, held_out, shared_errors
-        As for `Density`.
-    points
-        Of each round, of which there are eight at most.
-    seed
-        Of the points.
-
-    Returns
-    -------
-    Posterior
-        Whose ``converged`` says whether it may be believed.
+    Later rounds (``points`` in each) are normal with the mean and covariance of the points weighed so far; all points
+    are weighed over the mixture of what all rounds were drawn from (Cornuet et al. 2012, doi
+    10.1111/j.1467-9469.2011.00756.x). Whether the outcome may be believed is said by its ``converged``.
     """
-    density, draw = Density(emulators, space, held_out, shared_errors), np.random.default_rng(seed)
-    # What points were drawn from: means and roots of the covariances.
-    normals: list[tuple[FloatArray, FloatArray]] = [(np.zeros(density.dimensions), np.eye(density.dimensions))]
-    places, known = np.zeros((0, density.dimensions)), np.zeros(0)
+    draw, count = np.random.default_rng(seed), density.dimensions
+    normals = [(np.zeros(count), np.eye(count))]  # that points were drawn from: means and covariances
+    places, known = np.zeros((0, count)), np.zeros(0)
     for _ in range(_ROUNDS):
-        middle, root = normals[-1]
-        fresh = middle + draw.standard_normal((points, density.dimensions)) @ root.T
+        middle, width = normals[-1]
+        fresh = middle + draw.standard_normal((points, count)) @ np.linalg.cholesky(width).T
         places, known = np.concatenate([places, fresh]), np.concatenate([known, density(fresh)])
-        logarithm = known - _log_mixture(places, normals)
-        weight = tempered = _weights(logarithm)
+        drawn = [multivariate_normal.logpdf(places, *normal) for normal in normals]
+        logarithm = known - logsumexp(drawn, axis=0) + np.log(len(normals))
+        weight = tempered = softmax(logarithm)
         if _worth(weight) > LEAST_SAMPLES:
             break
         share, enough = 1.0, min(_TEMPERED, points / 2.0)
         while _worth(tempered) < enough:
             share *= 0.8
-            tempered = _weights(share * logarithm)
-        width = np.cov(places.T, aweights=tempered).reshape(density.dimensions, density.dimensions)
-        normals.append((tempered @ places, np.asarray(np.linalg.cholesky(_WIDER * width), np.float64)))
-    chosen = _systematic(weight, min(_KEPT, len(weight)), draw)
+            tempered = softmax(share * logarithm)
+        width = np.cov(places.T, aweights=tempered).reshape(count, count)
+        normals.append((tempered @ places, _WIDER * width))
+    samples = min(_KEPT, len(weight))  # each point as often as it weighs
+    steps = (np.arange(samples) + draw.random()) / samples
+    chosen = np.minimum(np.searchsorted(np.cumsum(weight), steps), len(weight) - 1)
     unit, discrepancy = density.places(places[chosen])
     best = density.places(places[[np.argmax(known)]])[0][0]
     return Posterior(unit, discrepancy, known[chosen], density.groups, best, len(places), _worth(weight))
 
 
-def _weights(logarithm: FloatArray) -> FloatArray:
-    return np.asarray(np.exp(logarithm - logsumexp(logarithm)))
-
-
 def _worth(weight: FloatArray) -> float:
     return 1.0 / float(np.sum(weight**2))
-
-
-def _systematic(weight: FloatArray, count: int, draw: np.random.Generator) -> npt.NDArray[np.int64]:
-    """Places of so many points, each as often as it weighs."""
-    steps = (np.arange(count) + draw.random()) / count
-    return np.asarray(np.minimum(np.searchsorted(np.cumsum(weight), steps), len(weight) - 1))
-
-
-def _log_mixture(places: FloatArray, normals: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    """Log density of equal shares of normal distributions, but for a constant."""
-    each = [
-        -0.5 * np.sum(np.linalg.solve(root, (places - middle).T) ** 2, axis=0) - np.log(np.diag(root)).sum()
-        for middle, root in normals
-    ]
-    return np.asarray(logsumexp(each, axis=0) - np.log(len(normals)))

@@ -1,179 +1,178 @@
-"""What a calibration found, as tables: observations beside predictions, parameters with their uncertainty."""
+"""What a calibration found, as tables and figures: observations beside predictions, and the posterior."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from math import isfinite, nan
+from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.calibration.calibrate import Outcome
-from walkers.calibration.emulator import Emulator, transformed
+from walkers.calibration.emulator import FloatArray, Space, transformed
 from walkers.calibration.posterior import LEAST_SAMPLES, Posterior
-from walkers.calibration.waves import Wave
-from walkers.inputs.calibration import QUANTITIES, Observation, Parameter
+from walkers.inputs.calibration import QUANTITIES, Parameter
 from walkers.inputs.text import rendered
 from walkers.inputs.units import SPEED
+from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, save_figure, styled
 from walkers.runner.files import write_bytes, write_json, write_text
 
-FloatArray = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from walkers.inputs.calibration import Band
+
 RECORD_NAME = "calibration.json"
 _SIGMAS = 2.0
 _NARROW, _NARROWER = 1.0 / 3.0, 2.0 / 3.0
 """A parameter is identified if the posterior's interval is less than a third of the prior's and it has converged."""
+_AGAINST = {
+    "peak_acceleration": "peak acceleration (m/s²)",
+    "gamma0": r"dimensionless peak force $\Gamma_0$",
+    "frequency": "frequency (Hz)",
+    "sin_delta": r"asymmetry $\sin\,\delta$",
+}
+
+# --- tables -----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Row:
-    """An observation and what is predicted of it; speeds in mm/s, angles in degrees.
+def write_outcome(found: Outcome, to: Path) -> list[Path]:
+    """Write ``posterior.parquet``, ``calibration.json`` and ``.md``, and the figures (`figures_of`); their paths.
 
-    Attributes
-    ----------
-    name, group, title, unit, value, deviation
-        As published.
-    engine
-        At the best set; None where there is no walker.
-    low, high, samples
-        Of the engine over samples of the posterior, of those that are walkers, and how many these are.
-    emulator, error, feasible
-        At the best set; ``feasible`` is the probability that there is a walker, as it is learned from the waves.
-    agrees
-        Whether the engine lies within the deviation of the published value.
-    derived
-        Whether it follows from others, and does not count.
-    half_step, twice_as_long
-        The engine at the best set with half the time step, and for twice as long; None where there is no walker.
-    held_out
-        For each trial that did not see the observation's group: predicted mean and standard deviation.
+    The samples' columns are the parameters (in their units), ``discrepancy_GROUP`` (in standard deviations) and
+    ``log_density``.
     """
+    import pandas as pd
 
-    name: str
-    group: str
-    title: str
-    unit: str
-    value: float
-    deviation: float
-    engine: float | None
-    low: float | None
-    high: float | None
-    samples: int
-    emulator: float
-    error: float
-    feasible: float
-    agrees: bool
-    derived: bool
-    half_step: float | None
-    twice_as_long: float | None
-    held_out: dict[str, tuple[float, float]]
-
-
-def unit_of(observation: Observation) -> tuple[str, float]:
-    """Unit in which an observation is shown, and how many of it the SI unit is."""
-    if observation.over:
-        return "", 1.0
-    return ("mm/s", 1e3) if QUANTITIES[observation.quantity] is SPEED else ("°", 1.0)
+    to.mkdir(parents=True, exist_ok=True)
+    record, posterior = record_of(found), found.posterior
+    samples = pd.DataFrame(found.space.values(posterior.unit), columns=[one.name for one in found.space.parameters])
+    for place, group in enumerate(posterior.groups):
+        samples[f"discrepancy_{group}"] = posterior.discrepancy[:, place]
+    samples["log_density"] = posterior.log_density
+    files = [to / name for name in ("posterior.parquet", RECORD_NAME, "calibration.md")]
+    write_bytes(files[0], samples.to_parquet(index=False))
+    write_json(files[1], record)
+    discrepancies = np.percentile(posterior.discrepancy, (5.0, 50.0, 95.0), axis=0).T.tolist()
+    told = {"samples": len(found.predictive.unit), "least": LEAST_SAMPLES, "narrow": _NARROW}
+    page = rendered("walkers.calibration", "report.md.j2", found=record, discrepancies=discrepancies, **told)
+    write_text(files[2], page)
+    sources = [Path(run).name for run in found.predictive.table["run"]]
+    for name, figure in figures_of(found, record["observations"]).items():
+        files += save_figure(figure, to / f"{name}.png", sources, title=f"{found.calibration.file.title}: {name}")
+    return files
 
 
-def labelled(parameter: Parameter) -> str:
-    """A parameter's symbol, with its unit if it has one."""
+def record_of(found: Outcome) -> dict[str, Any]:
+    """What ``calibration.json`` holds; observations in mm/s and degrees."""
+    calibration, posterior, emulators = found.calibration, found.posterior, found.emulators
+    names = [one.name for one in found.space.parameters]
+    rows = [_row(found, place) for place in range(len(emulators.each))]
+    own = [row["agrees"] for row in rows if not row["derived"]]
+    values = np.percentile(found.space.values(posterior.unit), (5.0, 50.0, 95.0), axis=0).T.tolist()
+    narrowed = dict(zip(names, _narrowing(found.space, posterior), strict=True))
+    mean, deviation = emulators.predict(found.predictive.unit)
+    seen = [
+        transformed(values, one.observation)
+        for values, one in zip(found.predictive.outcome.T, emulators.each, strict=True)
+    ]
+    errors = np.abs(np.stack(seen, axis=1) - mean) / deviation
+    errors = errors[np.isfinite(errors)]
+    return {
+        "calibration": calibration.name,
+        "title": calibration.file.title,
+        "settings": calibration.file.model_dump(mode="json"),
+        "parameters": {one.name: _labelled(one) for one in found.space.parameters},
+        "sets": len(found.unit),
+        "best": dict(zip(names, found.space.values(found.checks["best"].unit[0]).tolist(), strict=True)),
+        "intervals": dict(zip(names, values, strict=True)),
+        "discrepancies": dict(zip(posterior.groups, np.median(posterior.discrepancy, axis=0).tolist(), strict=True)),
+        "narrowing": narrowed,
+        "words": {name: words_of(share, converged=posterior.converged) for name, share in narrowed.items()},
+        "posterior": _worth(posterior),
+        "held_out_posteriors": {name: _worth(one) for name, one in found.held_out.items()},
+        "emulators": {
+            one.observation.name: {
+                key: _finite(getattr(one, key)) for key in ("explained", "error", "error_inflation", "sets")
+            }
+            for one in emulators.each
+        },
+        "emulators_checked": len(errors),
+        "emulators_within_two_errors": float(np.mean(errors <= _SIGMAS)) if len(errors) else None,
+        "feasible": {
+            "seen": float(np.mean(~np.isnan(found.predictive.outcome))),
+            "expected": float(emulators.feasible(found.predictive.unit).mean()),
+        },
+        "agree": sum(own),
+        "of": len(own),
+        "observations": rows,
+    }
+
+
+def _row(found: Outcome, place: int) -> dict[str, Any]:
+    """An observation, and what is predicted of it: by the engine and the emulator at the best set and over samples."""
+    emulator = found.emulators.each[place]
+    observation, best = emulator.observation, found.checks["best"].unit
+    speed = QUANTITIES[observation.quantity] is SPEED
+    unit, scale = ("", 1.0) if observation.over else ("mm/s", 1e3) if speed else ("°", 1.0)
+    seen = found.predictive.outcome[:, place] * scale
+    seen = seen[np.isfinite(seen)]
+    engine, finer, longer = (_finite(float(wave.outcome[0, place]) * scale) for wave in found.checks.values())
+    below, emulated, above = (float(emulator.draw(best, np.full(1, sigmas))[0]) * scale for sigmas in (-1.0, 0.0, 1.0))
+    held_out = {}
+    for name, posterior in found.held_out.items():
+        if observation.group in found.calibration.file.held_out[name]:
+            normal = np.random.default_rng(0).standard_normal(len(posterior.unit))
+            low, middle, high = np.percentile(emulator.draw(posterior.unit, normal), (16.0, 50.0, 84.0)) * scale
+            held_out[name] = (float(middle), float(high - low) / 2.0)
+    value, deviation = observation.value * scale, observation.deviation * scale
+    return {
+        "name": observation.name,
+        "group": observation.group,
+        "title": observation.title,
+        "unit": unit,
+        "value": value,
+        "deviation": deviation,
+        "engine": engine,
+        "low": float(seen.min()) if len(seen) else None,
+        "high": float(seen.max()) if len(seen) else None,
+        "samples": len(seen),
+        "emulator": emulated,
+        "error": (above - below) / 2.0,
+        "feasible": float(found.emulators.feasible(best)[0, place]),
+        "agrees": engine is not None and abs(engine - value) <= deviation,
+        "derived": observation.derived,
+        "half_step": finer,
+        "twice_as_long": longer,
+        "held_out": held_out,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def _worth(posterior: Posterior) -> dict[str, Any]:
+    return {name: getattr(posterior, name) for name in ("converged", "points", "effective_samples")}
+
+
+def _labelled(parameter: Parameter) -> str:
     return f"{parameter.symbol} ({parameter.unit})" if parameter.unit else parameter.symbol
 
 
-def rows_of(found: Outcome) -> list[Row]:
-    """A row an observation."""
-    rows = []
-    feasible = found.emulators.feasibility.probability(found.checks["best"].unit)[0]
-    for place, observation in enumerate(found.calibration.observations):
-        unit, scale = unit_of(observation)
-        emulated, error = found.emulators.each[place].value(found.checks["best"].unit)
-        seen = _seen(found.predictive, place, scale)
-        best, finer, longer = (
-            next(iter(_seen(found.checks[name], place, scale)), None) for name in ("best", "half-step", "twice-as-long")
-        )
-        rows.append(
-            Row(
-                name=observation.name,
-                group=observation.group,
-                title=observation.title,
-                unit=unit,
-                value=observation.value * scale,
-                deviation=observation.deviation * scale,
-                engine=best,
-                low=min(seen, default=None),
-                high=max(seen, default=None),
-                samples=len(seen),
-                emulator=float(emulated[0]) * scale,
-                error=float(error[0]) * scale,
-                feasible=float(feasible[place]),
-                agrees=best is not None and abs(best - observation.value * scale) <= observation.deviation * scale,
-                derived=observation.derived,
-                half_step=finer,
-                twice_as_long=longer,
-                held_out={
-                    name: _predicted(found.emulators.each[place], posterior, scale)
-                    for name, posterior in found.held_out.items()
-                    if observation.group in found.calibration.file.held_out[name]
-                },
-            )
-        )
-    return rows
-
-
-def _seen(wave: Wave, place: int, scale: float) -> list[float]:
-    """An observation of those of a wave's sets that have a walker."""
-    values = wave.outcome[:, place]
-    return [float(value) * scale for value in values[~np.isnan(values)]]
-
-
-def _predicted(emulator: Emulator, posterior: Posterior, scale: float) -> tuple[float, float]:
-    """Median over a posterior and half of the width that holds 68 %, the emulator's error in it."""
-    normal = np.random.default_rng(0).standard_normal(len(posterior.unit))
-    low, middle, high = np.percentile(emulator.draw(posterior.unit, normal), (16.0, 50.0, 84.0))
-    return float(middle) * scale, float(high - low) / 2.0 * scale
-
-
-def emulator_checks(found: Outcome) -> FloatArray:
-    """Errors of the emulators at the runs of the predictive wave, in their stated standard errors, shape (S, K).
-
-    NaN where there was nothing to observe.
-    """
-    mean, deviation = found.emulators.predict(found.predictive.unit)
-    seen = [
-        transformed(found.predictive.outcome[:, place], observation)
-        for place, observation in enumerate(found.emulators.observations)
-    ]
-    return np.asarray((np.stack(seen, axis=1) - mean) / deviation)
-
-
-def _inside(found: Outcome) -> tuple[int, float]:
-    """How many of the engine's values were there to check, and the share of those within two standard errors."""
-    checks = emulator_checks(found)
-    known = np.abs(checks[np.isfinite(checks)])
-    return len(known), float(np.mean(known <= _SIGMAS)) if len(known) else nan
-
-
-def feasibility_check(found: Outcome) -> tuple[float, float]:
-    """Share of the predictive wave's outcomes that exist, and the mean of the probabilities that they were given."""
-    expected = found.emulators.feasibility.probability(found.predictive.unit)
-    return float(np.mean(~np.isnan(found.predictive.outcome))), float(expected.mean())
-
-
-def narrowing(found: Outcome) -> dict[str, float]:
+def _narrowing(space: Space, posterior: Posterior) -> list[float]:
     """Of each parameter the posterior's 5 to 95 % interval over that of the prior: 1 if nothing was learned.
 
     In logarithms where the parameter's range is one of these.
     """
-    fine, shares = np.linspace(0.0, 1.0, 2001), {}
-    for place, one in enumerate(found.space.parameters):
-        points = np.full((len(fine), found.space.dimensions), 0.5)
+    fine, shares = np.linspace(0.0, 1.0, 2001), []
+    for place, samples in enumerate(posterior.unit.T):
+        points = np.full((len(fine), space.dimensions), 0.5)
         points[:, place] = fine
-        density = found.space.log_prior(points)
-        below = np.cumsum(np.exp(density - density.max()))
+        below = np.cumsum(np.exp(space.log_prior(points)))
         prior = np.interp([0.05, 0.95], below / below[-1], fine)
-        shares[one.name] = float(np.ptp(np.percentile(found.posterior.unit[:, place], (5.0, 95.0))) / np.ptp(prior))
+        shares.append(float(np.ptp(np.percentile(samples, (5.0, 95.0))) / np.ptp(prior)))
     return shares
 
 
@@ -184,100 +183,126 @@ def words_of(share: float, *, converged: bool) -> str:
     return "identified" if share < _NARROW else "narrowed" if share < _NARROWER else "not identified"
 
 
-def intervals(found: Outcome) -> dict[str, tuple[float, float, float]]:
-    """Of each parameter the 5th, 50th and 95th percentile of the posterior."""
-    values = found.space.values(found.posterior.unit)
-    percentiles = np.percentile(values, (5.0, 50.0, 95.0), axis=0)
-    return {
-        one.name: (float(low), float(middle), float(high))
-        for one, low, middle, high in zip(found.space.parameters, *percentiles, strict=True)
-    }
+# --- figures ----------------------------------------------------------------------------------------------------------
 
 
-def write_tables(found: Outcome, rows: list[Row], to: Path) -> list[Path]:
-    """Write ``posterior.parquet``, ``calibration.json`` and ``calibration.md``; rows from `rows_of`.
-
-    The samples' columns are the parameters (in their units), ``discrepancy_GROUP`` (in standard deviations) and
-    ``log_density``.
-    """
-    import pandas as pd
-
-    to.mkdir(parents=True, exist_ok=True)
-    posterior = found.posterior
-    samples = pd.DataFrame(found.space.values(posterior.unit), columns=[one.name for one in found.space.parameters])
-    for place, group in enumerate(posterior.groups):
-        samples[f"discrepancy_{group}"] = posterior.discrepancy[:, place]
-    samples["log_density"] = posterior.log_density
-    write_bytes(to / "posterior.parquet", samples.to_parquet(index=False))
-    write_json(to / RECORD_NAME, as_dict(found, rows))
-    write_text(to / "calibration.md", as_markdown(found, rows))
-    return [to / name for name in ("posterior.parquet", RECORD_NAME, "calibration.md")]
+def figures_of(found: Outcome, rows: list[dict[str, Any]]) -> dict[str, Figure]:
+    """``corner``, ``predictions`` and, if the file has any, ``bands``; rows are the record's observations."""
+    corners = draw_corners(found.space, found.posterior.unit, found.checks["best"].unit[0])
+    figures = {"corner": corners, "predictions": _predictions(rows)}
+    return figures | ({"bands": _bands(found)} if found.calibration.file.bands else {})
 
 
-def as_dict(found: Outcome, rows: list[Row]) -> dict[str, Any]:
-    """What ``calibration.json`` holds."""
-    posterior, parameters = found.posterior, [one.name for one in found.space.parameters]
-    (checked, inside), (made, expected), narrowed = _inside(found), feasibility_check(found), narrowing(found)
-    middle = np.median(posterior.discrepancy, axis=0).tolist()
-    return {
-        "calibration": found.calibration.name,
-        "title": found.calibration.file.title,
-        "settings": found.calibration.file.model_dump(mode="json"),
-        "parameters": {one.name: labelled(one) for one in found.space.parameters},
-        "sets": len(found.unit),
-        "best": found.best,
-        "intervals": intervals(found),
-        "discrepancies": dict(zip(posterior.groups, middle, strict=True)),
-        "narrowing": narrowed,
-        "words": {name: words_of(share, converged=posterior.converged) for name, share in narrowed.items()},
-        "posterior": _weights(posterior),
-        "held_out_posteriors": {name: _weights(one) for name, one in found.held_out.items()},
-        "emulators": {
-            one.observation.name: {
-                "explained": _finite(one.explained),
-                "error": _finite(one.error),
-                "error_inflation": one.error_inflation,
-                "sets": one.sets,
-            }
-            for one in found.emulators.each
-        },
-        "emulators_checked": checked,
-        "emulators_within_two_errors": _finite(inside),
-        "feasible": {"seen": made, "expected": expected},
-        "agree": agreeing(rows)[0],
-        "of": agreeing(rows)[1],
-        "observations": [asdict(row) for row in rows],
-        "sobol_total": {
-            one.observation.name: dict(zip(parameters, map(_finite, total), strict=True))
-            for one, total in zip(found.emulators.each, found.sobol, strict=True)
-        },
-    }
+@styled
+def draw_corners(space: Space, sets: FloatArray, best: FloatArray) -> Figure:
+    """The distributions of D parameters over sets (N, D) of the unit cube, of each pair of them, and the best set."""
+    import corner
+    from matplotlib.ticker import MaxNLocator
+    from matplotlib.transforms import ScaledTranslation
 
+    def drawn(unit: FloatArray) -> FloatArray:
+        values = space.values(unit)
+        return np.asarray(np.log10(values, out=values, where=space.logarithmic))
 
-def agreeing(rows: list[Row]) -> tuple[int, int]:
-    """How many observations agree, of how many; those that are derived from others count in neither."""
-    own = [row for row in rows if not row.derived]
-    return sum(row.agrees for row in own), len(own)
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if isfinite(value) else None
-
-
-def _weights(posterior: Posterior) -> dict[str, Any]:
-    return {name: getattr(posterior, name) for name in ("converged", "points", "effective_samples")}
-
-
-def as_markdown(found: Outcome, rows: list[Row]) -> str:
-    """The tables as a page."""
-    return rendered(
-        "walkers.calibration",
-        "report.md.j2",
-        found=as_dict(found, rows),
-        ranges={one.name: one.range for one in found.space.parameters},
-        trials=list(found.held_out),
-        samples=len(found.predictive.unit),
-        discrepancies=np.percentile(found.posterior.discrepancy, (5.0, 50.0, 95.0), axis=0).T.tolist(),
-        least=LEAST_SAMPLES,
-        narrow=_NARROW,
+    count, words = space.dimensions, [("log " if one.log else "") + _labelled(one) for one in space.parameters]
+    figure, _ = new_figure(TWO_COLUMNS, TWO_COLUMNS, nrows=count, ncols=count)
+    # corner places its panels itself; after the constrained engine alone that would be refused.
+    figure.set_layout_engine("tight")
+    figure.set_layout_engine("none")
+    corner.corner(
+        drawn(sets),
+        fig=figure,
+        labels=["\n".join(label.split()) for label in words],  # panels of many parameters are no wider than a word
+        range=drawn(np.array([np.zeros(count), np.ones(count)])).T.tolist(),
+        truths=None if count == 1 else drawn(best),  # of one parameter corner has a panel, in which it cannot mark any
+        truth_color="C1",
+        quantiles=[0.05, 0.5, 0.95],
+        label_kwargs={"fontsize": 7},
+        plot_datapoints=False,
+        smooth=1.0,
+        bins=24,
+        hist_kwargs={"linewidth": 0.8},
+        contour_kwargs={"linewidths": 0.6},
     )
+    if count == 1:
+        figure.axes[0].axvline(float(drawn(best)[0]), color="C1")
+    # Few ticks, none at a corner, and labels as far from the panels as the ticks ask for, not as panels are wide.
+    edge, away = 1.0 / TWO_COLUMNS, -26.0 / 72.0
+    figure.subplots_adjust(left=edge, bottom=edge, right=0.99, top=0.99, wspace=0.1, hspace=0.1)
+    beneath, beside = (ScaledTranslation(*way, figure.dpi_scale_trans) for way in ((0.0, away), (away, 0.0)))
+    for panel in figure.axes:
+        panel.grid(visible=False)
+        panel.xaxis.set_label_coords(0.5, 0.0, transform=panel.transAxes + beneath)
+        panel.yaxis.set_label_coords(0.0, 0.5, transform=panel.transAxes + beside)
+        for axis in (panel.xaxis, panel.yaxis):
+            locator = axis.get_major_locator()
+            if isinstance(locator, MaxNLocator):
+                locator.set_params(nbins=3, prune="both")
+    return figure
+
+
+@styled
+def _predictions(rows: list[dict[str, Any]]) -> Figure:
+    """Residuals in standard deviations: the engine at the best set and over the posterior, and what was held out."""
+    figure, axes = new_figure(TWO_COLUMNS, 0.3 * len(rows) + 1.2)
+    places = np.arange(len(rows))[::-1]
+    axes.axvspan(-1.0, 1.0, color="0.9", lw=0)
+    axes.axvline(0.0, color="0.4", lw=0.8)
+    published, deviation, low, high, best = (
+        np.array([row[name] for row in rows], dtype=np.float64)  # None is NaN
+        for name in ("value", "deviation", "low", "high", "engine")
+    )
+    ends = ((one - published) / deviation for one in (low, high))
+    axes.hlines(places, *ends, color="C0", lw=4.0, alpha=0.5, label="engine over the posterior")
+    axes.plot((best - published) / deviation, places, "o", ms=5, color="C1", label="engine at the best set")
+    for number, trial in enumerate(dict.fromkeys(trial for row in rows for trial in row["held_out"])):
+        seen = [place for place, row in enumerate(rows) if trial in row["held_out"]]
+        middle, width = np.array([rows[place]["held_out"][trial] for place in seen]).T
+        residual, error = (middle - published[seen]) / deviation[seen], width / deviation[seen]
+        look = {"fmt": "s", "ms": 4, "color": f"C{number + 2}", "lw": 1.0}
+        axes.errorbar(residual, places[seen] - 0.22, xerr=error, label=trial, **look)
+    axes.set_yticks(places, [row["title"] for row in rows], fontsize=7)
+    axes.set(xlabel="(predicted - published)/standard deviation", ylim=(-0.8, len(rows) - 0.2))
+    axes.set_xscale("symlog", linthresh=3.0)
+    figure.legend(loc="outside upper center", ncols=2)
+    return figure
+
+
+@styled
+def _bands(found: Outcome) -> Figure:
+    """The engine over the posterior and at the best set, against what the experiments differ in."""
+    bands = found.calibration.file.bands
+    columns = min(len(bands), 3)
+    lines = -(-len(bands) // columns)
+    figure, axes = new_figure(TWO_COLUMNS, 2.3 * lines + 0.4, nrows=lines, ncols=columns, squeeze=False)
+    for place, band in zip(axes.flat, bands, strict=False):
+        _band(place, band, found)
+    for place in axes.flat[len(bands) :]:
+        place.set_visible(False)
+    letter_panels(axes.flat[: len(bands)])
+    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def _band(axes: Axes, band: Band, found: Outcome) -> None:
+    labels, best = list(found.calibration.experiments), found.checks["best"]
+    chosen = [labels.index(one) for one in band.of]
+    where = best.table[band.against].to_numpy()[chosen]
+    order = np.argsort(where)
+    many, alone = (wave.seen[band.quantity][:, chosen] * 1e3 for wave in (found.predictive, best))
+    seen = order[np.isfinite(many[:, order]).any(axis=0)]
+    low, high = (of(many[:, seen], axis=0) for of in (np.nanmin, np.nanmax))
+    axes.fill_between(where[seen], low, high, color="C0", alpha=0.3, lw=0, label="engine over the posterior")
+    axes.plot(where[order], alone[0, order], "o-", ms=4, lw=1.0, color="C1", label="engine at the best set")
+    published = [
+        (where[band.of.index(of)], one.value * 1e3, one.deviation * 1e3)
+        for one in found.calibration.observations
+        if one.quantity == band.quantity and not one.over
+        for of in one.of
+        if of in band.of
+    ]
+    x, value, deviation = np.reshape(published, (-1, 3)).T
+    axes.errorbar(x, value, deviation, fmt="ks", ms=4, lw=1.0, label="published")
+    quantity, _, which = band.quantity.partition("_")
+    place = f" at contact {which}" if quantity == "sliding" else f" of bead {which}" if which else ""
+    axes.set(title=band.title, xlabel=_AGAINST[band.against], ylabel=f"{quantity}{place} (mm/s)")

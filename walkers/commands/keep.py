@@ -50,7 +50,7 @@ Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
 Reported = Annotated[
     str,
     typer.Argument(
-        metavar="RUN|SWEEP|CALIBRATION",
+        metavar="RUN|SWEEP",
         help="One of them: its directory, its name in --out, or a case.",
         autocompletion=completion.runs_and_sweeps,
     ),

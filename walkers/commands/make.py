@@ -220,8 +220,7 @@ def calibrate(
 ) -> int:
     """Calibrate, or go on with it: waves of runs, emulators, posterior, predictions by the engine."""
     from walkers.calibration.calibrate import calibrate
-    from walkers.calibration.figures import draw
-    from walkers.calibration.report import rows_of, write_tables
+    from walkers.calibration.report import write_outcome
     from walkers.inputs.calibration import load_calibration
     from walkers.progress import progress_of_sweep
 
@@ -232,8 +231,7 @@ def calibrate(
     how = _By(engine=engine, allow_failed_audit=allow_failed_audit)
     found = calibrate(read, out, on_cores(jobs), progress_of=progress_of_sweep, **how)
     tell(*(f"{name}: {len(failures)} points failed" for name, failures in found.failures.items()))
-    rows = rows_of(found)
-    print_lines([*write_tables(found, rows, folder), *draw(found, rows, folder)])
+    print_lines(write_outcome(found, folder))
     return 0  # a set whose run fails is an outcome: it counts as far off
 
 

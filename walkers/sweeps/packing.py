@@ -16,7 +16,7 @@ from math import ceil
 
 from walkers.inputs.case import Case
 from walkers.runner.cost import pairs_of_beads, predicted_seconds
-from walkers.templates.sharing import sharing_key
+from walkers.templates.scene import sharing_key
 
 MOST_WALKERS = 96
 """In a deck; with 96 the share of the deck's own cost is down to 4 %."""

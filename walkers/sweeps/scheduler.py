@@ -22,7 +22,7 @@ from walkers.sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, PlannedDeck, h
 from walkers.sweeps.record import PARSL, PointState, SweepRecord, chains, states, velocity_of
 from walkers.sweeps.site import Site, pilots, threads
 from walkers.sweeps.worker import STOPS, Report, SweepStopped, Task, work
-from walkers.templates.sharing import sharing_key
+from walkers.templates.scene import sharing_key
 
 if TYPE_CHECKING:
     from concurrent.futures import Future

@@ -66,7 +66,7 @@ def make_runs(
     Parameters
     ----------
     cases
-        Cases that may share a deck (`walkers.templates.sharing`).
+        Cases that may share a deck (`walkers.templates.scene`).
     out
         Folder of the run directories; made if need be.
     engine

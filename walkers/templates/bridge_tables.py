@@ -8,7 +8,7 @@ infinite slope. Within a cell the engine's forces are cubic, through four rows.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import inf, log2
 
@@ -16,8 +16,7 @@ import numpy as np
 
 from walkers.physics.bridge import BridgeLaw, Curve, FloatArray, Surfaces
 from walkers.physics.laws import law_of
-from walkers.templates.scene import Bead
-from walkers.templates.sharing import Surface
+from walkers.templates.scene import Bead, Surface
 
 TOLERANCE = 1e-6
 """Of interpolated forces, relative to a column's largest value within a factor of two of the gap."""
@@ -46,7 +45,16 @@ class Table:
     @property
     def gaps(self) -> FloatArray:
         """Of the rows, m."""
-        return _gaps(self.curve.rupture, self.scale, self.octaves, self.cells, (0.0, 1.0 / 3.0, 2.0 / 3.0), end=True)
+        return np.append(self.within(np.array([0.0, 1.0 / 3.0, 2.0 / 3.0])), self.curve.rupture)
+
+    def within(self, parts: FloatArray) -> FloatArray:
+        """Gaps at some parts of all cells, m."""
+        mantissas = (1.0 + (np.arange(self.cells)[:, None] + parts).ravel() / self.cells)[None, :]
+        near = self.scale * ((2.0 ** np.arange(self.octaves)[:, None] * mantissas).ravel() - 1.0)
+        middle = self.scale * (2.0**self.octaves - 1.0)
+        even = (np.arange(2 * self.cells)[:, None] + parts).ravel() / (2 * self.cells)
+        far = middle + (self.curve.rupture - middle) * (1.0 - (1.0 - even) ** 2)
+        return np.concatenate([near, far])
 
     def text(self) -> str:
         """The table's part of the engine's file after its first line; twelve digits, far beyond `TOLERANCE`."""
@@ -57,7 +65,7 @@ class Table:
 
 @lru_cache(maxsize=4096)
 def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) -> Table:
-    """Tabulate a law as finely as the tolerance of the interpolated forces asks for (`TOLERANCE`).
+    """Tabulate a law as finely as the tolerance of the interpolated forces asks for.
 
     Raises
     ------
@@ -77,7 +85,7 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
     cells = _COARSEST
     while cells <= _FINEST:
         table = Table(curve, scale, octaves, cells, np.empty(0))
-        table = Table(curve, scale, octaves, cells, _checked(curve, table.gaps))
+        table = replace(table, rows=_checked(curve, table.gaps))
         worst, gap = _error(table)
         if worst <= tolerance:
             return table
@@ -86,19 +94,6 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
         f"the finest table, of {_FINEST} cells an octave, is off by {worst:.1g} at a gap of {gap:g} m; expected a law "
         f"that is smooth between contact, {scale:g} m and its rupture, {curve.rupture:g} m"
     )
-
-
-def _gaps(
-    rupture: float, scale: float, octaves: int, cells: int, within: Sequence[float], *, end: bool = False
-) -> FloatArray:
-    """Gaps at some parts of all cells, m."""
-    parts = np.array(within)
-    mantissas = (1.0 + (np.arange(cells)[:, None] + parts).ravel() / cells)[None, :]
-    near = scale * ((2.0 ** np.arange(octaves)[:, None] * mantissas).ravel() - 1.0)
-    middle = scale * (2.0**octaves - 1.0)
-    even = (np.arange(2 * cells)[:, None] + parts).ravel() / (2 * cells)
-    far = middle + (rupture - middle) * (1.0 - (1.0 - even) ** 2)
-    return np.concatenate([near, far, [rupture] if end else []])
 
 
 def _checked(curve: Curve, gaps: FloatArray) -> FloatArray:
@@ -122,33 +117,21 @@ def _checked(curve: Curve, gaps: FloatArray) -> FloatArray:
 
 
 def _error(table: Table) -> tuple[float, float]:
-    """The largest relative error between rows, and its gap (m)."""
+    """The largest relative error between rows of what the engine makes of them, and its gap (m)."""
     parts = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])
-    gaps = _gaps(table.curve.rupture, table.scale, table.octaves, table.cells, parts.tolist())
+    gaps = table.within(parts)
     exact = _checked(table.curve, gaps)
-    error = np.abs(_cubics(table.rows, parts).reshape(exact.shape) - exact)
+    # Lagrange's polynomials through the four rows of a cell, at these parts of it.
+    powers = np.arange(4)
+    shares = parts[:, None] ** powers @ np.linalg.inv((powers[:, None] / 3.0) ** powers)
+    fours = np.lib.stride_tricks.sliding_window_view(table.rows, 4, axis=0)[::3]
+    error = np.abs(np.swapaxes(fours @ shares.T, 1, 2).reshape(exact.shape) - exact)
     # Errors count against what is near: forces fall by orders of magnitude, and some end at zero.
     nearer = np.abs(exact[np.searchsorted(gaps, 0.5 * gaps)])
     size = np.maximum(np.maximum(nearer, np.abs(exact)), 1e-3 * np.abs(table.rows[:1]))
     relative = np.divide(error, size, out=np.zeros_like(error), where=size > 0.0).max(axis=1)
     worst = int(relative.argmax())
     return float(relative[worst]), float(gaps[worst])
-
-
-def _cubics(rows: FloatArray, parts: FloatArray) -> FloatArray:
-    """What the engine makes of the rows at some parts of each cell, shape (cells, parts, 5)."""
-    first, second, third, last = rows[0:-1:3], rows[1::3], rows[2::3], rows[3::3]
-    t = parts[None, :, None]
-    shares = (
-        -4.5 * (t - 1 / 3) * (t - 2 / 3) * (t - 1),
-        13.5 * t * (t - 2 / 3) * (t - 1),
-        -13.5 * t * (t - 1 / 3) * (t - 1),
-        4.5 * t * (t - 1 / 3) * (t - 2 / 3),
-    )
-    values: FloatArray = sum(
-        share * row[:, None, :] for share, row in zip(shares, (first, second, third, last), strict=True)
-    )  # type: ignore[assignment]
-    return values
 
 
 def bridge_tables(surfaces: Sequence[Surface], beads: Iterable[Bead]) -> str:

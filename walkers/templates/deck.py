@@ -22,9 +22,7 @@ from walkers.templates.layout import (
     Layout,
     PlacedWalker,
 )
-from walkers.templates.placement import place
-from walkers.templates.scene import Scene
-from walkers.templates.sharing import Loading, Surface, check_sharing, loadings_of, surface_of, surfaces_of
+from walkers.templates.scene import Scene, place, surface_of
 
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
@@ -42,35 +40,28 @@ SETTLING_SECONDS = 0.05
 """Length of the segments in which beads come to rest; at the end of each we check whether they have."""
 _STIFFEST = 1e9
 """Pa; no case has stiffer contacts, but a check may."""
+_MOST_BINS = 3e7
+"""Of the largest bead's radius, into which atoms are sorted every 1,000 steps.
+
+60 beads in a box of 1.5e9 took 50 times as long with the sorting as without; above 2^31 the engine refuses.
+"""
+_LEAST_NEIGHBOURS = 100
 _SKIN = 2e-4
 """m; of piles: between 0.1 and 0.3 mm it makes no difference of more than some per cent to the time of a step."""
 
 
 @dataclass(frozen=True)
 class Deck:
-    """A deck ready to run.
+    """A deck ready to run."""
 
-    Attributes
-    ----------
-    text, files, layout
-        What LIGGGHTS reads; the files that it reads in turn, name to text; what it will write.
-    box, fastest
-        Corners of the simulation box, m; a speed that no bead can reach by the drive, gravity and the capillary forces
-        alone, m/s.
-    silence, log_limit
-        How long the engine may write nothing, s, and how large its log may become, bytes.
-    beyond_limits
-        Whether the time step is beyond a limit, as a case may insist.
-    """
-
-    text: str
-    files: Mapping[str, str]
-    layout: Layout
-    box: tuple[Vector, Vector]
-    fastest: float
-    silence: float
-    log_limit: float
-    beyond_limits: bool = False
+    text: str  # what LIGGGHTS reads
+    files: Mapping[str, str]  # that it reads in turn, name to text
+    layout: Layout  # what it will write
+    box: tuple[Vector, Vector]  # corners of the simulation box, m
+    fastest: float  # a speed that no bead can reach by the drive, gravity and the capillary forces alone, m/s
+    silence: float  # how long the engine may write nothing, s
+    log_limit: float  # how large its log may become, bytes
+    beyond_limits: bool = False  # whether the time step is beyond a limit, as a case may insist
 
 
 @dataclass(frozen=True)
@@ -108,56 +99,19 @@ class Segment:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a deck is put together from.
+    """What a deck is put together from."""
 
-    Attributes
-    ----------
-    case, scene, recording, walkers
-        Materials, liquid, contacts, drive, gravity and time step; what stands in the box; length and sampling; which
-        beads are whose.
-    prescribed
-        Beads keep their velocities instead of following the forces.
-    ranks, checkpoint
-        Number of MPI processes; restart file to write or to go on from.
-    surfaces, loadings
-        How the beads' surfaces touch and what loads them, by `walkers.templates.scene.Bead.surface` and
-        ``Bead.loading``; the case's own if left out.
-    fastest
-        Speed that no bead can reach, m/s; if left out, what `fastest_of` says of the case.
-    drive_from
-        Step at which the drive begins; None for a segment before it.
-    skin
-        How far beyond contact neighbours are looked for, m; if left out, the smallest radius, and wide bins, which
-        suits few beads far apart.
-    """
-
-    case: Case
+    case: Case  # materials, liquid, contacts, drive, gravity and time step
     scene: Scene
     recording: Recording
-    walkers: tuple[PlacedWalker, ...] = ()
-    prescribed: bool = False
-    ranks: int = 1
+    walkers: tuple[PlacedWalker, ...] = ()  # which beads are whose
+    prescribed: bool = False  # beads keep their velocities instead of following the forces
+    ranks: int = 1  # number of MPI processes
     checkpoint: Checkpoint = Checkpoint()
-    surfaces: tuple[Surface, ...] = ()
-    loadings: tuple[Loading, ...] = ()
-    fastest: float | None = None
-    drive_from: int | None = 0
-    skin: float | None = None
-
-    @property
-    def shaken(self) -> bool:
-        """Whether the drive is on in the deck."""
-        return self.drive_from is not None
-
-    @property
-    def several(self) -> bool:
-        """Whether not all beads have the same gravity and drive."""
-        return len({(one.gravity, one.harmonics) for one in self.loadings}) > 1
-
-    @property
-    def begins_to_shake(self) -> bool:
-        """Whether the drive begins where the deck does."""
-        return self.drive_from == self.recording.begin
+    fastest: float | None = None  # speed that no bead can reach, m/s; `fastest_of` the case if left out
+    drive_from: int | None = 0  # step at which the drive begins; None for a segment before it
+    skin: float | None = None  # how far beyond contact neighbours are looked for, m; if left out, the smallest radius,
+    # and wide bins, which suits few beads far apart
 
 
 def first_segment(case: Case) -> Segment:
@@ -195,14 +149,13 @@ def render_shared_deck(cases: Sequence[Case]) -> Deck:
     Raises
     ------
     ValueError
-        If they cannot share a deck (see `walkers.templates.sharing.sharing_key`).
+        If they cannot share a deck (see `walkers.templates.scene.sharing_key`).
     """
     return compose(plan_of(*cases))
 
 
 def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
     """The plan of a segment of cases that share a deck: their bodies on one boundary, recorded as the cases say."""
-    check_sharing(cases)
     case, run = cases[0], cases[0].run
     segment = segment or first_segment(case)
     scene, walkers = place(cases)
@@ -222,8 +175,6 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
         walkers=walkers,
         ranks=run.ranks,
         checkpoint=Checkpoint(restart, PREVIOUS_RESTART_NAME if restart and segment.begin else None),
-        surfaces=surfaces_of(cases),
-        loadings=loadings_of(cases),
         fastest=max(fastest_of(one, scene) for one in cases),
         drive_from=segment.drive_from,
         skin=_SKIN if case.loose else None,
@@ -243,9 +194,15 @@ def compose(plan: Plan) -> Deck:
     case, scene = plan.case, plan.scene
     first = case.drive.harmonics[0]
     layout = _layout(plan)
-    surfaces = plan.surfaces or (surface_of(case),)
+    surfaces = scene.surfaces or (surface_of(case),)
+    several = len(scene.loadings) > 1
     contacts = [contact for contact, _ in surfaces]
-    largest = max(bead.radius for bead in scene.beads)
+    radii = [bead.radius for bead in scene.beads]
+    smallest, largest = min(radii), max(radii)
+    skin = plan.skin or smallest
+    # How many of the smallest beads there is room for within sight of the largest one, and some more.
+    sight = largest + 2.0 * smallest + skin
+    most_neighbours = max(_LEAST_NEIGHBOURS, ceil((sight**3 - largest**3) / smallest**3))
     space = prod(high - low for low, high in zip(scene.lower, scene.upper, strict=True))
     rolling = " rolling_friction cdt" if case.contact.rolling_friction > 0 else ""
     pair_columns = " ".join(PAIR_BRIDGES).split()
@@ -272,19 +229,21 @@ def compose(plan: Plan) -> Deck:
         bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
         down=[component / case.gravity for component in case.gravity_vector] if case.gravity else [],
         plan=plan,
+        shaken=plan.drive_from is not None,
+        several=several,
         # Of a drive that moves the walls; it has one harmonic.
         peak_velocity=[first.peak_velocity * component for component in first.direction],
         loads_name=LOADS_NAME,
         pair_bridge_terms=[f"c_pair_bridges[{pair_columns.index(one) + 1}]" for one in layout.pair_bridge_columns],
         wall_bridge_terms=[f"f_walls[{WALL_BRIDGES.index(one) + 1}]" for one in layout.wall_bridge_columns],
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
-        skin=plan.skin or min(bead.radius for bead in scene.beads),
-        most_neighbours=_most_neighbours(scene, plan.skin),
+        skin=skin,
+        most_neighbours=most_neighbours,
         # At most some ten thousand bins, none smaller than two beads (m).
         bin_size=None if plan.skin else max(4.0 * largest, (space / 2e4) ** (1.0 / 3.0)),
         wide=not plan.skin and space > _MOST_BINS * largest**3,
     )  # fmt: skip
-    files = {LOADS_NAME: _loads(plan)} if plan.several else {}
+    files = {LOADS_NAME: _loads(scene)} if several else {}
     try:
         files[BRIDGES_NAME] = bridge_tables(surfaces, scene.beads)
     except UnusableLawError as error:
@@ -295,11 +254,13 @@ def compose(plan: Plan) -> Deck:
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, *bounds, beyond)
 
 
-def _loads(plan: Plan) -> str:
+def _loads(scene: Scene) -> str:
     """Gravity and the amplitude of the inertial acceleration of each harmonic, bead by bead, as the engine reads it."""
-    rows = ((bead.id, plan.loadings[bead.loading]) for bead in plan.scene.beads)
-    vectors = ((number, (load.gravity, *load.harmonics)) for number, load in rows)
-    return "".join(f"{number} {' '.join(repr(x) for one in of for x in one)}\n" for number, of in vectors)
+    rows = []
+    for bead in scene.beads:
+        load = scene.loadings[bead.loading]
+        rows.append(" ".join([str(bead.id), *(repr(x) for vector in (load.gravity, *load.harmonics) for x in vector)]))
+    return "\n".join(rows) + "\n"
 
 
 def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
@@ -315,24 +276,6 @@ def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
     ]
 
 
-_MOST_BINS = 3e7
-"""Of the largest bead's radius, into which atoms are sorted every 1,000 steps.
-
-60 beads in a box of 1.5e9 took 50 times as long with the sorting as without; above 2^31 the engine refuses.
-"""
-
-
-_LEAST_NEIGHBOURS = 100
-
-
-def _most_neighbours(scene: Scene, skin: float | None) -> int:
-    """How many of the smallest beads there is room for within sight of the largest one, and some more."""
-    radii = [bead.radius for bead in scene.beads]
-    small, large = min(radii), max(radii)
-    sight = large + 2.0 * small + (skin or small)
-    return max(_LEAST_NEIGHBOURS, ceil((sight**3 - large**3) / small**3))
-
-
 def fastest_of(case: Case, scene: Scene) -> float:
     """Ten times the boundary's peak velocity (20 in a pile), the deepest fall, and what a bridge can give, m/s."""
     sizes = sorted(bead.radius for bead in scene.beads)
@@ -346,17 +289,18 @@ def fastest_of(case: Case, scene: Scene) -> float:
 
 def _layout(plan: Plan) -> Layout:
     recording = plan.recording
+    steps = recording.steps - recording.begin
     return Layout(
         bead_dump="beads.bin",
         bead_columns=recording.bead_columns,
         sample_every=recording.sample_every,
-        frames=(recording.steps - recording.begin) // recording.sample_every + 1,
+        frames=steps // recording.sample_every + 1,
         pair_bridge_dump="bridges.pairs.txt",
         pair_bridge_columns=PAIR_BRIDGE_COLUMNS,
         wall_bridge_dump="bridges.walls.txt",
         wall_bridge_columns=recording.wall_bridge_columns,
         bridge_every=recording.bridge_every,
-        bridge_frames=(recording.steps - recording.begin) // recording.bridge_every + 1,
+        bridge_frames=steps // recording.bridge_every + 1,
         atoms=len(plan.scene.beads),
         steps=recording.steps,
         time_step=plan.case.run.time_step,

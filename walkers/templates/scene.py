@@ -1,44 +1,149 @@
-"""What stands in the simulation box: beads, and walls."""
+"""What stands in the simulation box: beads and walls, of one case or of several that share a deck.
+
+An engine deck has one time step and shape of boundary, and walls that do not move where walkers of several
+cases stand on them. What may differ from walker to walker are the beads' radii, how they start, their surfaces
+(frictions and restitution) with their liquid, which become atom types, and what loads them: how the boundary leans,
+along what axes and how strongly it is shaken. Only the frequencies and phases of the drive are the same for all.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
-from walkers.inputs.boundary import Wall
+from walkers.inputs.boundary import Span, Wall
+from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
+from walkers.inputs.loads import hop_height, reach
+from walkers.physics.matter import Contact, Liquid
+from walkers.templates.layout import PlacedWalker
+
+Surface = tuple[Contact, Liquid]
+"""How beads touch each other and the walls: an atom type of a deck."""
 
 
 @dataclass(frozen=True)
 class Bead:
-    """A bead at the start.
-
-    Attributes
-    ----------
-    id, centre, radius, velocity, spin
-        m, m/s, rad/s.
-    surface
-        Which of the deck's ways to touch is its, from 1.
-    loading
-        Which of the deck's loadings it feels, from 0 (`walkers.templates.sharing.Loading`).
-    density
-        kg/m³; None for that of the case.
-    """
+    """A bead at the start; m, m/s, rad/s, kg/m³."""
 
     id: int
     centre: Vector
     radius: float
     velocity: Vector = (0.0, 0.0, 0.0)
     spin: Vector = (0.0, 0.0, 0.0)
-    surface: int = 1
-    loading: int = 0
-    density: float | None = None
+    surface: int = 1  # which of the scene's ways to touch is its, from 1
+    loading: int = 0  # which of the scene's loadings it feels, from 0
+    density: float | None = None  # None for that of the case
+
+
+@dataclass(frozen=True)
+class Loading:
+    """What acts on a bead besides its contacts, in the frame of the boundary, m/s².
+
+    Gravity, and the amplitude of the inertial acceleration of each harmonic of the drive.
+    """
+
+    gravity: Vector
+    harmonics: tuple[Vector, ...]
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Beads, walls and the box's corners, all in m."""
+    """Beads, walls and the box's corners, all in m; how surfaces touch and what loads beads, each once."""
 
     beads: tuple[Bead, ...]
     walls: tuple[Wall, ...]
     lower: Vector
     upper: Vector
+    surfaces: tuple[Surface, ...] = ()  # the case's own if left out
+    loadings: tuple[Loading, ...] = ()
+
+
+def surface_of(case: Case) -> Surface:
+    """How the beads of a case touch each other and the walls."""
+    return case.contact, replace(case.liquid, name=None, density=None)
+
+
+def loading_of(case: Case) -> Loading:
+    """What the beads of a case feel."""
+    amplitudes = [(one.peak_acceleration, one.direction) for one in case.drive.harmonics]
+    inertia = tuple((a * x, a * y, a * z) for a, (x, y, z) in amplitudes)
+    return Loading(case.gravity_vector, inertia)
+
+
+def sharing_key(case: Case) -> Hashable:
+    """Cases with equal keys may share a deck: everything of the case that a deck has only once.
+
+    The time step is among it. Cases whose ``"auto"`` steps differ (beads of other sizes) stay apart, so that a case is
+    integrated with the same step whoever shares the deck.
+    """
+    if not case.independent:
+        return case
+    # Walkers that are to stand closer than their own reach would not meet the same neighbours in another company.
+    crowded = case if min(one.spacing for one in case.walkers) < 2.0 * reach(case) else None
+    contact = replace(
+        case.contact,
+        friction_bead_bead=0.0,
+        friction_bead_wall=0.0,
+        restitution=0.0,
+        # The model of rolling friction is in the deck or not.
+        rolling_friction=float(case.contact.rolling_friction > 0.0),
+    )
+    boundary = replace(case.boundary, material="", tilt=0.0, uphill=0.0)
+    times: Hashable = tuple((one.frequency, one.phase) for one in case.drive.harmonics)
+    driven = (case.drive, loading_of(case)) if case.drive.frame == "lab" else times
+    return (boundary, contact, driven, case.run, case.density, crowded)
+
+
+@lru_cache(maxsize=4)  # the segments of a run begin with the same scene
+def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
+    """Place the bodies of cases that share a deck, and size the box so that no walker can leave it unnoticed.
+
+    Walkers stand on a grid, all else where the case has it. Each walker draws its start from its own random stream
+    (seed, number of the walker in its case), so that walker k is the same whoever shares the deck.
+
+    Raises
+    ------
+    ValueError
+        If the cases cannot share a deck (`sharing_key`).
+    """
+    if len({sharing_key(case) for case in cases}) != 1:
+        raise ValueError("these cases cannot share a deck")
+    surfaces = tuple(dict.fromkeys(surface_of(case) for case in cases))
+    loadings = tuple(dict.fromkeys(loading_of(case) for case in cases))
+    standing = [(case, make, one) for case in cases for make, one in case.standing()]
+    walking = sum(one.walks for _, _, one in standing)
+    spacing = max((walkers.spacing for case in cases for walkers in case.walkers), default=0.0)
+    boundary = cases[0].boundary
+    grid = boundary.grid(walking, spacing) if walking else []
+    walkers: list[PlacedWalker] = []
+    beads: list[Bead] = []
+    for case, make, one in standing:
+        x, y = origin = grid[len(walkers)] if one.walks else (0.0, 0.0)
+        surface, loading = 1 + surfaces.index(surface_of(case)), loadings.index(loading_of(case))
+        ids = tuple(range(1 + len(beads), 1 + len(beads) + len(one.beads)))
+        for number, bead in zip(ids, one.beads, strict=True):
+            centre = (x + bead.x, y + bead.y, bead.z)
+            beads.append(Bead(number, centre, bead.radius, surface=surface, loading=loading))
+        if one.walks:
+            walkers.append(PlacedWalker(len(walkers), make, ids, one.facing, one.angle, origin))
+    room = boundary.room(_span(cases, grid, spacing))
+    return Scene(tuple(beads), boundary.walls, *room, surfaces, loadings), tuple(walkers)
+
+
+def _span(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> Span:
+    far = max(spacing / 2.0, *(reach(case) for case in cases))
+    largest = max(max(case.radii) for case in cases)
+    amplitude = max(case.drive.amplitude for case in cases)
+    placed = [bead for case in cases if case.placed is not None for bead in case.placed.beads]
+    return Span(
+        half_x=max([x for x, _ in grid] + [abs(x) for x, *_ in placed], default=0.0) + far,
+        half_y=max([y for _, y in grid] + [abs(y) for _, y, *_ in placed], default=0.0) + far,
+        height=10.0 * largest
+        + max([z for _, _, z, _ in placed], default=0.0)
+        + max(hop_height(case) for case in cases)
+        + 2.0 * amplitude,
+        margin=4.0 * largest + 2.0 * amplitude,
+        largest=largest,
+    )

@@ -1,7 +1,7 @@
-"""Alignment: a dimer that rolls sideways without sliding obeys a Mathieu equation.
+"""Alignment: whether a dimer on a substrate or a wall keeps to the axis of the drive.
 
-Rolling about the line through its contacts with the substrate, a dimer turns by ψ̇ = Ω (R1 - R2)/L with L = 2√(R1 R2).
-Energy and the work of the inertial force give, with ϑ = πft,
+One that rolls sideways without sliding, about the line through its contacts with the substrate, turns by
+ψ̇ = Ω (R1 - R2)/L with L = 2√(R1 R2). Energy and the work of the inertial force give a Mathieu equation, with ϑ = πft,
 
     d²ψ/dϑ² + [U - 4V cos 2ϑ] ψ = 0,    4V = (5/7) a0/(π² f²) (R1 - R2)/L (Σ m R)/(Σ m R²)
 
@@ -11,38 +11,44 @@ which adds 2β dψ/dϑ with 2πfβ = (5/7) (Σ Q)/(Σ m R²); that between the b
 drive is fast, U + 2V²/(1 + β²) takes the place of U - 4V cos 2ϑ (Kapitza's pendulum): a dimer on its head (U < 0)
 stands where that is positive.
 
-The equation takes the two beads for a cone, one rigid body. They are not: `walkers.theory.sideways` leaves them free.
+The equation takes the two beads for a cone, one rigid body. They are not: each may spin about its own normal to the
+substrate, against which nothing holds it, and a contact that slides along the axis resists sideways sliding as a drag
+does only. `turning_rate` leaves all that to the beads: it is the Floquet exponent of ψ, both beads' sideways velocities
+and their spins about the drive and about the normal, linearised about the axial motion of `walkers.theory.motion`. The
+engine's dimers turn over at these rates within a per cent (docs/explanation/climbing.md).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import log, pi, radians, sqrt, tan
 
 import numpy as np
 import numpy.typing as npt
 from scipy.special import mathieu_a, mathieu_b
 
+from walkers.inputs.case import Case
+from walkers.inputs.loads import dimer_of
 from walkers.physics.dimer import Dimer
-from walkers.theory.quasistatic import FloatArray
+from walkers.theory.motion import Friction, Walker, walk
+from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
-NEUTRAL = 1e-6
+_NEUTRAL = 1e-6
 """A growth per unit of ϑ, or a multiplier less one, that is the error of what is zero."""
 _BANDS = 6
 """So many intervals of stability are looked at, from the lowest."""
+_SLOWEST = 1e-4
+"""A contact that slides more slowly, m/s, resists sideways sliding as much as one that slides at this."""
+_STEPS = 256
+"""Of a cycle."""
+_ANGLE = radians(1.0)
+"""The angle to the axis at which rolling friction is to act. It is the larger the smaller the angle, for while a bead's
+rolling along the axis reverses, only its rolling sideways is left."""
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """Parameters of the Mathieu equation of small angles to the axis, and whether these stay small.
-
-    Attributes
-    ----------
-    u, v
-        U and V.
-    damping
-        β.
-    """
+    """U, V and β of the Mathieu equation of small angles to the axis, and whether these stay small."""
 
     u: float
     v: float
@@ -51,12 +57,17 @@ class Alignment:
     @property
     def stable(self) -> bool:
         """Whether small angles stay small (if nothing damps them; what does lets them decay)."""
-        return bool(is_stable(self.u, self.v)) if self.damping == 0.0 else self.growth <= NEUTRAL
+        return bool(is_stable(self.u, self.v)) if self.damping == 0.0 else self.growth <= _NEUTRAL
 
     @property
     def growth(self) -> float:
-        """How fast small angles grow, per unit of ϑ; times πf per second."""
-        return growth(self.u, self.v, self.damping)
+        """How fast (Floquet) small angles grow at most, per unit of ϑ; times πf per second."""
+        steps = 128  # of a period of π, U - 4V cos 2ϑ constant in each
+        theta = pi * (np.arange(steps) + 0.5) / steps
+        slopes = np.zeros((steps, 2, 2))
+        slopes[:, 0, 1], slopes[:, 1, 1] = 1.0, -2.0 * self.damping
+        slopes[:, 1, 0] = 4.0 * self.v * np.cos(2.0 * theta) - self.u
+        return float(np.log(np.abs(_multipliers(slopes, pi / steps)).max()) / pi)
 
 
 def alignment(
@@ -72,10 +83,8 @@ def alignment(
     ----------
     dimer
         The beads, the large one first.
-    frequency
-        Of the drive, Hz.
-    peak_acceleration
-        Of the substrate, m/s².
+    frequency, peak_acceleration
+        Of the drive, Hz and m/s².
     steady_acceleration
         Acceleration that pulls the beads along the axis, m/s², positive from the small bead to the large one: the
         weight of a climber with its large bead below, which hangs as from a pivot (U > 0). A climber that leads with
@@ -95,42 +104,20 @@ def alignment(
     )
 
 
-def growth(u: float, v: float, damping: float = 0.0) -> float:
-    """Largest growth rate of the solutions of d²ψ/dϑ² + 2β dψ/dϑ + [U - 4V cos 2ϑ] ψ = 0 (Floquet), per unit of ϑ.
-
-    Parameters
-    ----------
-    u, v, damping
-        U, V and β.
-    """
-    steps = 128  # of a period of π, U - 4V cos 2ϑ constant in each
-    theta = pi * (np.arange(steps) + 0.5) / steps
-    slopes = np.zeros((steps, 2, 2))
-    slopes[:, 0, 1], slopes[:, 1, 1] = 1.0, -2.0 * damping
-    slopes[:, 1, 0] = 4.0 * v * np.cos(2.0 * theta) - u
-    return float(np.log(np.abs(multipliers(slopes, pi / steps)).max()) / pi)
-
-
-def multipliers(slopes: FloatArray, step: float) -> npt.NDArray[np.complex128]:
+def _multipliers(slopes: FloatArray, step: float) -> npt.NDArray[np.complex128]:
     """By what dx/dt = A(t) x grows in a period (Floquet's multipliers); A in each step, shape (steps, n, n)."""
     from scipy.linalg import expm
 
     period = np.eye(slopes.shape[-1])
     for one in expm(slopes * step):
         period = one @ period
-    found: npt.NDArray[np.complex128] = np.linalg.eigvals(period).astype(np.complex128)
-    return found
+    return np.linalg.eigvals(period).astype(np.complex128)
 
 
 def is_stable(u: npt.ArrayLike, v: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-    """Whether all solutions of the Mathieu equation are bounded.
+    """Whether all solutions of the Mathieu equation are bounded; U and V of shapes that broadcast.
 
     They are between the characteristic values a_n(q) and b_{n+1}(q) with q = 2V, a = U.
-
-    Parameters
-    ----------
-    u, v
-        U and V, of shapes that broadcast.
     """
     a, q = np.broadcast_arrays(np.asarray(u, np.float64), 2.0 * np.abs(np.asarray(v, np.float64)))
     inside = [(mathieu_a(n, q) < a) & (a < mathieu_b(n + 1, q)) for n in range(_BANDS)]
@@ -153,19 +140,12 @@ def turning(parameters: Alignment, start: float, angles: npt.ArrayLike, phase: f
 
     Parameters
     ----------
-    parameters
-        U, V and β.
-    start
-        ψ at ϑ = 0, rad.
+    parameters, start
+        U, V and β; ψ at ϑ = 0, rad.
     angles : ndarray, shape (N,)
-        ϑ = πft at which ψ is wanted, from 0 on.
+        ϑ = πft at which ψ (rad, of this shape) is wanted, from 0 on.
     phase
         Of the drive, rad; at 0 the substrate accelerates toward the large bead first.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        ψ, rad.
     """
     from scipy.integrate import solve_ivp
 
@@ -178,3 +158,91 @@ def turning(parameters: Alignment, start: float, angles: npt.ArrayLike, phase: f
     solution = solve_ivp(slope, (0.0, float(theta[-1])), [start, 0.0], t_eval=theta, rtol=1e-8, atol=1e-10)
     psi: FloatArray = solution.y[0]
     return psi
+
+
+def time_to_turn(rate: float) -> float:
+    """Seconds from 1° to 90° at dψ/dt = rate sin ψ, in 1/s: ln(tan(ψ2/2)/tan(ψ1/2))/rate."""
+    return log(tan(radians(90.0) / 2.0) / tan(_ANGLE / 2.0)) / rate
+
+
+def turning_rate(case: Case) -> float | None:
+    """How fast small angles to the axis grow, 1/s; negative where they decay, None if the motion is not periodic.
+
+    Each contact resists sideways sliding by c = μF/|v|, for friction is against the direction of sliding, which is the
+    axis but for a small angle, and its bridge as it does along the axis. Rolling friction resists sideways rolling by
+    μ F R/|ω| likewise, with the engine's model of constant torque; it is left out of the axial motion.
+    """
+    dimer, walker, friction = dimer_of(case), Walker.of_case(case), Friction.of_cases(case)
+    frequency, peak, steady = case.drive.frequency, case.drive.peak_acceleration, case.axial_gravity
+    motion = walk(walker, friction, frequency, peak, steady_acceleration=steady, steps_per_cycle=_STEPS)
+    if not (motion.periodic[0] and motion.solved[0]):
+        return None
+    # The axial motion in the middle of each step, and the forces that go with it.
+    after = motion.series[:, 0]
+    before = np.roll(after, 1, axis=1)
+    sliding, slope = (before + after) / 2.0, (after - before) * frequency * _STEPS
+    pull = peak * np.cos(2.0 * pi * (np.arange(_STEPS) + 0.5) / _STEPS) + steady
+    gains, roll = inertia_matrix(dimer.sin_delta) / dimer.total_mass, rolling_matrix(*dimer.radii)
+    _, coupling, rolling = walker.resistances
+    couples = coupling * sliding + rolling * (roll @ sliding)
+    parallel = np.linalg.solve(gains, -slope - np.outer([1.0, 1.0, 0.0], pull)) - roll.T @ couples
+    normal = walker.at_rest * dimer.capillary_scale + normal_force_matrix(dimer.sin_delta) @ parallel
+    normal = np.maximum(normal, 0.0)  # a contact that would open bears nothing
+    radii, masses, accelerated = np.array(dimer.radii)[:, None], np.array(dimer.masses)[:, None], translation(slope)
+    spin = (translation(sliding) - sliding[:2]) / radii  # about the horizontal across the axis
+    push = masses[0] * (accelerated + pull) + parallel[0]  # along the axis, of the second bead on the first
+    torque = 0.4 * masses * radii * (accelerated - slope[:2]) - radii * parallel[:2] - couples[:2]  # of the other bead
+    # Against sideways sliding and, at beads' sideways speed in the mean at `_ANGLE`, rolling.
+    drags = np.asarray(friction.kinetic) * normal / np.maximum(np.abs(sliding), _SLOWEST)
+    speed = 5.0 / 7.0 * peak / (2.0 * pi * frequency) * _ANGLE / sqrt(2.0)
+    levers, spins = np.array([*dimer.radii, dimer.reduced_radius])[:, None], np.array([*spin, spin[0] - spin[1]])
+    hindered = case.contact.rolling_friction * normal * levers / np.hypot(spins, speed / levers)
+    slopes = _sideways(dimer, walker.resistances, drags, hindered, spin, push, torque)
+    found = _multipliers(slopes, 1.0 / (frequency * _STEPS))
+    # Beads that spin against each other about their vertical axes, as two wheels in mesh, do so for ever.
+    neutral = np.abs(found - 1.0).argmin()
+    if abs(found[neutral] - 1.0) < _NEUTRAL:
+        found = np.delete(found, neutral)
+    return float(np.log(np.abs(found).max()) * frequency)
+
+
+def _sideways(
+    dimer: Dimer,
+    resistances: FloatArray,
+    drags: FloatArray,
+    hindered: FloatArray,
+    spin: FloatArray,
+    push: FloatArray,
+    torque: FloatArray,
+) -> FloatArray:
+    """The linear equations of sideways motion, shape (steps, 7, 7).
+
+    Of ψ, then of each bead the velocity across the drive, then of each the spin about the drive, then about the
+    vertical. The push along the axis has a part across the drive, ψ times as large; so have the torque and the spin.
+    Contacts slide and roll across the dimer, v and q; forces -(c v + S v + C q) and couples -(C v + Q q + h q) act as
+    `walkers.physics.bridge` has it, c the drags and h what hinders rolling. SI units.
+    """
+    radii, sine = np.array(dimer.radii), dimer.sin_delta
+    cosine, inertias = sqrt(1.0 - sine**2), 0.4 * np.array(dimer.masses) * radii**2
+    slopes = np.zeros((len(push), 7, 7))
+    sliding, rolling = np.zeros((2, 3, *slopes.shape[::2]))  # sideways, at each contact
+    for bead in range(2):
+        sliding[bead, :, 1 + bead], sliding[bead, :, 3 + bead], rolling[bead, :, 3 + bead] = 1.0, radii[bead], 1.0
+    sliding[2, :, 0], rolling[2, :, 0] = sine * (radii @ spin), sine * (spin[0] - spin[1])
+    sliding[2, :, 1:] = [1.0, -1.0, *(radii * sine), *(-radii * cosine)]
+    rolling[2, :, 3:] = [sine, -sine, -cosine, cosine]
+    slide, couple, turn = resistances[..., None]
+    forces = -(drags[:, :, None] + slide) * sliding - couple * rolling
+    couples = -couple * sliding - (turn + hindered[:, :, None]) * rolling
+    # Rolling friction acts against the spin across the drive as well, which the other bead's torque must overcome.
+    couples[:2, :, 0] -= hindered[:2] * spin
+    slopes[:, 0, 1:3] = np.array([1.0, -1.0]) / (2.0 * sqrt(radii[0] * radii[1]))
+    for bead, side in enumerate((1.0, -1.0)):
+        velocity, roll, vertical = 1 + bead, 3 + bead, 5 + bead
+        slopes[:, velocity] = (side * forces[2] + forces[bead]) / dimer.masses[bead]
+        slopes[:, velocity, 0] += side * push / dimer.masses[bead]
+        between = radii[bead] * forces[2] + side * couples[2]
+        slopes[:, roll] = (radii[bead] * forces[bead] + couples[bead] + sine * between) / inertias[bead]
+        slopes[:, roll, 0] -= torque[bead] / inertias[bead]
+        slopes[:, vertical] = -cosine * between / inertias[bead]
+    return slopes

@@ -45,23 +45,12 @@ class Friction:
     μ(v) = μk + (μs - μk) exp(-(v/vs)²), after Stribeck. Each is a number, or an array that broadcasts to (3, N) for N
     parameter sets: contacts 1, 2 (beads on the substrate) and 3 (bead on bead). F is that of rigid beads; the engine's
     Coulomb limit has the damping of the contact besides, which is nothing while beads neither approach nor part.
-
-    Attributes
-    ----------
-    kinetic
-        μk, Coulomb's coefficient.
-    static
-        μs; μk where it is None.
-    stribeck_velocity
-        vs, m/s.
-    linear
-        κ, s/m: the paper's law.
     """
 
-    kinetic: npt.ArrayLike = 0.0
-    static: npt.ArrayLike | None = None
-    stribeck_velocity: float = 1e-3
-    linear: npt.ArrayLike = 0.0
+    kinetic: npt.ArrayLike = 0.0  # μk, Coulomb's coefficient
+    static: npt.ArrayLike | None = None  # μs; μk where it is None
+    stribeck_velocity: float = 1e-3  # vs, m/s
+    linear: npt.ArrayLike = 0.0  # κ, s/m: the paper's law
 
     @classmethod
     def coulomb(cls, bead_wall: npt.ArrayLike, bead_bead: npt.ArrayLike) -> Friction:
@@ -78,30 +67,14 @@ class Friction:
 
 @dataclass(frozen=True)
 class Walker:
-    """N walkers, each array of shape (N,) unless said otherwise.
+    """N walkers, each array of shape (N,) unless said otherwise."""
 
-    Attributes
-    ----------
-    radii : ndarray, shape (2, N)
-        R1 and R2, m.
-    asymmetry
-        μ.
-    scale
-        4πγR̄/M, m/s²: the acceleration that a force of 1 in the theory's unit gives.
-    force_unit
-        4πγR̄, N.
-    at_rest : ndarray, shape (3, N)
-        Normal forces at rest, in that unit.
-    resistances : ndarray, shape (3, 3, N)
-        S (N s/m), C (N s) and Q (N m s) of the bridges at contacts 1, 2 and 3, the first bead as body 1 of the last.
-    """
-
-    radii: FloatArray
-    asymmetry: FloatArray
-    scale: FloatArray
-    force_unit: FloatArray
-    at_rest: FloatArray
-    resistances: FloatArray
+    radii: FloatArray  # R1 and R2, m, shape (2, N)
+    scale: FloatArray  # 4πγR̄/M, m/s²: the acceleration that a force of 1 in the theory's unit gives
+    force_unit: FloatArray  # 4πγR̄, N
+    at_rest: FloatArray  # normal forces at rest, in that unit, shape (3, N)
+    resistances: FloatArray  # S (N s/m), C (N s), Q (N m s) of the bridges at contacts 1, 2 and 3, the first bead as
+    # body 1 of the last, shape (3, 3, N)
 
     @property
     def sin_delta(self) -> FloatArray:
@@ -113,7 +86,6 @@ class Walker:
         """The paper's walker: perfect wetting, no weight, dry."""
         return cls(
             radii=np.array(dimer.radii)[:, None],
-            asymmetry=np.array([dimer.mass_asymmetry]),
             scale=np.array([dimer.capillary_scale / dimer.total_mass]),
             force_unit=np.array([dimer.capillary_scale]),
             at_rest=forces_at_rest(dimer.sin_delta)[:, None],
@@ -140,34 +112,19 @@ class Walker:
 
 @dataclass(frozen=True)
 class Motion:
-    """Means over the last cycle of N walkers, m/s.
+    """Means over the last cycle of N walkers, m/s; over the later half of all cycles where it does not repeat itself.
 
-    Attributes
-    ----------
-    velocity : ndarray, shape (N,)
-        Of the walker, positive toward the large bead; NaN where a contact opened, for there the model does not hold,
-        and where the forces have no solution (the paper's law does not beyond some Γ0).
-    rotation : ndarray, shape (2, N)
-        Rotation velocities -R dφ/dt of the beads.
-    sliding : ndarray, shape (3, N)
-        Sliding velocities at the contacts.
-    smallest_normal_force : ndarray, shape (3, N)
-        Of each contact through the last cycle, in units of 4πγR̄; below zero it would have opened.
-    periodic : ndarray of bool, shape (N,)
-        Whether the last two cycles agree within 1 µm/s; means are over the later half of all cycles where they do not.
-    solved : ndarray of bool, shape (N,)
-        Whether forces that obey the law of friction were found all the way.
-    series : ndarray, shape (3, N, steps)
-        Sliding velocities through the last cycle, at the ends of its steps.
+    The velocity, positive toward the large bead, is NaN where a contact opened, for there the model does not hold, and
+    where the forces have no solution (the paper's law does not beyond some Γ0).
     """
 
-    velocity: FloatArray
-    rotation: FloatArray
-    sliding: FloatArray
-    smallest_normal_force: FloatArray
-    periodic: npt.NDArray[np.bool_]
-    solved: npt.NDArray[np.bool_]
-    series: FloatArray
+    velocity: FloatArray  # shape (N,)
+    rotation: FloatArray  # velocities -R dφ/dt of the beads, shape (2, N)
+    sliding: FloatArray  # at the contacts, shape (3, N)
+    smallest_normal_force: FloatArray  # of each contact in that cycle, in units of 4πγR̄, shape (3, N)
+    periodic: npt.NDArray[np.bool_]  # whether the last two cycles agree within 1 µm/s, shape (N,)
+    solved: npt.NDArray[np.bool_]  # whether forces that obey the law of friction were found all the way, shape (N,)
+    series: FloatArray  # sliding velocities through that cycle, at the ends of its steps, shape (3, N, steps)
 
     @property
     def opened(self) -> npt.NDArray[np.bool_]:
@@ -195,22 +152,18 @@ def walk(
         f in Hz and a0 in m/s², each a number or of shape (N,).
     steady_acceleration
         A pull along the axis toward the small bead, m/s²: the weight of a walker that climbs with its large bead above.
-    cycles
-        Of the drive, at most; fewer for a gait that repeats itself sooner.
-    steps_per_cycle
-        Steps of time.
-
-    Returns
-    -------
-    Motion
+    cycles, steps_per_cycle
+        Of the drive, at most (fewer for a gait that repeats itself sooner), and steps of time in each.
     """
-    given = (frequency, peak_acceleration, steady_acceleration, walker.scale)
-    drive = np.stack(np.broadcast_arrays(*(np.asarray(one, np.float64).reshape(-1) for one in given))[:3], axis=-1)
-    count = len(drive)
-    walkers, law = _rows_of(walker, count), _law_of(friction, count)
     from walkers.theory.stepping import integrate
 
-    mean, least, repeated, solved, series = integrate(walkers, law, drive, cycles, steps_per_cycle)
+    given = (frequency, peak_acceleration, steady_acceleration, walker.scale)
+    drive = np.stack(np.broadcast_arrays(*(np.asarray(one, np.float64).reshape(-1) for one in given))[:3], axis=-1)
+    static = friction.kinetic if friction.static is None else friction.static
+    laws = (friction.kinetic, static, friction.stribeck_velocity, friction.linear)
+    law = np.stack([np.broadcast_to(np.asarray(one, np.float64), (3, len(drive))).T for one in laws], axis=1)
+    tables = _tables(walker, drive[:, 0] * steps_per_cycle)
+    mean, least, repeated, solved, series = integrate(tables, law, drive, cycles, steps_per_cycle)
     velocity = translation(mean)
     if not np.any(drive[:, 2]):  # by symmetry; what is left is the error of the steps
         velocity = np.where(walker.sin_delta == 0.0, 0.0, velocity)
@@ -226,27 +179,27 @@ def walk(
     )
 
 
-def _rows_of(walker: Walker, count: int) -> FloatArray:
-    """The table of `walkers.theory.stepping.integrate`, shape (N, 13, 3)."""
-    asymmetry = np.broadcast_to(walker.asymmetry, (count,))
-    gains = inertia_matrix(asymmetry) * np.broadcast_to(walker.scale, (count,))[:, None, None]
-    matrix = normal_force_matrix(np.broadcast_to(walker.sin_delta, (count,)), asymmetry)
-    rest = np.broadcast_to(walker.at_rest, (3, count)).T[:, None]
-    roll = rolling_matrix(*np.broadcast_to(walker.radii, (2, count)))
-    resist = np.moveaxis(np.broadcast_to(walker.resistances / walker.force_unit, (3, 3, count)), -1, 1)[..., None]
-    slide, couple, turn = resist * np.eye(3)
+def _tables(walker: Walker, steps_per_second: FloatArray) -> FloatArray:
+    """The tables of `walkers.theory.stepping.integrate` for N numbers of steps a second, shape (N, 3, 13, 3).
+
+    Bridges slow the sliding velocities by A v, A = G (S + C H + Hᵀ(C + Q H)), and press contacts by B v,
+    B = D (S + C H): velocities v0 coast in h seconds to P v0, P = (1 + h A)⁻¹.
+    """
+    from walkers.theory.stepping import FINER, LEVELS, STAGE
+
+    gains, presses = (
+        inertia_matrix(walker.sin_delta) * walker.scale[:, None, None],
+        normal_force_matrix(walker.sin_delta),
+    )
+    roll = rolling_matrix(*walker.radii)
+    slide, couple, turn = np.moveaxis(walker.resistances / walker.force_unit, -1, 1)[..., None] * np.eye(3)
     forces, couples = slide + couple @ roll, couple + turn @ roll
     slowed = gains @ (forces + np.swapaxes(roll, 1, 2) @ couples)
-    return np.concatenate([gains, matrix, rest, slowed, matrix @ forces], axis=1)
-
-
-def _law_of(friction: Friction, count: int) -> FloatArray:
-    """The table of `walkers.theory.stepping.integrate`, shape (N, 4, 3)."""
-    values = (
-        friction.kinetic,
-        friction.kinetic if friction.static is None else friction.static,
-        friction.stribeck_velocity,
-        friction.linear,
-    )
-    rows = [np.broadcast_to(np.asarray(value, np.float64), (3, count)) for value in values]
-    return np.ascontiguousarray(np.moveaxis(np.stack(rows), -1, 0))
+    seconds = (STAGE / FINER ** np.arange(LEVELS) / steps_per_second[:, None])[..., None, None]
+    coast = np.linalg.inv(np.eye(3) + seconds * slowed[:, None])
+    gains, lifts = coast @ gains[:, None], (presses @ forces)[:, None]
+    presses = presses[:, None] - seconds * lifts @ gains
+    rest = walker.at_rest.T[:, None, None]
+    shape = coast.shape[:2]
+    parts = [np.broadcast_to(one, (*shape, *one.shape[2:])) for one in (coast, gains, presses, lifts, rest)]
+    return np.concatenate(parts, axis=2)

@@ -1,7 +1,9 @@
-"""What the theory says of a case: the paper's model, the same motion under Coulomb's law, where it ends, alignment."""
+"""What the theory says of cases: the paper's model, the same motion under Coulomb's law, where it ends, alignment."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from math import hypot, pi
 from typing import Any
 
@@ -9,10 +11,9 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
-from walkers.theory.mathieu import Alignment, alignment, largest_stable_v
+from walkers.theory.mathieu import Alignment, alignment, largest_stable_v, time_to_turn, turning_rate
 from walkers.theory.motion import Friction, Motion, Walker, walk
-from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, detachment, mean_velocity
-from walkers.theory.sideways import time_to_turn, turning_rate
+from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, FloatArray, detachment, mean_velocity
 
 MOVING = 1e-6
 """A walker faster than this, m/s, moves."""
@@ -20,22 +21,17 @@ GROWS = 0.05
 """A rate, 1/s, above which small angles to the axis grow: half as large again in ten seconds."""
 _TRIALS = 33
 _ROUNDS = 3
+MODEL, PAPER = "theory", f"paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
+"""Coulomb friction with the resistance of bridges (`motion_of`); the paper's own model, of what its friction was fitted
+to (`walkers.theory.quasistatic.mean_velocity`)."""
+_BEADS, _BOUNDARIES, _LIQUIDS = "ruby", ("chromium-coated glass", "glass"), ("Si AK5", "Si AK10")
+"""Of the paper's walkers on a level substrate (its Figs. 2 to 4)."""
 
 
 def motion_of(*cases: Case, viscous: bool = True) -> Motion:
     """The motions of cases' walkers, aligned with the drive, with the pulls that the engine gives their bridges.
 
-    Parameters
-    ----------
-    cases
-        N of them, driven along the substrate.
-    viscous
-        Whether the bridges' resistance to sliding and rolling acts beside friction.
-
-    Raises
-    ------
-    ValueError
-        If a drive is not along the substrate.
+    If ``viscous`` the bridges' resistance to sliding and rolling acts beside friction. Errors as for `check_applies`.
     """
     check_applies(*cases)
     return walk(
@@ -48,13 +44,7 @@ def motion_of(*cases: Case, viscous: bool = True) -> Motion:
 
 
 def check_applies(*cases: Case) -> None:
-    """Refuse cases that the theory is not one of.
-
-    Raises
-    ------
-    ValueError
-        With the key that is at fault and what the theory is one of.
-    """
+    """Raise ``ValueError`` for cases that the theory is not one of: the key at fault, and what the theory is one of."""
     for case in cases:
         if len(case.walkers) != 1 or len(case.walkers[0].radii) != 2 or case.loose:
             raise ValueError("bodies: the theory is one of dimers")
@@ -67,23 +57,15 @@ def check_applies(*cases: Case) -> None:
 
 
 def threshold(case: Case, *, viscous: bool = True) -> float:
-    """Γc: the smallest Γ0 at which a case's walker moves at the case's frequency.
+    """Γc: the smallest Γ0 at which a case's walker (as for `motion_of`) moves at the case's frequency.
 
-    Parameters
-    ----------
-    case, viscous
-        As for `motion_of`.
-
-    Returns
-    -------
-    float
-        To a part in ten thousand of the range in which contacts stay closed; NaN if it does not move there, and for a
-        symmetric dimer.
+    To a part in ten thousand of the range in which contacts stay closed; NaN if it does not move there, and for a
+    symmetric dimer.
     """
     check_applies(case)
-    if dimer_of(case).sin_delta == 0.0:
-        return float("nan")
     dimer, walker, friction = dimer_of(case), Walker.of_case(case, viscous=viscous), Friction.of_cases(case)
+    if dimer.sin_delta == 0.0:
+        return float("nan")
     low, high = 0.0, float(detachment(dimer.sin_delta).gamma)
     for _ in range(_ROUNDS):
         trials = np.linspace(low, high, _TRIALS)
@@ -101,21 +83,12 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
 def predict(case: Case) -> dict[str, Any]:
     """Everything that ``walkers theory`` prints, SI units; None where the model does not hold, with the reason.
 
-    Parameters
-    ----------
-    case
-        Driven along the substrate.
-
-    Raises
-    ------
-    ValueError
-        If it is not.
+    Errors as for `check_applies`.
     """
     dimer = dimer_of(case)
     gamma0 = dimer.gamma0(case.drive.peak_acceleration)
     end = detachment(dimer.sin_delta)
     linear = float(mean_velocity(gamma0, dimer.sin_delta))
-    models = {name: motion_of(case, viscous=viscous) for name, viscous in (("coulomb", False), ("viscous", True))}
     return {
         "gamma0": gamma0,
         "sin_delta": dimer.sin_delta,
@@ -124,19 +97,32 @@ def predict(case: Case) -> dict[str, Any]:
             "velocity": _number(linear),
             "reason": None if np.isfinite(linear) else f"{CONTACTS[int(end.contact)]} would open",
         },
-        **{
-            name: {
-                "velocity": _number(float(motion.velocity[0])) if motion.periodic[0] else None,
-                "rotation": [float(value) for value in motion.rotation[:, 0]],
-                "sliding": [float(value) for value in motion.sliding[:, 0]],
-                "reason": _reason(motion),
-                "threshold": _number(threshold(case, viscous=name == "viscous")),
-            }
-            for name, motion in models.items()
-        },
+        "coulomb": _told(case, viscous=False),
+        "viscous": _told(case, viscous=True),
         "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},
         "alignment": alignment_of(case),
     }
+
+
+def _told(case: Case, *, viscous: bool) -> dict[str, Any]:
+    motion, reason = motion_of(case, viscous=viscous), None
+    if not motion.solved[0]:
+        reason = "the forces have no solution"
+    elif not motion.periodic[0]:
+        reason = "it comes to no steady motion"
+    elif motion.opened[0]:
+        reason = f"{CONTACTS[int(np.argmin(motion.smallest_normal_force[:, 0]))]} would open"
+    return {
+        "velocity": _number(float(motion.velocity[0])) if motion.periodic[0] else None,
+        "rotation": motion.rotation[:, 0].tolist(),
+        "sliding": motion.sliding[:, 0].tolist(),
+        "reason": reason,
+        "threshold": _number(threshold(case, viscous=viscous)),
+    }
+
+
+def _number(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def pendulum_of(case: Case) -> Alignment:
@@ -147,12 +133,7 @@ def pendulum_of(case: Case) -> Alignment:
 
 
 def alignment_of(case: Case) -> dict[str, Any]:
-    """Whether a case's dimer keeps to the axis, and if not how soon it has turned over.
-
-    Parameters
-    ----------
-    case
-        Driven along the substrate.
+    """Whether a case's dimer, driven along the substrate, keeps to the axis, and if not how soon it has turned over.
 
     Returns
     -------
@@ -177,20 +158,6 @@ def alignment_of(case: Case) -> dict[str, Any]:
         "stands": None if rate is None else rate <= GROWS,
         "turns_over_after": None if rate is None or rate <= GROWS else time_to_turn(rate),
     }
-
-
-def _number(value: float) -> float | None:
-    return value if np.isfinite(value) else None
-
-
-def _reason(motion: Motion) -> str | None:
-    if not motion.solved[0]:
-        return "the forces have no solution"
-    if not motion.periodic[0]:
-        return "it comes to no steady motion"
-    if not motion.opened[0]:
-        return None
-    return f"{CONTACTS[int(np.argmin(motion.smallest_normal_force[:, 0]))]} would open"
 
 
 def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
@@ -252,3 +219,57 @@ def _details(model: dict[str, Any]) -> str:
     told = f"; beads rotate at {rotation}, large one slides at {model['sliding'][0] * 1e3:.2f}"
     gamma = model.get("threshold")
     return told + (f"; moves from Γc = {gamma:.3f}" if gamma is not None else "")
+
+
+def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, FloatArray], dict[str, int]]:
+    """What the models predict for a column of the table of a sweep of N cases.
+
+    Parameters
+    ----------
+    cases, column
+        N of them; ``velocity``, ``right_facing``, ``left_facing``, ``rotation_1``, ``sliding_1``, …
+
+    Returns
+    -------
+    predictions
+        From the name of a model to its values, m/s, shape (N,); NaN where it says nothing. Empty where no model has the
+        column, or says anything at any point.
+    reasons
+        Why points have none of `MODEL`, or velocities none of `PAPER`, and of how many that is so.
+    """
+    family, _, number = column.rpartition("_")
+    is_velocity = column in ("velocity", "right_facing", "left_facing")
+    if not is_velocity and family not in ("rotation", "sliding"):
+        return {}, {f"the theory has no {column}": len(cases)}
+    whys = [_why_not(case, column) for case in cases]
+    able = [place for place, why in enumerate(whys) if why is None]
+    reasons = Counter(why for why in whys if why)
+    if not able:
+        return {}, dict(reasons)
+    model, paper = np.full(len(cases), np.nan), np.full(len(cases), np.nan)
+    motion = motion_of(*(cases[place] for place in able))
+    values = motion.velocity if is_velocity else getattr(motion, family)[int(number) - 1]
+    known = motion.periodic & np.isfinite(motion.velocity)
+    model[able] = np.where(known, values, np.nan)
+    reasons += Counter({"a contact opens, or the motion does not repeat itself": int(np.sum(~known))})
+    for place in able if is_velocity else ():
+        case, dimer = cases[place], dimer_of(cases[place])
+        same = case.material == _BEADS and case.boundary.material in _BOUNDARIES and case.liquid.name in _LIQUIDS
+        if same and case.axial_gravity == 0.0:
+            paper[place] = mean_velocity(dimer.gamma0(case.drive.peak_acceleration), dimer.sin_delta)
+        else:
+            of = f"{_BEADS} on level {' or '.join(_BOUNDARIES)} in {' or '.join(_LIQUIDS)}"
+            reasons[f"the {PAPER}, is one of {of}"] += 1
+    found = {MODEL: model, PAPER: paper}
+    return {name: one for name, one in found.items() if np.isfinite(one).any()}, dict(reasons)
+
+
+def _why_not(case: Case, column: str) -> str | None:
+    """Why the theory says nothing of a case's column."""
+    try:
+        check_applies(case)
+    except ValueError as error:
+        return str(error).partition(": ")[2]
+    if case.axial_gravity != 0.0 and column != "right_facing":
+        return "on a slope the theory is one of walkers that go up it (right_facing)"
+    return None

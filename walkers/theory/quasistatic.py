@@ -7,7 +7,7 @@ points from bead 2 to bead 1. Forces are in units of 4πγR̄, so that a drive o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,6 @@ FloatArray = npt.NDArray[np.float64]
 FRICTION_OF_THE_PAPER = 33.0
 """κ of F∥ = κ v F, s/m: 0.033 s/mm, fitted in the paper to its Figs. 2 and 3."""
 CONTACTS = ("bead 1 on the substrate", "bead 2 on the substrate", "bead on bead")
-_ALONG = np.array([1.0, 1.0, 0.0])
-_QUASISTATIC = np.sqrt(0.5)
 
 
 def mass_asymmetry(sin_delta: npt.ArrayLike) -> FloatArray:
@@ -28,113 +26,42 @@ def mass_asymmetry(sin_delta: npt.ArrayLike) -> FloatArray:
     return asymmetry
 
 
-def _matrix(rows: list[list[FloatArray]]) -> FloatArray:
-    return np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
-
-
-def normal_force_matrix(sin_delta: npt.ArrayLike, asymmetry: npt.ArrayLike) -> FloatArray:
-    """The matrix D of F = F0 + D F∥ (their Eq. 2), from the balance of forces with fixed distances.
-
-    Parameters
-    ----------
-    sin_delta, asymmetry
-        sin δ and μ, of the same shape (…).
-
-    Returns
-    -------
-    ndarray, shape (…, 3, 3)
-    """
-    s, mu = np.broadcast_arrays(np.asarray(sin_delta, np.float64), np.asarray(asymmetry, np.float64))
-    heavy, light, one = (1.0 + mu) / 2.0, (1.0 - mu) / 2.0, np.ones_like(s)
+def normal_force_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
+    """The matrix D of F = F0 + D F∥ (their Eq. 2), from the balance of forces with fixed distances, shape (…, 3, 3)."""
+    s = np.asarray(sin_delta, np.float64)
+    mu, one = mass_asymmetry(s), np.ones_like(s)
+    heavy, light = (1.0 + mu) / 2.0, (1.0 - mu) / 2.0
     rows = [[-light * s, heavy * s, -one], [light * s, -heavy * s, one], [light, -heavy, s]]
     matrix: FloatArray = _matrix(rows) / np.sqrt(1.0 - s**2)[..., None, None]
     return matrix
 
 
-def inertia_matrix(asymmetry: npt.ArrayLike) -> FloatArray:
-    """The matrix G of M dv/dt = -M a (1, 1, 0) - G F∥ (their Eq. 3), solid spheres.
-
-    Parameters
-    ----------
-    asymmetry
-        μ, of shape (…).
-
-    Returns
-    -------
-    ndarray, shape (…, 3, 3)
-    """
-    mu = np.asarray(asymmetry, np.float64)
+def inertia_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
+    """The matrix G of M dv/dt = -M a (1, 1, 0) - G F∥ (their Eq. 3), solid spheres, shape (…, 3, 3)."""
+    mu = mass_asymmetry(sin_delta)
     first, second, one = 5.0 / (1.0 + mu), 5.0 / (1.0 - mu), np.ones_like(mu)
-    rows = [[1.0 + first, one, first], [one, 1.0 + second, second], [first, second, first + second]]
-    return _matrix(rows)
+    return _matrix([[1.0 + first, one, first], [one, 1.0 + second, second], [first, second, first + second]])
 
 
 def rolling_matrix(first: npt.ArrayLike, second: npt.ArrayLike) -> FloatArray:
     """The matrix H of q = H v: rolling rates (`walkers.physics.bridge`) from sliding velocities, closed contacts.
 
-    Beads that go at v = (v1 + v2 - v3)/2 and slide at v1 and v2 on the substrate have q1 = (v1 - v)/R1 and
-    q2 = (v2 - v)/R2; on each other they have q3 = q1 - q2, the first bead as body 1.
-
-    Parameters
-    ----------
-    first, second
-        R1 and R2, m, of the same shape (…).
-
-    Returns
-    -------
-    ndarray, shape (…, 3, 3), 1/m
+    Beads of radii R1 and R2 (m, of shape …) that go at v = (v1 + v2 - v3)/2 and slide at v1 and v2 on the substrate
+    have q1 = (v1 - v)/R1 and q2 = (v2 - v)/R2; on each other they have q3 = q1 - q2, the first bead as body 1. Shape
+    (…, 3, 3), 1/m.
     """
     one, two = 0.5 / np.asarray(first, np.float64), 0.5 / np.asarray(second, np.float64)
     return _matrix([[one, -one, one], [-two, two, two], [one + two, -one - two, one - two]])
 
 
+def _matrix(rows: list[list[FloatArray]]) -> FloatArray:
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
 def forces_at_rest(sin_delta: npt.ArrayLike) -> FloatArray:
     """F0, shape (…, 3): the normal forces at rest that balance the capillary ones; perfect wetting, no weight."""
     s = np.asarray(sin_delta, np.float64)
-    forces: FloatArray = np.stack([1.0 + s, 1.0 - s, (1.0 - s**2) / 2.0], axis=-1)
-    return forces
-
-
-def _friction_forces(sin_delta: FloatArray) -> FloatArray:
-    """F∥ under a steady force of 1 along -x, shape (…, 3): inertia alone decides, whatever the friction law."""
-    gains = inertia_matrix(mass_asymmetry(sin_delta))
-    forces: FloatArray = np.linalg.solve(gains, np.broadcast_to(-_ALONG, (*sin_delta.shape, 3))[..., None])[..., 0]
-    return forces
-
-
-@dataclass(frozen=True)
-class Detachment:
-    """Where the model ends: at a larger peak force a contact's normal force reaches zero.
-
-    Attributes
-    ----------
-    gamma : ndarray, shape (…)
-        The steady force, in units of 4πγR̄, at which it does.
-    contact : ndarray of int, shape (…)
-        Which one, a place in `CONTACTS`.
-    """
-
-    gamma: FloatArray
-    contact: npt.NDArray[np.int64]
-
-
-def detachment(sin_delta: npt.ArrayLike) -> Detachment:
-    """The smallest force along the axis, either way, that pulls a contact open.
-
-    The friction forces that go with a steady force follow from inertia alone, so that this holds for any friction law
-    that can give them.
-
-    Parameters
-    ----------
-    sin_delta
-        sin δ of beads of equal density, shape (…).
-    """
-    s = np.asarray(sin_delta, np.float64)
-    matrix = normal_force_matrix(s, mass_asymmetry(s))
-    slope = np.abs(np.einsum("...ij,...j->...i", matrix, _friction_forces(s)))
-    with np.errstate(divide="ignore"):
-        limits = forces_at_rest(s) / slope
-    return Detachment(limits.min(axis=-1), limits.argmin(axis=-1))
+    return np.stack([1.0 + s, 1.0 - s, (1.0 - s**2) / 2.0], axis=-1)
 
 
 def translation(sliding: FloatArray) -> FloatArray:
@@ -143,13 +70,36 @@ def translation(sliding: FloatArray) -> FloatArray:
     return velocity
 
 
+def _under_a_steady_force(sin_delta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """F∥ and D F∥ under a force of 1 along -x, shape (…, 3): inertia alone decides, whatever the friction law."""
+    along = np.broadcast_to([[-1.0], [-1.0], [0.0]], (*sin_delta.shape, 3, 1))
+    parallel = np.linalg.solve(inertia_matrix(sin_delta), along)
+    return parallel[..., 0], (normal_force_matrix(sin_delta) @ parallel)[..., 0]
+
+
+class Detachment(NamedTuple):
+    """Where the model ends: the force (unit 4πγR̄) at which a contact opens, and which one, a place in `CONTACTS`."""
+
+    gamma: FloatArray
+    contact: npt.NDArray[np.int64]
+
+
+def detachment(sin_delta: npt.ArrayLike) -> Detachment:
+    """The smallest force along the axis, either way, that pulls a contact of beads of equal density open, shape (…).
+
+    The friction forces that go with a steady force follow from inertia alone, so that this holds for any friction law
+    that can give them.
+    """
+    s = np.asarray(sin_delta, np.float64)
+    with np.errstate(divide="ignore"):
+        limits = forces_at_rest(s) / np.abs(_under_a_steady_force(s)[1])
+    return Detachment(limits.min(axis=-1), limits.argmin(axis=-1))
+
+
 def mean_velocity(gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike) -> FloatArray:
     """Mean velocity for a quasi-static drive of ±Γ0/√2 under the paper's friction, from the matrices.
 
-    Parameters
-    ----------
-    gamma0, sin_delta
-        Γ0 and sin δ of beads of equal density, of shapes that broadcast.
+    Γ0 and sin δ of beads of equal density may be of any shapes that broadcast.
 
     Returns
     -------
@@ -158,13 +108,11 @@ def mean_velocity(gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike) -> FloatArray
         hold.
     """
     gamma, s = np.broadcast_arrays(np.asarray(gamma0, np.float64), np.asarray(sin_delta, np.float64))
-    matrix, rest = normal_force_matrix(s, mass_asymmetry(s)), forces_at_rest(s)
-    unit = _friction_forces(s)
+    parallel, pressed = _under_a_steady_force(s)
     sides = []
-    for sign in (1.0, -1.0):
-        parallel = sign * _QUASISTATIC * gamma[..., None] * unit
-        normal = rest + np.einsum("...ij,...j->...i", matrix, parallel)
-        sliding = parallel / (FRICTION_OF_THE_PAPER * np.where(normal > 0.0, normal, np.nan))
+    for force in (np.sqrt(0.5) * gamma[..., None], -np.sqrt(0.5) * gamma[..., None]):
+        normal = forces_at_rest(s) + force * pressed
+        sliding = force * parallel / (FRICTION_OF_THE_PAPER * np.where(normal > 0.0, normal, np.nan))
         sides.append(translation(np.moveaxis(sliding, -1, 0)))
     mean: FloatArray = (sides[0] + sides[1]) / 2.0
     return mean

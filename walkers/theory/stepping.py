@@ -7,20 +7,22 @@ import numpy.typing as npt
 from numba import njit
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Three = tuple[float, float, float]
 
+FINER, LEVELS = 8, 3
+"""A step in which a contact begins to stick or to slip is cut into 8, and of these those in which it does into 8."""
+STAGE = 1.0 - np.sqrt(0.5)
+"""Length of either stage of an L-stable step of second order (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006)."""
+_TICKS = FINER ** (LEVELS - 1)
 _NEWTON_STEPS = 30
 _TOLERANCE = 1e-8
 """Of the friction forces, in units of 4πγR̄."""
 _SLIDING, _PARALLEL, _NORMAL, _MODE = range(4)
-"""Rows of a walker's state: sliding velocities, friction forces, normal forces, and 0, ±1: sticking, sliding."""
-_RIGHT, _START, _FREE, _NOW = range(3, 7)
-"""Rows of what is worked with, after a matrix: right side, velocities that a stage starts from and coasts to; from the
-last one on the walker's first seven rows as the bridges' resistance leaves them."""
-_FIRST = 1.0 - np.sqrt(0.5)
-"""Length of either stage of an L-stable step of second order (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006)."""
-_FINER = 8
-_TICKS = _FINER**2
-"""A step in which a contact begins to stick or to slip is cut into 8, and of these those in which it does into 8."""
+"""Rows of a walker's state: sliding velocities, friction forces, normal forces, and 0, ±1: sticking, sliding. What is
+worked with has such a state first, then a matrix and a right side."""
+_COAST, _GAIN, _PRESS, _LIFT, _REST = 0, 3, 6, 9, 12
+"""First rows of the matrices of a walker's table."""
 _REPEATED = 1e-6
 _FAST = 3e-3
 """Mean sliding velocities of two cycles that differ by less than 1 µm/s (of each 3 mm/s) are those of one gait."""
@@ -28,16 +30,15 @@ _FAST = 3e-3
 
 @njit(cache=True)
 def integrate(
-    walkers: FloatArray, law: FloatArray, drive: FloatArray, cycles: int, steps: int
-) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_], npt.NDArray[np.bool_], FloatArray]:
+    tables: FloatArray, law: FloatArray, drive: FloatArray, cycles: int, steps: int
+) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, FloatArray]:
     """Walk N walkers from rest.
 
     Parameters
     ----------
-    walkers : ndarray, shape (N, 13, 3)
-        Of each: three rows of G times 4πγR̄/M (m/s²), three rows of D, the normal forces at rest; of the bridges'
-        resistance to the sliding velocities three rows of how it slows them (1/s), and three of what it adds to the
-        normal forces (s/m).
+    tables : ndarray, shape (N, 3, 13, 3)
+        Of each walker, for stages of a step, of an 8th and of a 64th of it, which take h seconds each: velocities v0
+        become P v0 - h G F∥, normal forces are F0 + B P v0 + D F∥. Three rows of P, G (m/s²), D and B (s/m), and F0.
     law : ndarray, shape (N, 4, 3)
         Of each, contact by contact: μk, μs, vs (m/s), κ (s/m).
     drive : ndarray, shape (N, 3)
@@ -47,22 +48,18 @@ def integrate(
 
     Returns
     -------
-    mean : ndarray, shape (3, N)
-        Sliding velocities in the mean over the last cycle, m/s.
-    least : ndarray, shape (3, N)
-        Smallest normal forces in it.
-    repeated : ndarray of bool, shape (N,)
-        Whether the last two cycles agree; where they do not, means are over the later half of all cycles.
-    solved : ndarray of bool, shape (N,)
-        Whether friction forces that obey the law were found at every step.
+    mean, least : ndarray, shape (3, N)
+        Over the last cycle sliding velocities (m/s) in the mean, and the smallest normal forces.
+    repeated, solved : ndarray of bool, shape (N,)
+        Whether the last two cycles agree (where they do not, means are over the later half of all), and whether
+        friction forces that obey the law were found at every step.
     series : ndarray, shape (N, steps, 3)
         Sliding velocities through the last cycle.
     """
-    count = walkers.shape[0]
+    count = len(drive)
     means, leasts = np.zeros((3, count)), np.zeros((3, count))
     repeated, solved = np.zeros(count, np.bool_), np.ones(count, np.bool_)
-    series = np.zeros((count, steps, 3))
-    after, work = np.zeros((4, 3)), np.zeros((_NOW + 7, 3))
+    series, work = np.zeros((count, steps, 3)), np.zeros((8, 3))
     for of in range(count):
         state, totals = np.zeros((4, 3)), np.full((2, 3), np.inf)
         later = np.zeros(3)
@@ -70,8 +67,7 @@ def integrate(
             before = totals[0].copy()
             totals[0], totals[1] = 0.0, np.inf
             for step in range(steps):
-                begin, length = step / steps, 1.0 / steps
-                if not _advance(walkers[of], law[of], drive[of], begin, length, state, totals, after, work):
+                if not _advance(tables[of], law[of], drive[of], step / steps, 1.0 / steps, state, totals, work):
                     solved[of] = False
                     break
                 series[of, step] = state[_SLIDING]
@@ -89,45 +85,43 @@ def integrate(
 
 @njit(cache=True)
 def _advance(  # noqa: PLR0913, PLR0917
-    walker: FloatArray,
+    tables: FloatArray,
     law: FloatArray,
     drive: FloatArray,
     begin: float,
     length: float,
     state: FloatArray,
     totals: FloatArray,
-    after: FloatArray,
     work: FloatArray,
 ) -> bool:
     """One step of time, in shorter ones where a contact begins to stick or to slip; state and totals in place.
 
-    Whether friction forces were found all the way.
+    Times are parts of a cycle. Whether friction forces were found all the way.
     """
-    tick, width = 0, _TICKS
+    tick, level, after = 0, 0, work[:4]
     while tick < _TICKS:
+        width = _TICKS // FINER**level
         now, part = begin + tick / _TICKS * length, width / _TICKS * length
-        start = work[_START]
-        for at in range(3):
-            start[at] = state[_SLIDING, at]
-            after[_SLIDING, at], after[_PARALLEL, at] = state[_SLIDING, at], state[_PARALLEL, at]
-        found = _stage(walker, law, drive, now, _FIRST * part, after, work)
+        after[:] = state
+        start = (state[0, 0], state[0, 1], state[0, 2])
+        found = _stage(tables[level], law, drive, now + STAGE * part, STAGE * part, start, work)
         # The second stage starts from where the slope of the first one leads.
-        for at in range(3):
-            start[at] += (1.0 - _FIRST) / _FIRST * (after[_SLIDING, at] - state[_SLIDING, at])
-        found &= _stage(walker, law, drive, now + (1.0 - _FIRST) * part, _FIRST * part, after, work)
-        if width > 1 and (not found or _differ(after[_MODE], state[_MODE])):
-            width //= _FINER
+        more = (1.0 - STAGE) / STAGE
+        x, y, z = start
+        start = (x + more * (after[0, 0] - x), y + more * (after[0, 1] - y), z + more * (after[0, 2] - z))
+        found &= _stage(tables[level], law, drive, now + part, STAGE * part, start, work)
+        if level < LEVELS - 1 and (not found or _differ(after[_MODE], state[_MODE])):
+            level += 1
             continue
         if not found:
             return False
         for at in range(3):
             totals[0, at] += part / 2.0 * (state[_SLIDING, at] + after[_SLIDING, at])
             totals[1, at] = min(totals[1, at], after[_NORMAL, at])
-            for row in range(4):
-                state[row, at] = after[row, at]
+        state[:] = after
         tick += width
-        if width < _TICKS and tick % (width * _FINER) == 0:
-            width *= _FINER
+        if level and tick % (width * FINER) == 0:
+            level -= 1
     return True
 
 
@@ -138,85 +132,55 @@ def _differ(one: FloatArray, other: FloatArray) -> bool:
 
 @njit(cache=True)
 def _stage(
-    walker: FloatArray,
-    law: FloatArray,
-    drive: FloatArray,
-    begin: float,
-    length: float,
-    state: FloatArray,
-    work: FloatArray,
+    table: FloatArray, law: FloatArray, drive: FloatArray, end: float, length: float, start: Three, work: FloatArray
 ) -> bool:
-    """An implicit Euler step of a part of a cycle from the sliding velocities in work; its end replaces the state."""
-    seconds = length / drive[0]
-    push = seconds * (drive[1] * np.cos(2.0 * np.pi * (begin + length)) + drive[2])
-    free, now = work[_FREE], work[_NOW:]
-    for at in range(3):
-        free[at] = work[_START, at] - (push if at < 2 else 0.0)
-    _resist(walker, seconds, work)
-    solved = _settle(now, seconds, law, state, work)
+    """An implicit Euler step from the velocities ``start``; its end replaces the state. Whether forces were found."""
+    seconds, state = length / drive[0], work[:4]
+    push = seconds * (drive[1] * np.cos(2.0 * np.pi * end) + drive[2])
+    free = _times(table, _COAST, (start[0] - push, start[1] - push, start[2]))
+    x, y, z = _times(table, _LIFT, free)
+    rest = (table[_REST, 0] + x, table[_REST, 1] + y, table[_REST, 2] + z)
+    solved = _settle(table, law, seconds, free, rest, work)
     for at in range(3):
         slips = state[_MODE, at] != 0.0
-        state[_SLIDING, at] = free[at] - seconds * _row(now, at, state[_PARALLEL]) if slips else 0.0
-        state[_NORMAL, at] = now[6, at] + _row(now, 3 + at, state[_PARALLEL])
+        state[_SLIDING, at] = free[at] - seconds * _row(table, _GAIN + at, state[_PARALLEL]) if slips else 0.0
+        state[_NORMAL, at] = rest[at] + _row(table, _PRESS + at, state[_PARALLEL])
     return solved
 
 
 @njit(cache=True)
-def _resist(walker: FloatArray, seconds: float, work: FloatArray) -> None:
-    """What the bridges' resistance leaves of a stage, implicitly, in place.
-
-    The velocities at its end are (1 + h A) v' = v - h G F∥, and the normal forces F0 + D F∥ + B v'.
-    """
-    rows, free, now = work[:3], work[_FREE], work[_NOW:]
-    for at in range(3):
-        for by in range(3):
-            rows[at, by] = seconds * walker[7 + at, by]
-        rows[at, at] += 1.0
-    free[0], free[1], free[2] = _solved(rows, free)
-    for by in range(3):
-        now[0, by], now[1, by], now[2, by] = _solved(rows, walker[:3, by])
-    for at in range(3):
-        for by in range(3):
-            now[3 + at, by] = walker[3 + at, by] - seconds * _row(walker, 10 + at, now[:3, by])
-        now[6, at] = walker[6, at] + _row(walker, 10 + at, free)
-
-
-@njit(cache=True)
-def _settle(walker: FloatArray, seconds: float, law: FloatArray, state: FloatArray, work: FloatArray) -> bool:
+def _settle(table: FloatArray, law: FloatArray, seconds: float, free: Three, rest: Three, work: FloatArray) -> bool:
     """Find the friction forces and modes at the end of a stage, in place, by a semi-smooth Newton method.
 
-    Whether they were found.
-
     A contact sticks if the force that would hold it is within the limit, else it slips (Alart and Curnier, Comput.
-    Methods Appl. Mech. Eng. 92 (1991) 353).
+    Methods Appl. Mech. Eng. 92 (1991) 353). Whether they were found.
     """
-    parallel, rows, right, free = state[_PARALLEL], work[:3], work[_RIGHT], work[_FREE]
+    modes, parallel, rows, right = work[_MODE], work[_PARALLEL], work[4:7], work[7]
     for _ in range(_NEWTON_STEPS):
         for at in range(3):
-            normal = max(walker[6, at] + _row(walker, 3 + at, parallel), 0.0)
-            speed = free[at] - seconds * _row(walker, at, parallel)
-            own = seconds * walker[at, at]
+            normal = max(rest[at] + _row(table, _PRESS + at, parallel), 0.0)
+            speed = free[at] - seconds * _row(table, _GAIN + at, parallel)
+            own = seconds * table[_GAIN + at, at]
             wanted = parallel[at] + speed / own
             if abs(wanted) <= normal * law[1, at]:
-                state[_MODE, at] = 0.0
+                modes[at] = 0.0
                 for by in range(3):
-                    rows[at, by] = walker[at, by] / walker[at, at]
+                    rows[at, by] = table[_GAIN + at, by] / table[_GAIN + at, at]
                 right[at] = speed / own
-            else:
-                side = np.sign(wanted)
-                state[_MODE, at] = side
-                fade = law[1, at] - law[0, at]
-                if fade != 0.0:
-                    fade *= np.exp(-((speed / law[2, at]) ** 2))
-                kinetic = law[0, at] + fade
-                drag = normal * law[3, at]
-                slope = side * kinetic + law[3, at] * speed
-                # How the force at a normal force falls with the speed, after Stribeck, and grows with it by κ.
-                steep = drag - 2.0 * side * normal * fade * speed / law[2, at] ** 2
-                for by in range(3):
-                    rows[at, by] = steep * seconds * walker[at, by] - slope * walker[3 + at, by]
-                rows[at, at] += 1.0
-                right[at] = side * kinetic * normal + drag * speed - parallel[at]
+                continue
+            side = np.sign(wanted)
+            modes[at] = side
+            fade = law[1, at] - law[0, at]
+            if fade != 0.0:
+                fade *= np.exp(-((speed / law[2, at]) ** 2))
+            kinetic, drag = law[0, at] + fade, normal * law[3, at]
+            slope = side * kinetic + law[3, at] * speed
+            # How the force at a normal force falls with the speed, after Stribeck, and grows with it by κ.
+            steep = drag - 2.0 * side * normal * fade * speed / law[2, at] ** 2
+            for by in range(3):
+                rows[at, by] = steep * seconds * table[_GAIN + at, by] - slope * table[_PRESS + at, by]
+            rows[at, at] += 1.0
+            right[at] = side * kinetic * normal + drag * speed - parallel[at]
         change = _solved(rows, right)
         for at in range(3):
             parallel[at] += change[at]
@@ -226,13 +190,19 @@ def _settle(walker: FloatArray, seconds: float, law: FloatArray, state: FloatArr
 
 
 @njit(cache=True)
-def _row(matrix: FloatArray, at: int, vector: FloatArray) -> float:
+def _times(table: FloatArray, first: int, vector: Three) -> Three:
+    """A matrix of a table, from its first row on, times a vector."""
+    return _row(table, first, vector), _row(table, first + 1, vector), _row(table, first + 2, vector)
+
+
+@njit(cache=True)
+def _row(matrix: FloatArray, at: int, vector: FloatArray | Three) -> float:
     """One row of a matrix times a vector."""
     return matrix[at, 0] * vector[0] + matrix[at, 1] * vector[1] + matrix[at, 2] * vector[2]
 
 
 @njit(cache=True)
-def _solved(rows: FloatArray, right: FloatArray) -> tuple[float, float, float]:
+def _solved(rows: FloatArray, right: FloatArray) -> Three:
     """The solution of three linear equations, by Cramer's rule."""
     a, b, c = rows[0, 0], rows[0, 1], rows[0, 2]
     d, e, f = rows[1, 0], rows[1, 1], rows[1, 2]
