@@ -16,7 +16,7 @@ from walkers.inputs.calibration import Calibration
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.schema import ALTERNATIVES
 from walkers.inputs.sweep import Sweep, expand
-from walkers.paper.sensitivity import misalignment
+from walkers.paper.comparison import misalignment
 from walkers.postprocess.steady_state import steady_walkers, together
 from walkers.postprocess.tables import read_table
 from walkers.sweeps.run import run_sweep
