@@ -200,7 +200,7 @@ def test_progress_that_nobody_reads_stops_nothing(in_folder: Path) -> None:
     """A line of progress is due each time that there is some, when the reader has gone."""
     (in_folder / "base.toml").write_text(to_toml(document(run=SHORT)))
     (in_folder / "sweep.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
-    program = "from walkers import main, progress; progress._rarely = lambda: lambda elapsed: True; main.main()"
+    program = "from walkers import main, progress; progress._FIRST_LINE_SECONDS = 0.0; main.main()"
     script = f'{sys.executable} -c "{program}" sweep sweep.toml -j 1 2>&1 | true; echo "${{PIPESTATUS[0]}}"'
     done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "0"

@@ -49,7 +49,8 @@ class Value(NamedTuple):
 def misalignment(run: str | Path) -> FloatArray:
     """Angles of a run's walkers to the drive axis at the end, whichever way they face, degrees, each 0 to 90."""
     ends = np.degrees(read_table(run, "walkers")["orientation_end"].to_numpy())
-    return np.abs((ends + 90.0) % 180.0 - 90.0)
+    angles: FloatArray = np.abs((ends + 90.0) % 180.0 - 90.0)
+    return angles
 
 
 def evaluate(number: Observation, table: pd.DataFrame) -> Value:
@@ -97,8 +98,10 @@ def _of_walkers(point: Point, quantity: str, table: pd.DataFrame) -> Value | Non
     if quantity == "astray":
         return Value(100.0 * float((~on_axis(read_table(run, "walkers"))).mean()))
     speeds = steady_walkers(run)[quantity].to_numpy() * 1e3
-    ends = (speeds.mean(), speeds.min(), speeds.max()) if len(speeds) else (nan, nan, nan)
-    return Value(*map(float, ends), _theory(point, quantity), int(rows["walkers"].iloc[0]) - len(speeds))
+    theory, left_out = _theory(point, quantity), int(rows["walkers"].iloc[0]) - len(speeds)
+    if not len(speeds):
+        return Value(theory=theory, left_out=left_out)
+    return Value(float(speeds.mean()), float(speeds.min()), float(speeds.max()), theory, left_out)
 
 
 def _theory(point: Point, quantity: str) -> float:
@@ -116,9 +119,9 @@ def compare(sources: Sources) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        What is published (``key``, ``what``, ``unit``, ``published``, ``measured``, ``bounds``); our
-        `Value`, None where there is none; ``ratio`` of engine (or theory, where the number is one of theory alone) to published, None where
-        that is zero or in words; ``within_bounds``, whether it lies within what the paper says (None: it gives no
+        What is published (``key``, ``what``, ``unit``, ``published``, ``measured``, ``bounds``); our `Value`, None
+        where there is none; ``ratio`` of engine (or theory, where the number is one of theory alone) to published, None
+        where that is zero or in words; ``within_bounds``, whether it lies within what the paper says (None: it gives no
         bounds); ``agrees``, the same or, without bounds, whether within `AGREES` of the published value; and ``why``
         not: what that depends on.
     """

@@ -125,7 +125,13 @@ def _threshold(axes: Axes, sources: Sources) -> None:
     ends = thresholds(sources.out / "fig2-threshold")
     bounds = ends[["gamma0_at_rest", "gamma0_moving"]].to_numpy(dtype=float)
     for number, (frequency, (low, high)) in enumerate(zip(ends["drive.frequency"], bounds, strict=True)):
-        look = {"fmt": _MARKERS[float(frequency)], "color": f"C{number}", "ms": 4, "lw": 1.0, "mfc": "none"}
+        look: dict[str, Any] = {
+            "fmt": _MARKERS[float(frequency)],
+            "color": f"C{number}",
+            "ms": 4,
+            "lw": 1.0,
+            "mfc": "none",
+        }
         axes.errorbar(frequency, (low + high) / 2.0, yerr=(high - low) / 2.0, **look)
     case = shipped()
     predicted = [threshold(driven(case, frequency, [case.drive.peak_acceleration])[0]) for frequency in _MARKERS]
@@ -213,12 +219,9 @@ def _draw_cycles(axes: Axes, trajectory: Group) -> None:
 
 
 def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
-    """Velocity of the walker and rotation velocities of its beads as the theory has them, through the cycles shown.
+    """Velocity of the walker and rotation velocities of its beads by the theory, m/s, through the cycles shown.
 
-    Returns
-    -------
-    list of ndarray, shape (cycles × steps + 1,)
-        m/s, from the begin of a cycle of the engine's drive; NaN where a contact would open.
+    From the begin of a cycle of the engine's drive; NaN where a contact would open.
     """
     motion = motion_of(trajectory.case)
     sliding = motion.series[:, 0] if np.isfinite(motion.velocity[0]) else np.full_like(motion.series[:, 0], np.nan)

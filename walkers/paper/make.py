@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -49,20 +48,10 @@ COMPARISON = "comparison"
 COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
 
 
-@dataclass(frozen=True)
-class Made:
-    """What was made.
+class Made(NamedTuple):
+    """What was made: files; points that failed, by sweep; figures of which nothing could be drawn, and why.
 
-    Attributes
-    ----------
-    files
-        All of them.
-    failures
-        Points that failed and are left out, by sweep.
-    left_out
-        Figures of which nothing could be drawn, and why.
-    agree, compared
-        How many published numbers that test the engine agree, of how many; 0 of 0 if they were not compared.
+    Of ``compared`` published numbers that test the engine so many ``agree``; none if they were not compared.
     """
 
     files: list[Path]
@@ -89,21 +78,17 @@ def make_figures(  # noqa: PLR0913
     ----------
     out, to
         Folders of the run directories and of the figures.
-    options, engine, allow_failed_audit
-        As for `walkers.sweeps.run.run_sweep`.
+    options, engine, allow_failed_audit, progress_of
+        As for `walkers.paper.sources.make_sources`.
     only
         Names of `FIGURES`, or ``comparison``; if empty, all but those that are drawn only if asked for.
     formats
         Of the figures, of `walkers.postprocess.drawing.FORMATS`.
-    progress_of
-        As for `walkers.paper.sources.make_sources`.
 
     Raises
     ------
     InputError
         If there is no such figure or format, or a file is where a folder is to be.
-    runner.EngineFailure
-        If there is no engine, or its audit failed.
     """
     import joblib
 

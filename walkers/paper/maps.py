@@ -109,8 +109,8 @@ def fig_alignment(sources: Sources) -> Figure:
     axes["asymmetric"].set_title("asymmetric: along the axis, ψ = 0, ±180°, …")
     axes["symmetric"].set_title("symmetric: across the axis, ψ = ±90°")
     handles, labels = axes["asymmetric"].get_legend_handles_labels()
-    told = {"title": "(a) to (c): started at an angle of", "loc": "outside lower center", "ncols": len(labels)}
-    figure.legend(handles, labels, **told)
+    title = "(a) to (c): started at an angle of"
+    figure.legend(handles, labels, title=title, loc="outside lower center", ncols=len(labels))
     beginning.plot([], [], color="0.2", label="engine")
     beginning.plot([], [], "--", color="0.2", label="rolling without sliding")
     legend_below(beginning, ncols=2)
@@ -193,8 +193,8 @@ def fig_modes(sources: Sources) -> Figure:
     kinds.set(ylabel=r"dimensionless peak force $\Gamma_0$", ylim=(0.0, None), title="modes in the engine")
     speed = table["velocity"].to_numpy() * 1e3
     low, high = np.nanpercentile(speed, (2.0, 95.0))  # few are not to darken the rest
-    look = {"marker": "s", "s": 26, "cmap": "viridis", "vmin": min(low, 0.0), "vmax": high}
-    drawn = speeds.scatter(table["sin_delta"], table["gamma0"], c=speed, **look)
+    look = {"cmap": "viridis", "vmin": min(low, 0.0), "vmax": high}
+    drawn = speeds.scatter(table["sin_delta"], table["gamma0"], c=speed, marker="s", s=26, **look)
     speeds.set_title("velocity in the engine")
     figure.colorbar(drawn, ax=speeds, label="velocity (mm/s)", extend="both", location="right")
     for panel in (kinds, speeds):
@@ -256,8 +256,10 @@ def fig_climbing(sources: Sources) -> Figure:
         axes[0].set(ylabel="bridges' viscosity over the liquid's", yscale="log")
     letter_panels(rows.flat)
     figure.colorbar(drawn, ax=rows, label="up the slope (mm/s)", shrink=0.6, extend="both", ticks=_SPEEDS, format="%g")
-    look = {"ls": "", "color": "0.2", "mfc": "0.85", "ms": 5.5, "mew": 0.5}
-    handles = [Line2D([], [], marker=marker, label=name, **look) for name, marker in POSTURES.items()]
+    handles = [
+        Line2D([], [], ls="", marker=marker, color="0.2", mfc="0.85", ms=5.5, mew=0.5, label=name)
+        for name, marker in POSTURES.items()
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=5)
     return figure
 
@@ -270,8 +272,10 @@ def _draw_map(axes: Axes, table: pd.DataFrame, key: str) -> PathCollection:
     shades = SymLogNorm(1.0, vmin=_SPEEDS[0], vmax=_SPEEDS[-1])  # few are fast, and they are not to bleach the rest
     for posture, marker in enumerate(POSTURES.values()):
         here = table[found == posture]
-        look = {"marker": marker, "s": 26, "cmap": "RdBu", "norm": shades, "ec": "0.2", "lw": 0.4}
-        drawn = axes.scatter(here[key], here["liquid.viscosity_ratio"], c=here["axial_velocity"] * 1e3, **look)
+        drawn = axes.scatter(
+            here[key], here["liquid.viscosity_ratio"], c=here["axial_velocity"] * 1e3, marker=marker, s=26, cmap="RdBu",
+            norm=shades, ec="0.2", lw=0.4,
+        )  # fmt: skip
     return drawn
 
 

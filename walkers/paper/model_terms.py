@@ -64,18 +64,10 @@ _HOPELESS = 30.0
 
 @dataclass(frozen=True)
 class Fit:
-    """What terms give at best.
+    """What terms give at best: with which parameters, and by what a number is called what comes out (m/s, or a ratio).
 
-    Attributes
-    ----------
-    name, parameters
-        Of the terms; the best parameters.
-    values
-        By what a number is called, what comes out (m/s, or a ratio); None where the forces have no solution.
-    met, missed
-        How many of them lie within their deviations; the names of the others, the worst first.
-    misfit
-        Σ ln(1 + r²), r in deviations.
+    So many are ``met``, within their deviations; of the others the names, the worst first. ``misfit`` is Σ ln(1 + r²),
+    r in deviations.
     """
 
     name: str
@@ -113,10 +105,7 @@ def _walkers() -> Walker:
 def speeds(parameters: Mapping[str, float]) -> dict[str, dict[Point, float]]:
     """What walkers of the paper do, m/s, by quantity and point; NaN where the forces have no solution.
 
-    Parameters
-    ----------
-    parameters
-        Of `ALWAYS` and of any of `TERMS`.
+    The parameters are of `ALWAYS` and of any of `TERMS`.
     """
     cases, walkers = walkers_of_the_paper(), _walkers()
     known = {**_WITHOUT, "log10_kappa": -inf, **parameters}
@@ -171,11 +160,9 @@ def fit(
     Parameters
     ----------
     name, ranges
-        Of the terms, and of all parameters that are searched for.
+        Of the terms, and of all parameters that are searched for; others are ``fixed``.
     wanted
         What is to come out, of `FITTED`.
-    fixed
-        Parameters that are not searched for.
     begin
         Parameters to begin with; those of a term that are not among them begin where it does nothing.
     generations

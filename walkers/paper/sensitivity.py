@@ -41,14 +41,10 @@ _NO_RANGE = 1e-6
 
 
 def sensitivities(sources: Sources) -> pd.DataFrame:
-    """`OBSERVED` for the shipped parameters and for each parameter lower and higher.
+    """`OBSERVED` for the shipped parameters and for each parameter lower and higher, in the order of the sweep.
 
-    Returns
-    -------
-    DataFrame
-        A row a set of parameters, in the order of the sweep: ``parameter`` (``shipped``, one of `PARAMETERS`, or
-        ``uncalibrated``), ``value``, and a column an observation: NaN where a run of it is not finished, and for speeds
-        of which no walker is left on the axis.
+    Columns are ``parameter`` (``shipped``, one of `PARAMETERS`, or ``uncalibrated``), its ``value``, and the
+    observations: NaN where a run is not finished, and for speeds of which no walker is left on the axis.
     """
     import pandas as pd
 
@@ -101,7 +97,7 @@ def _tornado(axes: Axes, found: pd.DataFrame, key: str) -> None:
         axes.axvline(shipped, color="0.1", lw=1.0, label="shipped")
     else:
         axes.set_title("shipped: none on the axis")
-    axes.axvline(OBSERVATIONS[key].value, color="C1", ls="--", lw=1.4, label="published")
+    axes.axvline(OBSERVATIONS[key].value or 0.0, color="C1", ls="--", lw=1.4, label="published")
     axes.margins(x=0.08)
     low, high = axes.get_xlim()
     if high - low < _NO_RANGE:  # nothing changes it: a scale of its rounding would say nothing
