@@ -71,22 +71,19 @@ class Observation:
 
     Attributes
     ----------
-    key, what
-        Its name, and what it is in words.
-    value, unit
-        As published; None where the paper states it in words only. Such a one has bounds, and does not count among
-        those that agree or disagree.
-    bounds
-        Between which a value is what the paper says, if it says so: the rounding of its digits (0.735, of which Γ0 =
-        0.74 is made, is on its edge) is none. Those of angles are ours.
+    key, what, unit
+        Its name, what it is in words, and in which unit.
+    value, bounds
+        As published; and between which a value is what the paper says, if it says so: the rounding of its digits
+        (0.735, of which Γ0 = 0.74 is made, is on its edge) is none, those of angles are ours. What is stated in words
+        only has bounds and no value, and does not count among those that agree or disagree.
     depends_on
         A sentence: what a disagreement of the engine depends on.
     measured
         Whether it tests the engine: Γ0 and Mathieu's V follow from beads and drive alone.
-    of, over
-        It is a mean over walkers, or its ratio to one over others, pair by pair.
-    quantity
-        Of these, see `walkers.paper.comparison.evaluate`; empty where there is a function for the number.
+    of, over, quantity
+        It is a mean over walkers, or its ratio to one over others, pair by pair, of a quantity, see
+        `walkers.paper.comparison.evaluate`; if there is none that has a function for the number.
     fitted, deviation
         What it is called among those that the theory is fitted to (`walkers.paper.model_terms`), if it is one, and its
         error there, in ``unit``; 15 % if None.
