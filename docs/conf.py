@@ -22,7 +22,7 @@ version = release = metadata.version("granular-walkers")
 extensions = [
     *("numpydoc", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode", "sphinxcontrib.typer"),
     *("myst_nb", "sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex"),
-    *("docstrings", "generated", "mathml"),  # docs/_ext
+    *("readable", "generated"),  # docs/_ext
 ]
 exclude_patterns = ["_ext", "_templates", "examples", "**/.ipynb_checkpoints", "gallery/**.ipynb"]
 templates_path = ["_templates"]

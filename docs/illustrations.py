@@ -17,27 +17,26 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from walkers import load_case, run
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.report import write_outcome
 from walkers.check.validate import validate
 from walkers.inputs.axes import flatten
 from walkers.inputs.calibration import load_calibration
 from walkers.inputs.case import Case
-from walkers.inputs.changes import settings_of
 from walkers.inputs.errors import InputError, Problem
-from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.model_terms import try_model_terms, write_model_terms
-from walkers.pipeline import run
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.films import FilmOptions
-from walkers.postprocess.series import render_run, render_series
+from walkers.postprocess.series import render_series
 from walkers.runner.files import read_json, write_json, write_text
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import cores_here
@@ -47,6 +46,7 @@ RECORD = Path("figures") / "made-from.json"
 _BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)")
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
+_OF_CALIBRATION = ("bands", "corner", "predictions")
 
 
 @dataclass(frozen=True)
@@ -62,49 +62,41 @@ def _of_figure(name: str, *files: str, sweeps: Iterable[str]) -> Illustration:
     def make(out: Path, docs: Path) -> None:
         make_figures(out, docs / "figures", Options(cores_here()), only=[name], formats=("png",))
 
-    return Illustration(files, lambda: _points(sweeps), make)
+    return Illustration(files, lambda: [case for sweep in sweeps for case in load_sweep(sweep).cases()], make)
 
 
-def _points(sweeps: Iterable[str]) -> Iterator[Case]:
-    for sweep in sweeps:
-        yield from load_sweep(sweep).cases()
-
-
-def _rendered(name: str, case: str, *settings: str, apart: float | None = None) -> Illustration:
-    """A picture of one run: as `walkers render` has it, or views so many s apart."""
+def _of_run(
+    name: str, case: str, changes: Mapping[str, Any] | None = None, apart: float | None = None, film: Any = None
+) -> Illustration:
+    """A picture of one run as `walkers render` has it, or views so many s apart; or a film of it."""
+    file = f"pictures/{name}.gif" if film else f"pictures/{name}.png"
 
     def make(out: Path, docs: Path) -> None:
-        done, place = run(loaded(), out), docs / "pictures" / f"{name}.png"
-        if apart is None:
-            render_run(done.directory, place)
+        done = run(load_case(case, changes), out)
+        if film:
+            done.film(docs / file, film)
+        elif apart:
+            render_series(done.directory, docs / file, apart=apart)
         else:
-            render_series(done.directory, place, apart=apart)
+            done.render(docs / file)
 
-    def loaded() -> Case:
-        return load_case(case, settings_of(settings))
-
-    return Illustration((f"pictures/{name}.png",), lambda: [loaded()], make)
+    return Illustration((file,), lambda: [load_case(case, changes)], make)
 
 
-def _model_terms(_: Path, docs: Path) -> None:
+def _make_model_terms(_: Path, docs: Path) -> None:
     write_model_terms(try_model_terms(), docs / "figures")
 
 
-def _film(out: Path, docs: Path) -> None:
-    options = FilmOptions(size=(512, 216), fps=20, slowdown=20.0, walker=0, end=0.4)
-    run(load_case("fig1b", {"run.cycles": 60}), out).film(docs / "pictures" / "walker.gif", options)
-
-
-def _validation(out: Path, docs: Path) -> None:
+def _make_validation(out: Path, docs: Path) -> None:
     made = validate(out, docs / "explanation", jobs=cores_here())
     for statement in made.failed:
         print(f"walkers: not as expected: {statement}", file=sys.stderr)
 
 
-def _calibration(out: Path, docs: Path) -> None:
+def _make_calibration(out: Path, docs: Path) -> None:
     found = calibrate(load_calibration("ruby"), out, Options(cores_here()))
     write_outcome(found, out / "ruby")
-    for name in ("bands", "corner", "predictions"):
+    for name in _OF_CALIBRATION:
         shutil.copy(out / "ruby" / f"{name}.png", docs / "figures" / f"calibration-{name}.png")
     shutil.copy(out / "ruby" / "calibration.md", docs / "figures" / "calibration.md")
 
@@ -116,28 +108,31 @@ def _calibrated() -> list[Case]:
     return [load_case(read.file.case, {**base, **values}) for values in read.experiments.values()]
 
 
+def _shipped(*names: str) -> Callable[[], list[Case]]:
+    return lambda: [load_case(name) for name in names]
+
+
 ILLUSTRATIONS: Mapping[str, Illustration] = {
-    "walker": _rendered("walker", "fig1b", "run.cycles=60"),
-    "film": Illustration(("pictures/walker.gif",), lambda: [load_case("fig1b", {"run.cycles": 60})], _film),
-    "tray": _rendered("tray", "tray"),
-    "climber": _rendered("climber", "climber"),
-    "pile": _rendered("pile", "pile-small", "run.duration=10 s", apart=2.0),
+    "walker": _of_run("walker", "fig1b", {"run.cycles": 60}),
+    "film": _of_run(
+        *("walker", "fig1b", {"run.cycles": 60}),
+        film=FilmOptions(size=(512, 216), fps=20, slowdown=20.0, walker=0, end=0.4),
+    ),
+    "tray": _of_run("tray", "tray"),
+    "climber": _of_run("climber", "climber"),
+    "pile": _of_run("pile", "pile-small", {"run.duration": "10 s"}, apart=2.0),
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
     "model-terms": Illustration(
-        ("figures/model_terms.md", "figures/model_terms.json"),
-        lambda: [load_case("fig1b"), load_case("fig4a")],
-        _model_terms,
+        ("figures/model_terms.md", "figures/model_terms.json"), _shipped("fig1b", "fig4a"), _make_model_terms
     ),
     "validation": Illustration(
         ("explanation/validation.md",),
-        lambda: [load_case(name) for name in ("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci")],
-        _validation,
+        _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci"),
+        _make_validation,
     ),
     "calibration": Illustration(
-        tuple(f"figures/calibration-{name}.png" for name in ("bands", "corner", "predictions")),
-        _calibrated,
-        _calibration,
+        tuple(f"figures/calibration-{name}.png" for name in _OF_CALIBRATION), _calibrated, _make_calibration
     ),
 }
 
@@ -152,19 +147,19 @@ def digest(cases: Iterable[Case]) -> str:
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12]
 
 
-def stale(docs: Path) -> list[str]:
-    """Files of the documentation that are missing, or show other cases than today's."""
-    record = recorded(docs)
-    return [file for one in ILLUSTRATIONS.values() for file in _outdated(one, digest(one.cases()), record, docs)]
-
-
-def _outdated(one: Illustration, today: str, record: Mapping[str, str], docs: Path) -> list[str]:
-    return [file for file in one.files if record.get(file) != today or not (docs / file).is_file()]
-
-
-def recorded(docs: Path) -> dict[str, str]:
+def _recorded(docs: Path) -> dict[str, str]:
     """The digest of the cases that each file was made from."""
     return read_json(docs / RECORD) if (docs / RECORD).is_file() else {}
+
+
+def stale(docs: Path) -> dict[str, list[str]]:
+    """Of `ILLUSTRATIONS` those of which files are missing, or show other cases than today's; and these files."""
+    record, found = _recorded(docs), {}
+    for name, one in ILLUSTRATIONS.items():
+        today = digest(one.cases())
+        files = [file for file in one.files if record.get(file) != today or not (docs / file).is_file()]
+        found |= {name: files} if files else {}
+    return found
 
 
 def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[Path]:
@@ -176,16 +171,13 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
         if name not in ILLUSTRATIONS:
             raise InputError("illustrations", [Problem("", name, f"expected one of {', '.join(ILLUSTRATIONS)}")])
     written = []
-    for name, one in ILLUSTRATIONS.items():
-        if only and name not in only:
-            continue
-        today = digest(one.cases())
-        if only or _outdated(one, today, recorded(docs), docs):
-            print(f"walkers: {name}", file=sys.stderr)
-            one.make(out, docs)
-            record = {**recorded(docs), **dict.fromkeys(one.files, today)}
-            write_json(docs / RECORD, dict(sorted(record.items())))
-            written += [docs / file for file in one.files]
+    for name in only or stale(docs):
+        print(f"walkers: {name}", file=sys.stderr)
+        one = ILLUSTRATIONS[name]
+        one.make(out, docs)
+        record = {**_recorded(docs), **dict.fromkeys(one.files, digest(one.cases()))}
+        write_json(docs / RECORD, dict(sorted(record.items())))
+        written += [docs / file for file in one.files]
     return written + refresh_pages(pages_of(docs), facts(docs), out)
 
 
@@ -220,14 +212,13 @@ def outputs_in(page: Path) -> dict[str, str]:
     return {one["command"]: without_hashes(one["text"]) for one in found}
 
 
-def without_hashes(text: str) -> str:
-    """A text with the names of runs without what depends on the engine's binary."""
-    return _RUN_HASH.sub("", text)
-
-
 def facts_in(page: Path) -> list[tuple[str, str]]:
     """The facts that a page quotes, and how."""
     return [(one["name"], one["text"]) for one in _FACT.finditer(page.read_text("utf-8"))]
+
+
+without_hashes = partial(_RUN_HASH.sub, "")
+"""A text with the names of runs without what depends on the engine's binary."""
 
 
 def output_of(command: str, out: Path) -> str:
@@ -241,12 +232,6 @@ def output_of(command: str, out: Path) -> str:
     return printed.replace(str(out), "runs")
 
 
-def main() -> None:
-    """``python -m docs.illustrations RUNS DOCS [NAME...]``."""
-    out, docs, *only = sys.argv[1:]
-    for path in make_illustrations(Path(out), Path(docs), only):
-        print(path)
-
-
 if __name__ == "__main__":
-    main()
+    for path in make_illustrations(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:]):
+        print(path)

@@ -15,7 +15,7 @@ from typing import Any
 
 from walkers.inputs.reading import read_toml
 from walkers.inputs.sweep import Sweep, expand, shipped_sweeps
-from walkers.paper.comparison import Row, compare
+from walkers.paper.comparison import compare
 from walkers.paper.make import COMPARED
 from walkers.paper.sources import Sources, make_sources
 from walkers.runner import find_engine
@@ -60,24 +60,24 @@ def make_in_full(out: Path) -> Sources:
     return Sources(out)
 
 
-def table(fast: list[Row], full: list[Row]) -> str:
+def table(fast: list[dict[str, Any]], full: list[dict[str, Any]]) -> str:
     """The numbers of the comparison, both ways."""
     lines = ["| number | unit | in full | as shipped | difference |", "|---|---|---|---|---|"]
     worst = 0.0
     for one, other in zip(fast, full, strict=True):
         if (
-            one.engine is None
-            or other.engine is None
-            or one.key.startswith(("fig2_gamma", "fig4a_gamma", "fig4b_gamma"))
+            one["engine"] is None
+            or other["engine"] is None
+            or one["key"].startswith(("fig2_gamma", "fig4a_gamma", "fig4b_gamma"))
         ):
             continue
-        difference = abs(one.engine - other.engine)
-        if difference <= _SMALL.get(one.unit, 0.0) and abs(other.engine) < 10.0 * _SMALL.get(one.unit, 0.0):
-            told = f"{difference:.1g} {one.unit}"
+        difference = abs(one["engine"] - other["engine"])
+        if difference <= _SMALL.get(one["unit"], 0.0) and abs(other["engine"]) < 10.0 * _SMALL.get(one["unit"], 0.0):
+            told = f"{difference:.1g} {one['unit']}"
         else:
-            share = difference / abs(other.engine)
+            share = difference / abs(other["engine"])
             worst, told = max(worst, share), f"{share:.2%}"
-        lines.append(f"| {one.what} | {one.unit} | {other.engine:.5g} | {one.engine:.5g} | {told} |")
+        lines.append(f"| {one['what']} | {one['unit']} | {other['engine']:.5g} | {one['engine']:.5g} | {told} |")
     return "\n".join([*lines, "", f"Largest difference: {worst:.2%}."])
 
 

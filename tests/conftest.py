@@ -44,12 +44,7 @@ from walkers.sweeps.scheduler import Options
 REFERENCE: dict[str, Any] = {
     "beads": {"material": "ruby"},
     "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
-    "liquid": {
-        "name": "Si AK5",
-        "volume_fraction": 0.01,
-        "viscosity_ratio": 1.0,
-        "contact_angle": "0 deg",
-    },
+    "liquid": {"name": "Si AK5", "volume_fraction": 0.01, "viscosity_ratio": 1.0, "contact_angle": "0 deg"},
     "boundary": {"material": "chromium-coated glass"},
     "contact": {
         "friction": {"bead_bead": 0.1, "bead_wall": 0.1},
@@ -160,54 +155,32 @@ def run_directory(runs_folder: Path) -> Callable[..., Path]:
 def trajectory(run_directory: Callable[..., Path]) -> Callable[..., Group]:
     """Run and read the trajectory."""
 
-    def run(case: Case | None = None, **changes: Any) -> Group:
-        return read_motion(run_directory(case, **changes)).groups[0]
-
-    return run
+    return lambda case=None, **changes: read_motion(run_directory(case, **changes)).groups[0]
 
 
 @pytest.fixture(scope="session")
 def walked(trajectory: Callable[..., Group]) -> Callable[..., Walk]:
     """Run and fit the velocities."""
 
-    def run(case: Case | None = None, **changes: Any) -> Walk:
-        return walk(trajectory(case, **changes))
-
-    return run
+    return lambda case=None, **changes: walk(trajectory(case, **changes))
 
 
-LOOKED_THROUGH = {
-    "grid": {
-        "axes": {"drive.frequency": ["60 Hz", "80 Hz"], "drive.peak_acceleration": ["2 g", "4 g", "6 g"]},
-    },
+_FREQUENCIES, _PEAKS = {"drive.frequency": ["60 Hz", "80 Hz"]}, {"drive.peak_acceleration": ["2 g", "4 g", "6 g"]}
+_FRICTIONS = {f"contact.friction.bead_{other}": {"uniform": [0.05, 0.3]} for other in ("wall", "bead")}
+LOOKED_THROUGH: dict[str, dict[str, Any]] = {
+    "grid": {"axes": {**_FREQUENCIES, **_PEAKS}},
     "rough": {
         "set": {"contact.friction.bead_wall": 0.2},
-        "axes": {"drive.frequency": ["60 Hz", "80 Hz"], "drive.peak_acceleration": ["4 g", "2 g"]},
+        "axes": {**_FREQUENCIES, "drive.peak_acceleration": ["4 g", "2 g"]},
     },
-    "three": {
-        "axes": {
-            "contact.friction.bead_wall": [0.1, 0.2],
-            "drive.frequency": ["60 Hz", "80 Hz"],
-            "drive.peak_acceleration": ["2 g", "4 g", "6 g"],
-        },
-    },
+    "three": {"axes": {"contact.friction.bead_wall": [0.1, 0.2], **_FREQUENCIES, **_PEAKS}},
     "beads": {
         "axes": {
             "liquid.name": ["Si AK5", "Si AK10"],
             "dimers.radii": [["0.3 mm", "0.2 mm"], ["0.25 mm", "0.2 mm"], ["0.35 mm", "0.2 mm"]],
         },
     },
-    "sampled": {
-        "sample": [
-            {
-                "points": 4,
-                "ranges": {
-                    "contact.friction.bead_wall": {"uniform": [0.05, 0.3]},
-                    "contact.friction.bead_bead": {"uniform": [0.05, 0.3]},
-                },
-            }
-        ]
-    },
+    "sampled": {"sample": [{"points": 4, "ranges": _FRICTIONS}]},
 }
 """Sweeps that are plotted, listed and compared, of two walkers each for four cycles."""
 

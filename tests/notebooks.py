@@ -13,29 +13,21 @@ from typing import Any
 import nbformat
 from nbclient import NotebookClient
 
-FOLDER = Path(__file__).parents[1] / "docs" / "tutorial"
 SECONDS = 300
 """That a cell may take, on a machine that is busy elsewhere."""
 
 
 def notebooks() -> list[Path]:
     """The notebooks of the tutorial."""
-    return sorted(FOLDER.glob("*.ipynb"))
+    return sorted((Path(__file__).parents[1] / "docs" / "tutorial").glob("*.ipynb"))
 
 
 def executed(path: Path, folder: Path) -> Any:
     """A notebook, executed in a folder; the first error ends it."""
     notebook = nbformat.read(path, as_version=4)
+    how = {"timeout": SECONDS, "startup_timeout": SECONDS, "kernel_name": "python3"}
     # The state of widgets holds all of K3D.
-    client = NotebookClient(
-        notebook,
-        timeout=SECONDS,
-        startup_timeout=SECONDS,
-        kernel_name="python3",
-        resources={"metadata": {"path": str(folder)}},
-        store_widget_state=False,
-    )
-    client.execute()
+    NotebookClient(notebook, resources={"metadata": {"path": str(folder)}}, store_widget_state=False, **how).execute()
     return notebook
 
 
@@ -57,13 +49,8 @@ def tagged(notebook: Any, tag: str) -> Any:
     return ast.literal_eval(text)
 
 
-def main() -> None:
-    """Execute all and store them."""
-    for path in notebooks():
-        with tempfile.TemporaryDirectory() as folder:
-            nbformat.write(stored(executed(path, Path(folder))), path)
-        print(path)
-
-
 if __name__ == "__main__":
-    main()
+    for place in notebooks():
+        with tempfile.TemporaryDirectory() as empty:
+            nbformat.write(stored(executed(place, Path(empty))), place)
+        print(place)

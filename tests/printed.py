@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import RendererAgg
-from matplotlib.collections import Collection, PathCollection
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.path import Path
@@ -26,6 +26,7 @@ _TOLERANCE = 0.5
 have."""
 _SPACE = 2.0
 """Points between texts side by side below which they are read as one."""
+_UNIT = Path([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5)], closed=True)
 
 
 class _Recorder(RendererAgg):
@@ -50,8 +51,7 @@ def _drawn(figure: Figure) -> tuple[_Recorder, list[Text]]:
     return recorder, [text for text in texts if text.get_gid() in recorder.groups and text.get_text().strip()]
 
 
-@dataclass(frozen=True)
-class _Box:
+class _Box(NamedTuple):
     """A rectangle on the page that may be oblique; pixels."""
 
     what: str
@@ -60,9 +60,9 @@ class _Box:
     def meets(self, other: _Box) -> bool:
         return self.path.intersects_path(other.path, filled=True)
 
-    @property
-    def extents(self) -> Bbox:
-        return self.path.get_extents()
+
+def _upright(what: str, box: Bbox) -> _Box:
+    return _Box(what, Path.unit_rectangle().transformed(BboxTransformTo(box)))
 
 
 def _box_of(text: Text, renderer: RendererAgg, shrunk: float, space: float) -> _Box:
@@ -74,18 +74,9 @@ def _box_of(text: Text, renderer: RendererAgg, shrunk: float, space: float) -> _
         size = text.get_window_extent(renderer).size
         text.set_rotation(angle)
     width, height = np.maximum(size + np.array([space, -2.0 * shrunk]), 1.0)
-    x, y = (extent.p0 + extent.p1) / 2.0
-    turned = Affine2D().scale(width, height).rotate_deg(angle).translate(x, y)
+    centre = (extent.p0 + extent.p1) / 2.0
+    turned = Affine2D().scale(width, height).rotate_deg(angle).translate(*centre)
     return _Box(text.get_text(), turned.transform_path(_UNIT))
-
-
-_UNIT = Path([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5)], closed=True)
-
-
-def _all_axes(figure: Figure) -> Iterator[Axes]:
-    for axes in figure.axes:
-        yield axes
-        yield from (child for child in axes.child_axes if isinstance(child, Axes))
 
 
 def _shapes(axes: Axes) -> Iterator[tuple[Path, bool]]:
@@ -99,30 +90,26 @@ def _shapes(axes: Axes) -> Iterator[tuple[Path, bool]]:
         if patch.get_visible() and patch.get_data_transform() == data:
             yield patch.get_transform().transform_path(patch.get_path()), True
     for collection in axes.collections:
-        yield from _shapes_of(collection) if collection.get_visible() else ()
-
-
-def _shapes_of(collection: Collection) -> Iterator[tuple[Path, bool]]:
-    if isinstance(collection, PathCollection):
-        offsets = np.ma.filled(np.ma.masked_invalid(collection.get_offsets()), np.nan)
-        yield Path(collection.get_offset_transform().transform(offsets[np.isfinite(offsets).all(axis=1)])), False
-        return
-    for path in collection.get_paths():
-        if len(path.vertices):
-            yield collection.get_transform().transform_path(path), True
+        if not collection.get_visible():
+            continue
+        if isinstance(collection, PathCollection):
+            places = np.ma.filled(np.ma.masked_invalid(collection.get_offsets()), np.nan)
+            places = places[np.isfinite(places).all(axis=1)]
+            yield Path(collection.get_offset_transform().transform(places)), False
+        else:
+            paths = (path for path in collection.get_paths() if len(path.vertices))
+            yield from ((collection.get_transform().transform_path(path), True) for path in paths)
 
 
 def _covers(box: _Box, axes: Axes) -> bool:
     """Whether a box lies over data of axes."""
-    seen = Bbox.intersection(box.extents, axes.bbox)
+    seen = Bbox.intersection(box.path.get_extents(), axes.bbox)
     if seen is None or min(seen.size) < 1.0:
         return False
-    for path, lines in _shapes(axes):
-        if lines and path.intersects_bbox(seen, filled=False):
-            return True
-        if not lines and len(path.vertices) and path.vertices.size and seen.count_contains(path.vertices):
-            return True
-    return False
+    return any(
+        path.intersects_bbox(seen, filled=False) if lines else path.vertices.size and seen.count_contains(path.vertices)
+        for path, lines in _shapes(axes)
+    )
 
 
 def _tick_marks(axes: Axes) -> Iterator[_Box]:
@@ -131,15 +118,11 @@ def _tick_marks(axes: Axes) -> Iterator[_Box]:
         for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
             if low <= tick.get_loc() <= high:
                 marks = (mark for mark in (tick.tick1line, tick.tick2line) if mark.get_visible())
-                yield from (_rectangle("tick", mark.get_window_extent()) for mark in marks)
+                yield from (_upright("tick", mark.get_window_extent()) for mark in marks)
 
 
-def _rectangle(what: str, box: Bbox) -> _Box:
-    return _Box(what, Path.unit_rectangle().transformed(BboxTransformTo(box)))
-
-
-def overlaps(figure: Figure) -> list[str]:
-    """Texts over texts, ticks, legends and data, legends over data, and what is cut off at the figure's edge."""
+def spoilt(figure: Figure) -> list[str]:
+    """Texts over texts, ticks, legends and data, legends over data, what is cut off, small print, odd widths."""
     recorder, texts = _drawn(figure)
     shrunk, space = _TOLERANCE * figure.dpi / 72.0, _SPACE * figure.dpi / 72.0
     boxes = [_box_of(text, recorder, shrunk, space) for text in texts]
@@ -147,43 +130,31 @@ def overlaps(figure: Figure) -> list[str]:
     written = {id(text) for legend in legends for text in legend.findobj(Text)}
     free = [box for text, box in zip(texts, boxes, strict=True) if id(text) not in written]
     frames = [
-        _rectangle(
+        _upright(
             "legend " + "; ".join(text.get_text() for text in legend.get_texts()),
             legend.get_window_extent(recorder).padded(-shrunk),
         )
         for legend in legends
     ]
-    found = [f"{one.what!r} over {other.what!r}" for one, other in combinations(boxes, 2) if one.meets(other)]
-    found += [f"{one.what!r} over {frame.what!r}" for one in free for frame in frames if one.meets(frame)]
-    found += [f"{one.what!r} over {other.what!r}" for one, other in combinations(frames, 2) if one.meets(other)]
-    for axes in _all_axes(figure):
-        if not axes.get_visible():
-            continue
+    pairs = [*combinations(boxes, 2), *((one, frame) for one in free for frame in frames), *combinations(frames, 2)]
+    found = [f"{one.what!r} over {other.what!r}" for one, other in pairs if one.meets(other)]
+    within = [child for axes in figure.axes for child in axes.child_axes if isinstance(child, Axes)]
+    for axes in (one for one in (*figure.axes, *within) if one.get_visible()):
         marks = list(_tick_marks(axes))
         for box in (*free, *frames):
-            if _covers(box, axes):
-                found.append(f"{box.what!r} over data")
-            if any(box.meets(mark) for mark in marks):
-                found.append(f"{box.what!r} over a tick")
+            found += [f"{box.what!r} over data"] if _covers(box, axes) else []
+            found += [f"{box.what!r} over a tick"] if any(box.meets(mark) for mark in marks) else []
     page = figure.bbox.padded(shrunk + space)
-    outside = [box for box in (*boxes, *frames) if (box.extents.p0 < page.p0).any() or (box.extents.p1 > page.p1).any()]
-    return found + [f"{box.what!r} is cut off" for box in outside]
-
-
-def small_print(figure: Figure) -> list[str]:
-    """Texts below `LEAST_SIZE`."""
-    sizes = {text.get_text(): float(text.get_fontsize()) for text in _drawn(figure)[1]}
-    return [f"{told!r} has {size:g} pt" for told, size in sizes.items() if size < LEAST_SIZE - 1e-9]
+    for box in (*boxes, *frames):
+        extents = box.path.get_extents()
+        found += [f"{box.what!r} is cut off"] if (extents.p0 < page.p0).any() or (extents.p1 > page.p1).any() else []
+    sizes = {text.get_text(): float(text.get_fontsize()) for text in texts}
+    found += [f"{told!r} has {size:g} pt" for told, size in sizes.items() if size < LEAST_SIZE - 1e-9]
+    width = float(figure.get_size_inches()[0])
+    return found if any(abs(width - column) < 1e-9 for column in COLUMNS) else [*found, f"{width:g} inches wide"]
 
 
 def letters(figure: Figure) -> list[str]:
     """The letters of a figure's panels, in the order in which they were made."""
     found = [re.match(r"\((\w+)\)", axes.get_title(loc="left")) for axes in figure.axes]
     return [match[1] for match in found if match]
-
-
-def spoilt(figure: Figure) -> list[str]:
-    """All of these, and a width that is none of a column's."""
-    width = float(figure.get_size_inches()[0])
-    wide = [] if any(abs(width - column) < 1e-9 for column in COLUMNS) else [f"{width:g} inches wide"]
-    return [*overlaps(figure), *small_print(figure), *wide]

@@ -167,7 +167,7 @@ SCRIPTS = {
     "help, unread": ('{program} --help | true; exit "${{PIPESTATUS[0]}}"', 0, ""),
     # A line of progress is due each time that there is some, when the reader has gone.
     "progress, unread": (
-        f'{sys.executable} -c "from walkers import main, progress; progress._rarely = lambda: lambda elapsed: True; '
+        f'{sys.executable} -c "from walkers import main, progress; progress._FIRST_LINE_SECONDS = 0.0; '
         'main.main()" sweep sweep.toml -j 1 2>&1 | true; exit "${{PIPESTATUS[0]}}"',
         *(0, ""),
     ),

@@ -1,4 +1,4 @@
-"""The program and the Makefile, as a user meets them."""
+"""The program, the Makefile and the package, as a user meets them: at a shell and from Python."""
 
 import json
 import os
@@ -6,29 +6,52 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import walkers
 from tests.conftest import PROGRAM, SHORT, call, document, to_toml
+from walkers import find_run, load_case
+from walkers import run as run_case
+from walkers.inputs.reading import shipped_cases
+from walkers.main import COMMANDS
 from walkers.physics.time_step import WALKER_FRACTIONS
+from walkers.postprocess import read_result, read_table
+from walkers.runner import find_engine, finished_run
+from walkers.runner.directory import run_place
+from walkers.runner.provenance import COMMIT_NAME, software
 
 ROOT = Path(__file__).parent.parent
 
 
-def _walkers(*arguments: str) -> str:
-    """The installed program, as a process of its own."""
-    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, check=True).stdout
+def _python(script: str, folder: Path | str = ROOT) -> str:
+    """What a new interpreter prints in a folder."""
+    return subprocess.run(
+        [sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, check=True
+    ).stdout.strip()
+
+
+@pytest.mark.smoke
+def test_two_beads_walk_toward_the_large_one(run_directory: Callable[..., Path]) -> None:
+    """A 2-bead deck through the whole pipeline in a second or two: if this fails, nothing else is worth looking at."""
+    directory = run_directory(run=SHORT)
+    run = finished_run(directory)
+    assert run is not None
+    assert run.manifest["engine"]["version"] == "LIGGGHTS-PUBLIC 3.8.0"
+    assert 1e-3 < read_result(directory)["velocity"]["mean"] < 1e-2
+    assert len(read_table(directory, "trajectory")) == 61
+
+
+# --- what a newcomer does ---------------------------------------------------------------------------------------------
 
 
 def test_show_tells_what_follows_from_a_case() -> None:
     shown = call("show", "fig1b", check=True).stdout
-    for part in ("Γ0 = 0.3811", "sin δ = 0.2", "μ = 0.5429", "4πγR limit", "rayleigh", "viscous", " a cycle"):
-        assert part in shown
+    assert all(part in shown for part in ("Γ0 = 0.3811", "sin δ = 0.2", "μ = 0.5429", "4πγR limit", "rayleigh"))
     summary = json.loads(call("show", "fig1b", "--json", check=True).stdout)
     assert summary["dimer"]["gamma0"] == pytest.approx(0.3811, abs=1e-4)
-    assert summary["case"]["walkers"][0]["radii"] == [3e-4, 2e-4]
     shares = summary["time_step"]["share"]
     assert shares.keys() == WALKER_FRACTIONS.keys()
     assert all(0.0 < share <= WALKER_FRACTIONS[limit] for limit, share in shares.items())
@@ -37,18 +60,15 @@ def test_show_tells_what_follows_from_a_case() -> None:
     assert all(0.5 < contact["capillary_force"] / contact["capillary_force_limit"] < 0.9 for contact in walls)
 
 
-def test_deck_is_printed_or_written(tmp_path: Path) -> None:
-    printed = _walkers("deck", "fig1b")
-    call("deck", "fig1b", "--to", str(tmp_path / "deck"), check=True)
-    assert (tmp_path / "deck" / "walker.lig").read_text() == printed
-    assert (tmp_path / "deck" / "bridges.txt").exists()
-    again = call("deck", "fig1b", "--to", str(tmp_path / "deck"))
-    assert again.returncode == 2
-
-
-def test_from_a_case_file_to_pictures(in_folder: Path) -> None:
+def test_from_a_case_file_to_a_deck_and_pictures(in_folder: Path) -> None:
     (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
-    assert "toward the large bead" in _walkers("run", "mine.toml")
+    printed = call("deck", "mine.toml", check=True).stdout
+    call("deck", "mine.toml", "--to", "deck", check=True)
+    assert (in_folder / "deck" / "walker.lig").read_text() == printed
+    assert (in_folder / "deck" / "bridges.txt").exists()
+    assert call("deck", "mine.toml", "--to", "deck").returncode == 2
+    done = subprocess.run([PROGRAM, "run", "mine.toml"], capture_output=True, text=True, check=True)
+    assert "toward the large bead" in done.stdout
     assert "(already run)" in call("run", "mine.toml", check=True).stdout
     for command, last in (("plot", "gait.png"), ("vtk", "walkers.pvd"), ("render", "walker.png")):
         path = Path(call(command, "mine.toml", check=True).stdout.split()[-1])
@@ -77,9 +97,109 @@ def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch
     assert "\x1b" not in done.stderr
 
 
-def test_make_help_lists_the_targets() -> None:
-    shown = subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    assert all(f"make {target}" in shown for target in ("walker", "test", "help", "clean"))
+# --- help, version, completion ----------------------------------------------------------------------------------------
+
+
+def test_help_names_every_command() -> None:
+    shown = call("--help", check=True).stdout
+    assert not set(shown) & set("╭│╰─"), "boxes are for terminals"
+    for command in COMMANDS:
+        assert f"\n  {command} " in shown
+        assert call(command, "-h", check=True).stdout == call(command, "--help", check=True).stdout
+    for module in ("walkers", "walkers.main"):
+        done = subprocess.run([sys.executable, "-m", module, "-h"], capture_output=True, text=True, check=True)
+        assert done.stdout == shown
+    targets = subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert all(f"make {target}" in targets for target in ("walker", "test", "help", "clean"))
+
+
+def test_version_names_package_commit_and_engine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    package, engine = call("--version", check=True).stdout.splitlines()
+    assert package.startswith("granular-walkers 0.")
+    if (ROOT / ".git").exists():
+        told = subprocess.run(["git", "-C", ROOT, "rev-parse", "HEAD"], capture_output=True, text=True, check=True)
+        assert package.partition("(commit ")[2].removesuffix(")").removesuffix("+changes") == told.stdout.strip()
+    assert engine == f"LIGGGHTS-PUBLIC 3.8.0, {find_engine().path}"
+    # A wheel names the commit that it was built from.
+    wheel = shutil.copytree(Path(walkers.__file__).parent, tmp_path / "walkers")
+    (wheel / COMMIT_NAME).write_text("0123abc\n")
+    told_by_wheel = _python("from walkers.main import describe_version as one; print(one())", tmp_path)
+    assert told_by_wheel.startswith(f"granular-walkers {software().version} (commit 0123abc)\n")
+    monkeypatch.setenv("WALKERS_ENGINE", "no-such-engine")
+    assert "no engine: no-such-engine" in call("--version", check=True).stdout
+
+
+def test_shells_complete_commands_names_runs_and_sweeps(
+    looked_through: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def completed(line: str) -> list[str]:
+        """What bash is offered for the last word of a line."""
+        words = {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split(" ")) - 1)}
+        with monkeypatch.context() as environment:
+            environment.setattr(sys, "argv", ["walkers"])
+            for name, value in {"_WALKERS_COMPLETE": "complete_bash", **words}.items():
+                environment.setenv(name, value)
+            return call(check=True).stdout.split()
+
+    (tmp_path / "runs").symlink_to(looked_through)
+    shutil.copy(looked_through.parent / "base.toml", tmp_path / "figure.toml")
+    monkeypatch.chdir(tmp_path)
+    runs = {Path(run).name for run in walkers.load("runs/three")["run"]}
+    assert completed("walkers comp") == ["compare"]
+    assert completed("walkers run fig") == [*(name for name in shipped_cases() if name[:3] == "fig"), "figure.toml"]
+    assert "fig2" in completed("walkers sweep fi")
+    assert runs <= set(completed("walkers result base-"))
+    assert set(completed("walkers plot ")) >= runs | {"grid", "fig1b"}
+    assert completed("walkers plot runs/th") == ["runs/three"]
+    assert completed("walkers table runs/g") == ["runs/grid"]
+    assert completed("walkers list --case ") == ["base"]
+    assert completed("walkers list --status fa") == ["failed"]
+    assert completed("walkers result --out elsewhere base-") == []
+
+
+# --- what a word names ------------------------------------------------------------------------------------------------
+
+
+def test_an_input_of_another_kind_is_told_with_its_command(looked_through: Path, tmp_path: Path) -> None:
+    sweep, case, grid = tmp_path / "mine.toml", looked_through.parent / "base.toml", str(looked_through / "grid")
+    sweep.write_text('case = "fig1b"\n[axes]\ndrive.frequency = ["60 Hz"]\n')
+    run = str(Path(walkers.load(grid)["run"][0]).resolve())
+    for arguments, told in (
+        (("run", "fig2"), "fig2: is a sweep: walkers sweep fig2"),
+        (("show", str(sweep)), f"is a sweep: walkers sweep {sweep}"),
+        (("deck", grid), "is a sweep's directory: walkers table"),
+        (("run", run), f"is a run's directory: walkers result {run}"),
+        (("sweep", "fig1b"), "fig1b: is a case: walkers run fig1b"),
+        (("sweep", str(case)), f"is a case: walkers run {case}"),
+        (("sweep", grid), "is a sweep's directory"),
+        (("theory", "ruby"), "ruby: is a calibration: walkers calibrate ruby"),
+        (("calibrate", "fig2"), "fig2: is a sweep"),
+        (("result", grid), "a sweep's directory: walkers plot, table and status take it"),
+        (("compare", grid, run), f"{grid}: is a sweep, to be compared with another sweep"),
+        (("climb", grid), f"{grid}: expected a finished run of a pile"),
+    ):
+        done = call(*arguments)
+        assert done.returncode == 2
+        assert told in done.stderr
+
+
+def test_sweeps_are_found_in_another_folder_of_runs(looked_through: Path, in_folder: Path) -> None:
+    out = ("--out", str(looked_through))
+    assert call("status", "grid", *out, check=True).stdout.startswith("grid: 6 points, 6 finished")
+    assert call("table", "grid", *out, "--csv", check=True).stdout.count("\n") == 7
+
+
+def test_a_folder_does_not_shadow_the_run_of_the_case_that_it_is_named_like(in_folder: Path) -> None:
+    call("deck", "fig1b", "--to", "fig1b", check=True)
+    place = run_case(load_case("fig1b", {"run.cycles": 6, "run.settling_cycles": 2}), in_folder / "short").directory
+    told = call("result", "fig1b")
+    assert "no finished run in runs; first do: walkers run fig1b" in told.stderr
+    engine, case = find_engine(), load_case("fig1b")
+    shutil.copytree(place, run_place(case, engine, Path("runs")))
+    assert find_run("fig1b").directory == run_place(case, engine, Path("runs"))
+
+
+# --- the package ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
@@ -91,30 +211,23 @@ def test_without_root_and_engine_the_administrators_command_is_told() -> None:
         for tool in ("bash", "make", "id", "awk"):
             (place / tool).symlink_to(str(shutil.which(tool)))
         shutil.copy(ROOT / "Makefile", place)
-        done = subprocess.run(
-            ["make", "--no-print-directory", "engine"],
-            cwd=place,
-            env={"PATH": folder},
-            user=65534,
-            capture_output=True,
-            text=True,
-            check=False,
-            stdin=subprocess.DEVNULL,
-        )
+        how = {"cwd": place, "env": {"PATH": folder}, "user": 65534, "stdin": subprocess.DEVNULL}
+        command = ["make", "--no-print-directory", "engine"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, **how)
     assert done.returncode != 0
     assert "apt-get install liggghts" in done.stderr
     assert "administrator" in done.stderr
 
 
-def test_installing_claims_one_name() -> None:
-    """Others may have a module called inputs or runner, and theirs is theirs."""
+def test_the_package_claims_one_name_and_exports_few_that_are_documented() -> None:
+    """Others may have a module called inputs or runner, and theirs is theirs. Nothing public needs a notebook."""
     from importlib.metadata import packages_distributions
 
-    names = [name for name, owners in packages_distributions().items() if "granular-walkers" in owners]
-    assert [name for name in names if not name.startswith("__editable__")] == ["walkers"]
-    script = (
-        "import walkers.inputs, sys; print([name for name in sys.modules if name in ('inputs', 'runner', 'sweeps')])"
-    )
-    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd="/")
-    assert told.stdout.strip() == "[]"
-    assert dir(walkers) == sorted(walkers.__all__)
+    owned = [name for name, owners in packages_distributions().items() if "granular-walkers" in owners]
+    assert [name for name in owned if not name.startswith("__editable__")] == ["walkers"]
+    modules = "walkers.inputs, walkers.pipeline, walkers.postprocess.report.run, walkers.sweeps.report"
+    wanted = "{'inputs', 'runner', 'sweeps', 'IPython'}"
+    assert _python(f"import sys, {modules}; print(sorted({wanted} & set(sys.modules)))", "/") == "[]"
+    names = ["Run", "find_run", "load", "load_case", "plot_sweep", "report", "run", "sweep", "sweep_figure"]
+    assert dir(walkers) == walkers.__all__ == names
+    assert all(getattr(walkers, name).__doc__ for name in walkers.__all__)

@@ -225,7 +225,7 @@ def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, mo
     stamp = FinishedRun(run_case(case, tmp_path).directory).manifest["finished"]
     # It is not there at the first look, but at the second, after the run has been locked.
     answers = iter([None])
-    monkeypatch.setattr("walkers.runner.directory.finished_run", lambda place: next(answers, finished_run(place)))
+    monkeypatch.setattr("walkers.pipeline.finished_run", lambda place: next(answers, finished_run(place)))
     outcome = run_case(case, tmp_path)
     assert outcome.cached
     assert not list(answers)  # the first look has been

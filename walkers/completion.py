@@ -6,71 +6,51 @@ Where nothing is offered the shell completes names of files by itself. Nothing i
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable
 from pathlib import Path
 
 import typer
 
-from walkers.pipeline import DEFAULT_OUT, RECORDS
+from walkers import DEFAULT_OUT, RECORDS
 
 _RUN = re.compile(r".+-[0-9a-f]{12}")
-_RECORD, _MANIFEST = RECORDS["sweep"], RECORDS["run"]
 
 
-def cases(incomplete: str) -> list[str]:
-    """Shipped cases, and TOML files."""
-    from walkers.inputs.reading import shipped_cases
+def offering(*kinds: str) -> Callable[[typer.Context, str], list[str]]:
+    """What offers things of some kinds that begin as what was typed.
 
-    return _beginning(incomplete, [*shipped_cases(), *_typed(incomplete, "*.toml")])
+    Parameters
+    ----------
+    kinds
+        ``case``, ``sweep file``: shipped ones, and TOML files. ``run``, ``sweep``: names in ``--out``, and directories.
+    """
 
+    def offered(ctx: typer.Context, incomplete: str) -> list[str]:
+        from walkers.inputs.reading import shipped_cases
+        from walkers.inputs.sweep import shipped_sweeps
 
-def sweep_files(incomplete: str) -> list[str]:
-    """Shipped sweeps, and TOML files."""
-    from walkers.inputs.sweep import shipped_sweeps
+        names: list[str] = []
+        for kind in kinds:
+            if kind in RECORDS:
+                names += [*_names(ctx, kind), *_typed(incomplete, f"*/{RECORDS[kind]}")]
+            else:
+                names += [*(shipped_cases() if kind == "case" else shipped_sweeps()), *_typed(incomplete, "*.toml")]
+        return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
-    return _beginning(incomplete, [*shipped_sweeps(), *_typed(incomplete, "*.toml")])
-
-
-def runs(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Shipped cases, names of finished runs in ``--out``, and their directories."""
-    from walkers.inputs.reading import shipped_cases
-
-    return _beginning(incomplete, [*shipped_cases(), *_named(_out(ctx), _MANIFEST), *_folders(incomplete, _MANIFEST)])
-
-
-def sweeps(incomplete: str) -> list[str]:
-    """Directories of sweeps."""
-    return _beginning(incomplete, _folders(incomplete or f"{DEFAULT_OUT}/", _RECORD))
+    return offered
 
 
-def runs_and_sweeps(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Those of `runs`, and sweeps by name and directory."""
-    of_sweeps = [*_named(_out(ctx), _RECORD), *_folders(incomplete, _RECORD)]
-    return [*runs(ctx, incomplete), *_beginning(incomplete, of_sweeps)]
-
-
-def case_names(ctx: typer.Context, incomplete: str) -> list[str]:
+def names_of_cases(ctx: typer.Context, incomplete: str) -> list[str]:
     """Names of the cases that were run in ``--out``."""
-    return _beginning(incomplete, (name.rpartition("-")[0] for name in _named(_out(ctx), _MANIFEST)))
+    names = dict.fromkeys(name.rpartition("-")[0] for name in _names(ctx, "run"))
+    return [name for name in names if name.startswith(incomplete)]
 
 
-def _out(ctx: typer.Context) -> Path:
-    return Path(ctx.params.get("out") or DEFAULT_OUT)
-
-
-def _beginning(incomplete: str, names: Iterable[str]) -> list[str]:
-    return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
-
-
-def _named(out: Path, kind: str) -> list[str]:
-    """Names of what has such a file in a folder of runs."""
-    folders = sorted(path.parent.name for path in out.glob(f"*/{kind}"))
-    return [name for name in folders if kind == _RECORD or _RUN.fullmatch(name)]
-
-
-def _folders(incomplete: str, kind: str) -> list[str]:
-    """Folders that begin as what was typed and have such a file."""
-    return _typed(incomplete, f"*/{kind}")
+def _names(ctx: typer.Context, kind: str) -> list[str]:
+    """Names of runs or sweeps in ``--out``."""
+    out = Path(ctx.params.get("out") or DEFAULT_OUT)
+    folders = sorted(path.parent.name for path in out.glob(f"*/{RECORDS[kind]}"))
+    return [name for name in folders if kind == "sweep" or _RUN.fullmatch(name)]
 
 
 def _typed(incomplete: str, pattern: str) -> list[str]:

@@ -8,17 +8,10 @@ from typing import Any
 
 
 def exporting(package: str, **names: Sequence[str]) -> Callable[[str], Any]:
-    """The ``__getattr__`` of a package.
+    """The ``__getattr__`` of a package that exports, for each of its modules, some of what that holds.
 
     Whoever needs one module of a package, such as its errors, does not wait for all the others, and for pydantic,
     jinja2 and numpy with them.
-
-    Parameters
-    ----------
-    package
-        Its name.
-    names
-        For each of its modules, what the package exports of it.
     """
     modules = {name: f"{package}.{module}" for module, exported in names.items() for name in exported}
 

@@ -4,75 +4,46 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from importlib import import_module
-from io import TextIOBase, TextIOWrapper
+from io import BufferedWriter, FileIO, TextIOWrapper
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import FrameType
-from typing import Annotated, Any, BinaryIO, NoReturn, TextIO
+from typing import Annotated, Any, NoReturn
 
 import typer
 
 COMMANDS = {
     **{"show": "look", "deck": "make", "run": "make"},
     **dict.fromkeys(("result", "plot", "render", "film", "vtk", "paraview", "export", "theory"), "look"),
-    **{"sweep": "make", "status": "look", "table": "look", "climb": "look", "compare": "look"},
-    **dict.fromkeys(("list", "clean", "report", "verify", "archive"), "keep"),
+    "sweep": "make",
+    **dict.fromkeys(("status", "table", "climb", "compare", "list", "clean", "report", "verify", "archive"), "look"),
     **dict.fromkeys(("figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"), "make"),
 }
 """Modules of `walkers.commands` in which the commands are functions, in the order of ``walkers --help``."""
 
-INTERRUPTED = 130
+_INTERRUPTED = 130
 _STDOUT = "standard output"
+_ENGINE_SECONDS = 10.0
+"""How long the engine may take to say what it is."""
 
 
-class _Stream(TextIOBase):
+class _Stream(FileIO):
     """Standard output or error: what the one cannot take is told by its name, what the other cannot goes nowhere."""
 
-    def __init__(self, stream: TextIO, *, is_output: bool) -> None:
-        self.stream, self.is_output = stream, is_output
-
-    @property
-    def encoding(self) -> str:  # type: ignore[override]
-        """Of the stream."""
-        return self.stream.encoding
-
-    @property
-    def buffer(self) -> BinaryIO:
-        """Its bytes."""
-        return self.stream.buffer
-
-    def write(self, text: str) -> int:
-        """Write a text."""
-        with self._told():
-            return self.stream.write(text)
-        return len(text)
-
-    def flush(self) -> None:
-        """Flush the stream."""
-        with self._told():
-            self.stream.flush()
-
-    def isatty(self) -> bool:
-        """Whether the stream is a terminal."""
-        return self.stream.isatty()
-
-    def fileno(self) -> int:
-        """Number of the stream's file."""
-        return self.stream.fileno()
-
-    @contextmanager
-    def _told(self) -> Iterator[None]:
+    def write(self, data: Any) -> int:
         try:
-            yield
-        except (OSError, ValueError) as error:
-            if isinstance(error, OSError) and not isinstance(error, BrokenPipeError):
+            return super().write(data)
+        except OSError as error:
+            if self.fileno() == 2:
+                return len(data)
+            if not isinstance(error, BrokenPipeError):
                 error.filename = _STDOUT
-            if self.is_output:
-                raise
+            raise
 
 
 class _Terminated(BaseException):
@@ -93,7 +64,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
         signal.signal(signal.SIGHUP, _on_signal)
     _open_streams()
-    warnings.showwarning = _show_warning
+    warnings.showwarning = lambda message, *_, **__: print(f"walkers: warning: {message}", file=sys.stderr)
     sys.exit(_status(arguments))
 
 
@@ -108,16 +79,15 @@ def _open_streams() -> None:
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
     sys.stdin = sys.stdin or open(0, closefd=False)  # noqa: SIM115
-    sys.stdout = sys.stdout or open(1, "w", closefd=False)  # noqa: SIM115
-    sys.stderr = sys.stderr or open(2, "w", closefd=False)  # noqa: SIM115
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
-    sys.stdout, sys.stderr = _Stream(sys.stdout, is_output=True), _Stream(sys.stderr, is_output=False)
-
-
-def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"walkers: warning: {message}", file=sys.stderr)
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        stream = getattr(sys, name)
+        if stream is not getattr(sys, f"__{name}__"):
+            continue  # whoever called us has put another there
+        encoding = "utf-8" if stream is None else stream.encoding
+        writer = BufferedWriter(_Stream(number, "w", closefd=False))
+        at_once = number == 2 or os.isatty(number)
+        text = TextIOWrapper(writer, encoding, errors="backslashreplace", line_buffering=at_once)
+        setattr(sys, name, text)
 
 
 def _status(arguments: list[str] | None) -> int:
@@ -128,8 +98,8 @@ def _status(arguments: list[str] | None) -> int:
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
         return _told(stop)
-    if outcome == INTERRUPTED:  # typer turns Ctrl-C into a status
-        return _tell("interrupted", INTERRUPTED)
+    if outcome == _INTERRUPTED:  # typer turns Ctrl-C into a status
+        return _tell("interrupted", _INTERRUPTED)
     return outcome if isinstance(outcome, int) else 0
 
 
@@ -164,8 +134,6 @@ def _program() -> typer.Typer:
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from walkers.version import describe_version
-
         print(describe_version())
         raise typer.Exit
 
@@ -178,11 +146,30 @@ def _options(
     """Take what is no command's."""
 
 
+def describe_version() -> str:
+    """Package, its commit if that is known, and engine, a line each."""
+    from walkers.runner.binary import find_engine, version_in
+    from walkers.runner.failures import EngineMissing
+    from walkers.runner.provenance import PROJECT, software
+
+    ours = software()
+    package = f"{PROJECT} {ours.version}" + (f" (commit {ours.commit})" if ours.commit else "")
+    try:
+        path = find_engine().path
+    except EngineMissing as missing:
+        return f"{package}\n{missing}"
+    version, command = None, [str(path), "-log", "none", "-in", "/dev/null"]
+    with TemporaryDirectory() as folder, suppress(OSError, subprocess.TimeoutExpired):  # it writes files there
+        how: dict[str, Any] = {"cwd": folder, "stdin": subprocess.DEVNULL, "timeout": _ENGINE_SECONDS}
+        version = version_in(subprocess.run(command, capture_output=True, check=False, **how).stdout)
+    return f"{package}\n{version or 'an engine that does not name its version'}, {path}"
+
+
 def _told(stop: BaseException) -> int:
     """Tell why the program stopped; the exit status of that."""
     from walkers.inputs.errors import InputError, WalkersError
 
-    known = ((InputError, 2), (WalkersError, 1), (KeyboardInterrupt, INTERRUPTED), (typer.Abort, INTERRUPTED))
+    known = ((InputError, 2), (WalkersError, 1), (KeyboardInterrupt, _INTERRUPTED), (typer.Abort, _INTERRUPTED))
     status = stop.status if isinstance(stop, _Terminated) else next((s for k, s in known if isinstance(stop, k)), None)
     if status is not None:
         return _tell(str(stop) or "interrupted", status)

@@ -1,17 +1,33 @@
-"""A case from file to result: what the commands do, for use from Python."""
+"""A case from file to result, and runs and sweeps found again: what the commands do, for use from Python."""
 
 from __future__ import annotations
 
+import base64
 import threading
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from walkers import DEFAULT_OUT, RECORDS
 from walkers.inputs.errors import InputError, Problem, WalkersError, check_utf8
-from walkers.notebook import Pictures
+from walkers.inputs.reading import load_case, shipped_cases
+from walkers.progress import progress_of, progress_of_sweep, shown_if
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import (
+    CASE_NAME,
+    FinishedRun,
+    case_of,
+    finished_run,
+    layout_of,
+    run_name,
+    run_place,
+    unfinished,
+)
+from walkers.runner.failures import EngineMissing, RunBusy
 
 if TYPE_CHECKING:
     import k3d
@@ -21,14 +37,23 @@ if TYPE_CHECKING:
     from walkers.inputs.origins import Origin
     from walkers.postprocess.films import FilmOptions
     from walkers.postprocess.motion import Motion
-    from walkers.runner.directory import FinishedRun
     from walkers.runner.launch import Progress
     from walkers.sweeps.comparison import Side
 
-Kind = Literal["run", "sweep", "calibration", "archive", "folder"]
-DEFAULT_OUT = Path("runs")
-RECORDS: dict[Kind, str] = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}
-"""Files by which directories are known, without the imports of those that write them."""
+
+class Pictures(list[Path]):
+    """Paths of pictures; a notebook shows the pictures themselves."""
+
+    def _repr_html_(self) -> str:
+        """The PNGs, one below the other; of other files the names."""
+        shown = []
+        for path in self:
+            if path.suffix.lower() == ".png" and path.is_file():
+                source = f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"
+                shown.append(f'<img src="{source}" alt="{escape(path.stem)}" style="max-width:100%">')
+            else:
+                shown.append(f"<p>{escape(str(path))}</p>")
+        return "\n".join(shown)
 
 
 @dataclass(frozen=True)
@@ -53,8 +78,6 @@ class Run:
     @property
     def case(self) -> Case:
         """The resolved case."""
-        from walkers.runner.directory import case_of
-
         return case_of(self.directory)
 
     @property
@@ -106,13 +129,26 @@ class Run:
 
         return Pictures(plot_run(self.directory, to, formats))
 
-    def view(self, *, height: int = 480) -> k3d.Plot:
-        """Its beads in three dimensions, for a notebook; see `walkers.postprocess.report.scene.scene_of`.
+    def render(self, to: Path | None = None, *, images: int = 6) -> Pictures:
+        """Render pictures of it, see `walkers.postprocess.series.render_run`: paths, which a notebook shows."""
+        from walkers.postprocess.series import render_run
 
-        Parameters
-        ----------
-        height
-            Pixels.
+        return Pictures(render_run(self.directory, to, images=images))
+
+    def film(
+        self,
+        to: Path | None = None,
+        options: FilmOptions | None = None,
+        *,
+        on_progress: Callable[[int, int], None] | None = None,
+    ) -> Path:
+        """Film it, see `walkers.postprocess.films.render_film`."""
+        from walkers.postprocess.films import render_film
+
+        return render_film(self.directory, to, options, on_progress=on_progress)
+
+    def view(self, *, height: int = 480) -> k3d.Plot:
+        """Its beads in three dimensions, for a notebook, so many pixels high.
 
         Examples
         --------
@@ -135,12 +171,6 @@ class Run:
 
         return write_vtk(self.directory, destination=to, **options)
 
-    def archive(self, to: Path | None = None, **options: Any) -> Path:
-        """Pack it into an RO-Crate, see `walkers.archive.writing.write_archive` and its `ArchiveOptions`."""
-        from walkers.archive.writing import ArchiveOptions, write_archive
-
-        return write_archive(self.directory, to, ArchiveOptions(**options))
-
     def paraview(self, to: Path | None = None, **options: Any) -> Path:
         """Write it with a script for ParaView, see `walkers.postprocess.paraview_script.write_paraview`."""
         from walkers.postprocess.paraview_script import write_paraview
@@ -153,23 +183,14 @@ class Run:
 
         return write_trajectory(self.directory, to, every=every)
 
-    def film(
-        self,
-        to: Path | None = None,
-        options: FilmOptions | None = None,
-        *,
-        on_progress: Callable[[int, int], None] | None = None,
-    ) -> Path:
-        """Film it, see `walkers.postprocess.films.render_film`."""
-        from walkers.postprocess.films import render_film
+    def archive(self, to: Path | None = None, **options: Any) -> Path:
+        """Pack it into an RO-Crate, see `walkers.archive.writing.write_archive` and its `ArchiveOptions`."""
+        from walkers.archive.writing import ArchiveOptions, write_archive
 
-        return render_film(self.directory, to, options, on_progress=on_progress)
+        return write_archive(self.directory, to, ArchiveOptions(**options))
 
-    def render(self, to: Path | None = None, *, images: int = 6) -> Pictures:
-        """Render pictures of it, see `walkers.postprocess.series.render_run`: paths, which a notebook shows."""
-        from walkers.postprocess.series import render_run
 
-        return Pictures(render_run(self.directory, to, images=images))
+# --- making -----------------------------------------------------------------------------------------------------------
 
 
 def run(
@@ -217,17 +238,15 @@ def run(
     >>> one.walkers[["facing", "steady"]].drop_duplicates("facing").to_dict("list")
     {'facing': [1, -1], 'steady': [True, True]}
     """
-    from walkers.inputs.reading import load_case
-    from walkers.progress import progress_of, shown_if
-    from walkers.runner.binary import find_engine
-    from walkers.runner.directory import finished_run, run_place, unfinished
-    from walkers.runner.failures import RunBusy
+    from walkers.inputs.run_tables import limits_of
     from walkers.sweeps.shared_deck import check_audit, make_runs
 
     case = load_case(case) if isinstance(case, (str, Path)) else case
     for one in (Path(out).absolute(), case.name):
         check_utf8(one)
-    _check_changed(case)
+    if exceeded := [] if case.as_read else limits_of(case).exceeded_by(case.run.time_step):
+        told = f"beyond the {' and the '.join(exceeded)} limit of the case as changed: use load_case(name, changes)"
+        raise InputError(case.name, [Problem("run.time_step", f"{case.run.time_step:.3g} s", told)])
     binary = find_engine(engine)
     place = run_place(case, binary, out)
     if finished_run(place) is not None and not force:
@@ -244,21 +263,63 @@ def run(
     return Run(made.runs[place.name].directory, cached=place.name in made.found, origins=case.origins)
 
 
-def _check_changed(case: Case) -> None:
-    """Refuse a case that was changed after it was read and whose time step no longer suits it."""
-    from walkers.inputs.run_tables import limits_of
-
-    exceeded = [] if case.as_read else limits_of(case).exceeded_by(case.run.time_step)
-    if exceeded:
-        told = f"beyond the {' and the '.join(exceeded)} limit of the case as changed: use load_case(name, changes)"
-        raise InputError(case.name, [Problem("run.time_step", f"{case.run.time_step:.3g} s", told)])
-
-
 def _load_postprocess() -> None:
     import pyarrow.parquet  # noqa: F401
 
     import walkers.postprocess.walking  # noqa: F401
 
+
+def sweep(
+    sweep: str | Path,
+    out: Path = DEFAULT_OUT,
+    *,
+    jobs: int | None = None,
+    changes: Mapping[str, Any] | None = None,
+    progress: bool | None = None,
+) -> pd.DataFrame:
+    """Make the runs of a sweep that are missing, on this machine, and give its table.
+
+    Parameters
+    ----------
+    sweep
+        A sweep file, or the name of a shipped sweep.
+    out
+        Folder of the run directories.
+    jobs
+        Decks at once; all cores if left out.
+    changes
+        Values put beside those of its ``[set]``, by dotted keys.
+    progress
+        Show how far it is; if None, in notebooks.
+
+    Returns
+    -------
+    DataFrame
+        One row per point (`walkers.sweeps.table.load`); points that failed say so in the column ``status``.
+
+    Raises
+    ------
+    InputError
+        If the sweep or one of its points cannot be used.
+
+    Examples
+    --------
+    >>> walkers.sweep("fig4", tmp)[["liquid.name", "status"]].to_dict("list")
+    {'liquid.name': ['Si AK5', 'Si AK10'], 'status': ['finished', 'finished']}
+    """
+    from walkers.inputs.sweep import load_sweep
+    from walkers.sweeps.run import run_sweep
+    from walkers.sweeps.scheduler import Options
+    from walkers.sweeps.site import cores_here
+    from walkers.sweeps.table import load
+
+    read = load_sweep(sweep, changes)
+    with shown_if(progress, progress_of_sweep(read.name)) as advance:
+        record, _ = run_sweep(read, Path(out), Options(jobs or cores_here()), on_progress=advance)
+    return load(record.directory)
+
+
+# --- finding ----------------------------------------------------------------------------------------------------------
 
 _NO_RUN = {
     "folder": "not a finished run: expected a folder with a manifest.json",
@@ -268,52 +329,19 @@ _NO_RUN = {
 }
 
 
-@dataclass(frozen=True)
-class Place:
-    """Where something is that a user named, what it is, and the case by which it was found, if it was by one."""
+class Place(NamedTuple):
+    """Where something is that a user named; what it is (of `RECORDS`, ``archive`` or ``folder``); by which case."""
 
     path: Path
-    kind: Kind
+    kind: str
     case: Case | None = None
 
 
-def locate(what: Case | str | Path, out: Path = DEFAULT_OUT) -> Place:
-    """Find what a user names; nothing in it is read or made anew.
+def placed(name: str | Path, out: Path = DEFAULT_OUT) -> Place | None:
+    """What there is of a name, as a path or in a folder of runs, but for the runs of cases.
 
-    Parameters
-    ----------
-    what
-        A directory, or its name in ``out``; a zip file; or a case (resolved, file or shipped name), whose finished run
-        with the installed engine is looked up there.
-    out
-        Folder of the run directories.
-
-    Raises
-    ------
-    InputError
-        If there is no such thing, or a case has no finished run.
-    runner.EngineFailure
-        If a case is given and there is no engine to look its run up for.
+    A folder shadows no shipped case by its name alone.
     """
-    from walkers.inputs.reading import load_case
-
-    if isinstance(what, (str, Path)):
-        if (there := _placed(what, out)) is not None:
-            return there
-        case = load_case(what)
-    else:
-        case = what
-    run = _run_of(case, out)
-    if run is None:
-        name = what if isinstance(what, (str, Path)) else case.name
-        raise InputError(str(name), [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
-    return Place(run, "run", case)
-
-
-def _placed(name: str | Path, out: Path) -> Place | None:
-    """What there is of a name, but for the runs of cases: a folder shadows no shipped case by its name alone."""
-    from walkers.inputs.reading import shipped_cases
-
     path = Path(name)
     for place in (path, out / path):
         for kind, file in RECORDS.items():
@@ -324,14 +352,36 @@ def _placed(name: str | Path, out: Path) -> Place | None:
     return Place(path, "folder") if path.is_dir() and str(name) not in shipped_cases() else None
 
 
+def _run_of(case: Case, out: Path) -> Path | None:
+    """The directory of a case's finished run with the installed engine."""
+    place = out / run_name(case, find_engine())
+    return place if finished_run(place) else None
+
+
+def locate(what: Case | str | Path, out: Path = DEFAULT_OUT) -> Place:
+    """Find what a user names, as `find_run` does, or anything else of `RECORDS`, a zip file or a folder.
+
+    Nothing in it is read or made anew.
+    """
+    if isinstance(what, (str, Path)):
+        if there := placed(what, out):
+            return there
+        name, case = str(what), load_case(what)
+    else:
+        name, case = what.name, what
+    if run := _run_of(case, out):
+        return Place(run, "run", case)
+    raise InputError(name, [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
+
+
 def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     """Find a finished run.
 
     Parameters
     ----------
     run
-        A run directory, or its name in ``out``; or a case (resolved, file or shipped name),
-        whose run with the installed engine is looked up there.
+        A run directory, or its name in ``out``; or a case (resolved, file or shipped name), whose run with the
+        installed engine is looked up there.
     out
         Folder of the run directories.
 
@@ -342,69 +392,82 @@ def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
     runner.EngineFailure
         If a case is given and there is no engine to look it up for.
     """
-    place = locate(run, out)
+    return run_at(locate(run, out), str(run))
+
+
+def run_at(place: Place, name: str) -> Run:
+    """The run at a place that a user named so; refused as by `find_run` if it is none, or cannot be read."""
     if place.kind != "run":
-        raise InputError(str(run), [Problem("", None, _NO_RUN[place.kind])])
+        raise InputError(name, [Problem("", None, _NO_RUN[place.kind])])
     _check(place.path)
     return Run(place.path, origins=None if place.case is None else place.case.origins)
 
 
+def find_sweep(sweep: str | Path, out: Path = DEFAULT_OUT) -> Path:
+    """The directory of a sweep, given itself or its name in a folder of runs; of nothing there the path as it is."""
+    there = placed(sweep, out)
+    return there.path if there and there.kind == "sweep" else Path(sweep)
+
+
 def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:
-    """A run, or a case with its run if it has one, for `walkers.sweeps.comparison.compare_runs`.
+    """A run, which need not be finished, or a case with its run if it has one, to be compared."""
+    from walkers.sweeps.comparison import Side
+
+    there = placed(run, out)
+    if there and (there.path / CASE_NAME).is_file():
+        try:
+            return Side(there.path.name, case_of(there.path), there.path if there.kind == "run" else None)
+        except (OSError, ValueError) as error:
+            raise InputError(str(run), [Problem("", None, f"its case cannot be read ({error})")]) from error
+    case, directory = load_case(run), None
+    with suppress(EngineMissing):
+        directory = _run_of(case, out)
+    return Side(str(run), case, directory)
+
+
+def report(what: str | Path, to: Path | None = None, out: Path = DEFAULT_OUT) -> Path:
+    """Write the report of a run or a sweep: one HTML file that needs no network.
 
     Parameters
     ----------
-    run
-        A run directory, also of a run that is not finished; its name in ``out``; or a case (file or shipped name).
+    what
+        The directory of one of them, or its name in ``out``; or a case, whose run is looked up there.
+    to
+        The file; ``report.html`` in that directory if None.
     out
         Folder of the run directories.
 
     Raises
     ------
     InputError
-        If it is none of them.
+        If there is no such thing, or the name is none of an HTML file.
+
+    Examples
+    --------
+    >>> walkers.report(walkers.run("fig1b", tmp).directory, tmp / "fig1b.html").name
+    'fig1b.html'
     """
-    from walkers.inputs.reading import load_case
-    from walkers.runner.directory import CASE_NAME, case_of, finished_run
-    from walkers.runner.failures import EngineMissing
-    from walkers.sweeps.comparison import Side
+    from walkers.postprocess.report.page import check_report
+    from walkers.sweeps.report import report_sweep
 
-    directory = Path(run) if (Path(run) / CASE_NAME).is_file() else _named(run, out)
-    if directory is not None:
-        try:
-            return Side(directory.name, case_of(directory), directory if finished_run(directory) else None)
-        except (OSError, ValueError) as error:
-            raise InputError(str(run), [Problem("", None, f"its case cannot be read ({error})")]) from error
-    case, there = load_case(run), None
-    with suppress(EngineMissing):
-        there = _run_of(case, out)
-    return Side(str(run), case, there)
+    if to is not None:
+        check_report(to)
+    place = locate(what, out)
+    if place.kind == "sweep":
+        return report_sweep(place.path, to)
+    return run_at(place, str(what)).report(to)
 
 
-def find_sweep(sweep: str | Path, out: Path = DEFAULT_OUT) -> Path | None:
-    """The directory of a sweep, given itself or its name in the folder ``out``; None if there is none."""
-    return next((path for path in (Path(sweep), out / sweep) if (path / RECORDS["sweep"]).is_file()), None)
+# --- checking ---------------------------------------------------------------------------------------------------------
 
 
-def _named(run: str | Path, out: Path) -> Path | None:
-    """The directory of the finished run of this name in a folder."""
-    from walkers.runner.directory import finished_run
-
-    return out / run if Path(run).name == str(run) and finished_run(out / run) else None
-
-
-def _run_of(case: Case, out: Path) -> Path | None:
-    """The directory of a case's finished run with the installed engine."""
-    from walkers.runner.binary import find_engine
-    from walkers.runner.directory import run_name
-
-    return _named(run_name(case, find_engine()), out)
+class IncompleteRunWarning(UserWarning):
+    """The dump of a finished run is shorter than its layout says: somebody cut it since."""
 
 
 def _check(directory: Path, *, dumps: bool = True) -> None:
     """Refuse a finished run that cannot be read; its tables are made anew if need be."""
     from walkers.postprocess.analysis import current_result
-    from walkers.runner.directory import FinishedRun
 
     run = FinishedRun(directory)
     for name in ("manifest", "case", "layout"):
@@ -427,8 +490,6 @@ def _told(directory: Path, message: str) -> Iterator[None]:
 
 def _check_dumps(run: FinishedRun) -> None:
     """Refuse a run without a dump that no archive left out; warn of one that was cut."""
-    from walkers.runner.directory import layout_of
-
     left_out = run.manifest.get("left_out", ())  # of an archive
     for segment in run.segments:
         layout = layout_of(segment)
@@ -439,8 +500,4 @@ def _check_dumps(run: FinishedRun) -> None:
             raise InputError(str(run.directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
         if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
             told = f"{dump} is incomplete: what is drawn or written ends early"
-            warnings.warn(told, IncompleteRunWarning, stacklevel=4)
-
-
-class IncompleteRunWarning(UserWarning):
-    """The dump of a finished run is shorter than its layout says: somebody cut it since."""
+            warnings.warn(told, IncompleteRunWarning, stacklevel=5)

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.errors import InputError, Problem
+from walkers.postprocess.drawing import FORMATS, save_figure
+from walkers.runner.directory import case_of
+from walkers.sweeps.factors import find_name
+from walkers.sweeps.figure import draw
+from walkers.sweeps.figure_layout import default_column, drawn_column, layout_of
+from walkers.sweeps.record import read_record
+from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,28 +40,20 @@ def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: A
     choices
         ``x``, ``y``, ``hue``, ``panels``, ``log``, ``theory`` of `sweep_figure`.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError
         As `sweep_figure`; or if the file's suffix is none of a figure.
     """
-    from walkers.postprocess.drawing import FORMATS, save_figure
-    from walkers.sweeps.table import load
-
     table = load(directory)
     place = Path(to) if to is not None else Path(directory) / f"{_column(table, choices.get('y'))}.png"
-    if place.suffix.lower().lstrip(".") not in FORMATS or place.is_dir():
+    form = place.suffix.lower().lstrip(".")
+    if form not in FORMATS or place.is_dir():
         expected = f"expected the name of a file that ends in .{', .'.join(FORMATS)}"
         raise InputError("--to", [Problem("", None, f"{place}: {expected}")])
     figure = sweep_figure(directory, **choices)
     runs = [Path(run).name for run in table.loc[table["status"] == "finished", "run"]]
-    written = save_figure(figure, place, runs, (place.suffix.lower().lstrip("."),), str(table.attrs["sweep"]))
-    return written[0]
+    return save_figure(figure, place, runs, (form,), str(table.attrs["sweep"]))[0]
 
 
 def sweep_figure(
@@ -96,54 +94,33 @@ def sweep_figure(
     InputError
         If it is no sweep's directory, no point is finished, or there is no such column.
     """
-    from walkers.sweeps.figure import draw
-    from walkers.sweeps.figure_layout import drawn_column, layout_of
-    from walkers.sweeps.record import read_record
-    from walkers.sweeps.table import load
-
     record, table = read_record(directory), load(directory)
     column = _column(table, y)
-    done = _finished(str(directory), table, column)
+    done = table[table["status"] == "finished"]
+    counts = Counter(table["status"][table["status"] != "finished"])
+    others = ", ".join(f"{number} {status}" for status, number in counts.items())
+    if done.empty:
+        told = f"no point is finished ({others or 'there is none'})"
+        raise InputError(str(directory), [Problem("", None, told)])
+    if counts:
+        _tell(f"{sum(counts.values())} of {len(table)} points left out: {others}")
+    if empty := int(done[column].isna().sum()):
+        _tell(f"{empty} of {len(done)} finished points have no {column}")
     layout = layout_of(record, done, x=x, hue=hue, panels=panels)
     if layout.untold:
         _tell(f"not told apart: {'; '.join(layout.untold)}")
-    predicted = _predicted(done, column) if theory else {}
-    title = record.title or record.name
-    return draw(layout, drawn_column(done, column, predicted), title=title, log=log)
+    predicted: dict[str, FloatArray] = {}
+    if theory:
+        from walkers.theory.prediction import predicted_column
+
+        predicted, reasons = predicted_column([case_of(Path(run)) for run in done["run"]], column)
+        for reason, number in reasons.items():
+            _tell(f"not drawn at {number} of {len(done)} points: {reason}")
+    return draw(layout, drawn_column(done, column, predicted), title=record.title or record.name, log=log)
 
 
 def _column(table: pd.DataFrame, wanted: str | None) -> str:
-    from walkers.sweeps.factors import find_name
-    from walkers.sweeps.figure_layout import default_column
-
     return find_name("--y", wanted, table.columns) if wanted else default_column(table)
-
-
-def _finished(source: str, table: pd.DataFrame, column: str) -> pd.DataFrame:
-    """The rows that have a result, and a word on the others."""
-    done = table[table["status"] == "finished"]
-    counts = Counter(status for status in table["status"] if status != "finished")
-    if done.empty:
-        raise InputError(source, [Problem("", None, f"no point is finished ({_listed(counts) or 'there is none'})")])
-    if counts:
-        _tell(f"{sum(counts.values())} of {len(table)} points left out: {_listed(counts)}")
-    if empty := int(done[column].isna().sum()):
-        _tell(f"{empty} of {len(done)} finished points have no {column}")
-    return done
-
-
-def _listed(counts: Mapping[str, int]) -> str:
-    return ", ".join(f"{number} {status}" for status, number in counts.items())
-
-
-def _predicted(done: pd.DataFrame, column: str) -> dict[str, FloatArray]:
-    from walkers.runner.directory import case_of
-    from walkers.theory.prediction import predicted_column
-
-    predicted, reasons = predicted_column([case_of(Path(run)) for run in done["run"]], column)
-    for reason, number in reasons.items():
-        _tell(f"not drawn at {number} of {len(done)} points: {reason}")
-    return predicted
 
 
 def _tell(message: str) -> None:

@@ -23,7 +23,7 @@ from walkers.inputs.calibration import QUANTITIES, Calibration, Speed
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.schema import ALTERNATIVES
 from walkers.inputs.sweep import Sweep, expand
-from walkers.paper.sensitivity import misalignment
+from walkers.paper.comparison import misalignment
 from walkers.paper.sources import ProgressOf
 from walkers.postprocess.steady_state import steady_walkers, together
 from walkers.postprocess.tables import read_table

@@ -8,64 +8,37 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
-from walkers import completion
+from walkers.completion import names_of_cases, offering
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case as ResolvedCase
     from walkers.sweeps.scheduler import Options
 
-Case = Annotated[
-    str,
-    typer.Argument(
-        metavar="CASE",
-        help="A case file, or the name of a shipped case such as fig1b.",
-        autocompletion=completion.cases,
-    ),
-]
-Run = Annotated[
-    str,
-    typer.Argument(
-        metavar="RUN",
-        help="A run: its directory, its name in --out, or a case whose run is looked up there.",
-        autocompletion=completion.runs,
-    ),
-]
+_CASE = "A case file, or the name of a shipped case such as fig1b."
+_RUN = "A run: its directory, its name in --out, or a case whose run is looked up there."
+_RUN_OR_SWEEP = "A run or a sweep: its directory, its name in --out, or a case."
+_SET = "Another value than the file's, such as drive.frequency=70Hz; repeatable."
+_AGE = "Only what is older than this, such as 7d or 12h."
+
+Case = Annotated[str, Argument(metavar="CASE", help=_CASE, autocompletion=offering("case"))]
+Run = Annotated[str, Argument(metavar="RUN", help=_RUN, autocompletion=offering("case", "run"))]
 RunOrSweep = Annotated[
-    str,
-    typer.Argument(
-        metavar="RUN|SWEEP",
-        help="A run or a sweep: its directory, its name in --out, or a case.",
-        autocompletion=completion.runs_and_sweeps,
-    ),
+    str, Argument(metavar="RUN|SWEEP", help=_RUN_OR_SWEEP, autocompletion=offering("case", "run", "sweep"))
 ]
-Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
-EngineName = Annotated[str | None, typer.Option("--engine", help="Name or path of the liggghts binary.")]
-AllowFailedAudit = Annotated[bool, typer.Option("--allow-failed-audit", help="Run on an engine that failed its audit.")]
-Jobs = Annotated[int | None, typer.Option("-j", "--jobs", min=1, help="Decks at once; all cores if left out.")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, SI units.")]
-Formats = Annotated[
-    list[str] | None, typer.Option("--format", help="Of the figures: png, svg or pdf; may be repeated.")
-]
-SweepColumn = Annotated[
-    str | None, typer.Option("--y", help="Of sweeps: a column; velocity, of piles climbs if left out.")
-]
+Out = Annotated[Path, Option(help="Folder of the run directories.")]
+Set = Annotated[list[str] | None, Option("--set", metavar="KEY=VALUE", help=_SET)]
+EngineName = Annotated[str | None, Option(help="Name or path of the liggghts binary.")]
+AllowFailedAudit = Annotated[bool, Option("--allow-failed-audit", help="Run on an engine that failed its audit.")]
+Jobs = Annotated[int | None, Option("-j", "--jobs", min=1, help="Decks at once; all cores if left out.")]
+Json = Annotated[bool, Option("--json", help="Print JSON, SI units.")]
+Formats = Annotated[list[str] | None, Option("--format", help="Of the figures: png, svg or pdf; may be repeated.")]
+SweepColumn = Annotated[str | None, Option(help="Of sweeps: a column; velocity, of piles climbs if left out.")]
 CaseName = Annotated[
-    str | None,
-    typer.Option(
-        "--case", metavar="NAME", help="Only what is of the case of this name.", autocompletion=completion.case_names
-    ),
+    str | None, Option(metavar="NAME", help="Only what is of the case of this name.", autocompletion=names_of_cases)
 ]
-OlderThan = Annotated[
-    str | None, typer.Option("--older-than", metavar="AGE", help="Only what is older than this, such as 7d or 12h.")
-]
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="KEY=VALUE", help="Another value than the file's, such as drive.frequency=70Hz; repeatable."
-    ),
-]
+OlderThan = Annotated[str | None, Option(metavar="AGE", help=_AGE)]
 
 
 def load(case: str, settings: list[str] | None) -> ResolvedCase:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypedDict
+from typing import TYPE_CHECKING, TypedDict
 
-import typer
+from typer import Argument, Option
 
-from walkers import completion
+import walkers
+from walkers import DEFAULT_OUT
 from walkers.commands.arguments import (
     AllowFailedAudit,
     Case,
@@ -27,68 +28,19 @@ from walkers.commands.arguments import (
     refuse,
     tell,
 )
-from walkers.pipeline import DEFAULT_OUT
+from walkers.completion import offering
 
 if TYPE_CHECKING:
-    from walkers.check.audit import Checked
-    from walkers.check.validate import Chapter
     from walkers.inputs.case import Case as Resolved
-    from walkers.pipeline import Run
 
 _MANY = 10_000
 """Points of a sweep that take seconds to be resolved."""
-
-Cases = Annotated[
-    list[str],
-    typer.Argument(metavar="CASE...", help="Case files, or names of shipped cases.", autocompletion=completion.cases),
-]
-SweepFile = Annotated[
-    str,
-    typer.Argument(
-        metavar="SWEEP", help="A sweep file, or a shipped sweep such as fig2.", autocompletion=completion.sweep_files
-    ),
-]
-CalibrationFile = Annotated[
-    str, typer.Argument(metavar="CALIBRATION", help="A calibration file, or a shipped calibration such as ruby.")
-]
-DeckFolder = Annotated[
-    Path | None, typer.Option("--to", help="Write the deck and its files into this new folder, to run by hand.")
-]
-Force = Annotated[bool, typer.Option("--force", help="Run again even if the run is there.")]
-RunLimit = Annotated[
-    float | None, typer.Option("--limit", min=0.0, help="Stop a run (of a pile: a segment) after this many seconds.")
-]
-SpreadFlag = Annotated[
-    bool,
-    typer.Option("--spread", help="Also with what is guessed, calibrated or uncertain drawn from its range: a band."),
-]
-Points = Annotated[int | None, typer.Option("--points", min=2, max=4096, help="Of the spread; 32 if left out.")]
-SitePath = Annotated[Path | None, typer.Option("--site", help="A site file: run on that cluster instead.")]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be done, and its cost; write nothing.")]
-Retries = Annotated[int, typer.Option("--retries", min=0, help="How often a failed point is tried again.")]
-EngineLimit = Annotated[float | None, typer.Option("--limit", min=0.0, help="Stop an engine after this many seconds.")]
-CalibrationFolder = Annotated[
-    Path | None, typer.Option("--to", help="Folder of tables and figures; OUT/NAME if left out.")
-]
-FiguresFolder = Annotated[Path, typer.Option("--to", help="Folder of the figures.")]
-OnlyFigures = Annotated[
-    list[str] | None, typer.Option("--only", help="Name of a figure, or comparison; may be repeated.")
-]
-TermsFolder = Annotated[Path, typer.Option("--to", help="Folder of the tables.")]
-Generations = Annotated[int, typer.Option("--generations", min=1, help="Of each search.")]
-OnlyChecks = Annotated[list[str] | None, typer.Option("--only", help="Name of a check; may be repeated.")]
-QuickAudit = Annotated[bool, typer.Option("--quick", help="Leave out the checks that take longest.")]
-Cycles = Annotated[int | None, typer.Option("--cycles", help="Of the drive, in place of the case's own.")]
-Without = Annotated[
-    list[str] | None, typer.Option("--without", metavar="TERM", help="Leave a term out, such as friction.")
-]
-Seeds = Annotated[int, typer.Option("--seeds", min=1, help="Of a pile: so many starts, for the statistics.")]
-Chapters = Annotated[list[str] | None, typer.Argument(metavar="[CHAPTER]...", help="Some chapters; all if left out.")]
-QuickChapters = Annotated[bool, typer.Option("--quick", help="Of each the part that takes seconds.")]
-PageFolder = Annotated[Path | None, typer.Option("--to", help="Folder of the page; OUT/validation if left out.")]
-ChapterJobs = Annotated[
-    int | None, typer.Option("-j", "--jobs", min=1, help="Chapters at once; all cores if left out.")
-]
+_OFFERED = offering("case")
+_CASES = "Case files, or names of shipped cases."
+_SWEEP = "A sweep file, or a shipped sweep such as fig2."
+_DECK = "Write the deck and its files into this new folder, to run by hand."
+_LIMIT = "Stop a run (of a pile: a segment) after this many seconds."
+_SPREAD = "Also with what is guessed, calibrated or uncertain drawn from its range: a band."
 
 
 class _By(TypedDict):
@@ -98,7 +50,7 @@ class _By(TypedDict):
     allow_failed_audit: bool
 
 
-def deck(case: Case, settings: Set = None, to: DeckFolder = None) -> None:
+def deck(case: Case, settings: Set = None, to: Path | None = Option(None, help=_DECK)) -> None:
     """Print the LIGGGHTS deck of a case (of a run in segments, the first), or write it with its files."""
     from walkers.inputs.errors import InputError, Problem
     from walkers.runner.binary import find_engine, plugin_of, run_script
@@ -121,19 +73,18 @@ def deck(case: Case, settings: Set = None, to: DeckFolder = None) -> None:
 
 
 def run(
-    cases: Cases,
+    cases: list[str] = Argument(metavar="CASE...", help=_CASES, autocompletion=_OFFERED),
     settings: Set = None,
     out: Out = DEFAULT_OUT,
-    force: Force = False,
+    force: bool = Option(False, "--force", help="Run again even if the run is there."),
     as_json: Json = False,
-    limit: RunLimit = None,
-    spread: SpreadFlag = False,
-    points: Points = None,
+    limit: float | None = Option(None, min=0.0, help=_LIMIT),
+    spread: bool = Option(False, "--spread", help=_SPREAD),
+    points: int | None = Option(None, min=2, max=4096, help="Of the spread; 32 if left out."),
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Run cases, unless they have been run, and print their results (with --json an object a line)."""
-    from walkers import pipeline
     from walkers.progress import progress_of, progress_of_sweep
     from walkers.runner.failures import EngineFailure
 
@@ -149,7 +100,7 @@ def run(
     for case in loaded:
         try:
             with progress_of(case.name) as advance:
-                done = pipeline.run(case, out, force=force, progress=advance, time_limit=limit, **how)
+                done = walkers.run(case, out, force=force, progress=advance, time_limit=limit, **how)
         except EngineFailure as failure:
             tell(f"{case.name}: {failure}")
             failed = True
@@ -169,14 +120,14 @@ def run(
 
 
 def sweep(
-    sweep: SweepFile,
+    sweep: str = Argument(metavar="SWEEP", help=_SWEEP, autocompletion=offering("sweep file")),
     settings: Set = None,
     out: Out = DEFAULT_OUT,
     jobs: Jobs = None,
-    site: SitePath = None,
-    dry_run: DryRun = False,
-    retries: Retries = 0,
-    limit: EngineLimit = None,
+    site: Path | None = Option(None, help="A site file: run on that cluster instead."),
+    dry_run: bool = Option(False, "--dry-run", help="Say what would be done, and its cost; write nothing."),
+    retries: int = Option(0, min=0, help="How often a failed point is tried again."),
+    limit: float | None = Option(None, min=0.0, help="Stop an engine after this many seconds."),
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
@@ -211,9 +162,11 @@ def sweep(
 
 
 def calibrate(
-    calibration: CalibrationFile,
+    calibration: str = Argument(
+        metavar="CALIBRATION", help="A calibration file, or a shipped calibration such as ruby."
+    ),
     out: Out = DEFAULT_OUT,
-    to: CalibrationFolder = None,
+    to: Path | None = Option(None, help="Folder of tables and figures; OUT/NAME if left out."),
     jobs: Jobs = None,
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
@@ -237,8 +190,8 @@ def calibrate(
 
 def figures(
     out: Out = DEFAULT_OUT,
-    to: FiguresFolder = Path("figures"),
-    only: OnlyFigures = None,
+    to: Path = Option(Path("figures"), help="Folder of the figures."),
+    only: list[str] | None = Option(None, help="Name of a figure, or comparison; may be repeated."),
     formats: Formats = None,
     jobs: Jobs = None,
     engine: EngineName = None,
@@ -260,7 +213,10 @@ def figures(
     return 1 if made.failures or made.left_out else 0
 
 
-def model_terms(to: TermsFolder = Path("figures"), generations: Generations = 120) -> int:
+def model_terms(
+    to: Path = Option(Path("figures"), help="Folder of the tables."),
+    generations: int = Option(120, min=1, help="Of each search."),
+) -> int:
     """Fit the theory to the published numbers with one term after the other; no engine is needed."""
     from walkers.paper.model_terms import try_model_terms, write_model_terms
 
@@ -272,8 +228,8 @@ def model_terms(to: TermsFolder = Path("figures"), generations: Generations = 12
 
 
 def audit(
-    only: OnlyChecks = None,
-    quick: QuickAudit = False,
+    only: list[str] | None = Option(None, help="Name of a check; may be repeated."),
+    quick: bool = Option(False, "--quick", help="Leave out the checks that take longest."),
     as_json: Json = False,
     engine: EngineName = None,
 ) -> int:
@@ -283,9 +239,6 @@ def audit(
     from walkers.runner.binary import find_engine
     from walkers.runner.failures import EngineMissing
 
-    def told(checked: Checked) -> None:
-        tell(f"{checked.name} ({checked.seconds:.1f} s)")
-
     checks = selected(only or (), quick=quick)
     try:
         binary = find_engine(engine)
@@ -293,7 +246,7 @@ def audit(
         if engine is None:
             raise
         raise InputError("--engine", [Problem("", None, str(missing))]) from missing
-    report = run_audit(checks, engine=binary, on_done=told)
+    report = run_audit(checks, engine=binary, on_done=lambda checked: tell(f"{checked.name} ({checked.seconds:.1f} s)"))
     print_as(as_json, report.as_dict, report.as_text)
     if not only:
         try:
@@ -306,16 +259,15 @@ def audit(
 def crosscheck(
     case: Case,
     out: Out = DEFAULT_OUT,
-    cycles: Cycles = None,
-    without: Without = None,
+    cycles: int | None = Option(None, help="Of the drive, in place of the case's own."),
+    without: list[str] | None = Option(None, metavar="TERM", help="Leave a term out, such as friction."),
     settings: Set = None,
-    seeds: Seeds = 1,
+    seeds: int = Option(1, min=1, help="Of a pile: so many starts, for the statistics."),
     as_json: Json = False,
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Compare a case's run with an engine of our own, written from the published formulas; exit 1 if they differ."""
-    from walkers import pipeline
     from walkers.check.comparison import crosscheck, describe, shortened
     from walkers.check.engine import TERMS
     from walkers.inputs.errors import InputError, Problem
@@ -325,16 +277,15 @@ def crosscheck(
     check_folder("--out", out)
     refuse("--seeds", seeds > 1 and loaded.mixture is None, "is for piles: walkers and placed beads start but one way")
     for term in without or ():
-        if term not in TERMS:
-            raise InputError(f"--without {term}", [Problem("", None, f"expected one of {', '.join(TERMS)}")])
+        refuse(f"--without {term}", term not in TERMS, f"expected one of {', '.join(TERMS)}")
     try:
         loaded = loaded if cycles is None else shortened(loaded, cycles)
     except ValueError as error:
         raise InputError("--cycles", [Problem("", None, str(error))]) from error
 
-    def make(one: Resolved, folder: Path) -> Run:
+    def make(one: Resolved, folder: Path) -> walkers.Run:
         with progress_of(one.name) as advance:
-            return pipeline.run(one, folder, engine=engine, progress=advance, allow_failed_audit=allow_failed_audit)
+            return walkers.run(one, folder, engine=engine, progress=advance, allow_failed_audit=allow_failed_audit)
 
     found = crosscheck(loaded, out, without or (), seeds=seeds, make=make)
     if as_json:
@@ -346,25 +297,22 @@ def crosscheck(
 
 
 def validate(
-    chapters: Chapters = None,
-    quick: QuickChapters = False,
+    chapters: list[str] | None = Argument(None, metavar="[CHAPTER]...", help="Some chapters; all if left out."),
+    quick: bool = Option(False, "--quick", help="Of each the part that takes seconds."),
     out: Out = DEFAULT_OUT,
-    to: PageFolder = None,
-    jobs: ChapterJobs = None,
+    to: Path | None = Option(None, help="Folder of the page; OUT/validation if left out."),
+    jobs: int | None = Option(None, "-j", "--jobs", min=1, help="Chapters at once; all cores if left out."),
     as_json: Json = False,
 ) -> int:
     """Check the decks against published benchmarks, exact solutions and a second engine, and write a page of it."""
     from walkers.check.validate import validate
-    from walkers.sweeps.site import cores_here
 
     check_folder("--out", out)
-    folder = to or out / "validation"
+    folder, cores = to or out / "validation", on_cores(jobs).workers
     check_folder("--to", folder)
-
-    def told(chapter: Chapter) -> None:
-        tell(f"{chapter.name} done")
-
-    made = validate(out, folder, only=chapters or (), quick=quick, jobs=jobs or cores_here(), on_done=told)
+    made = validate(
+        out, folder, only=chapters or (), quick=quick, jobs=cores, on_done=lambda one: tell(f"{one.name} done")
+    )
     numbers = {chapter.name: dict(chapter.numbers) for chapter in made.chapters}
     print_as(as_json, lambda: numbers, lambda: "\n".join(map(str, made.files)))
     tell(*(f"not as expected: {statement}" for statement in made.failed))

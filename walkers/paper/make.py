@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from walkers.inputs.errors import InputError, Problem
-from walkers.paper.alignment import fig_alignment
-from walkers.paper.climbing import fig_climbing, fig_zoo
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
-from walkers.paper.modes import fig_modes
-from walkers.paper.rotation import fig4
+from walkers.paper.figures import fig1b, fig2, fig3, fig4
+from walkers.paper.maps import fig_alignment, fig_climbing, fig_modes, fig_zoo
 from walkers.paper.sensitivity import fig_sensitivity
 from walkers.paper.sources import NothingFinishedError, ProgressOf, Sources, make_sources
-from walkers.paper.stroboscopic import fig1b
-from walkers.paper.velocity import fig2, fig3
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.runner.files import write_text
 from walkers.sweeps.scheduler import Failure, Options
@@ -29,8 +24,7 @@ FORMATS = ("png", "svg")
 """In which figures are written if nothing else is asked for; of those of `walkers.postprocess.drawing`."""
 
 
-@dataclass(frozen=True)
-class Drawing:
+class Drawing(NamedTuple):
     """A figure: how it is drawn, from which sweeps, and what it is; and whether only if it is asked for by name."""
 
     draw: Callable[[Sources], Figure]
@@ -54,20 +48,10 @@ COMPARISON = "comparison"
 COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
 
 
-@dataclass(frozen=True)
-class Made:
-    """What was made.
+class Made(NamedTuple):
+    """What was made: files; points that failed, by sweep; figures of which nothing could be drawn, and why.
 
-    Attributes
-    ----------
-    files
-        All of them.
-    failures
-        Points that failed and are left out, by sweep.
-    left_out
-        Figures of which nothing could be drawn, and why.
-    agree, compared
-        How many published numbers that test the engine agree, of how many; 0 of 0 if they were not compared.
+    Of ``compared`` published numbers that test the engine so many ``agree``; none if they were not compared.
     """
 
     files: list[Path]
@@ -92,64 +76,56 @@ def make_figures(  # noqa: PLR0913
 
     Parameters
     ----------
-    out
-        Folder of the run directories.
-    to
-        Folder of the figures.
-    options, engine, allow_failed_audit
-        As for `walkers.sweeps.run.run_sweep`.
+    out, to
+        Folders of the run directories and of the figures.
+    options, engine, allow_failed_audit, progress_of
+        As for `walkers.paper.sources.make_sources`.
     only
         Names of `FIGURES`, or ``comparison``; if empty, all but those that are drawn only if asked for.
     formats
         Of the figures, of `walkers.postprocess.drawing.FORMATS`.
-    progress_of
-        As for `walkers.paper.sources.make_sources`.
-
-    Returns
-    -------
-    Made
 
     Raises
     ------
     InputError
         If there is no such figure or format, or a file is where a folder is to be.
-    runner.EngineFailure
-        If there is no engine, or its audit failed.
     """
     import joblib
 
-    usual = [name for name, drawing in FIGURES.items() if not drawing.only_asked]
-    chosen = list(only) or [*usual, COMPARISON]
+    known = (*FIGURES, COMPARISON)
+    chosen = list(only) or [name for name in known if name == COMPARISON or not FIGURES[name].only_asked]
     for name in chosen:
-        if name not in (*FIGURES, COMPARISON):
-            raise InputError("--only", [Problem("", name, f"expected one of {', '.join((*FIGURES, COMPARISON))}")])
+        if name not in known:
+            raise InputError("--only", [Problem("", name, f"expected one of {', '.join(known)}")])
     check_formats(formats)
     for option, folder in (("--out", out), ("--to", to)):
         if folder.exists() and not folder.is_dir():
             raise InputError(option, [Problem("", None, f"expected a folder, {folder} is a file")])
-    needed = {name: FIGURES[name].sweeps if name in FIGURES else COMPARED for name in chosen}
-    sweeps = dict.fromkeys(sweep for names in needed.values() for sweep in names)
+    needed = [FIGURES[name].sweeps if name in FIGURES else COMPARED for name in chosen]
     sources, failures = make_sources(
-        sweeps, out, options, engine=engine, allow_failed_audit=allow_failed_audit, progress_of=progress_of
+        dict.fromkeys(sweep for sweeps in needed for sweep in sweeps),
+        out,
+        options,
+        engine=engine,
+        allow_failed_audit=allow_failed_audit,
+        progress_of=progress_of,
     )
     figures = [name for name in chosen if name in FIGURES]
     # Processes of loky do not import the caller's script, as those of `multiprocessing` do.
     draw = joblib.Parallel(n_jobs=min(options.workers, len(figures) or 1))
-    outcomes = dict(
-        zip(figures, draw(joblib.delayed(draw_figure)(name, out, to, formats) for name in figures), strict=True)
-    )
-    files = [path for outcome in outcomes.values() if isinstance(outcome, list) for path in outcome]
-    left_out = {name: outcome for name, outcome in outcomes.items() if isinstance(outcome, str)}
+    outcomes = draw(joblib.delayed(draw_figure)(name, out, to, formats) for name in figures)
+    files = [path for outcome in outcomes if isinstance(outcome, list) for path in outcome]
+    left_out = {name: one for name, one in zip(figures, outcomes, strict=True) if isinstance(one, str)}
     failed = {name: points for name, points in failures.items() if points}
     if COMPARISON not in chosen:
         return Made(files, failed, left_out)
-    compared = compare(sources)
+    rows = compare(sources)
+    texts = {".md": as_markdown(rows), ".json": json.dumps(as_dict(rows), indent=2, ensure_ascii=False) + "\n"}
     to.mkdir(parents=True, exist_ok=True)
-    texts = {".md": as_markdown(compared), ".json": json.dumps(as_dict(compared), indent=2, ensure_ascii=False) + "\n"}
     for suffix, text in texts.items():
         files.append((to / COMPARISON).with_suffix(suffix))
         write_text(files[-1], text)
-    return Made(files, failed, left_out, *count(compared, measured=True))
+    return Made(files, failed, left_out, *count(rows, measured=True))
 
 
 def draw_figure(name: str, out: Path, to: Path, formats: Sequence[str] = FORMATS) -> list[Path] | str:

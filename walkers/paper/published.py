@@ -1,70 +1,92 @@
-"""What the paper publishes of the walker as numbers: ``published.toml``, and of which walkers each is."""
+"""What the paper publishes of walkers as numbers (``published.toml``), and of which walkers: rows of sweeps, and cases.
+
+`walkers.paper.comparison` evaluates each by the engine and by the theory.
+"""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from walkers.inputs.case import Case
+from walkers.inputs.drive import Drive, Harmonic
+from walkers.inputs.loads import dimer_of
+from walkers.inputs.reading import load_case
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 GRAVITY = 9.8
 """The paper's g, m/s²."""
-_DEVIATION = 0.15
 FIG4_PEAKS = (2.0, 10.0)
 """Fig. 4a and b: peak acceleration, g."""
+_DEVIATION = 0.15
 
 
 class Point(NamedTuple):
-    """A walker of the paper's: the sweep that has it, its radii (mm), its frequency (Hz) and peak acceleration (g).
+    """Walkers of the paper's: a sweep that has them, radii (mm), frequency (Hz), peak acceleration (g) or Γ0.
 
-    Where no acceleration is given Γ0 is 0.5.
+    ``angle`` is where they start, degrees; what is None is whatever the sweep has.
     """
 
     sweep: str
     radii: tuple[float, float]
-    frequency: float
-    peak: float | None
+    frequency: float | None = None
+    peak: float | None = None
+    gamma0: float | None = None
+    angle: float | None = None
 
-    @property
-    def name(self) -> str:
-        """What the walker differs from others of its figure in."""
+    def rows(self, table: pd.DataFrame) -> pd.DataFrame:
+        """Those of the points of a sweep that are these walkers."""
+        peak = None if self.peak is None else self.peak * GRAVITY
+        wanted = {
+            **{f"radius_{number}": radius * 1e-3 for number, radius in enumerate(self.radii, start=1)},
+            **{"frequency": self.frequency, "peak_acceleration": peak, "gamma0": self.gamma0},
+            "dimers.angle": self.angle,
+        }
+        chosen = np.ones(len(table), dtype=bool)
+        for column, value in wanted.items():
+            if value is not None and column in table:
+                chosen &= np.isclose(table[column], value, rtol=1e-4)
+        return table[chosen]
+
+    def case(self) -> Case:
+        """The shipped case with these walkers, for the theory."""
         if self.sweep == "fig4":
-            return f"4{'ab'[FIG4_PEAKS.index(self.peak or 0.0)]}"
-        return "{:g}/{:g} mm".format(*self.radii) if self.peak is None else f"{self.frequency:g} Hz, {self.peak:g} g"
+            return load_case("fig4a" if self.peak == FIG4_PEAKS[0] else "fig4b")
+        if self.gamma0 is not None:
+            large, small = self.radii
+            return of_radii(shipped(), (large * 1e-3, small * 1e-3), self.gamma0)
+        return driven(shipped(), self.frequency or 0.0, [(self.peak or 0.0) * GRAVITY])[0]
 
 
 @dataclass(frozen=True)
-class Published:
-    """A published number, and of what it is one.
+class Observation:
+    """Something that the paper says of walkers, most often a number, and of which walkers.
 
     Attributes
     ----------
-    key
-        Names it.
-    what
-        In words.
-    value
-        As published, in ``unit``; None where the paper states it in words only. Such a one has bounds, and does not
-        count among those that agree or disagree.
-    unit
-        Shown with it.
-    bounds
-        Between which a value is what the paper says, if it says so: the rounding of its digits (0.735, of which Γ0 =
-        0.74 is made, is on its edge) is none. Those of angles are ours.
+    key, what, unit
+        Its name, what it is in words, and in which unit.
+    value, bounds
+        As published; and between which a value is what the paper says, if it says so: the rounding of its digits
+        (0.735, of which Γ0 = 0.74 is made, is on its edge) is none, those of angles are ours. What is stated in words
+        only has bounds and no value, and does not count among those that agree or disagree.
     depends_on
         A sentence: what a disagreement of the engine depends on.
     measured
         Whether it tests the engine: Γ0 and Mathieu's V follow from beads and drive alone.
-    of, over
-        The number is a mean over walkers, or its ratio to one over others, pair by pair.
-    quantity
-        Of these: ``velocity``, ``rotation_1`` or ``sliding_1`` of those that walk; ``gamma0``; ``velocity_of_all``,
-        whichever way they turn. Empty where `walkers.paper.comparison` has a function for the number.
-    fitted
-        What it is called among those that the theory is fitted to (`walkers.paper.model_terms`), if it is one.
-    deviation
-        Its error there, in ``unit``; 15 % if None.
+    of, over, quantity
+        It is a mean over walkers, or its ratio to one over others, pair by pair, of a quantity, see
+        `walkers.paper.comparison.evaluate`; if there is none that has a function for the number.
+    fitted, deviation
+        What it is called among those that the theory is fitted to (`walkers.paper.model_terms`), if it is one, and its
+        error there, in ``unit``; 15 % if None.
     compared
         Whether it is one of the comparison.
     """
@@ -96,30 +118,54 @@ class Published:
         return self.deviation * (1.0 if self.over else 1e-3)
 
 
-def _points(given: Mapping[str, Any]) -> tuple[Point, ...]:
-    large, small = given["radii"]
-    return tuple(Point(given["sweep"], (large, small), one, given.get("peak")) for one in given["frequencies"])
-
-
-def _read(given: Mapping[str, Any], reasons: Mapping[str, str]) -> Published:
-    points = {name: _points(given[name]) for name in ("of", "over") if name in given}
-    bounds = {"bounds": tuple(given["bounds"])} if "bounds" in given else {}
-    return Published(**{**given, **points, **bounds, "depends_on": reasons.get(given.get("depends_on", ""), "")})
+def _read(given: dict[str, Any], reasons: Mapping[str, str]) -> Observation:
+    for name in {"of", "over"} & given.keys():
+        walkers = {**given[name], "radii": tuple(given[name]["radii"])}
+        frequencies = walkers.pop("frequencies", [None])
+        given[name] = tuple(Point(**walkers, frequency=frequency) for frequency in frequencies)
+    if "bounds" in given:
+        given["bounds"] = tuple(given["bounds"])
+    return Observation(**{**given, "depends_on": reasons.get(given.get("depends_on", ""), "")})
 
 
 _FILE = tomllib.loads(Path(__file__).with_name("published.toml").read_text("utf-8"))
-NUMBERS = tuple(_read(given, _FILE["reasons"]) for given in _FILE["numbers"])
-"""Every number that the paper publishes of walkers, and others that follow from what it says."""
-COMPARED = tuple(number for number in NUMBERS if number.compared)
-BY_KEY = {number.key: number for number in NUMBERS}
-FIT = {float(g): BY_KEY[f"fig2_{g}g"].si for g in range(2, 7)}
+OBSERVATIONS = {given["key"]: _read(given, _FILE["reasons"]) for given in _FILE["numbers"]}
+"""All that the paper says of walkers, and what follows from it, by key."""
+FIT = {float(g): OBSERVATIONS[f"fig2_{g}g"].si for g in range(2, 7)}
 """Fig. 2: the paper's fitted curve below the plateau, m/s, at peak accelerations in g."""
-FIG3_FIT = {one.of[0].radii: one.si for one in NUMBERS if one.key.startswith("fig3_") and one.value}
+FIG3_FIT = {one.of[0].radii: one.si for key, one in OBSERVATIONS.items() if key.startswith("fig3_") and one.value}
 """Fig. 3: the same curve at Γ0 = 0.5, m/s, by the radii in mm."""
-_FITTED = (
-    *(f"fig2_{g}g" for g in range(2, 7)),
-    *("fig2_plateau", "fig2_frequency_4g", "fig2_frequency", "fig2_rest"),
-    *(number.key for number in NUMBERS if number.fitted and number.key.startswith(("fig3", "fig4"))),
-)
-FITTED = tuple(BY_KEY[key] for key in _FITTED)
-"""Those that the theory is fitted to: of walkers on the axis whose contacts stay closed."""
+
+
+# --- its walkers as cases, with the shipped parameters ----------------------------------------------------------------
+
+
+def shipped() -> Case:
+    """The case whose beads, liquid and contacts Figs. 1b and 2 have."""
+    return load_case("fig1b")
+
+
+def driven(case: Case, frequency: float, accelerations: Iterable[float]) -> list[Case]:
+    """A case at another frequency, Hz, and peak accelerations, m/s²; for the theory, without a time step for a deck."""
+    drives = [Harmonic(case.drive.direction, float(frequency), float(peak)) for peak in accelerations]
+    run = replace(case.run, time_step=0.0)
+    return [replace(case, drive=Drive((one,), case.drive.frame), run=run) for one in drives]
+
+
+def of_radii(case: Case, radii: tuple[float, float], gamma0: float) -> Case:
+    """A case with other beads, radii in m, driven at a Γ0."""
+    dimer = replace(case, walkers=(replace(case.walkers[0], radii=radii),))
+    return replace(dimer, drive=case.drive.with_peak(dimer_of(dimer).peak_acceleration(gamma0)))
+
+
+def of_asymmetry(case: Case, sin_delta: float, gamma0: float) -> Case:
+    """A case with beads of the same mean radius and another asymmetry, driven at a Γ0."""
+    mean = dimer_of(case).mean_radius
+    return of_radii(case, (mean * (1.0 + sin_delta), mean * (1.0 - sin_delta)), gamma0)
+
+
+def described(case: Case) -> str:
+    """Radii, drive and liquid of a case in a few words, for titles."""
+    radii = "/".join(f"{radius * 1e3:g}" for radius in case.walkers[0].radii)
+    drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration / GRAVITY:.3g} g"
+    return f"R = {radii} mm, {drive}, {case.liquid.name}"

@@ -8,11 +8,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from walkers.inputs.errors import WalkersError
 from walkers.inputs.sweep import load_sweep
-from walkers.paper.published import GRAVITY, Point
 from walkers.postprocess.motion import Group, read_motion
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Failure, Options, SweepProgress
@@ -29,42 +26,22 @@ class NothingFinishedError(WalkersError):
 
 
 class Sources:
-    """Finished sweeps in a folder of run directories.
-
-    Parameters
-    ----------
-    out
-        The folder.
+    """Finished sweeps in a folder of run directories: ``table`` gives the table of one, by its name, ``trajectory`` the
+    motion of the (first) walkers of a run, by its directory.
     """
 
     def __init__(self, out: Path) -> None:
         self.out = out
         self.table: Callable[[str], pd.DataFrame] = lru_cache(maxsize=None)(lambda sweep: load(out / sweep))
-        # The motion of the (first) walkers in a run directory.
         self.trajectory: Callable[[str], Group] = lru_cache(maxsize=32)(lambda run: read_motion(run).groups[0])
 
     def finished(self, sweep: str) -> pd.DataFrame:
-        """The points of a sweep that are finished.
-
-        Raises
-        ------
-        NothingFinishedError
-            If there is none.
-        """
+        """The points of a sweep that are finished; a `NothingFinishedError` if there is none."""
         table = self.table(sweep)
         done = table[table["status"] == "finished"]
         if done.empty:
             raise NothingFinishedError(f"no point of the sweep {sweep} is finished")
         return done
-
-    def rows(self, point: Point) -> pd.DataFrame:
-        """The row of a sweep that is a point of the paper's; none if it is not finished."""
-        table = self.finished(point.sweep)
-        radii = np.isclose(table[["radius_1", "radius_2"]] * 1e3, point.radii).all(axis=1)
-        driven = np.isclose(table["frequency"], point.frequency)
-        if point.peak is not None:
-            driven &= np.isclose(table["peak_acceleration"], point.peak * GRAVITY)
-        return table[radii & driven]
 
     def runs(self, *sweeps: str) -> list[str]:
         """Names of the finished runs of sweeps."""
@@ -80,34 +57,20 @@ def make_sources(
     allow_failed_audit: bool = False,
     progress_of: ProgressOf | None = None,
 ) -> tuple[Sources, dict[str, list[Failure]]]:
-    """Run what is missing of shipped sweeps.
+    """Run what is missing of shipped sweeps, by their names, as `walkers.sweeps.run.run_sweep` does.
 
-    Parameters
-    ----------
-    names
-        Of the sweeps.
-    out, options, engine, allow_failed_audit
-        As for `walkers.sweeps.run.run_sweep`.
-    progress_of
-        Gives, for the name of a sweep, a context whose value is told of its progress.
-
-    Returns
-    -------
-    sources
-        The sweeps.
-    failures
-        Of each sweep, the points that failed; figures leave them out.
-
-    Raises
-    ------
-    runner.EngineFailure
-        If there is no engine, or its audit failed.
+    ``progress_of`` gives, for the name of a sweep, a context whose value is told of its progress. Of each sweep the
+    points that failed are given too; figures leave them out.
     """
     failures = {}
     for name in names:
-        sweep = load_sweep(name)
         with progress_of(name) if progress_of else nullcontext() as advance:
             _, failures[name] = run_sweep(
-                sweep, out, options, engine=engine, allow_failed_audit=allow_failed_audit, on_progress=advance
+                load_sweep(name),
+                out,
+                options,
+                engine=engine,
+                allow_failed_audit=allow_failed_audit,
+                on_progress=advance,
             )
     return Sources(out), failures

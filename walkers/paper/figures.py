@@ -1,0 +1,233 @@
+"""Figs. 1b, 2, 3 and 4 of the paper: engine, theory and published values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from walkers.inputs.loads import dimer_of
+from walkers.paper import published
+from walkers.paper.published import GRAVITY, OBSERVATIONS, described, driven, of_asymmetry, of_radii, shipped
+from walkers.paper.sources import Sources
+from walkers.postprocess.drawing import ONE_COLUMN, TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
+from walkers.postprocess.gait import gait
+from walkers.postprocess.series import top_view
+from walkers.sweeps.table import thresholds
+from walkers.theory.prediction import motion_of, threshold
+from walkers.theory.quasistatic import FloatArray, detachment, mean_velocity, translation
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from walkers.postprocess.motion import Group
+
+_INTERVAL, _IMAGES = 0.3, 6
+"""Fig. 1b: seconds between images, and how many."""
+_MARKERS = {60.0: "D", 70.0: "o", 80.0: "^", 90.0: "s"}
+"""Fig. 2: the paper's symbols by frequency, Hz."""
+_DASHES = ("-", (0, (6, 2)), (0, (3, 2)), (0, (1, 1.5)))
+"""From the lowest frequency to the highest."""
+_FINE = 61
+_CYCLES = 2
+"""Of Fig. 4."""
+_SERIES = (
+    ("walker", "velocity", "s", "#c4473a"),
+    ("large bead", "rotation_1", "o", "#111111"),
+    ("small bead", "rotation_2", "^", "#1f5fa8"),
+)
+"""Of Fig. 4: name, column of a sweep's table, marker and colour."""
+_PUBLISHED_DASHES = (0, (6, 2, 1, 2))
+
+
+@styled
+def fig1b(sources: Sources) -> Figure:
+    """The first walker of the alignment's dimers that start on the axis, seen from above every 0.3 s."""
+    table = OBSERVATIONS["alignment_asymmetric"].of[0].rows(sources.finished("alignment"))
+    trajectory = sources.trajectory(table.sort_values("dimers.angle")["run"].iloc[0])
+    case, largest = trajectory.case, float(trajectory.radii.max())
+    cycles = round(_INTERVAL * case.drive.frequency)
+    frames = np.arange(_IMAGES) * cycles * case.run.samples_per_cycle
+    frames = frames[frames < len(trajectory.time)]
+    centre = trajectory.mass_centre[frames, 0] @ np.stack([trajectory.drive_axis, trajectory.across_axis], axis=-1)
+    along = (float(centre[:, 0].min()) - 2.4 * largest, float(centre[:, 0].max()) + 2.4 * largest)
+    half, origin = 1.15 * largest, float(centre[0, 0])
+    row = 0.97 * ONE_COLUMN * 2.0 * half / (along[1] - along[0]) + 0.22
+    figure, axes = new_figure(ONE_COLUMN, len(frames) * row + 0.75, nrows=len(frames), sharex=True)
+    for panel, frame, (_, middle) in zip(axes, frames, centre, strict=True):
+        picture = top_view(trajectory, 0, int(frame), along, (float(middle) - half, float(middle) + half))
+        edges = [(along[0] - origin) * 1e3, (along[1] - origin) * 1e3, -half * 1e3, half * 1e3]
+        panel.imshow(picture, extent=edges, interpolation="bilinear")
+        panel.set(yticks=[], title=f"{trajectory.time[frame]:.1f} s")
+        panel.axvline(0.0, color="white", lw=0.6, ls=":")
+        panel.grid(visible=False)
+    axes[-1].set_xlabel("along the shaking axis,\nfrom the mass centre at the start (mm)")
+    letter_panels(axes)
+    figure.suptitle(f"{described(case)}\nan image every {cycles} cycles")
+    return figure
+
+
+def _errorbars(axes: Axes, x: pd.Series[float], rows: pd.DataFrame, **look: Any) -> None:
+    """Means with bars from the smallest to the largest of the walkers, as in the paper."""
+    mean, low, high = (rows[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
+    axes.errorbar(x, mean, yerr=[mean - low, high - mean], mfc="none", **look)
+
+
+@styled
+def fig2(sources: Sources) -> Figure:
+    """Velocity against peak acceleration at four frequencies, dry friction alone, and the threshold of motion."""
+    table, case = sources.finished("fig2"), shipped()
+    dimer = dimer_of(case)
+    rows = [["engine", "dry"], ["engine", "threshold"]]
+    figure, axes = new_figure(TWO_COLUMNS, 4.8, mosaic=rows, width_ratios=[1.5, 1.0], height_ratios=[1.4, 1.0])
+    engine, dry = axes["engine"], axes["dry"]
+    top = float(table["peak_acceleration"].max()) / GRAVITY
+    peaks = np.linspace(0.02, top, _FINE) * GRAVITY
+    paper = mean_velocity(np.array([dimer.gamma0(peak) for peak in peaks]), dimer.sin_delta) * 1e3
+    for number, frequency in enumerate(sorted(table["frequency"].unique())):
+        there, name = table[table["frequency"] == frequency], f"{frequency:g} Hz"
+        line: dict[str, Any] = {"color": f"C{number}", "ls": _DASHES[number % len(_DASHES)]}
+        symbol = {"fmt": _MARKERS[frequency], "color": line["color"], "ms": 4, "lw": 0.7, "mew": 0.8}
+        _errorbars(engine, there["peak_acceleration"] / GRAVITY, there, label=name, **symbol)
+        cases = driven(case, frequency, peaks)
+        engine.plot(peaks / GRAVITY, motion_of(*cases).velocity * 1e3, lw=0.9, **line)
+        dry.plot(peaks / GRAVITY, motion_of(*cases, viscous=False).velocity * 1e3, label=name, **line)
+    for panel in (engine, dry):
+        panel.plot(peaks / GRAVITY, paper, color="0.45", lw=2.0, zorder=0)
+        panel.plot(list(published.FIT), np.array(list(published.FIT.values())) * 1e3, "*", color="0.45", ms=8, zorder=0)
+        panel.axhline(0.0, color="0.4", lw=0.6)
+        panel.set(xlabel=r"peak acceleration $a_0$ (g, 9.8 m/s²)", ylabel="velocity (mm/s)", xlim=(0.0, top * 1.03))
+    # The paper's fit goes on beyond what the paper measured: that is not to flatten the rest.
+    measured = [*table["smallest"], *table["largest"], *published.FIT.values()]
+    low, high = min(0.0, np.nanmin(measured) * 1e3), np.nanmax(measured) * 1e3
+    engine.set_ylim(low - 0.04 * (high - low), high + 0.1 * (high - low))
+    engine.set_title("engine, and theory with bridges")
+    dry.set_title("theory: Coulomb friction, dry")
+    dry.locator_params(nbins=5)
+    scale = dimer.gamma0(GRAVITY)
+    above = engine.secondary_xaxis("top", functions=(lambda g: g * scale, lambda gamma0: gamma0 / scale))
+    above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
+    engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction, bridges")
+    engine.plot([], [], color="0.45", lw=2.0, marker="*", ms=8, label="paper's fit, κ = 0.033 s/mm")
+    legend_below(engine, ncols=3, title="symbols: engine, mean and range of 6 walkers; in (c) of 2")
+    legend_below(dry, ncols=4, columnspacing=1.0, handlelength=1.8, handletextpad=0.4)
+    _threshold(axes["threshold"], sources)
+    letter_panels((engine, dry, axes["threshold"]))
+    figure.suptitle(f"R = {'/'.join(f'{radius * 1e3:g}' for radius in dimer.radii)} mm, {case.liquid.name}")
+    return figure
+
+
+def _threshold(axes: Axes, sources: Sources) -> None:
+    """Γc by the paper's protocol: between the last drive that moved the walkers and the first that did not."""
+    sources.finished("fig2-threshold")
+    ends = thresholds(sources.out / "fig2-threshold")
+    bounds = ends[["gamma0_at_rest", "gamma0_moving"]].to_numpy(dtype=float)
+    for number, (frequency, (low, high)) in enumerate(zip(ends["drive.frequency"], bounds, strict=True)):
+        look: dict[str, Any] = {
+            "fmt": _MARKERS[float(frequency)],
+            "color": f"C{number}",
+            "ms": 4,
+            "lw": 1.0,
+            "mfc": "none",
+        }
+        axes.errorbar(frequency, (low + high) / 2.0, yerr=(high - low) / 2.0, **look)
+    case = shipped()
+    predicted = [threshold(driven(case, frequency, [case.drive.peak_acceleration])[0]) for frequency in _MARKERS]
+    axes.plot(list(_MARKERS), predicted, "--", color="0.2", lw=0.9)
+    axes.set(ylim=(0.0, 1.3 * float(np.nanmax([*bounds.flat, *predicted]))))
+    axes.set(xlim=(55.0, 95.0), xticks=list(_MARKERS))
+    axes.locator_params(axis="y", nbins=5)
+    axes.set(title="threshold of motion; dashed: theory", xlabel="frequency (Hz)", ylabel=r"$\Gamma_\mathrm{c}$")
+
+
+@styled
+def fig3(sources: Sources) -> Figure:
+    """Velocity against asymmetry at Γ0 = 0.5."""
+    table, case = sources.finished("fig3"), shipped()
+    figure, axes = new_figure(ONE_COLUMN, 4.1)
+    sines, gamma0 = np.linspace(1e-3, 0.4, _FINE), float(table["gamma0"].iloc[0])
+    axes.plot(sines, mean_velocity(gamma0, sines) * 1e3, color="0.45", lw=2.0, label="paper's fit, κ = 0.033 s/mm")
+    fitted = [((r1 - r2) / (r1 + r2), v * 1e3) for (r1, r2), v in published.FIG3_FIT.items()]
+    axes.plot(*zip(*fitted, strict=True), "*", color="0.45", ms=8)
+    cases = [of_asymmetry(case, sine, gamma0) for sine in sines]
+    for viscous, style, name in ((True, "--", "bridges"), (False, ":", "dry")):
+        label = f"Coulomb friction, {name}, mean R 0.25 mm"
+        axes.plot(sines, motion_of(*cases, viscous=viscous).velocity * 1e3, style, color="0.1", lw=0.9, label=label)
+    pairs = list(zip(table["radius_1"], table["radius_2"], strict=True))
+    same = motion_of(*[of_radii(case, radii, gamma0) for radii in pairs]).velocity * 1e3
+    axes.plot(table["sin_delta"], same, "x", color="0.1", ms=6, label="Coulomb friction, bridges, these beads")
+    _errorbars(axes, table["sin_delta"], table, fmt="s", color="C2", ms=5, label="engine")
+    # The beads stand above the axes, where they meet no symbol; upright, for some asymmetries are nearly the same.
+    above = axes.secondary_xaxis("top")
+    above.set_xticks(table["sin_delta"], [f"{one * 1e3:g}/{other * 1e3:g}" for one, other in pairs], rotation=90)
+    above.set_xlabel("$R_1/R_2$ (mm)")
+    shown = np.linspace(0.0, 0.41, 400)
+    if (ended := np.sqrt(0.5) * gamma0 >= detachment(shown).gamma).any():  # the paper's model does
+        axes.axvline(float(shown[np.argmax(ended)]), color="0.45", ls="-.", lw=0.8)
+    axes.set(xlabel=r"asymmetry $\sin\delta = (R_1 - R_2)/(R_1 + R_2)$", ylabel="velocity (mm/s)")
+    axes.set(xlim=(-0.01, 0.41), ylim=(-0.3, None))
+    figure.suptitle(rf"$\Gamma_0$ = {gamma0:g}, {case.drive.frequency:g} Hz, {case.liquid.name}")
+    legend_below(axes)
+    return figure
+
+
+@styled
+def fig4(sources: Sources) -> Figure:
+    """Velocity and rotation of the beads through two cycles, where the large bead rolls and where it slides too."""
+    from matplotlib.lines import Line2D
+
+    table = sources.finished("fig4")
+    figure, axes = new_figure(TWO_COLUMNS, 3.6, ncols=2)
+    means: dict[str, list[str]] = {name: [] for name, *_ in _SERIES}
+    for panel, letter, peak in zip(axes, "ab", published.FIG4_PEAKS, strict=True):
+        keys = {"walker": f"fig4{letter}_velocity", "large bead": f"fig4{letter}_rotation"}
+        known = {name: OBSERVATIONS[key].si * 1e3 for name, key in keys.items() if key in OBSERVATIONS}
+        for _, row in table[np.isclose(table["peak_acceleration"], peak * GRAVITY)].iterrows():
+            trajectory = sources.trajectory(row["run"])
+            _draw_cycles(panel, trajectory)
+            panel.set_title(f"{described(trajectory.case)}, $\\Gamma_0$ = {row['gamma0']:.3g}")
+            for name, column, *_ in _SERIES:
+                paper = f", published {known[name]:g}" if name in known else ""
+                means[name].append(f"({letter}) {row[column] * 1e3:.2f}{paper}")
+        for name, _, _, colour in _SERIES:
+            if name in known:
+                panel.axhline(known[name], color=colour, ls=_PUBLISHED_DASHES, lw=1.0)
+    letter_panels(axes)
+    handles = [
+        Line2D([], [], ls="", marker=marker, ms=4, mfc="none", color=colour, label=f"{name}: {'; '.join(means[name])}")
+        for name, _, marker, colour in _SERIES
+    ]
+    handles.append(Line2D([], [], color="0.3", lw=0.9, label="lines: Coulomb friction and drag"))
+    handles.append(Line2D([], [], color="0.3", lw=1.0, ls=_PUBLISHED_DASHES, label="published means"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, title="means in mm/s")
+    return figure
+
+
+def _draw_cycles(axes: Axes, trajectory: Group) -> None:
+    """The last cycles of the first walker, the theory's last cycle beside it."""
+    run, motion = trajectory.case.run, gait(trajectory)
+    samples = run.samples_per_cycle
+    last = slice((run.cycles - _CYCLES) * samples, run.cycles * samples + 1)
+    values = [motion.velocity[last, 0], motion.rotation[last, 0, 0], motion.rotation[last, 0, 1]]
+    for (_, _, marker, colour), series, line in zip(_SERIES, values, theory_of_cycles(trajectory), strict=True):
+        axes.plot(np.arange(len(series)) / samples, series * 1e3, marker, color=colour, ms=4, mfc="none", mew=0.8)
+        axes.plot(np.arange(len(line)) / (len(line) - 1) * _CYCLES, line * 1e3, color=colour, lw=0.9)
+    axes.axhline(0.0, color="0.4", lw=0.6)
+    axes.set(xlabel="time (cycles of the drive)", ylabel=r"velocity; beads: $-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)")
+
+
+def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
+    """Velocity of the walker and rotation velocities of its beads by the theory, m/s, through the cycles shown.
+
+    From the begin of a cycle of the engine's drive; NaN where a contact would open.
+    """
+    motion = motion_of(trajectory.case)
+    sliding = motion.series[:, 0] if np.isfinite(motion.velocity[0]) else np.full_like(motion.series[:, 0], np.nan)
+    velocity = translation(sliding)
+    # The theory's substrate accelerates as cos 2πft, the engine's, which moves as sin 2πft, as -sin 2πft along x.
+    quarter = sliding.shape[1] // 4
+    ahead = quarter if trajectory.walkers[0].facing > 0 else -quarter
+    one = [np.roll(series, 1 - ahead) for series in (velocity, velocity - sliding[0], velocity - sliding[1])]
+    return [np.concatenate([np.tile(series, _CYCLES), series[:1]]) for series in one]
