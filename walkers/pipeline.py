@@ -107,7 +107,7 @@ class Run:
         return Pictures(plot_run(self.directory, to, formats))
 
     def view(self, *, height: int = 480) -> k3d.Plot:
-        """Its beads in three dimensions, for a notebook; see `walkers.postprocess.report.scene.scene_of`.
+        """Its beads in three dimensions, for a notebook; see `walkers.postprocess.report.player.player_of`.
 
         Parameters
         ----------
@@ -119,9 +119,9 @@ class Run:
         >>> len(walkers.run("fig1b", tmp).view().objects)  # twelve beads, the floor, the lines on it
         14
         """
-        from walkers.postprocess.report.scene import scene_of
+        from walkers.postprocess.report.player import player_of
 
-        return scene_of(self.directory, height=height).plot
+        return player_of(self.directory, height=height).plot
 
     def report(self, to: Path | None = None) -> Path:
         """Write one HTML file to mail, see `walkers.postprocess.report.run.report_run`."""
@@ -142,8 +142,8 @@ class Run:
         return write_archive(self.directory, to, ArchiveOptions(**options))
 
     def paraview(self, to: Path | None = None, **options: Any) -> Path:
-        """Write it with a script for ParaView, see `walkers.postprocess.paraview_script.write_paraview`."""
-        from walkers.postprocess.paraview_script import write_paraview
+        """Write it with a script for ParaView, see `walkers.postprocess.paraview.write_paraview`."""
+        from walkers.postprocess.paraview import write_paraview
 
         return write_paraview(self.directory, to, **options)
 

@@ -239,7 +239,7 @@ def paraview(
 ) -> None:
     """Write what walkers vtk writes and a script that shows it in ParaView: spheres, bridges, walls, time."""
     from walkers.pipeline import find_run
-    from walkers.postprocess.paraview_script import open_paraview
+    from walkers.postprocess.paraview import open_paraview
 
     found = find_run(run, out)
     _refuse_as_placed(as_placed, found.case.apart)
