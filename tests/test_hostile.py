@@ -21,7 +21,7 @@ from walkers.inputs.text import rendered
 from walkers.postprocess import read_motion
 from walkers.postprocess.analysis import current_result
 from walkers.postprocess.drawing import new_figure, plain_text, save_figure
-from walkers.postprocess.paraview_script import _script
+from walkers.postprocess.paraview import _script
 from walkers.postprocess.report.run import result_html
 from walkers.runner.directory import CASE_NAME, case_of
 from walkers.runner.files import write_json

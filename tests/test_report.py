@@ -25,8 +25,8 @@ from walkers.postprocess.analysis import current_result
 from walkers.postprocess.motion import gathered
 from walkers.postprocess.quantities import number_of, rounded
 from walkers.postprocess.report.page import LARGEST, overhead
+from walkers.postprocess.report.player import cameras_of, player_of
 from walkers.postprocess.report.run import report_run, summary_of
-from walkers.postprocess.report.scene import cameras_of, scene_of
 from walkers.postprocess.scene import camera_axes
 from walkers.runner.provenance import software
 from walkers.sweeps.report import report_sweep
@@ -43,6 +43,7 @@ class Page:
 
     def __init__(self, path: Path) -> None:
         text = path.read_text("utf-8")
+        self.carried = dict(re.findall(r'<script type="text/plain" id="([^"]+)">([^<]+)</script>', text))
         self.scripts = re.findall(r"<script\b[^>]*>(.*?)</script>", text, re.DOTALL)
         bare = re.sub(r"(<(script|style)\b[^>]*>).*?</\2>", r"\1", text, flags=re.DOTALL)
         self.title = html.unescape("".join(re.findall(r"<title>(.*?)</title>", bare, re.DOTALL)))
@@ -58,16 +59,12 @@ def _attributes(tag: str) -> dict[str, str]:
     return {name: "".join(values) for name, *values in found}
 
 
-def at(result: Any, key: str) -> Any:
-    for part in key.split("."):
-        result = result[int(part)] if isinstance(result, list) else result[part]
-    return result
-
-
 def check_numbers(page: Page, result: dict[str, Any]) -> set[str]:
     """Each number is the result's to its last digit, and what is shown is that number in its unit; their keys."""
     for number, text in page.numbers:
-        value = at(result, number["data-key"])
+        value: Any = result
+        for part in number["data-key"].split("."):
+            value = value[int(part)] if isinstance(value, list) else value[part]
         assert float(number["value"]) == value, number
         shown = value * float(number["data-factor"])
         last = 10.0 ** -len(text.partition("e")[0].partition(".")[2]) * 10.0 ** float(text.partition("e")[2] or 0)
@@ -106,10 +103,8 @@ def pile_run(once: Once) -> Path:
 @pytest.fixture(scope="session")
 def pile_report(pile_run: Path, once: Once) -> Path:
     """Asked for by the run's name in the folder of the runs."""
-    return (
-        once("pile-report", lambda to: walkers.report(pile_run.name, to / "report.html", pile_run.parent))
-        / "report.html"
-    )
+    place = once("pile-report", lambda to: walkers.report(pile_run.name, to / "report.html", pile_run.parent))
+    return place / "report.html"
 
 
 @pytest.fixture(scope="session")
@@ -131,14 +126,16 @@ def swept_report(swept: Path, once: Once) -> Path:
     return once("swept-report", lambda to: walkers.report(swept.name, to / "report.html", swept.parent)) / "report.html"
 
 
-@pytest.mark.parametrize("name", ["walked", "pile"])
-def test_every_number_of_a_report_is_the_results(name: str, request: pytest.FixtureRequest) -> None:
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [
+        ("walked", {"velocity.mean", "velocity.standard_error", "rotation.bead_2", "orientation_end.largest"}),
+        ("pile", {"surface.end", "brazil_nut.end", "coordination.rest.contacts", "beads", "driven"}),
+    ],
+)
+def test_every_number_of_a_report_is_the_results(name: str, wanted: set[str], request: pytest.FixtureRequest) -> None:
     path, directory = (request.getfixturevalue(f"{name}_{what}") for what in ("report", "run"))
-    result = current_result(directory)
-    keys = check_numbers(Page(path), result)
-    wanted = {"walked": {"velocity.mean", "velocity.standard_error", "rotation.bead_2", "orientation_end.largest"}}
-    wanted["pile"] = {"surface.end", "brazil_nut.end", "coordination.rest.contacts", "beads", "driven"}
-    assert wanted[name] <= keys
+    assert wanted <= check_numbers(Page(path), current_result(directory))
     assert path.stat().st_size < LARGEST
 
 
@@ -147,70 +144,57 @@ def test_parameters_say_where_they_come_from(walked_report: Path, walked_run: Pa
     assert f"Written by granular-walkers {software().version}." in words
     origins = walkers.find_run(walked_run).case.origins
     assert len(origins) > 20
-    for one in origins:
-        assert one.key in words
-        assert one.text in words
-    for said in ("given", "library", "default"):
+    for said in ("given", "library", "default", *(told for one in origins for told in (one.key, one.text))):
         assert said in words
 
 
-@pytest.mark.parametrize("name", ["walked_report", "swept_report"])
-def test_a_users_words_are_words(name: str, request: pytest.FixtureRequest) -> None:
-    path = request.getfixturevalue(name)
-    page = Page(path)
-    assert page.title == HOSTILE
-    assert HOSTILE in page.words
-    assert not any("hostile" in script for script in page.scripts)
-    assert html.escape(HOSTILE, quote=False).split()[0] in path.read_text("utf-8")
-
-
 @pytest.mark.parametrize("name", ["walked_report", "pile_report", "swept_report"])
-def test_a_report_refers_to_nothing_outside(name: str, request: pytest.FixtureRequest) -> None:
+def test_a_report_refers_to_nothing_outside_and_a_users_words_are_words(
+    name: str, request: pytest.FixtureRequest
+) -> None:
     path = request.getfixturevalue(name)
-    page = Page(path)
+    page, text = Page(path), path.read_text("utf-8")
     assert all(one.startswith(("#", "data:")) for one in page.references), page.references
-    text = path.read_text("utf-8")
-    packed = dict(re.findall(r'<script type="text/plain" id="([^"]+)">([^<]+)</script>', text))
-    assert {"library-k3d", "library-bokeh"} < set(packed)
-    library = zlib.decompress(base64.b64decode(packed["library-k3d"])).decode()
+    assert {"library-k3d", "library-bokeh"} < set(page.carried)
+    library = zlib.decompress(base64.b64decode(page.carried["library-k3d"])).decode()
     assert "url(fonts/" not in library.split("sourcesContent")[0]
     assert "<noscript>" in text
     for folder in {str(Path.home()), str(Path(__file__).parents[1]), str(path.parent)} - {"/"}:
         assert folder not in page.words
+    if name != "pile_report":
+        assert page.title == HOSTILE
+        assert HOSTILE in page.words
+        assert not any("hostile" in script for script in page.scripts)
+        assert html.escape(HOSTILE, quote=False).split()[0] in text
 
 
 def test_a_sweeps_report_says_which_runs_it_leaves_out(swept: Path, swept_report: Path, tmp_path: Path) -> None:
-    page = Page(swept_report)
+    page, velocity = Page(swept_report), set(load(swept)["velocity"])
     assert {"#point-0", "#point-1", "#point-2"} < set(page.references)
     assert "left out" not in page.words
-    table = load(swept)
-    shown = {float(number["value"]) for number, _ in page.numbers}
-    assert set(table["velocity"]) < shown
-    carried = dict(re.findall(r'id="((?:scene|plots)-[^"]+)">([^<]+)<', swept_report.read_text("utf-8")))
-    one = sum(len(value) for name, value in carried.items() if name.endswith("point-0"))
-    rest = swept_report.stat().st_size - overhead() - sum(map(len, carried.values()))
+    assert velocity < {float(number["value"]) for number, _ in page.numbers}
+    carried = {name: len(text) for name, text in page.carried.items() if not name.startswith("library")}
+    one = sum(size for name, size in carried.items() if name.endswith("point-0"))
+    rest = swept_report.stat().st_size - overhead() - sum(carried.values())
     # Room for two of three.
-    limit = overhead() + len(carried["plots-sweep"]) + int(2.5 * one) + rest
+    limit = overhead() + carried["plots-sweep"] + int(2.5 * one) + rest
     less = report_sweep(swept, tmp_path / "less.html", largest=limit)
     assert less.stat().st_size < limit < swept_report.stat().st_size
     page = Page(less)
     assert "#point-1" not in page.references
     assert {"#point-0", "#point-2"} < set(page.references)
     assert re.search(r"left out, .*:\s+1\.", page.words)
-    assert set(table["velocity"]) < {float(number["value"]) for number, _ in page.numbers}
+    assert velocity < {float(number["value"]) for number, _ in page.numbers}
 
 
-def test_the_scene_is_the_motion(walked_run: Path) -> None:
-    """Each bead of the scene is where the motion has it, turned as its spins turned it, to the scene's 0.1 µm."""
-    motion = gathered(read_motion(walked_run), lane=1.25).driven
-    scene = scene_of(walked_run)
-    beads = [one for one in scene.plot.objects if one.name.startswith("bead")]
+def test_the_player_shows_the_motion(walked_run: Path) -> None:
+    """Each bead is where the motion has it, turned as its spins turned it, to 0.1 µm."""
+    motion, player = gathered(read_motion(walked_run), lane=1.25).driven, player_of(walked_run)
+    beads = [one for one in player.plot.objects if one.name.startswith("bead")]
     assert len(beads) == len(motion.radius) == 4
-    assert (scene.begin, scene.end) == (motion.time[0], motion.time[-1])
+    assert (player.begin, player.end) == (motion.time[0], motion.time[-1])
     across = np.cross([0.0, 0.0, 1.0], motion.case.drive_axis)
-    rotation = current_result(walked_run)["rotation"]
     settled = motion.case.run.settling_cycles * motion.case.run.samples_per_cycle
-    seconds = motion.time[-1] - motion.time[settled]
     rolled: dict[int, list[float]] = {0: [], 1: []}
     for number, ball in enumerate(beads):
         matrices = np.array(list(ball.model_matrix.values()), dtype=float)
@@ -218,37 +202,36 @@ def test_the_scene_is_the_motion(walked_run: Path) -> None:
         np.testing.assert_allclose(matrices[:, :3, 3], 1e3 * motion.position[:, number], atol=1e-4)
         turned = Rotation.from_matrix(matrices[[settled, -1], :3, :3] / (1e3 * motion.radius[number]))
         way = motion.walkers[number // 2].facing * float((turned[1] * turned[0].inv()).as_rotvec() @ across)
-        rolled[number % 2].append(way * motion.radius[number] / seconds)
+        rolled[number % 2].append(way * motion.radius[number] / (motion.time[-1] - motion.time[settled]))
+    rotation = current_result(walked_run)["rotation"]
     for bead, key in enumerate(("bead_1", "bead_2")):
         assert np.mean(rolled[bead]) == pytest.approx(rotation[key], rel=0.01, abs=2e-6)
-
-
-def test_words_and_numbers() -> None:
-    """Numbers have the digits that their errors leave; a liquid without a name is not named."""
-    given = [(1.38173201, 4.9e-5), (1.38173201, 0.31), (1234.5678, 20.0), (0.0012345678,), (6,)]
-    assert [rounded(*one) for one in given] == ["1.381732", "1.38", "1235", "0.001235", "6"]
-    case = make_case()
-    assert "glass, Si AK5; 80 Hz" in summary_of(case)
-    assert "glass; 80 Hz" in summary_of(replace(case, liquid=replace(case.liquid, name=None)))
-
-
-def test_a_scene_without_gravity_is_seen_as_the_floor_lies(walked_run: Path) -> None:
-    motion = read_motion(walked_run)
-    weightless = replace(motion, case=replace(motion.case, gravity=0.0))
+    weightless = replace(motion, case=replace(motion.case, gravity=0.0))  # is seen as the floor lies
     assert cameras_of(weightless) == cameras_of(motion)
     np.testing.assert_allclose(camera_axes(weightless), camera_axes(motion))
 
 
 def test_long_runs_are_thinned_out_and_say_so(walked_run: Path, pile_run: Path) -> None:
-    scene = scene_of(walked_run, places=200)
-    beads = [one for one in scene.plot.objects if one.name.startswith("bead")]
+    player = player_of(walked_run, places=200)
+    beads = [one for one in player.plot.objects if one.name.startswith("bead")]
     assert sum(len(one.model_matrix) for one in beads) <= 200
-    assert any("are shown" in caption or "is shown" in caption for caption in scene.captions)
-    pile = scene_of(pile_run)
+    assert any("are shown" in caption or "is shown" in caption for caption in player.captions)
+    pile, motion = player_of(pile_run), read_motion(pile_run).driven
     points = next(one for one in pile.plot.objects if one.name == "beads")
-    motion = read_motion(pile_run).driven
     np.testing.assert_allclose(points.positions[f"{motion.time[-1]:.6f}"], 1e3 * motion.position[-1], atol=1e-3)
     assert any("do not show how they roll" in caption for caption in pile.captions)
+
+
+def test_words_and_numbers() -> None:
+    """Numbers have the digits that their errors leave, in units that one reads; a liquid without a name has none."""
+    given = [(1.38173201, 4.9e-5), (1.38173201, 0.31), (1234.5678, 20.0), (0.0012345678,), (6,)]
+    assert [rounded(*one) for one in given] == ["1.381732", "1.38", "1235", "0.001235", "6"]
+    shown = {unit: number_of({"a": 0.25}, "a", unit) for unit in ("m", "m/s", "rad", "share")}
+    told = {"m": ("250", "mm"), "m/s": ("250", "mm/s"), "rad": ("14.32", "°"), "share": ("25", "%")}
+    assert {unit: (one.text, one.unit) for unit, one in shown.items() if one} == told
+    case = make_case()
+    assert "glass, Si AK5; 80 Hz" in summary_of(case)
+    assert "glass; 80 Hz" in summary_of(replace(case, liquid=replace(case.liquid, name=None)))
 
 
 @pytest.mark.parametrize("to", ["report.txt", "folder.html", "nowhere/report.html"])
@@ -273,8 +256,7 @@ def test_the_command_finds_what_a_name_means(walked_run: Path, swept: Path, tmp_
 
 def test_runs_show_themselves(walked_run: Path, tmp_path: Path) -> None:
     """In a notebook: a table that is the result, the parameters, and the pictures that were drawn."""
-    run = walkers.find_run(walked_run)
-    shown = tmp_path / "shown.html"
+    run, shown = walkers.find_run(walked_run), tmp_path / "shown.html"
     shown.write_text(run._repr_html_(), "utf-8")
     assert "velocity.mean" in check_numbers(Page(shown), run.result)
     assert "<details>" in shown.read_text("utf-8")
@@ -285,20 +267,8 @@ def test_runs_show_themselves(walked_run: Path, tmp_path: Path) -> None:
 
 
 def test_progress_is_shown_where_it_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    case = make_case(run={"cycles": 8, "settling_cycles": 2}, drive={"frequency": "83 Hz"})
+    case, seen = make_case(run={"cycles": 8, "settling_cycles": 2}, drive={"frequency": "83 Hz"}), []
     walkers.run(case, tmp_path, progress=False, force=True)
-    assert capsys.readouterr().err == ""
-    seen: list[float] = []
     walkers.run(case, tmp_path, progress=lambda progress: seen.append(progress.step), force=True)
     assert seen
     assert capsys.readouterr().err == ""
-
-
-def test_units_of_a_table_are_those_that_one_reads() -> None:
-    shown = {unit: number_of({"a": 0.25}, "a", unit) for unit in ("m", "m/s", "rad", "share")}
-    assert {unit: (one.text, one.unit) for unit, one in shown.items() if one} == {
-        "m": ("250", "mm"),
-        "m/s": ("250", "mm/s"),
-        "rad": ("14.32", "°"),
-        "share": ("25", "%"),
-    }

@@ -155,9 +155,9 @@ class Run:
         >>> len(walkers.run("fig1b", tmp).view().objects)  # twelve beads, the floor, the lines on it
         14
         """
-        from walkers.postprocess.report.scene import scene_of
+        from walkers.postprocess.report.player import player_of
 
-        return scene_of(self.directory, height=height).plot
+        return player_of(self.directory, height=height).plot
 
     def report(self, to: Path | None = None) -> Path:
         """Write one HTML file to mail, see `walkers.postprocess.report.run.report_run`."""
@@ -172,8 +172,8 @@ class Run:
         return write_vtk(self.directory, destination=to, **options)
 
     def paraview(self, to: Path | None = None, **options: Any) -> Path:
-        """Write it with a script for ParaView, see `walkers.postprocess.paraview_script.write_paraview`."""
-        from walkers.postprocess.paraview_script import write_paraview
+        """Write it with a script for ParaView, see `walkers.postprocess.paraview.write_paraview`."""
+        from walkers.postprocess.paraview import write_paraview
 
         return write_paraview(self.directory, to, **options)
 

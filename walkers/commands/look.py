@@ -167,7 +167,7 @@ def paraview(
     start: bool = Option(False, "--open", help="Start ParaView with it."),
 ) -> None:
     """Write what walkers vtk writes and a script that shows it in ParaView: spheres, bridges, walls, time."""
-    from walkers.postprocess.paraview_script import open_paraview
+    from walkers.postprocess.paraview import open_paraview
 
     found = _run_to_place(run, out, as_placed)
     script = found.paraview(to, colour=colour, every=every, as_placed=as_placed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
-from itertools import chain, product
+from itertools import product
 from pathlib import Path
 from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
-ONE_COLUMN = 3.4
-TWO_COLUMNS = 7.0
+ONE_COLUMN, TWO_COLUMNS = 3.4, 7.0
 """Widths of figures in one and in two columns of a journal, inches."""
 FORMATS = ("png", "svg", "pdf")
 """In which figures can be written."""
@@ -50,20 +49,9 @@ def plain_text(text: str) -> str:
 
 
 def new_figure(width: float, height: float, *, mosaic: Any = None, **options: Any) -> tuple[Figure, Any]:
-    """A figure without pyplot's global state, for functions that are `styled`.
+    """A figure (inches) and its axes without pyplot's global state, for functions that are `styled`.
 
-    Parameters
-    ----------
-    width, height
-        Inches.
-    mosaic
-        Of `matplotlib.figure.Figure.subplot_mosaic`; left out, ``subplots`` makes the axes.
-    options
-        Of either.
-
-    Returns
-    -------
-    figure, axes
+    Options are those of `matplotlib.figure.Figure.subplots`, or with a ``mosaic`` those of ``subplot_mosaic``.
     """
     from matplotlib.figure import Figure
 
@@ -73,7 +61,7 @@ def new_figure(width: float, height: float, *, mosaic: Any = None, **options: An
 
 def letter_panels(panels: Iterable[Axes]) -> None:
     """Put (a), (b), … before the titles of panels, which move to the left; after z come aa, ab, …."""
-    letters = chain(ascii_lowercase, map("".join, product(ascii_lowercase, repeat=2)))
+    letters = [*ascii_lowercase, *map("".join, product(ascii_lowercase, repeat=2))]
     for panel, letter in zip(panels, letters, strict=False):
         title, size = panel.get_title(), panel.title.get_fontsize()
         panel.set_title("")
@@ -81,20 +69,10 @@ def letter_panels(panels: Iterable[Axes]) -> None:
 
 
 def series_look(number: int) -> dict[str, Any]:
-    """Colour, dashes and marker of a series of many.
+    """Colour, dashes and marker of a series of many, as options of `matplotlib.axes.Axes.plot`.
 
     The first 120 have other looks; of the first 15 no two have the same dashes and marker, so that they can be told
     apart without their colours.
-
-    Parameters
-    ----------
-    number
-        Of the series, from 0.
-
-    Returns
-    -------
-    dict
-        Options of `matplotlib.axes.Axes.plot`.
     """
     return {
         "color": f"C{number}",
@@ -105,16 +83,9 @@ def series_look(number: int) -> dict[str, Any]:
 
 
 def legend_below(axes: Axes, lines: int = 2, **options: Any) -> Legend:
-    """A legend below axes, where it covers nothing.
+    """A legend below axes of a figure with constrained layout, where it covers nothing.
 
-    Parameters
-    ----------
-    axes
-        Of a figure with constrained layout, which makes room for it.
-    lines
-        Of text between the axes and the legend: tick labels and the label of the abscissa are 2.
-    options
-        Of `matplotlib.axes.Axes.legend`.
+    ``lines`` of text stand between the axes and it: tick labels and the label of the abscissa are 2.
     """
     from matplotlib.transforms import ScaledTranslation
 
@@ -136,16 +107,17 @@ def check_formats(formats: Sequence[str]) -> None:
             raise InputError("--format", [Problem("", None, f"{form!r}: expected one of {', '.join(FORMATS)}")])
 
 
-def check_picture(path: Path, suffix: str) -> None:
-    """Refuse a place for a picture or a film that would be written as something else.
+def check_place(path: Path, *suffixes: str) -> None:
+    """Refuse a place for a file that would be written as something else.
 
     Raises
     ------
     InputError
-        If it has another suffix or is a folder.
+        If it has none of these suffixes or is a folder.
     """
-    if path.suffix.lower() != suffix or path.is_dir():
-        raise InputError("--to", [Problem("", None, f"{path}: expected the name of a {suffix} file")])
+    if path.suffix.lower() not in suffixes or path.is_dir():
+        expected = f"expected the name of a {' or '.join(suffixes)} file"
+        raise InputError("--to", [Problem("", None, f"{path}: {expected}")])
 
 
 def save_figure(
@@ -166,10 +138,6 @@ def save_figure(
     title
         Written into the file.
 
-    Returns
-    -------
-    list of Path
-
     Raises
     ------
     InputError
@@ -187,10 +155,9 @@ def save_figure(
     # Laid out once, for all formats: a layout begins where the last one ended, and would be another each time.
     styled(figure.draw_without_rendering)()
     figure.set_layout_engine("none")
-    written = []
-    for form in dict.fromkeys(formats):
-        place = path.with_suffix(f".{form}")
+    written = [path.with_suffix(f".{form}") for form in dict.fromkeys(formats)]
+    for place in written:
+        form = place.suffix[1:]
         with beside(place) as new:
             styled(figure.savefig)(new, format=form, metadata=metadata[form])
-        written.append(place)
     return written

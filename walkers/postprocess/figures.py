@@ -1,29 +1,202 @@
-"""Figures of a run (matplotlib): where walkers went and turned, their gait; what clusters rose over a pile."""
+"""Figures of a run: panels with lines, drawn by matplotlib here and by Bokeh in reports.
+
+Where walkers went and turned, and their gait; what a pile did.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
-from walkers.postprocess.drawing import (
-    TWO_COLUMNS,
-    letter_panels,
-    new_figure,
-    plain_text,
-    series_look,
-    styled,
-)
+from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, series_look, styled
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.gait import averages, distance_walked, gait, walk
 from walkers.postprocess.motion import Group
-from walkers.postprocess.panels import MOST_NAMED, Panel, gait_panels, pile_panels, walk_panels
 from walkers.postprocess.piles import PileAnalysis
+from walkers.postprocess.posture import ways
+from walkers.postprocess.slopes import fit_slopes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+_MOST_NAMED = 12
+"""Walkers, or climbs, that a legend names."""
+_MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
+"""How events are marked (`walkers.postprocess.events`)."""
+_FEWEST_SAMPLES = 8
+"""Samples a cycle below which a gait shows nothing."""
+_GREY, _OTHERS = "#5b6770", "#c78a2c"
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line in the units of its panel, of K points.
+
+    ``colour`` is its number among the colours of a figure, or a colour; ``marker`` as matplotlib calls it; a ``width``
+    (points) of 0 is of marks alone; an ``error`` is of each y.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    label: str = ""
+    colour: int | str = 0
+    marker: str = ""
+    dashed: bool = False
+    width: float = 1.1
+    error: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A plot: title, labels of its axes, lines from the lowest to the uppermost, and what is grey behind them.
+
+    ``band`` are two lines of the same x with grey between them, ``settled`` the x up to which it is grey, ``log`` says
+    that y is logarithmic.
+    """
+
+    title: str
+    x: str
+    y: str
+    lines: list[Line]
+    band: tuple[Line, Line] | None = None
+    settled: float = 0.0
+    log: bool = False
+
+
+def walk_panels(groups: list[Group]) -> list[Panel]:
+    """Distance walked, orientation, and paths from above, of all walkers, once a cycle."""
+    case = groups[0].case
+    strobe, settled, facing = case.run.samples_per_cycle, case.run.settled_strobes, ways(uphill=case.goes_uphill)
+    walked: list[Line] = []
+    turned: list[Line] = []
+    paths: list[Line] = []
+    for group in groups:
+        time, distance = distance_walked(group)
+        slope, _ = fit_slopes(time[settled:], distance[settled:])
+        way = (group.mass_centre[::strobe] - group.mass_centre[0]) * 1e3
+        for place, walker in enumerate(group.walkers):
+            number = walker.walker
+            told = f"{number}: {facing[int(walker.facing < 0)]}, {slope[place] * 1e3:.3g} mm/s"
+            look = (told if number < _MOST_NAMED else "", number)
+            walked.append(Line(time, distance[:, place] * 1e3, *look))
+            turned.append(Line(time, np.degrees(group.orientation[::strobe, place]), *look))
+            paths.append(Line(way[:, place] @ group.drive_axis, way[:, place] @ group.across_axis, *look))
+    begin = walked[-1].x[settled]
+    return [
+        Panel("Distance along the heading; grey: settling", "time (s)", "distance walked (mm)", walked, settled=begin),
+        Panel("Orientation", "time (s)", "orientation ψ (°)", turned, settled=begin),
+        Panel("Paths of the mass centres, seen from above", "along the drive axis (mm)", "across it (mm)", paths),
+    ]
+
+
+def velocity_panel(groups: list[Group]) -> Panel:
+    """The velocity of each walker with the standard error of its fit."""
+    facing = ways(uphill=groups[0].case.goes_uphill)
+    number, faced = (np.array([getattr(w, key) for one in groups for w in one.walkers]) for key in ("walker", "facing"))
+    walks = [walk(one) for one in groups]
+    velocity, error = (
+        1e3 * np.concatenate([getattr(one, key) for one in walks]) for key in ("velocity", "standard_error")
+    )
+    lines = [
+        Line(number[these], velocity[these], f"started facing {name}", colour, marker, width=0.0, error=error[these])
+        for (way, colour, marker), name in zip(((1, 0, "o"), (-1, 1, "s")), facing, strict=True)
+        if (these := faced == way).any()
+    ]
+    return Panel("Velocity of each walker, standard error of its fit", "number of the walker", "velocity (mm/s)", lines)
+
+
+def gait_panels(group: Group) -> list[Panel]:
+    """Velocities of the first walker through its last two cycles (Fig. 4 of Khan et al.), and of the substrate.
+
+    None if the run was sampled less than eight times a cycle.
+    """
+    samples, first = group.case.run.samples_per_cycle, group.walkers[0]
+    if samples < _FEWEST_SAMPLES or len(group.time) <= 2 * samples:
+        return []
+    motion = gait(group)
+    cycles = (len(group.time) - 1) // samples
+    last = slice((cycles - 2) * samples, cycles * samples + 1)
+    phase = group.time[last] * group.case.drive.frequency - (cycles - 2)
+    series = [("walker", motion.velocity[last, 0], walk(group).velocity[0], "#c4473a", "s")]
+    marks = [("#1a1a1a", "o"), ("#1f3b73", "^"), ("#3f7f93", "v"), ("#808080", "D")]
+    series += [
+        (f"bead {bead + 1}", motion.rotation[last, 0, bead], mean, *marks[bead % len(marks)])
+        for bead, mean in enumerate(averages(group).rotation[0])
+    ]
+    lines = [
+        Line(phase, values * 1e3, f"{name} (mean {mean * 1e3:.2f} mm/s)", colour, marker)
+        for name, values, mean, colour, marker in series
+    ]
+    x = "time (cycles of the drive), the last two"
+    panels = [Panel(f"walker {first.walker}", x, "velocity; beads:\n−R dφ/dt (mm/s)", lines)]
+    shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
+    if np.any(shaken):  # faster than its walkers by far: in their panel it would make them all flat
+        line = Line(phase, first.facing * shaken * 1e3, colour=_GREY, dashed=True)
+        panels.append(Panel("substrate, positive as for the walker", x, "velocity\n(mm/s)", [line]))
+    return panels
+
+
+def pile_panels(found: PileAnalysis) -> list[Panel]:
+    """Heights of the clusters' leaders over the pile's surface with events, segregation, bridges, agitation."""
+    time, bed, x = found.motion.time, found.bed, "time from the begin of the drive (s)"
+    surface = Line(time, 1e3 * bed["surface"], "surface, median", _GREY)
+    low, high = (
+        Line(time, 1e3 * bed[f"surface_{side}"], "surface, 10th to\n90th percentile") for side in ("low", "high")
+    )
+    agitation = Line(time, np.maximum(bed["mean_square_velocity"], 1e-12))
+
+    def pair(title: str, y: str, first: tuple[str, str], second: tuple[str, str]) -> Panel:
+        lines = [Line(time, bed[first[0]], first[1]), Line(time, bed[second[0]], second[1], 2, dashed=True)]
+        return Panel(title, x, y, lines)
+
+    return [
+        Panel("Clusters' leaders", x, "height (mm)", [surface, *_leaders(found), *_events(found)], (low, high)),
+        pair(
+            "Segregation: (z of large − z of small) / their sum",
+            "Brazil-nut\nindex",
+            ("brazil_nut", "all beads"),
+            ("brazil_nut_of_bulk", "bulk alone"),
+        ),
+        pair(
+            "Bridges and contacts with other beads",
+            "how many a bead,\nto other beads",
+            ("bridges", "bridges"),
+            ("contacts", "contacts"),
+        ),
+        Panel("Agitation, once a cycle", x, "mean square\nvelocity, strobed\n(m²/s²)", [agitation], log=True),
+    ]
+
+
+def _leaders(found: PileAnalysis) -> Iterator[Line]:
+    """The height of each cluster's leader, thick where it climbed."""
+    time, height = found.motion.time, found.motion.position[:, :, 2]
+    named = 0
+    for track, climb in zip(found.tracks, found.climbs, strict=True):
+        places = [frame for frame, members in zip(track.frames, track.members, strict=True) if climb.leader in members]
+        leads = "large" if found.motion.large[climb.leader] else "small"
+        named += climb.climbed
+        told = f"{climb.size} beads climb, led by a\n{leads} one: {climb.speed * 1e3:.1f} mm/s"
+        label = told if climb.climbed and named <= _MOST_NAMED else ""
+        colour, width = (2, 1.6) if climb.climbed else (_OTHERS, 0.6)
+        yield Line(time[places], height[places, climb.leader] * 1e3, label, colour, width=width)
+    if named > _MOST_NAMED:
+        yield Line(time[:0], time[:0], f"and {named - _MOST_NAMED} more climbs", 2, width=1.6)
+
+
+def _events(found: PileAnalysis) -> Iterator[Line]:
+    """A mark where something happened to a cluster, at the height of its leader in the frame nearest to it."""
+    for kind, marker in _MARKS.items():
+        if told := [event for event in found.events if event.kind == kind]:
+            times = np.array([event.time for event in told])
+            leaders = [found.climbs[event.track].leader for event in told]
+            heights = found.motion.position[np.searchsorted(found.motion.time, times), leaders, 2]
+            yield Line(times, heights * 1e3, kind, _GREY, marker, width=0.0)
 
 
 def walk_figures(groups: list[Group]) -> dict[str, Figure]:
@@ -40,15 +213,67 @@ def walk_figures(groups: list[Group]) -> dict[str, Figure]:
     return {"walk": _walk_figure(groups), **({"gait": _gait_figure(groups[0], panels)} if panels else {})}
 
 
+@styled
+def climb_figure(found: PileAnalysis) -> Figure:
+    """What a pile did: `pile_panels`, one below the other."""
+    case = found.motion.case
+    figure, axes = _stacked(pile_panels(found), 8.0, [2, 1, 1, 1])
+    axes[2].set_ylim(0.0, None)
+    figure.suptitle(f"{plain_text(case.title or case.name)}\n{case.count} beads, {case.drive.described()}")
+    return figure
+
+
+@styled
+def _walk_figure(groups: list[Group]) -> Figure:
+    rows = [["strobe", "walked"], ["strobe", "turned"]]
+    figure, axes = new_figure(TWO_COLUMNS, 5.2, mosaic=rows, width_ratios=[1, 1.6])
+    figure.suptitle(_title(groups[0].case))
+    _draw_strobe(axes["strobe"], groups[0])
+    for name, panel in zip(("walked", "turned"), walk_panels(groups), strict=False):
+        _draw(axes[name], panel)
+        axes[name].set_xlabel(panel.x)
+        for number, line in enumerate(axes[name].lines):
+            # Marks of walkers that do the same stand beside each other.
+            line.set(**series_look(number), markevery=(number % 6, 6), linewidth=0.9)
+    axes["walked"].set_title("grey: settling")
+    letter_panels(axes.values())
+    more = f" (the first {_MOST_NAMED})" if sum(len(group.walkers) for group in groups) > _MOST_NAMED else ""
+    handles = axes["walked"].get_legend_handles_labels()
+    title = f"walker: facing at the start, velocity{more}"
+    figure.legend(*handles, loc="outside lower center", ncols=4, title=title)
+    return figure
+
+
+@styled
+def _gait_figure(group: Group, panels: Sequence[Panel]) -> Figure:
+    figure, axes = _stacked(panels, 3.0 + 1.3 * len(panels), [2.5, 1.0][: len(panels)])
+    figure.suptitle(_title(group.case))
+    for one in axes:
+        one.axhline(0.0, color="0.4", lw=0.6)
+    return figure
+
+
+def _stacked(panels: Sequence[Panel], height: float, ratios: Sequence[float]) -> tuple[Figure, Any]:
+    """Panels one below the other, their legends beside them."""
+    figure, axes = new_figure(TWO_COLUMNS, height, nrows=len(panels), height_ratios=ratios, sharex=True, squeeze=False)
+    for one, panel in zip(axes[:, 0], panels, strict=True):
+        _draw(one, panel)
+        one.set_title(panel.title)
+        if any(line.label for line in panel.lines):
+            one.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), borderaxespad=0.0)
+    axes[-1, 0].set_xlabel(panels[-1].x)
+    letter_panels(axes[:, 0] if len(panels) > 1 else ())
+    figure.align_ylabels()
+    return figure, axes[:, 0]
+
+
 def _draw(axes: Axes, panel: Panel) -> None:
-    """A panel without its title and what is below it; lines with a number of many are marked to be told apart."""
+    """A panel without its title and what is below it."""
     for line in panel.lines:
-        look: dict[str, Any] = {"color": line.colour, "lw": line.width, "ls": "--" if line.dashed else "-"}
-        if isinstance(line.colour, int):
-            look["color"] = f"C{line.colour}"
-        if line.marker:
-            look |= {"marker": line.marker, "mfc": "none"}
-        axes.plot(line.x, line.y, label=line.label or None, **look)
+        colour = f"C{line.colour}" if isinstance(line.colour, int) else line.colour
+        look: dict[str, Any] = {"marker": line.marker, "mfc": "none"} if line.marker else {}
+        dashes = "--" if line.dashed else "-"
+        axes.plot(line.x, line.y, color=colour, lw=line.width, ls=dashes, label=line.label or None, **look)
     if panel.band:
         low, high = panel.band
         axes.fill_between(low.x, low.y, high.y, color="0.85", lw=0, label=low.label, zorder=0)
@@ -67,27 +292,6 @@ def _title(case: Case) -> str:
     return f"{plain_text(case.title or case.name)}\nR = {'; '.join(makes)} mm, {case.drive.described()}{gamma0}"
 
 
-@styled
-def _walk_figure(groups: list[Group]) -> Figure:
-    rows = [["strobe", "walked"], ["strobe", "turned"]]
-    figure, axes = new_figure(TWO_COLUMNS, 5.2, mosaic=rows, width_ratios=[1, 1.6])
-    figure.suptitle(_title(groups[0].case))
-    _draw_strobe(axes["strobe"], groups[0])
-    for name, panel in zip(("walked", "turned"), walk_panels(groups), strict=False):
-        _draw(axes[name], panel)
-        axes[name].set_xlabel(panel.x)
-        for number, line in enumerate(axes[name].lines):
-            # Marks of walkers that do the same stand beside each other.
-            line.set(**series_look(number), markevery=(number % 6, 6), linewidth=0.9)
-    axes["walked"].set_title("grey: settling")
-    letter_panels(axes.values())
-    more = " (the first 12)" if sum(len(group.walkers) for group in groups) > MOST_NAMED else ""
-    handles = axes["walked"].get_legend_handles_labels()
-    title = f"walker: facing at the start, velocity{more}"
-    figure.legend(*handles, loc="outside lower center", ncols=4, title=title)
-    return figure
-
-
 def _draw_strobe(axes: Axes, group: Group) -> None:
     """The first walker from above, its beads to scale, at eight times (as in Fig. 1b of the paper).
 
@@ -95,61 +299,21 @@ def _draw_strobe(axes: Axes, group: Group) -> None:
     """
     from matplotlib.patches import Circle
 
-    strobe = group.case.run.samples_per_cycle
-    ground = np.stack([group.drive_axis, group.across_axis], axis=-1)
-    position = group.position[::strobe, 0] @ ground * 1e3
-    radii = group.radii * 1e3
+    strobe, radii = group.case.run.samples_per_cycle, group.radii * 1e3
+    position = group.position[::strobe, 0] @ np.stack([group.drive_axis, group.across_axis], axis=-1) * 1e3
     middle = position.mean(axis=1)
     shown = np.unique(np.linspace(0, len(position) - 1, 8).round().astype(int))
     extent = max(float(np.ptp(position[..., 1], axis=1).max()), 0.6 * float(radii.max()))
     pitch = 2.0 * float(radii.max()) + extent
-    ends = []
+    along = position[shown, :, 0] - middle[0, 0]
+    across = position[shown, :, 1] - middle[shown, 1:] - pitch * np.arange(len(shown))[:, None]
     for row, frame in enumerate(shown):
-        for bead in range(len(radii)):
-            along = float(position[frame, bead, 0] - middle[0, 0])
-            across = float(position[frame, bead, 1] - middle[frame, 1]) - row * pitch
-            size = float(radii[bead])
-            axes.add_patch(Circle((along, across), size, fc="0.45" if bead == 0 else "0.75", ec="0.2", lw=0.6))
-            ends += [along - size, along + size]
-        seconds = f"{group.time[frame * strobe]:.2f} s"
-        place = (1.01, -row * pitch)
-        axes.annotate(seconds, place, xycoords=("axes fraction", "data"), fontsize=7, va="center")
-    axes.set(xlim=(min(ends) - radii.max(), max(ends) + radii.max()), ylim=(-pitch * (len(shown) - 0.4), 0.6 * pitch))
-    axes.set_aspect("equal")
+        for bead, size in enumerate(radii):
+            place, shade = (along[row, bead], across[row, bead]), "0.45" if bead == 0 else "0.75"
+            axes.add_patch(Circle(place, size, fc=shade, ec="0.2", lw=0.6))
+        beside: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "fontsize": 7, "va": "center"}
+        axes.annotate(f"{group.time[frame * strobe]:.2f} s", (1.01, -row * pitch), **beside)
+    edges = float((along - radii).min() - radii.max()), float((along + radii).max() + radii.max())
+    axes.set(xlim=edges, ylim=(-pitch * (len(shown) - 0.4), 0.6 * pitch), aspect="equal")
     axes.set(xlabel="along the drive axis (mm)", yticks=[], title="walker 0, time downward")
     axes.grid(visible=False)
-
-
-@styled
-def _gait_figure(group: Group, panels: Sequence[Panel]) -> Figure:
-    ratios = [2.5, 1.0][: len(panels)]
-    figure, axes = new_figure(
-        TWO_COLUMNS, 3.0 + 1.3 * len(panels), nrows=len(panels), height_ratios=ratios, sharex=True, squeeze=False
-    )
-    figure.suptitle(_title(group.case))
-    for one, panel in zip(axes[:, 0], panels, strict=True):
-        _draw(one, panel)
-        one.axhline(0.0, color="0.4", lw=0.6)
-        one.set_title(panel.title)
-    if len(panels) > 1:
-        letter_panels(axes[:, 0])
-    axes[-1, 0].set_xlabel(panels[-1].x)
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), ncols=4, loc="outside lower center")
-    return figure
-
-
-@styled
-def climb_figure(found: PileAnalysis) -> Figure:
-    """What a pile did: `walkers.postprocess.panels.pile_panels`, one below the other."""
-    panels, case = pile_panels(found), found.motion.case
-    figure, axes = new_figure(TWO_COLUMNS, 8.0, nrows=len(panels), height_ratios=[2, 1, 1, 1], sharex=True)
-    for one, panel in zip(axes, panels, strict=True):
-        _draw(one, panel)
-        if any(line.label for line in panel.lines):
-            one.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), borderaxespad=0.0)
-    axes[2].set_ylim(0.0, None)
-    axes[-1].set_xlabel(panels[-1].x)
-    letter_panels(axes)
-    figure.align_ylabels()
-    figure.suptitle(f"{plain_text(case.title or case.name)}\n{case.count} beads, {case.drive.described()}")
-    return figure

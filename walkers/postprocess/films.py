@@ -11,29 +11,30 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import ceil, log10
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.units import DURATION, parse_quantity
-from walkers.postprocess.film_files import check_film, write_film
-from walkers.postprocess.film_times import FilmTimes, film_times, positions_at
-from walkers.postprocess.motion import Motion, boundary_motion, read_motion
-from walkers.postprocess.rolling import turns_of
-from walkers.postprocess.scene import Camera, Picture, Window, camera_axes, pointed_out, round_below
+from walkers.postprocess.drawing import check_place
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.motion import Motion, read_motion
+from walkers.postprocess.rolling import follows_cycles
+from walkers.postprocess.scene import Picture, Scene, Window, camera_axes, round_below
+from walkers.runner.files import beside
 
-FILM_NAME = "film.mp4"
-FPS = 25
-"""Pictures a second; a GIF can have as many."""
 _SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080)}
-_SAMPLES = 6
-"""Pictures from which a GIF takes its colours."""
-_LETTERS = 24
-"""Of them, one below the other, would fill a picture."""
-_LEAST_LETTERS = 15
-"""Pixels."""
-_AROUND = 1.2
-"""Height and width of the picture over those of what the beads reach."""
+_AROUND = 1.2  # extent of the picture over that of what the beads reach
+_LETTERS, _LEAST_LETTERS = 24, 15  # lines of text that would fill a picture; pixels
+_SECONDS = 10.0  # a film lasts so long, or less, if no slowdown is given
+_LEAST_SEEN = 10.0  # recorded frames a second of such a film, where moments between them are not known
+_COLOURS, _SAMPLES = 40, 6  # in a GIF; pictures from which they are taken
+
+
+class FilmFailed(WalkersError):
+    """A film that could not be written as a whole."""
 
 
 @dataclass(frozen=True)
@@ -47,15 +48,15 @@ class FilmOptions:
     fps
         Pictures a second.
     slowdown
-        How many times slower than in reality; chosen if None (`walkers.postprocess.film_times.film_times`).
+        How many times slower than in reality; if None, 1, 2, 5, 10 … such that the film lasts 5 to 10 s.
     walker
         Number of the walker to show, of walkers that are independent.
     begin, end
-        Physical time from which and until which to show, s.
+        Physical time from which and until which to show, s; to the end of the run if None.
     """
 
     size: tuple[int, int] = _SIZES["720p"]
-    fps: int = FPS
+    fps: int = 25
     slowdown: float | None = None
     walker: int | None = None
     begin: float = 0.0
@@ -82,11 +83,6 @@ def render_film(
     on_progress
         Called with the number of pictures made and of all.
 
-    Returns
-    -------
-    Path
-        The film.
-
     Raises
     ------
     InputError
@@ -94,25 +90,34 @@ def render_film(
     FilmFailed
         If ffmpeg could not write all of it.
     """
-    path, options = destination or directory / FILM_NAME, options or FilmOptions()
-    check_film(path, options.size, options.fps)
+    path, options = destination or directory / "film.mp4", options or FilmOptions()
+    _check_format(path, options)
     motion = _shown(read_motion(directory).driven, options.walker)
-    times = film_times(motion, options.fps, options.slowdown, options.begin, options.end)
-    film = _Film(motion, times, options.size)
-    count = len(times.time)
+    times = film_times(motion, options)
+    count, frames = len(times.time), slice(int(times.frame[0]), int(times.frame[-1]) + 2)
+    window = Window(Scene.around(motion, camera_axes(motion), _AROUND, frames, rolling=True), options.size)
+    write = _captions(motion, times, window.pixels_per_mm, options.size)
+
+    def picture(number: int) -> Picture:
+        scene = window.picture(int(times.frame[number]), float(times.share[number]))
+        return write(scene, float(times.time[number]))
 
     def pictures() -> Iterator[Picture]:
         for number in range(count):
-            yield film.picture(number)
+            yield picture(number)
             if on_progress is not None:
                 on_progress(number + 1, count)
 
+    path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        is_gif = path.suffix.lower() == ".gif"
-        samples = [film.picture(int(number)) for number in np.linspace(0, count - 1, _SAMPLES)] if is_gif else []
-        write_film(path, pictures(), count, options.fps, samples)
+        with beside(path) as new:
+            if path.suffix.lower() == ".gif":
+                samples = np.linspace(0, count - 1, _SAMPLES).astype(int).tolist()
+                _write_gif(new, pictures(), options.fps, np.concatenate([*map(picture, samples)]))
+            else:
+                _write_mp4(new, pictures(), options, count)
     finally:
-        film.close()
+        window.close()
     return path
 
 
@@ -129,8 +134,8 @@ def parse_size(text: str) -> tuple[int, int]:
         return int(numbers[1]), int(numbers[2])
     if text in _SIZES:
         return _SIZES[text]
-    expected = f"{text!r}: expected {', '.join(_SIZES)}, or pixels across and up such as 1280x720, 64 at least"
-    raise InputError("--size", [Problem("", None, expected)])
+    expected = f"expected {', '.join(_SIZES)}, or pixels across and up such as 1280x720, 64 at least"
+    raise _refused("--size", f"{text!r}: {expected}")
 
 
 def parse_time(option: str, text: str) -> float:
@@ -144,7 +149,21 @@ def parse_time(option: str, text: str) -> float:
     try:
         return parse_quantity(text, DURATION)
     except ValueError as error:
-        raise InputError(option, [Problem("", None, f'{text!r}: expected a time such as "0.1 s"')]) from error
+        raise _refused(option, f'{text!r}: expected a time such as "0.1 s"') from error
+
+
+def _refused(option: str, told: str) -> InputError:
+    return InputError(option, [Problem("", None, told)])
+
+
+def _check_format(path: Path, options: FilmOptions) -> None:
+    """Refuse what a format cannot hold."""
+    suffix, (wide, tall), fps = path.suffix.lower(), options.size, options.fps
+    check_place(path, ".mp4", ".gif")
+    if suffix == ".mp4" and (wide % 2 or tall % 2):
+        raise _refused("--size", f"{wide}x{tall}: expected even numbers for an MP4")
+    if suffix == ".gif" and (100 % fps or fps > 50):  # pictures last whole hundredths of a second
+        raise _refused("--fps", f"{fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF")
 
 
 def _shown(motion: Motion, walker: int | None) -> Motion:
@@ -152,73 +171,98 @@ def _shown(motion: Motion, walker: int | None) -> Motion:
     count = len(motion.walkers)
     if not motion.case.apart:
         if walker is not None:
-            told = "the walkers of this run are shown together" if count else "the run has no walkers"
-            raise InputError("--walker", [Problem("", None, told)])
+            raise _refused(
+                "--walker", "the walkers of this run are shown together" if count else "the run has no walkers"
+            )
         return motion
     if walker is not None and walker >= count:
-        raise InputError("--walker", [Problem("", None, f"{walker}: expected less than {count}, the run's walkers")])
+        raise _refused("--walker", f"{walker}: expected less than {count}, the run's walkers")
     return motion.of_walkers(motion.walkers[walker or 0 :][:1])
 
 
-class _Film:
-    """The pictures of a film, in any order."""
+class FilmTimes(NamedTuple):
+    """The moments of a film, of K pictures.
 
-    def __init__(self, motion: Motion, times: FilmTimes, size: tuple[int, int]) -> None:
-        self._motion, self._times = motion, times
-        self._chosen, self._turns = pointed_out(motion), turns_of(motion)
-        self._shift, _ = boundary_motion(motion.case.drive, times.time)
-        seen = motion.select(slice(int(times.frame[0]), int(times.frame[-1]) + 2))
-        camera = Camera.around(seen, camera_axes(motion), share=_AROUND)
-        self._window = Window(seen, camera, size, rolling=self._turns is not None)
-        self._caption = _Caption(motion, times, self._window.pixels_per_mm, size)
+    ``time`` is physical (s), ``frame`` the number of the frame of the motion that is shown, or that comes before it,
+    ``share`` how far it is from there to the next one, 0 to 1. The film is ``slowdown`` times slower than in reality;
+    if it is ``stroboscopic`` all pictures are at one phase of the drive.
+    """
 
-    def picture(self, number: int) -> Picture:
-        """One of them."""
-        frame, share = int(self._times.frame[number]), float(self._times.share[number])
-        place = positions_at(self._motion, frame, share)
-        turned = None if self._turns is None else self._turns.at(frame, share)
-        scene = self._window.picture(place, self._chosen(frame), self._shift[number], turned)
-        return self._caption.on(scene, float(self._times.time[number]))
-
-    def close(self) -> None:
-        """Give back the window."""
-        self._window.close()
+    time: FloatArray
+    frame: npt.NDArray[np.int64]
+    share: FloatArray
+    slowdown: float
+    stroboscopic: bool
 
 
-class _Caption:
-    """What is written into each picture: time, slow motion, the drive, a scale bar."""
+def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
+    """Spread the pictures of a film over a motion while it is driven.
 
-    def __init__(self, motion: Motion, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]) -> None:
-        from matplotlib import get_data_path
-        from PIL import ImageFont
+    Pictures that are half a cycle apart or more are moved to whole cycles, as a stroboscope would show them; else the
+    shaking would beat with the pictures. Where frames are so rare that they do not follow a cycle each picture is the
+    nearest frame.
 
-        # Pillow's own letters have no × and no ².
-        font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
-        self._size, self._letters = size, max(_LEAST_LETTERS, size[1] // _LETTERS)
-        self._large, self._small = (ImageFont.truetype(font, round(share * self._letters)) for share in (1.2, 0.85))
-        # All pictures may be of one frame, where frames are rarer than pictures.
-        between = float(np.diff(times.time).max(initial=0.0)) or 1.0
-        self._decimals = max(0, ceil(-log10(between) - 1e-9))
-        self._bar = round_below(size[0] / 5.0 / pixels_per_mm)
-        self._bar_pixels = self._bar * pixels_per_mm
-        self._speed = told_speed(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
-        drive = motion.case.drive
-        self._drive = f"{drive.frequency:g} Hz, {drive.peak_acceleration:.3g} m/s²"
+    Raises
+    ------
+    InputError
+        If nothing of the run is between begin and end.
+    """
+    last, begin = float(motion.time[-1]), options.begin
+    end = last if options.end is None else min(options.end, last)
+    if not 0.0 <= begin < end:
+        told = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --from before --until"
+        raise _refused("--from, --until", told)
+    follows, slowdown = follows_cycles(motion), options.slowdown
+    if slowdown is None:
+        largest = _SECONDS / (end - begin)
+        if not follows:
+            largest = min(largest, 1.0 / (_LEAST_SEEN * float(np.median(np.diff(motion.time)))))
+        slowdown = max(1.0, round_below(largest))
+    interval, cycle = 1.0 / (options.fps * slowdown), 1.0 / motion.case.drive.frequency
+    time = begin + interval * np.arange(int((end - begin) / interval + 1e-9) + 1)
+    strobed = interval >= cycle / 2.0
+    if strobed:
+        time = np.round(time / cycle) * cycle
+    time = np.clip(time, motion.time[0], last)
+    if follows:
+        frame = np.clip(np.searchsorted(motion.time, time + 1e-12, side="right") - 1, 0, len(motion.time) - 2)
+        share = (time - motion.time[frame]) / (motion.time[frame + 1] - motion.time[frame])
+    else:
+        frame = np.abs(motion.time[:, None] - time).argmin(axis=0)
+        time, share = motion.time[frame], np.zeros(len(frame))
+    one_phase = strobed or motion.case.run.samples_per_cycle == 1
+    return FilmTimes(time, frame.astype(np.int64), np.clip(share, 0.0, 1.0), slowdown, one_phase)
 
-    def on(self, picture: Picture, time: float) -> Picture:
-        """A picture with all of it."""
-        from PIL import Image, ImageDraw
 
+def _captions(
+    motion: Motion, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
+) -> Callable[[Picture, float], Picture]:
+    """What writes time, slow motion, the drive and a scale bar into a picture."""
+    from matplotlib import get_data_path
+    from PIL import Image, ImageDraw, ImageFont
+
+    (wide, tall), edge = size, max(_LEAST_LETTERS, size[1] // _LETTERS)
+    # Pillow's own letters have no × and no ².
+    font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+    large, small = (ImageFont.truetype(font, round(share * edge)) for share in (1.2, 0.85))
+    # All pictures may be of one frame, where frames are rarer than pictures.
+    decimals = max(0, ceil(-log10(float(np.diff(times.time).max(initial=0.0)) or 1.0) - 1e-9))
+    speed = told_speed(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
+    drive = f"{motion.case.drive.frequency:g} Hz, {motion.case.drive.peak_acceleration:.3g} m/s²"
+    bar = round_below(wide / 5.0 / pixels_per_mm)
+    left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
+
+    def written(picture: Picture, time: float) -> Picture:
         page = Image.fromarray(picture)
-        draw, edge, (wide, tall) = ImageDraw.Draw(page), self._letters, self._size
-        draw.text((edge, edge), f"{time:.{self._decimals}f} s", "black", self._large, anchor="lt")
-        draw.text((edge, 2.8 * edge), self._speed, "#333333", self._small, anchor="lt")
-        draw.text((edge, tall - edge), self._drive, "#333333", self._small, anchor="ls")
-        right, level, thick = wide - edge, tall - edge, max(2, edge // 8)
-        draw.rectangle([right - self._bar_pixels, level - thick, right, level], "black")
-        middle = right - self._bar_pixels / 2.0
-        draw.text((middle, level - 1.5 * thick), f"{self._bar:g} mm", "black", self._small, anchor="md")
+        draw = ImageDraw.Draw(page)
+        draw.text((edge, edge), f"{time:.{decimals}f} s", "black", large, anchor="lt")
+        draw.text((edge, 2.8 * edge), speed, "#333333", small, anchor="lt")
+        draw.text((edge, level), drive, "#333333", small, anchor="ls")
+        draw.rectangle([left, level - thick, right, level], "black")
+        draw.text(((left + right) / 2.0, level - 1.5 * thick), f"{bar:g} mm", "black", small, anchor="md")
         return np.asarray(page)
+
+    return written
 
 
 def told_speed(slowdown: float) -> str:
@@ -226,3 +270,35 @@ def told_speed(slowdown: float) -> str:
     if slowdown == 1.0:
         return "real time"
     return f"{slowdown:.4g} × slower" if slowdown > 1.0 else f"{1.0 / slowdown:.4g} × faster"
+
+
+def _write_mp4(path: Path, pictures: Iterator[Picture], options: FilmOptions, count: int) -> None:
+    """H.264, by ffmpeg, which ends in silence when the disk is full."""
+    from imageio_ffmpeg import count_frames_and_secs, write_frames
+
+    # With its index in front a browser plays it while it loads.
+    index = ["-movflags", "+faststart"]
+    writer = write_frames(
+        path, options.size, fps=options.fps, codec="libx264", quality=7, macro_block_size=2, output_params=index
+    )
+    writer.send(None)
+    try:
+        for picture in pictures:
+            writer.send(np.ascontiguousarray(picture))
+    finally:
+        writer.close()
+    try:
+        written, _ = count_frames_and_secs(str(path))
+    except (RuntimeError, OSError):
+        written = 0
+    if written != count:
+        raise FilmFailed(f"ffmpeg wrote {written} of the {count} pictures of {path.parent}: is the disk full?")
+
+
+def _write_gif(path: Path, pictures: Iterator[Picture], fps: int, samples: Picture) -> None:
+    """One palette for all pictures, no dithering: what does not move is the same in all of them and takes no room."""
+    from PIL import Image
+
+    palette = Image.fromarray(samples).quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
+    reduced = (Image.fromarray(one).quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures)
+    next(reduced).save(path, save_all=True, append_images=reduced, duration=1000 // fps, loop=0, optimize=False)

@@ -1,34 +1,36 @@
-"""Files for ParaView: beads, bridges and the moving boundary as .vtp, joined by one .pvd in physical seconds."""
+"""Files for ParaView: beads, bridges and the moving boundary as .vtp, joined by one .pvd in physical seconds.
+
+Beside them a script that shows them, and no state file (``.pvsm``): only ParaView can write those, they hold all
+properties of one version and the absolute paths of the files.
+"""
 
 from __future__ import annotations
 
-import errno
-import os
 import shutil
+import subprocess
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
 
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.boundary import Flat, Wall
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.text import rendered
 from walkers.postprocess.analysis import analyses_of
-from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Bridges, Motion, gathered, read_bridges, read_motion
+from walkers.postprocess.scene import Scene, camera_axes, lines_between, mesh_of, walls_of
+from walkers.runner.files import write_text
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-FOLDER_NAME = "vtk"
-COLLECTION_NAME = "walkers.pvd"
-SCRIPT_NAME = "show.py"
-_END_OF_VTK = b"</VTKFile>\n"
-_SIDES = 64
-"""Of the prism that a round wall is drawn as."""
+_COLLECTION, _SCRIPT = "walkers.pvd", "show.py"
+_WIDE, _AROUND = 16.0 / 9.0, 1.15  # width over height of the view; its extent over that of what the beads reach
+_NECK = 0.45  # radius of what is drawn of a bridge over that of the smallest bead
+_SCALES = {"speed": "speed (m/s)", "radius": "radius (m)", "velocity": "velocity (m/s)", "omega": "omega (rad/s)"}
+"""Titles of colour scales; others are numbers of something."""
 
 
 def write_vtk(
@@ -65,97 +67,128 @@ def write_vtk(
     InputError
         If the folder holds anything else than such files.
     """
-    motion = shown_in_paraview(directory, as_placed=as_placed)
-    frames = _frames(motion, every or motion.case.run.samples_per_cycle)
-    return _write_series(destination or directory / FOLDER_NAME, frames, vtu=vtu)
-
-
-def shown_in_paraview(directory: Path, *, as_placed: bool) -> Motion:
-    """The motion that the files hold and the camera sees: walkers side by side, unless they are left as placed."""
-    motion = read_motion(directory)
-    return gathered(motion) if motion.case.boundary.bare and not as_placed else motion
-
-
-Meshes = dict[str, "pv.PolyData"]
-"""Of a frame: ``beads``, ``boundary`` and, where they were recorded, ``bridges``: parts 0, 1 and 2."""
-
-
-def _write_series(destination: Path, frames: Iterable[tuple[float, int, Meshes]], *, vtu: bool) -> Path:
-    """Write times (s), numbers and meshes of frames beside the folder and rename it."""
-    place = destination.resolve()
+    destination = destination or directory / "vtk"
+    motion, place = _shown(directory, as_placed=as_placed), destination.resolve()
     _check_replaceable(place)
     place.parent.mkdir(parents=True, exist_ok=True)
     beside = Path(tempfile.mkdtemp(prefix=f".{place.name}-", dir=place.parent))
-    root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
-    collection = ElementTree.SubElement(root, "Collection")
+    entries = []
     try:
         beside.chmod(0o755)
-        for time, number, meshes in frames:
+        for frame, meshes in _frames(motion, every or motion.case.run.samples_per_cycle):
             for part, (kind, mesh) in enumerate(meshes.items()):
-                file = f"{kind}_{number:06d}.vtp"
+                file = f"{kind}_{frame:06d}.vtp"
                 _save(mesh, beside / file)
-                entry = {"timestep": repr(time), "group": "", "part": str(part), "file": file}
-                ElementTree.SubElement(collection, "DataSet", entry)
+                time = float(motion.time[frame])
+                entries.append(f'    <DataSet timestep="{time!r}" group="" part="{part}" file="{file}" />')
             if vtu:
-                _write_vtu(beside / f"beads_{number:06d}.vtu", meshes["beads"])
-        ElementTree.indent(root)
-        ElementTree.ElementTree(root).write(beside / COLLECTION_NAME, encoding="utf-8", xml_declaration=True)
+                import pyvista as pv
+
+                pv.save_meshio(beside / f"beads_{frame:06d}.vtu", meshes["beads"])
+        head = '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>'
+        lines = ["<?xml version='1.0' encoding='utf-8'?>", head, *entries, "  </Collection>", "</VTKFile>"]
+        (beside / _COLLECTION).write_text("\n".join(lines), encoding="utf-8")
         if place.exists():
             shutil.rmtree(place)
         beside.rename(place)
     except BaseException:
         shutil.rmtree(beside, ignore_errors=True)
         raise
-    return destination / COLLECTION_NAME
+    return destination / _COLLECTION
+
+
+def write_paraview(
+    directory: Path, destination: Path | None = None, *, colour: str | None = None, **options: Any
+) -> Path:
+    """Write a run for ParaView, with a script that shows it.
+
+    Parameters
+    ----------
+    directory, destination, options
+        See `write_vtk`.
+    colour
+        Array by which beads are coloured; if None, ``walker`` where there are walkers, else ``speed``.
+
+    Raises
+    ------
+    InputError
+        If there is no such array, or the folder holds anything else than such files.
+    """
+    driven = _shown(directory, as_placed=options.get("as_placed", False)).driven
+    names = set(beads_at(driven, 0).array_names)
+    if (bridges := next(read_bridges(driven), None)) is not None:
+        names.update(*(one.point_data(driven)(bridges) for one in analyses_of(driven.case)))
+    colour = colour or ("walker" if driven.walkers else "speed")
+    if colour not in names:
+        told = f"{colour!r}: expected one of {', '.join(sorted(names))}"
+        raise InputError("--colour", [Problem("", None, told)])
+    folder = write_vtk(directory, destination=destination, **options).parent
+    write_text(folder / _SCRIPT, _script(driven, colour, folder.resolve()))
+    return folder / _SCRIPT
+
+
+def open_paraview(script: Path) -> None:
+    """Start ParaView with a script, and do not wait for it.
+
+    Raises
+    ------
+    InputError
+        If there is no ParaView.
+    """
+    program = shutil.which("paraview")
+    if program is None:
+        told = f"no program paraview is installed; {script} shows the run in one"
+        raise InputError("--open", [Problem("", None, told)])
+    subprocess.Popen([program, f"--script={script}"], start_new_session=True)
+
+
+def _shown(directory: Path, *, as_placed: bool) -> Motion:
+    """The motion that the files hold and the camera sees: walkers side by side, unless they are left as placed."""
+    motion = read_motion(directory)
+    return gathered(motion) if motion.case.boundary.bare and not as_placed else motion
 
 
 def _save(mesh: pv.PolyData, path: Path) -> None:
-    """Write a mesh; VTK only prints, at length, that it could not."""
-    from vtkmodules.vtkCommonCore import vtkObject
+    """Write a mesh; VTK by itself would only print, at length, that a disk is full."""
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
-    shown = vtkObject.GetGlobalWarningDisplay()
-    vtkObject.GlobalWarningDisplayOff()
-    try:
-        mesh.save(path, binary=True)
-    finally:
-        vtkObject.SetGlobalWarningDisplay(shown)
-    with path.open("rb") as file:
-        file.seek(max(0, path.stat().st_size - len(_END_OF_VTK)))
-        if file.read() != _END_OF_VTK:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path.parent))
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(mesh)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    path.write_text(writer.GetOutputString(), encoding="utf-8")
 
 
 def _check_replaceable(place: Path) -> None:
     """Only a folder that this module wrote, or an empty one, may be replaced."""
-    if not place.exists():
-        return
-    expected = "expected a new or empty folder, or one that an earlier walkers vtk wrote"
-    if not place.is_dir():
-        raise InputError(str(place), [Problem("", None, f"{expected}; it is a file")])
-    ours = (".vtp", ".vtu", Path(COLLECTION_NAME).suffix)
-    for path in place.iterdir():
-        if path.suffix not in ours and path.name != SCRIPT_NAME:
-            raise InputError(str(place), [Problem("", None, f"{expected}; it holds {path.name}")])
+    held = ""
+    if place.is_dir():
+        ours = {".vtp", ".vtu", Path(_COLLECTION).suffix}
+        names = [path.name for path in place.iterdir() if path.suffix not in ours and path.name != _SCRIPT]
+        held = f"it holds {names[0]}" if names else ""
+    elif place.exists():
+        held = "it is a file"
+    if held:
+        expected = "expected a new or empty folder, or one that an earlier walkers vtk wrote"
+        raise InputError(str(place), [Problem("", None, f"{expected}; {held}")])
 
 
-def _frames(motion: Motion, every: int) -> Iterator[tuple[float, int, Meshes]]:
-    """Times, numbers and meshes of one of so many frames of the drive."""
+def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, pv.PolyData]]]:
+    """One of so many frames of the drive, and its ``beads``, ``boundary`` and, where recorded, ``bridges``."""
     recorded = read_bridges(motion)
     following = next(recorded, None)
     further = [one.point_data(motion) for one in analyses_of(motion.case)]
-    outline = boundary_of(motion)
+    walls = mesh_of(walls_of(motion))
     for frame in range(motion.first_driven, len(motion.time), every):
         while following is not None and following.frame < frame:
             following = next(recorded, None)
-        meshes = {
-            "beads": beads_at(motion, frame),
-            "boundary": outline.translate(motion.substrate[frame], inplace=False),
-        }
+        meshes = {"beads": beads_at(motion, frame), "boundary": walls.translate(motion.substrate[frame])}
         if following is not None and following.frame == frame:
-            for name, values in (pair for one in further for pair in one(following).items()):
-                meshes["beads"].point_data[name] = values
+            for one in further:
+                meshes["beads"].point_data.update(one(following))
             meshes["bridges"] = bridges_at(motion, following)
-        yield float(motion.time[frame]), frame, meshes
+        yield frame, meshes
 
 
 def beads_at(motion: Motion, frame: int) -> pv.PolyData:
@@ -182,66 +215,6 @@ def beads_at(motion: Motion, frame: int) -> pv.PolyData:
     return mesh
 
 
-def boundary_of(motion: Motion) -> pv.PolyData:
-    """The walls: of a container up to its rim, of what has no end the part that the beads use."""
-    import pyvista as pv
-
-    boundary, margin = motion.case.boundary, 4.0 * float(motion.radius.max())
-    low, high = motion.position.min(axis=(0, 1)) - margin, motion.position.max(axis=(0, 1)) + margin
-    half, top = boundary.inner_width / 2.0, boundary.top
-    if boundary.closed:
-        wide = 1.01 * half  # a cylinder is drawn by flat sides, whose edges lie beyond it
-        low, high = np.array([-wide, -wide, min(low[2], 0.0)]), np.array([wide, wide, top])
-    planes = [plane for wall in boundary.walls for plane in _planes(wall)]
-    edges = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]
-    points: list[FloatArray] = []
-    cells: list[int] = []
-    for number, (point, normal) in enumerate(planes):
-        others = planes[:number] + planes[number + 1 :]
-        middle = (low + high) / 2.0
-        nearest = middle - (middle - point) @ normal * normal
-        corners = _clipped(_square(nearest, normal, 2.0 * float(np.linalg.norm(high - low))), [*others, *edges])
-        if len(corners) > 2:
-            cells += [len(corners), *range(len(points), len(points) + len(corners))]
-            points += list(corners)
-    return pv.PolyData(np.array(points), faces=cells)
-
-
-def _planes(wall: Wall) -> list[tuple[FloatArray, FloatArray]]:
-    """A point and the normal of a wall, or of each of the flat sides that a round one is drawn by."""
-    if isinstance(wall, Flat):
-        return [(np.array(wall.point), np.array(wall.normal))]
-    turns = 2.0 * np.pi * (np.arange(_SIDES) + 0.5) / _SIDES
-    outward = np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=-1)
-    return [(wall.radius * one, -one) for one in outward]
-
-
-def _square(centre: FloatArray, normal: FloatArray, size: float) -> FloatArray:
-    """Corners of a square about a point, shape (4, 3)."""
-    first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    first /= np.linalg.norm(first)
-    second = np.cross(normal, first)
-    return np.array([centre + size * (a * first + b * second) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
-
-
-def _clipped(corners: FloatArray, planes: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    """The part of a convex polygon on the inner side of planes (point, normal), after Sutherland and Hodgman (1974)."""
-    for point, normal in planes:
-        inside = (corners - point) @ normal
-        kept = []
-        for one, other, here, there in zip(
-            corners, np.roll(corners, -1, axis=0), inside, np.roll(inside, -1), strict=True
-        ):
-            if here >= -1e-12:
-                kept.append(one)
-            if (here > 1e-12 and there < -1e-12) or (here < -1e-12 and there > 1e-12):
-                kept.append(one + (other - one) * here / (here - there))
-        corners = np.array(kept).reshape(-1, 3)
-        if len(corners) < 3:
-            break
-    return corners
-
-
 def bridges_at(motion: Motion, bridges: Bridges) -> pv.PolyData:
     """Bridges of a frame as lines with ``gap`` (m), ``normal_force`` (N), ``touching`` and ``walker`` (first bead's).
 
@@ -260,19 +233,27 @@ def bridges_at(motion: Motion, bridges: Bridges) -> pv.PolyData:
     return mesh
 
 
-def lines_between(ends: FloatArray) -> pv.PolyData:
-    """Lines between pairs of points, shape (K, 2, 3)."""
-    import pyvista as pv
-
-    numbers = np.arange(2 * len(ends)).reshape(-1, 2)
-    lines = np.hstack([np.full((len(ends), 1), 2), numbers]).ravel()
-    return pv.PolyData(np.ascontiguousarray(ends.reshape(-1, 3)), lines=lines)
-
-
-def _write_vtu(path: Path, beads: pv.PolyData) -> None:
-    import meshio
-
-    points = np.asarray(beads.points)
-    cells = [("vertex", np.arange(len(points)).reshape(-1, 1))]
-    arrays = {name: np.asarray(beads.point_data[name]) for name in beads.point_data}
-    meshio.Mesh(points, cells, point_data=arrays).write(path)
+def _script(motion: Motion, colour: str, folder: Path) -> str:
+    scene = Scene.around(motion, camera_axes(motion), _AROUND)
+    tall = scene.height(_WIDE)
+    place, middle, up = scene.camera(10.0 * tall)
+    # What changes from frame to frame has a scale from nothing to what one in a hundred exceeds.
+    vectors = {"speed": motion.velocity, "velocity": motion.velocity, "omega": motion.spin}.get(colour)
+    return rendered(
+        "walkers.postprocess",
+        "paraview.py.j2",
+        title=motion.case.title or motion.case.name,
+        name=_SCRIPT,
+        collection=_COLLECTION,
+        folder=str(folder),
+        colour=colour,
+        scale=_SCALES.get(colour),
+        largest=None if vectors is None else np.percentile(np.linalg.norm(vectors, axis=-1), 99.0),
+        rounds=48 if len(motion.radius) < 100 else 24,
+        neck=_NECK * float(motion.radius.min()),
+        closed=motion.case.boundary.closed,
+        camera=(1e-3 * place).tolist(),
+        middle=(1e-3 * middle).tolist(),
+        up=up.tolist(),
+        half=1e-3 * tall / 2.0,
+    )

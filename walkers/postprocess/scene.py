@@ -1,60 +1,128 @@
-"""The scene of a run: beads, walls, what moves and where one looks from; drawn off-screen into pictures and films.
+"""The scene of a run: beads, walls, colours, what moves and from where one looks; drawn off-screen (PyVista).
 
-Reports and notebooks (K3D) and scripts for ParaView draw the same beads, walls and cameras.
+Reports and notebooks (`walkers.postprocess.report.player`) and ParaView (`walkers.postprocess.paraview`) show the same.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from math import cos, pi, radians, sin
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from walkers.inputs.boundary import Flat
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.motion import Motion
-from walkers.postprocess.paraview import boundary_of, lines_between
+from walkers.postprocess.motion import Motion, boundary_motion
 from walkers.postprocess.piles import Pile, analyse
+from walkers.postprocess.rolling import Turns, turns_of
 
 if TYPE_CHECKING:
     import pyvista as pv
 
 Picture = npt.NDArray[np.uint8]
 """Red, green, blue, shape (height, width, 3)."""
-RUBY = ("#b0203c", "#e0566c")
-GLASS = ("#8c9aa5", "#c9d2d8")
+RUBY = (0xB0203C, 0xE0566C)
+GLASS = (0x8C9AA5, 0xC9D2D8)
 """Large and small beads, of those that are pointed out and of the others."""
 _GROUND, _LINES, _WALL, _EDGE = "#e3e8eb", "#bcc6cd", "#eef1f3", "#5a6670"
-_PALE = 0.72
-"""White in the paler lunes of a bead that is seen to roll."""
-_BRIGHTEST = 150.0
-"""Mean of red, green and blue in the darker ones."""
+_SHADOW = 0.4  # of black, where a bead stands
+_PALE, _BRIGHTEST = 0.72, 150.0  # white in the paler lunes of a ball; mean of red, green and blue in the darker ones
 _LUNES = 6
-"""Of two colours in turn, about an axis: a beach ball, whose turning shows from every side."""
+_ROUNDS = ((10, 72), (100, 30), (500, 18))  # cells around a ball where beads are fewer than that; else 12
+_SIDES = 64  # of the prism that a round wall is drawn as
+_BEYOND = 6.0  # extent of the floor over that of the picture: it has no end
 _ELEVATION_OF_ONE, _ELEVATION = radians(35.0), radians(60.0)
 """From which a level floor is seen: with one walker on it, and with several."""
-_ASIDE = radians(25.0)
-"""From the normal of a steep wall, to which it is seen."""
-_STEEP = pi / 4.0
-_SINGLE, _FEW, _MANY = 10, 100, 500
-"""Beads from which on spheres are drawn coarser."""
-_SHADOW = 0.4
-"""Of black in a shadow, where a bead stands."""
-_BEYOND = 6.0
-"""Extent of the floor over that of the picture: it has no end."""
+_STEEP, _ASIDE = pi / 4.0, radians(25.0)
+"""The tilt of a wall that is seen from its normal, and how far aside from it."""
 
 
-def pointed_out(motion: Motion) -> Callable[[int], set[int]]:
-    """What gives, for a frame, the beads to colour: those of walkers, and of the clusters that climb and are free."""
-    walkers = set(np.flatnonzero(motion.walker_of >= 0).tolist())
-    if not Pile().applies(motion.case):
-        return lambda _: walkers
-    found = analyse(motion)
-    climbing = [track for track, climb in zip(found.tracks, found.climbs, strict=True) if climb.climbed]
-    return lambda frame: walkers | {bead for track in climbing for bead in track.members_at(frame)}
+@dataclass(frozen=True)
+class Scene:
+    """Beads and walls, and a view of them without perspective.
+
+    Attributes
+    ----------
+    motion
+        Of the beads.
+    axes : ndarray, shape (3, 3)
+        Unit vectors to the right in the picture, up, and toward the camera.
+    low, high : ndarray, shape (3,)
+        What the camera takes in, along these axes, mm.
+    shaken
+        Whether the camera rests in the laboratory, else on the boundary.
+    rolling
+        Whether beads are two-coloured where it is known how they roll.
+    """
+
+    motion: Motion
+    axes: FloatArray
+    low: FloatArray
+    high: FloatArray
+    shaken: bool = True
+    rolling: bool = False
+
+    @classmethod
+    def around(
+        cls, motion: Motion, axes: FloatArray, share: float = 1.0, frames: slice = slice(None), **options: bool
+    ) -> Scene:
+        """A view of all that beads reach in some frames, and of the width and the floor of a container.
+
+        ``share`` is the extent of the picture over that; options are ``shaken`` and ``rolling``.
+        """
+        seen = motion.position[frames]
+        if options.get("shaken", True):
+            seen = seen + motion.substrate[frames, None]
+        seen, radius = 1e3 * seen @ axes.T, 1e3 * motion.radius[:, None]
+        low, high = (seen - radius).min(axis=(0, 1)), (seen + radius).max(axis=(0, 1))
+        if motion.case.boundary.closed:
+            half = 1e3 * motion.case.boundary.inner_width / 2.0
+            low[:2], high[0] = np.minimum(low[:2], [-half, 0.0]), max(high[0], half)
+        wider = (share - 1.0) / 2.0 * (high - low)
+        return cls(motion, axes, low - wider, high + wider, **options)
+
+    def height(self, aspect: float) -> float:
+        """Of the picture, mm, whose width is so many times that."""
+        right, up, _ = self.high - self.low
+        return float(max(up, right / aspect))
+
+    def camera(self, distance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """A camera so far before the middle of what is seen: place and middle, mm, and upward direction."""
+        middle = (self.low + self.high) / 2.0 @ self.axes
+        return middle + distance * self.axes[2], middle, self.axes[1]
+
+    @cached_property
+    def turns(self) -> Turns | None:
+        """How beads turn; None where they are not to show it or it is not known."""
+        return turns_of(self.motion) if self.rolling else None
+
+    @cached_property
+    def pointed_out(self) -> npt.NDArray[np.bool_]:
+        """Which beads are coloured in a frame: those of walkers, and of clusters that climb; shape (F, N)."""
+        motion = self.motion
+        chosen = np.tile(motion.walker_of >= 0, (len(motion.time), 1))
+        if Pile().applies(motion.case):
+            pile = analyse(motion)
+            for track, climb in zip(pile.tracks, pile.climbs, strict=True):
+                for frame, members in zip(track.frames, track.members, strict=True):
+                    chosen[frame, list(members)] |= climb.climbed
+        return chosen
+
+    def colours(self, chosen: npt.NDArray[np.bool_]) -> FloatArray:
+        """Red, green, blue (to 255) of beads, some chosen ones in ruby, and of their paler lunes, shape (2, N, 3)."""
+        large = self.motion.large
+        packed = np.where(chosen, np.where(large, *RUBY), np.where(large, *GLASS))
+        plain = (packed[:, None] >> np.array([16, 8, 0]) & 255).astype(np.float64)
+        if self.turns is None:
+            return np.stack([plain, plain])
+        darker = plain * np.minimum(1.0, _BRIGHTEST / plain.mean(axis=1, keepdims=True))
+        return np.stack([darker, plain + _PALE * (255.0 - plain)])
 
 
 def against_gravity(motion: Motion) -> FloatArray:
@@ -72,7 +140,7 @@ def axes_toward(toward: FloatArray, upward: FloatArray) -> FloatArray:
 
 
 def camera_axes(motion: Motion) -> FloatArray:
-    """The `axes_toward` a camera in the boundary's frame.
+    """The `axes_toward` the camera of films, in the boundary's frame.
 
     Containers are seen from the side, floors from above and from the right of the drive axis, steep walls from a little
     aside; up in the picture is up against gravity.
@@ -90,116 +158,148 @@ def camera_axes(motion: Motion) -> FloatArray:
     return axes_toward(toward, against_gravity(motion))
 
 
-@dataclass(frozen=True)
-class Camera:
-    """A view without perspective.
+def walls_of(motion: Motion) -> list[FloatArray]:
+    """Corners of each wall, counterclockwise as the beads see them, m, shape (K, 3).
 
-    Attributes
-    ----------
-    axes : ndarray, shape (3, 3)
-        Unit vectors to the right, up and toward the camera (`camera_axes`).
-    low, high : ndarray, shape (3,)
-        What it takes in, along these axes, mm.
+    Those of a container end at its rim, those without an end where the beads do; a round one is a prism.
     """
+    from scipy.spatial import HalfspaceIntersection
 
-    axes: FloatArray
-    low: FloatArray
-    high: FloatArray
+    boundary, margin = motion.case.boundary, 4.0 * float(motion.radius.max())
+    low, high = motion.position.min(axis=(0, 1)) - margin, motion.position.max(axis=(0, 1)) + margin
+    if boundary.closed:
+        wide = 1.01 * boundary.inner_width / 2.0  # edges of the prism lie beyond the round wall
+        low, high = np.array([-wide, -wide, min(low[2], -wide)]), np.array([wide, wide, boundary.top])
+    planes: list[tuple[Any, Any]] = []
+    for wall in boundary.walls:
+        if isinstance(wall, Flat):
+            planes.append((wall.point, wall.normal))
+        else:
+            turns = 2.0 * pi * (np.arange(_SIDES) + 0.5) / _SIDES
+            planes += [(wall.radius * out, -out) for out in np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], 1)]
+    ends = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]
+    points, normals = (np.array(each) for each in zip(*planes, *ends, strict=True))
+    spaces = np.column_stack([-normals, np.einsum("px,px->p", normals, points)])
+    room = HalfspaceIntersection(spaces, motion.position[0, 0])
+    faces = []
+    for number, normal in enumerate(normals[: len(planes)]):
+        corners = room.intersections[[number in meeting for meeting in room.dual_facets]]
+        if len(corners) > 2:
+            spokes = corners - corners.mean(axis=0)
+            around = np.arctan2(spokes @ np.cross(normal, spokes[0]), spokes @ spokes[0])
+            faces.append(corners[np.argsort(around)])
+    return faces
 
-    @classmethod
-    def around(cls, motion: Motion, axes: FloatArray, *, share: float = 1.0, shaken: bool = True) -> Camera:
-        """A camera that sees all that beads reach, and the width and the floor of a container.
 
-        Parameters
-        ----------
-        motion
-            Of the beads.
-        axes
-            From which it is seen.
-        share
-            Height and width of the picture over those of what is seen.
-        shaken
-            Whether it rests in the laboratory, else on the boundary.
-        """
-        seen = 1e3 * (motion.position + motion.substrate[:, None] if shaken else motion.position) @ axes.T
-        radius = 1e3 * motion.radius[:, None]
-        low, high = (seen - radius).min(axis=(0, 1)), (seen + radius).max(axis=(0, 1))
-        if motion.case.boundary.closed:
-            half = 1e3 * motion.case.boundary.inner_width / 2.0
-            low[:2], high[0] = np.minimum(low[:2], [-half, 0.0]), max(high[0], half)
-        wider = (share - 1.0) / 2.0 * (high - low)
-        return cls(axes, low - wider, high + wider)
+def mesh_of(faces: Sequence[FloatArray]) -> pv.PolyData:
+    """Polygons with these corners."""
+    import pyvista as pv
 
-    @property
-    def middle(self) -> FloatArray:
-        """Of what is seen, mm."""
-        middle: FloatArray = (self.low + self.high) / 2.0 @ self.axes
-        return middle
+    sizes = [len(corners) for corners in faces]
+    first = np.cumsum([0, *sizes[:-1]])
+    cells = [[size, *range(begin, begin + size)] for begin, size in zip(first, sizes, strict=True)]
+    return pv.PolyData(np.concatenate(faces), faces=np.concatenate(cells))
 
-    def height(self, aspect: float) -> float:
-        """Of the picture, mm, whose width is so many times that."""
-        right, up, _ = self.high - self.low
-        return float(max(up, right / aspect))
 
-    def place(self, distance: float) -> FloatArray:
-        """A point so far before the middle, mm."""
-        place: FloatArray = self.middle + distance * self.axes[2]
-        return place
+def lines_between(ends: FloatArray) -> pv.PolyData:
+    """Lines between pairs of points, shape (K, 2, 3)."""
+    import pyvista as pv
+
+    lines = np.insert(np.arange(2 * len(ends)).reshape(-1, 2), 0, 2, axis=1)
+    return pv.PolyData(np.ascontiguousarray(ends.reshape(-1, 3)), lines=lines.ravel())
+
+
+def floor_lines(low: FloatArray, high: FloatArray, step: float) -> FloatArray:
+    """Ends of lines on the floor between two corners, along x and y at multiples of a step, shape (K, 2, 3)."""
+    lines = []
+    for along, across in ((0, 1), (1, 0)):
+        marks = step * np.arange(np.ceil(low[across] / step), np.floor(high[across] / step) + 1)
+        ends = np.zeros((len(marks), 2, 3))
+        ends[:, :, along], ends[:, :, across] = (low[along], high[along]), marks[:, None]
+        lines.append(ends)
+    return np.concatenate(lines)
+
+
+def round_below(value: float) -> float:
+    """The largest of …, 1, 2, 5, 10, … that is no larger."""
+    decade = 10.0 ** np.floor(np.log10(value) + 1e-9)
+    return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1.0 + 1e-9)))
+
+
+def beach_ball(rounds: int, motion: Motion) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """A unit ball of so many cells around (a multiple of six), whose turning shows from every side.
+
+    Its axis is that about which walkers roll, in containers y, toward which one looks.
+
+    Returns
+    -------
+    points : ndarray, shape (V, 3)
+        Its normals too.
+    triangles : ndarray, shape (T, 3)
+    pale
+        1 where a point is of one of the paler lunes, else 0, shape (V,).
+    """
+    import pyvista as pv
+
+    axis = np.cross([0.0, 0.0, 1.0], [1.0, 0.0, 0.0] if motion.case.boundary.closed else motion.case.drive_axis)
+    lunes = [
+        pv.Sphere(
+            radius=1.0,
+            direction=axis,
+            start_theta=begin,
+            end_theta=end,
+            theta_resolution=rounds // _LUNES,
+            phi_resolution=rounds // 2 + 1,
+        )
+        for begin, end in pairwise(np.linspace(0.0, 360.0, _LUNES + 1))
+    ]
+    ball = pv.merge(lunes, merge_points=False)
+    points = ball.points / np.linalg.norm(ball.points, axis=1, keepdims=True)
+    return points, ball.regular_faces, np.repeat(np.arange(_LUNES) % 2, len(points) // _LUNES)
 
 
 class Window:
-    """A window off-screen onto a run, without perspective, so that a scale bar holds: walls, beads and their shadows.
+    """A window off-screen onto a scene, of so many pixels across and up, `pixels_per_mm` of them to a mm."""
 
-    Parameters
-    ----------
-    motion
-        Whose beads, floor or walls are seen.
-    camera
-        From where.
-    size
-        Pixels across and up.
-    rolling
-        Whether beads are two-coloured, to be seen to roll.
-
-    Attributes
-    ----------
-    pixels_per_mm
-        In the picture.
-    """
-
-    def __init__(self, motion: Motion, camera: Camera, size: Sequence[int], *, rolling: bool = False) -> None:
+    def __init__(self, scene: Scene, size: Sequence[int]) -> None:
         # Without this VTK tries an X server first and says so.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
         import pyvista as pv
 
-        bare, closed = motion.case.boundary.bare, motion.case.boundary.closed
+        self._scene, self._bare, radius = scene, scene.motion.case.boundary.bare, 1e3 * scene.motion.radius
         self._plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
-        self._plotter.background_color = pv.Color(_GROUND if bare else "white")
-        tall, wide = camera.height(size[0] / size[1]), camera.height(size[0] / size[1]) * size[0] / size[1]
+        self._plotter.background_color = pv.Color(_GROUND if self._bare else "white")
+        tall = scene.height(size[0] / size[1])
+        wide = max(tall, tall * size[0] / size[1])
         self.pixels_per_mm = size[1] / tall
-        self._plotter.camera_position = [camera.place(10.0 * tall), camera.middle, camera.axes[1]]
+        self._plotter.camera_position = [*scene.camera(10.0 * tall)]
         self._plotter.camera.parallel_projection, self._plotter.camera.parallel_scale = True, tall / 2.0
-        around = self._add_floor if bare else self._add_walls
-        self._around: list[pv.Actor] = around(motion, camera, max(wide, tall))
-        self._plotter.camera.clipping_range = (0.1 * tall, 40.0 * max(tall, wide))
-        level = np.array([0.0, 0.0, 1.0])
-        axes = np.eye(3) if closed else axes_toward(level, np.cross(level, motion.case.drive_axis))
-        self._shadows = _Shadows(self._plotter, 1e3 * motion.radius) if bare else None
-        self._beads = _Beads(self._plotter, motion, axes if rolling else None)
+        self._around = self._floor(wide) if self._bare else self._walls(wide)
+        self._plotter.camera.clipping_range = (0.1 * tall, 40.0 * wide)
+        if self._bare:
+            disc = pv.Disc(inner=0.0, outer=1.0, r_res=8, c_res=48).triangulate()
+            self._shadows = _Copies(self._plotter, disc.points, disc.regular_faces, radius, lighting=False)
+            black = np.zeros((disc.n_points, 4))
+            black[:, 3] = 255.0 * _SHADOW * (1.0 - np.linalg.norm(disc.points, axis=1) ** 2) ** 2
+            self._shadows.colour(np.tile(black, (len(radius), 1, 1)))
+        rounds = next((cells for fewer, cells in _ROUNDS if len(radius) < fewer), 12)
+        points, triangles, self._pale = beach_ball(rounds, scene.motion)
+        self._beads = _Copies(self._plotter, points, triangles, radius, specular=0.4)
 
-    def picture(
-        self,
-        place: FloatArray,
-        coloured: Collection[int],
-        shift: FloatArray | None = None,
-        turned: FloatArray | None = None,
-    ) -> Picture:
-        """Beads at places relative to the boundary (m), some coloured, all shifted with it, turned by matrices."""
-        shift = np.zeros(3) if shift is None else 1e3 * shift
-        self._beads.colour(coloured)
-        self._beads.move(1e3 * place + shift, turned)
-        if self._shadows is not None:
-            self._shadows.move(1e3 * place + shift, float(shift[2]))
+    def picture(self, frame: int, share: float = 0.0) -> Picture:
+        """The beads at a share of the way from a frame to the next one, on the cubic through places and velocities."""
+        motion, shift = self._scene.motion, np.zeros(3)
+        place, time = motion.position[frame], motion.time[frame]
+        if share:
+            place = motion.select(slice(frame, frame + 2)).between(share).position[0]
+            time += share * (motion.time[frame + 1] - time)
+        if self._scene.shaken:
+            shift = 1e3 * boundary_motion(motion.case.drive, np.array([time]))[0][0]
+        turns = self._scene.turns
+        self._beads.colour(self._scene.colours(self._scene.pointed_out[frame])[self._pale].swapaxes(0, 1))
+        self._beads.move(1e3 * place + shift, None if turns is None else turns.at(frame, share))
+        if self._bare:
+            self._shadows.move(1e3 * place * [1.0, 1.0, 0.0] + shift)
         for actor in self._around:
             actor.position = tuple(shift)
         self._plotter.render()  # a screenshot does so the first time only
@@ -209,138 +309,53 @@ class Window:
         """Give back the window."""
         self._plotter.close()
 
-    def _add_floor(self, motion: Motion, camera: Camera, wide: float) -> list[pv.Actor]:
+    def _floor(self, wide: float) -> list[pv.Actor]:
         """A floor with lines, by which it is seen to move."""
         import pyvista as pv
 
-        del motion
-        spacing, half = round_below(wide / 8.0), _BEYOND * wide / 2.0
-        x, y = (np.round(place / spacing) * spacing for place in camera.middle[:2])
-        marks = spacing * np.arange(-int(half / spacing), int(half / spacing) + 1)
-        along = np.array([[[x - half, y + mark, 0.0], [x + half, y + mark, 0.0]] for mark in marks])
-        across = np.array([[[x + mark, y - half, 0.0], [x + mark, y + half, 0.0]] for mark in marks])
-        floor = pv.Plane(center=(x, y, -2e-3 * wide), i_size=2.0 * half, j_size=2.0 * half, direction=(0.0, 0.0, 1.0))
-        lines = lines_between(np.concatenate([along, across]) - [0.0, 0.0, 1e-3 * wide])
+        half, middle = _BEYOND * wide / 2.0, self._scene.camera(0.0)[1] * [1.0, 1.0, 0.0]
+        floor = pv.Plane(center=middle - [0.0, 0.0, 2e-3 * wide], i_size=2.0 * half, j_size=2.0 * half)
+        lines = lines_between(floor_lines(middle - half, middle + half, round_below(wide / 8.0)))
+        lines.translate([0.0, 0.0, -1e-3 * wide], inplace=True)
         return [
             self._plotter.add_mesh(floor, color=_GROUND, lighting=False),
             self._plotter.add_mesh(lines, color=_LINES, line_width=2, lighting=False),
         ]
 
-    def _add_walls(self, motion: Motion, camera: Camera, wide: float) -> list[pv.Actor]:
+    def _walls(self, wide: float) -> list[pv.Actor]:
         """Walls, of which those that would hide the beads are left out; their edges nearer, lest walls hide them."""
-        walls = boundary_of(motion).scale(1e3, inplace=False).clean(tolerance=1e-6, absolute=True)
+        walls = mesh_of(walls_of(self._scene.motion)).scale(1e3).clean(tolerance=1e-6, absolute=True)
         drawn = self._plotter.add_mesh(walls, color=_WALL, lighting=False)
         drawn.prop.culling = "back"
         edges = walls.extract_feature_edges(feature_angle=30.0, manifold_edges=False, non_manifold_edges=False)
-        edges.translate(1e-2 * wide * camera.axes[2], inplace=True)
+        edges.translate(1e-2 * wide * self._scene.axes[2], inplace=True)
         return [drawn, self._plotter.add_mesh(edges, color=_EDGE, line_width=2, lighting=False)]
 
 
-def round_below(value: float) -> float:
-    """The largest of …, 1, 2, 5, 10, … that is no larger."""
-    decade = 10.0 ** np.floor(np.log10(value) + 1e-9)
-    return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1.0 + 1e-9)))
+class _Copies:
+    """Copies of a unit mesh, one a bead, which are moved, turned and coloured from frame to frame; in mm."""
 
+    def __init__(self, plotter: pv.Plotter, points: Any, triangles: Any, radius: FloatArray, **look: Any) -> None:
+        import pyvista as pv
 
-def beach_ball(rounds: int) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
-    """A unit ball of so many cells around (a multiple of six) and half as many along its axis, which is y.
-
-    Returns
-    -------
-    vertices : ndarray, shape (V, 3)
-        Its normals too; lunes share none.
-    triangles : ndarray, shape (T, 3)
-    pale
-        Whether a vertex is of one of the paler lunes, shape (V,).
-    """
-    around, down = rounds // _LUNES, rounds // 2
-    angle = np.array([np.linspace(lune, lune + 1, around + 1) for lune in range(_LUNES)]) * 2.0 * np.pi / _LUNES
-    lower, turn = np.meshgrid(np.linspace(0.0, np.pi, down + 1), angle)
-    vertices = np.stack([np.sin(lower) * np.cos(turn), np.cos(lower), np.sin(lower) * np.sin(turn)], axis=-1)
-    corner = np.arange(len(vertices) * (down + 1)).reshape(_LUNES, around + 1, down + 1)
-    one, beside = corner[:, :-1, :-1].ravel(), corner[:, 1:, :-1].ravel()
-    triangles = np.concatenate([np.stack([one, beside, beside + 1], 1), np.stack([one, beside + 1, one + 1], 1)])
-    pale = np.repeat(np.arange(_LUNES) % 2 == 1, (around + 1) * (down + 1))
-    return vertices.reshape(-1, 3).astype(np.float32), triangles, pale
-
-
-def _copies(points: int, triangles: npt.NDArray[np.int64], count: int) -> pv.PolyData:
-    """A mesh of so many copies of triangles, each with points of its own."""
-    import pyvista as pv
-
-    faces = np.full((count, len(triangles), 4), 3, dtype=np.int64)
-    faces[:, :, 1:] = triangles + (np.arange(count) * points)[:, None, None]
-    return pv.PolyData(np.zeros((count * points, 3), dtype=np.float32), faces.ravel())
-
-
-class _Beads:
-    """All beads as one mesh, in mm, which is moved, turned and coloured from frame to frame.
-
-    Lunes, where beads are to be seen to roll, are about the second of some axes; None for beads of one colour.
-    """
-
-    def __init__(self, plotter: pv.Plotter, motion: Motion, axes: FloatArray | None) -> None:
-        count = len(motion.radius)
-        ball, triangles, pale = beach_ball(
-            72 if count < _SINGLE else 30 if count < _FEW else 18 if count < _MANY else 12
-        )
-        self._pale = pale if axes is not None else np.zeros_like(pale)
-        self._ball = ball if axes is None else (ball @ axes).astype(np.float32)
-        self._radius, self._large = (1e3 * motion.radius).astype(np.float32), motion.large
-        self._mesh = _copies(len(ball), triangles, count)
-        self._mesh.point_data["Normals"] = np.zeros((self._mesh.n_points, 3), dtype=np.float32)
+        faces = (triangles + len(points) * np.arange(len(radius))[:, None, None]).reshape(-1, 3)
+        self._points, self._radius = np.asarray(points, np.float32), radius[:, None, None].astype(np.float32)
+        self._mesh = pv.PolyData(np.tile(self._points, (len(radius), 1)), np.insert(faces, 0, 3, axis=1).ravel())
+        self.colour(np.zeros((len(radius), len(points), 4 if "lighting" in look else 3)))
+        self._mesh.point_data["Normals"] = np.asarray(self._mesh.points).copy()
         self._mesh.point_data.active_normals_name = "Normals"
-        self._mesh.point_data["colour"] = np.zeros((self._mesh.n_points, 3), dtype=np.uint8)
-        self._coloured: frozenset[int] | None = None
-        drawn = plotter.add_mesh(self._mesh, scalars="colour", rgb=True, specular=0.4, smooth_shading=False)
+        drawn = plotter.add_mesh(self._mesh, scalars="colour", rgb=True, smooth_shading=False, **look)
         drawn.prop.culling = "back"  # the far halves of spheres, half of the work, are never seen
         drawn.prop.interpolation = "Phong"  # by these normals, where pyvista would compute others
 
-    def move(self, centres: FloatArray, turned: FloatArray | None) -> None:
-        """Put them at centres (mm, shape (N, 3)), turned by rotation matrices (shape (N, 3, 3)) if that is known."""
+    def move(self, centres: FloatArray, turned: FloatArray | None = None) -> None:
+        """Put them at centres (shape (N, 3)), turned by rotation matrices (shape (N, 3, 3))."""
+        turned = np.tile(np.eye(3), (len(centres), 1, 1)) if turned is None else turned
         # A sphere's own points are its normals: smooth without computing any.
-        if turned is None:
-            normals = np.broadcast_to(self._ball, (len(centres), *self._ball.shape))
-        else:
-            normals = self._ball @ np.swapaxes(turned.astype(np.float32), 1, 2)
-        points = self._radius[:, None, None] * np.asarray(normals, np.float32) + centres[:, None].astype(np.float32)
-        self._mesh.points = points.reshape(-1, 3)
-        self._mesh.point_data["Normals"] = np.ascontiguousarray(normals.reshape(-1, 3))
+        normals = self._points @ np.swapaxes(turned, 1, 2).astype(np.float32)
+        self._mesh.points = (self._radius * normals + centres[:, None].astype(np.float32)).reshape(-1, 3)
+        self._mesh.point_data["Normals"] = normals.reshape(-1, 3)
 
-    def colour(self, coloured: Collection[int]) -> None:
-        """Give some beads the colours of those that are pointed out, all others those of glass."""
-        import pyvista as pv
-
-        if self._coloured == frozenset(coloured):
-            return
-        self._coloured = frozenset(coloured)
-        chosen = np.isin(np.arange(len(self._large)), list(coloured))
-        rgb = np.array([[pv.Color(name).int_rgb for name in names] for names in (GLASS, RUBY)], dtype=np.float64)
-        plain = rgb[chosen.astype(int), (~self._large).astype(int)]
-        pale = plain + _PALE * (255.0 - plain)
-        if self._pale.any():
-            plain = plain * np.minimum(1.0, _BRIGHTEST / plain.mean(axis=1))[:, None]
-        colours = np.where(self._pale[None, :, None], pale[:, None], plain[:, None])
-        self._mesh.point_data["colour"] = colours.reshape(-1, 3).round().astype(np.uint8)
-
-
-class _Shadows:
-    """A soft dark disc below each bead, on the floor z = 0; radii in mm."""
-
-    def __init__(self, plotter: pv.Plotter, radius: FloatArray) -> None:
-        import pyvista as pv
-
-        disc = pv.Disc(inner=0.0, outer=1.0, r_res=8, c_res=48).triangulate()
-        points = np.asarray(disc.points)
-        self._discs = radius[:, None, None] * points
-        self._mesh = _copies(len(points), disc.faces.reshape(-1, 4)[:, 1:].astype(np.int64), len(radius))
-        share = np.linalg.norm(points, axis=1)
-        rgba = np.zeros((len(points), 4), dtype=np.uint8)
-        rgba[:, 3] = (255.0 * _SHADOW * (1.0 - share**2) ** 2).round()
-        self._mesh.point_data["shadow"] = np.tile(rgba, (len(radius), 1))
-        plotter.add_mesh(self._mesh, scalars="shadow", rgb=True, lighting=False)
-
-    def move(self, centres: FloatArray, level: float) -> None:
-        """Put them below beads (mm, shape (N, 3)) on a floor at a level."""
-        below = centres * [1.0, 1.0, 0.0] + [0.0, 0.0, level]
-        self._mesh.points = (self._discs + below[:, None]).reshape(-1, 3).astype(np.float32)
+    def colour(self, colours: FloatArray) -> None:
+        """Colour their points, red, green, blue and perhaps opacity to 255, shape (N, V, 3 or 4)."""
+        self._mesh.point_data["colour"] = colours.reshape(-1, colours.shape[-1]).round().astype(np.uint8)

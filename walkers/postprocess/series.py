@@ -12,9 +12,9 @@ import numpy as np
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.units import DURATION, parse_quantity
-from walkers.postprocess.drawing import check_picture, new_figure, save_figure, styled
+from walkers.postprocess.drawing import check_place, new_figure, save_figure, styled
 from walkers.postprocess.motion import Group, Motion, gathered, read_motion
-from walkers.postprocess.scene import Camera, Picture, Window, axes_toward, pointed_out
+from walkers.postprocess.scene import Picture, Scene, Window, axes_toward
 from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
@@ -76,22 +76,22 @@ def render_series(
         If the destination is no PNG, frames were recorded less often, or the drive was shorter than that.
     """
     path = destination or directory / (SERIES_NAME if walker is None else PICTURE_NAME)
-    check_picture(path, ".png")
+    check_place(path, ".png")
     whole = read_motion(directory)
     motion = gathered(whole if walker is None else whole.of_walkers(whole.walkers[walker : walker + 1]))
     frames = _frames_evenly(motion, images) if apart is None else _frames_apart(motion, images, apart, directory)
-    sideways, chosen = motion.case.boundary.closed, pointed_out(motion)
+    sideways = motion.case.boundary.closed
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) if sideways else np.eye(3)
-    camera = Camera.around(motion.driven, axes, share=1.0 if sideways else 1.1, shaken=False)
-    (left, low, _), (right, high, _) = camera.low, camera.high
+    driven = slice(motion.first_driven, None)
+    scene = Scene.around(motion, axes, 1.0 if sideways else 1.1, driven, shaken=False)
+    (left, low, _), (right, high, _) = scene.low, scene.high
     high += 0.05 * (high - low) if sideways else 0.0
-    camera = replace(camera, high=np.array([right, high, camera.high[2]]))
-    window = Window(motion, camera, _pixels(right - left, high - low))
+    scene = replace(scene, high=np.array([right, high, scene.high[2]]))
+    window = Window(scene, _pixels(right - left, high - low))
     decimals = 2 if apart is None or apart >= 0.1 else 4
     figure, panels = _panels(len(frames), right - left, high - low, rows=None if walker is None else len(frames))
     for panel, frame in zip(panels, frames, strict=True):
-        picture = window.picture(motion.position[frame], chosen(frame))
-        panel.imshow(picture, extent=(left, right, low, high), interpolation="antialiased")
+        panel.imshow(window.picture(frame), extent=(left, right, low, high), interpolation="antialiased")
         panel.set_title(f"{motion.time[frame]:.{decimals}f} s", fontsize=10)
         panel.set_xlabel("x (mm)" if walker is None or panel is panels[-1] else "")
         panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])
@@ -129,10 +129,10 @@ def top_view(group: Group, walker: int, frame: int, along: tuple[float, float], 
     """
     motion = group.motion.of_walkers(group.walkers[walker : walker + 1])
     bounds = 1e3 * np.array([along, across, (0.0, 2.0 * group.radii.max())])
-    camera = Camera(axes_toward(np.array([0.0, 0.0, 1.0]), group.across_axis), *bounds.T)
+    scene = Scene(motion, axes_toward(np.array([0.0, 0.0, 1.0]), group.across_axis), bounds[:, 0], bounds[:, 1], False)
     pixels = 120.0 / (1e3 * float(group.radii.min()))
-    window = Window(motion, camera, [round(float(high - low) * pixels) for low, high in bounds[:2]])
-    picture = window.picture(motion.position[frame], range(len(motion.radius)))
+    window = Window(scene, [round(float(high - low) * pixels) for low, high in bounds[:2]])
+    picture = window.picture(frame)
     window.close()
     return picture
 

@@ -1,4 +1,4 @@
-"""One HTML file that carries all that it shows: libraries, plots and scenes, packed; no network, no other file.
+"""One HTML file that carries all that it shows: libraries, plots and players, packed; no network, no other file.
 
 A page is a list of sections, one of which is shown at a time where there is JavaScript; without it all of their tables
 can be read.
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.errors import InputError, Problem
+from walkers.postprocess.drawing import check_place
 from walkers.runner.files import write_text
 from walkers.runner.provenance import PROJECT, software
 
@@ -24,11 +25,10 @@ if TYPE_CHECKING:
     from bokeh.models import Model
     from jinja2 import Environment
 
-    from walkers.postprocess.report.scene import Scene
-
+_PACKAGE = "walkers.postprocess.report"
+NAME = "report.html"
 LARGEST = 5_000_000
 """Bytes that a report may have: what any mail takes along."""
-NAME = "report.html"
 
 
 def check_report(path: Path) -> None:
@@ -39,8 +39,7 @@ def check_report(path: Path) -> None:
     InputError
         If its name does not end in .html, it is a folder, or there is no folder for it.
     """
-    if path.suffix.lower() not in {".html", ".htm"} or path.is_dir():
-        raise InputError("--to", [Problem("", None, f"{path}: expected the name of a .html file")])
+    check_place(path, ".html", ".htm")
     if not path.absolute().parent.is_dir():
         raise InputError("--to", [Problem("", None, f"{path.absolute().parent}: there is no such folder")])
 
@@ -57,18 +56,16 @@ def write_page(path: Path, title: str, body: str, carried: Mapping[str, str]) ->
     body
         As HTML, of a template.
     carried
-        What scripts unpack, by id: from `packed_plots` and `packed_scene`.
+        What scripts unpack, by id: packed plots and players.
     """
-    libraries = {name: _library(name) for name in ("bokeh", "k3d")} if carried else {}
+    libraries = {f"library-{name}": _library(name) for name in ("bokeh", "k3d")} if carried else {}
     page = fill(
         "page.html.j2",
         title=title,
-        body=markup(body),
-        style=markup(_read("report.css")),
-        carried=carried,
-        libraries=libraries,
-        unpacker=markup(_unpacker()) if carried else "",
-        player=markup(_read("player.js")) if carried else "",
+        body=body,
+        style=_text(_PACKAGE, "report.css"),
+        carried={**libraries, **carried},
+        scripts=_scripts() if carried else [],
         written_by=f"{PROJECT} {software().version}",
     )
     write_text(path, page)
@@ -77,33 +74,20 @@ def write_page(path: Path, title: str, body: str, carried: Mapping[str, str]) ->
 
 def overhead() -> int:
     """Bytes of a page's libraries and scripts."""
-    return (
-        sum(map(len, (_library("bokeh"), _library("k3d"), _unpacker(), _read("player.js"), _read("report.css")))) + 2000
-    )
+    texts = [_library("bokeh"), _library("k3d"), *_scripts(), _text(_PACKAGE, "report.css")]
+    return sum(map(len, texts)) + 2000
 
 
-def fill(template: str, package: str = "walkers.postprocess.report", **values: Any) -> str:
+def fill(template: str, package: str = _PACKAGE, **values: Any) -> str:
     """The HTML of a template; what is put in is escaped."""
     return _environment(package).get_template(template).render(**values)
-
-
-def markup(text: str) -> Any:
-    """A text that is HTML already."""
-    from markupsafe import Markup
-
-    return Markup(text)
 
 
 def packed_plots(plots: Model) -> str:
     """Bokeh plots as the page carries them."""
     from bokeh.embed import json_item
 
-    return _packed(json.dumps(json_item(plots)).encode())
-
-
-def packed_scene(scene: Scene) -> str:
-    """A scene as the page carries it."""
-    return base64.b64encode(scene.plot.get_binary_snapshot(9)).decode()
+    return _packed(json.dumps(json_item(plots)))
 
 
 def picture_uri(path: Path) -> str:
@@ -111,38 +95,37 @@ def picture_uri(path: Path) -> str:
     return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"
 
 
-def _packed(contents: bytes) -> str:
-    return base64.b64encode(zlib.compress(contents, 9)).decode()
+def _packed(text: str) -> str:
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
 
 
 @cache
 def _library(name: str) -> str:
     if name == "k3d":
-        source = files("k3d").joinpath("static", "standalone.js").read_text("utf-8")
         # Its letters are in it as woff2; the same in other formats would be looked for beside the page.
-        return _packed(re.sub(r',url\(fonts/[^)]*\) format\("(?:woff|truetype)"\)', "", source).encode())
+        source = _text("k3d", "static/standalone.js")
+        return _packed(re.sub(r',url\(fonts/[^)]*\) format\("(?:woff|truetype)"\)', "", source))
     from bokeh.resources import Resources
 
-    return _packed("\n".join(Resources(mode="inline", components=["bokeh"], log_level="error").js_raw).encode())
+    return _packed("\n".join(Resources(mode="inline", components=["bokeh"], log_level="error").js_raw))
+
+
+def _scripts() -> list[str]:
+    """What unpacks and plays."""
+    return [_text("k3d", "static/fflate.js"), _text(_PACKAGE, "player.js")]
 
 
 @cache
-def _unpacker() -> str:
-    return files("k3d").joinpath("static", "fflate.js").read_text("utf-8")
-
-
-@cache
-def _read(name: str) -> str:
-    return files("walkers.postprocess.report").joinpath(name).read_text("utf-8")
+def _text(package: str, name: str) -> str:
+    return files(package).joinpath(name).read_text("utf-8")
 
 
 @cache
 def _environment(package: str) -> Environment:
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
-    own = PackageLoader("walkers.postprocess.report", ".")
     return Environment(
-        loader=ChoiceLoader([PackageLoader(package, "."), own]),
+        loader=ChoiceLoader([PackageLoader(package, "."), PackageLoader(_PACKAGE, ".")]),
         undefined=StrictUndefined,
         autoescape=True,
         trim_blocks=True,

@@ -1,4 +1,4 @@
-"""Interactive plots of a run (Bokeh): where walkers went and how fast, their gait; what a pile did."""
+"""Interactive plots (Bokeh): the panels of a run, and what plots of sweeps share with them."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ import numpy as np
 
 from walkers.postprocess.analysis import analyses_of
 from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.figures import Panel, gait_panels, pile_panels, velocity_panel, walk_panels
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.panels import Panel, gait_panels, pile_panels, velocity_panel, walk_panels
 from walkers.postprocess.piles import analyse
 from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
     from bokeh.models import Model
     from bokeh.plotting import figure as Figure  # noqa: N812
-
 
 COLOURS = ("#b0203c", "#1f3b73", "#3f7f93", "#c78a2c", "#5b6770", "#7a4a8c", "#4c8c4a", "#1d2429")
 _MARKERS = {"o": "circle", "s": "square", "^": "triangle", "v": "inverted_triangle", "D": "diamond", "x": "x"}
@@ -44,18 +43,17 @@ def plots_of(directory: Path) -> Model | None:
 def _plot(panel: Panel) -> Figure:
     from bokeh.models.annotations import BoxAnnotation
 
-    y = panel.y.replace("\n", " ")
-    plot = new_plot(panel.title, panel.x, y, y_axis_type="log" if panel.log else "linear")
+    plot = new_plot(panel.title, panel.x, panel.y.replace("\n", " "), y_axis_type="log" if panel.log else "linear")
     if panel.settled:
         plot.add_layout(BoxAnnotation(left=0.0, right=panel.settled, fill_color="#888888", fill_alpha=0.12))
     if panel.band:
         low, high = panel.band
         plot.varea(low.x, low.y, high.y, color="#5b6770", alpha=0.2, legend_label=low.label.replace("\n", " "))
     for line in panel.lines:
-        thin = slice(None, None, -(-len(line.x) // _MOST_POINTS) or None)
         look: dict[str, Any] = {"legend_label": line.label.replace("\n", " ")} if line.label else {}
         look["color"] = line.colour if isinstance(line.colour, str) else COLOURS[line.colour % len(COLOURS)]
         if line.width:
+            thin = slice(None, None, -(-len(line.x) // _MOST_POINTS) or None)
             dash = "dashed" if line.dashed else "solid"
             plot.line(line.x[thin], line.y[thin], line_width=line.width, line_dash=dash, **look)
         else:
@@ -77,11 +75,10 @@ def new_plot(title: str, x: str, y: str, *, height: int = 300, **options: Any) -
         height=height,
         sizing_mode="stretch_width",
         tools="pan,box_zoom,wheel_zoom,reset,save,hover",
-        toolbar_location="right",
+        active_scroll=None,  # the wheel scrolls the page
         **options,
     )
     plot.toolbar.logo = None
-    plot.toolbar.active_scroll = None  # the wheel scrolls the page
     return plot
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
+import base64
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,94 +11,44 @@ from walkers.inputs.case import Case
 from walkers.inputs.origins import Origin, text_of
 from walkers.inputs.readable import dotted
 from walkers.postprocess.analysis import analyses_in, current_result, quantities_of, warnings_of
-from walkers.postprocess.motion import read_motion
-from walkers.postprocess.report.page import NAME, check_report, fill, packed_plots, packed_scene, write_page
+from walkers.postprocess.report.page import NAME, check_report, fill, packed_plots, write_page
+from walkers.postprocess.report.player import MOST_PLACES, player_of
 from walkers.postprocess.report.plots import plots_of
-from walkers.postprocess.report.scene import MOST_PLACES, Scene, scene_of
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """A row of the table of parameters, as text."""
-
-    key: str
-    text: str
-    origin: str = ""
-    source: str = ""
-    range: str = ""
-    guessed: bool = False
-
-
-@dataclass(frozen=True)
 class RunReport:
-    """What the report of a run shows, for its template.
+    """What a page shows of a run, for its template; what the page's scripts unpack is ``carried``.
 
-    Attributes
+    Parameters
     ----------
     directory
         The run directory.
     id
         Of its section in the page.
     places
-        Beads times instants of its scene at most.
+        Beads times instants of its player at most.
     origins
         Where the values of the case come from; None: as the run recorded it.
     """
 
-    directory: Path
-    id: str = "run"
-    places: int = MOST_PLACES
-    origins: tuple[Origin, ...] | None = None
-
-    @cached_property
-    def result(self) -> dict[str, Any]:
-        """What the run gave."""
-        return current_result(self.directory)
-
-    @cached_property
-    def case(self) -> Case:
-        """The resolved case."""
-        return case_of(self.directory)
-
-    @property
-    def name(self) -> str:
-        """Of the run directory."""
-        return self.directory.resolve().name
-
-    @property
-    def title(self) -> str:
-        """What the case calls itself."""
-        return self.case.title or self.case.name
-
-    @cached_property
-    def shown(self) -> dict[str, Any]:
-        """What is told of a result and its case wherever they are shown."""
-        return shown_of(self.directory, self.result, self.origins)
-
-    @cached_property
-    def manifest(self) -> dict[str, Any]:
-        """What the run directory says of the run."""
-        return read_json(self.directory / MANIFEST_NAME)
-
-    @cached_property
-    def scene(self) -> Scene:
-        """The beads in three dimensions."""
-        return scene_of(read_motion(self.directory), places=self.places)
-
-    @property
-    def cameras(self) -> dict[str, str]:
-        """Buttons that put the camera somewhere: its places as JSON."""
-        return {name: json.dumps(camera) for name, camera in self.scene.cameras.items()}
-
-    @cached_property
-    def carried(self) -> dict[str, str]:
-        """What the page's scripts unpack."""
-        plots = plots_of(self.directory)
-        packed = {f"scene-{self.id}": packed_scene(self.scene)}
-        return packed if plots is None else {**packed, f"plots-{self.id}": packed_plots(plots)}
+    def __init__(
+        self,
+        directory: Path,
+        id: str = "run",
+        places: int = MOST_PLACES,
+        origins: tuple[Origin, ...] | None = None,
+    ) -> None:
+        case = case_of(directory)
+        self.id, self.name, self.title = id, directory.resolve().name, case.title or case.name
+        self.shown = shown_of(directory, current_result(directory), origins)
+        self.manifest = read_json(directory / MANIFEST_NAME)
+        self.player, plots = player_of(directory, places=places), plots_of(directory)
+        self.carried = {f"player-{id}": base64.b64encode(self.player.plot.get_binary_snapshot(9)).decode()}
+        if plots is not None:
+            self.carried[f"plots-{id}"] = packed_plots(plots)
 
 
 def report_run(directory: Path, to: Path | None = None, origins: tuple[Origin, ...] | None = None) -> Path:
@@ -108,17 +56,10 @@ def report_run(directory: Path, to: Path | None = None, origins: tuple[Origin, .
 
     Parameters
     ----------
-    directory
-        A run directory.
+    directory, origins
+        See `RunReport`.
     to
-        The file; ``report.html`` in the run directory if None.
-    origins
-        Where the values of the case come from; None: as the run recorded it.
-
-    Returns
-    -------
-    Path
-        The file, less than 5 MB.
+        The file, of less than 5 MB; ``report.html`` in the run directory if None.
 
     Raises
     ------
@@ -152,19 +93,24 @@ def shown_of(directory: Path, result: dict[str, Any], origins: tuple[Origin, ...
     Of runs that did not keep where their values come from, the parameters are in SI units.
     """
     case = case_of(directory)
-    known = [_parameter(one) for one in (case.origins if origins is None else origins)]
+    parameters = [
+        {
+            "key": one.key,
+            "text": one.text,
+            "origin": one.origin,
+            "source": one.source,
+            "range": " … ".join(map(text_of, one.range or ())),
+            "guessed": one.guessed,
+        }
+        for one in (case.origins if origins is None else origins)
+    ]
     return {
         "summary": summary_of(case),
         "warnings": warnings_of(result),
         "quantities": quantities_of(result),
-        "guessed": [parameter for parameter in known if parameter.guessed],
-        "parameters": known or [Parameter(key, text_of(value)) for key, value in flat(case.as_dict())],
+        "guessed": [one for one in parameters if one["guessed"]],
+        "parameters": parameters or [{"key": key, "text": text_of(value)} for key, value in flat(case.as_dict())],
     }
-
-
-def _parameter(one: Origin) -> Parameter:
-    ends = " … ".join(text_of(end) for end in one.range) if one.range else ""
-    return Parameter(one.key, one.text, one.origin, one.source, ends, one.guessed)
 
 
 def flat(values: Any) -> Iterator[tuple[str, Any]]:
@@ -174,6 +120,5 @@ def flat(values: Any) -> Iterator[tuple[str, Any]]:
 
 def result_html(directory: Path, result: dict[str, Any], origins: tuple[Origin, ...] | None = None) -> str:
     """A result as a piece of HTML: a table with errors and units, warnings, and the parameters folded in."""
-    headline = [line for one in analyses_in(result) for line in one.lines(result)][:1] or [result["case"]]
-    shown = shown_of(directory, result, origins)
-    return fill("result.html.j2", headline=headline[0], shown=shown, run=directory.name)
+    headline = next((line for one in analyses_in(result) for line in one.lines(result)), result["case"])
+    return fill("result.html.j2", headline=headline, shown=shown_of(directory, result, origins), run=directory.name)

@@ -1,0 +1,191 @@
+"""The beads of a run in three dimensions, to be played and turned: a K3D plot for reports and for notebooks.
+
+Seen in the frame of the boundary, in mm. Beads are beach balls, which shows how they roll, but for those whose spins
+are recorded too seldom to be added up (`walkers.postprocess.rolling`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, radians, tan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.motion import Motion, gathered, read_motion
+from walkers.postprocess.scene import (
+    Scene,
+    against_gravity,
+    axes_toward,
+    beach_ball,
+    floor_lines,
+    mesh_of,
+    round_below,
+    walls_of,
+)
+
+if TYPE_CHECKING:
+    import k3d
+
+MOST_PLACES = 8000
+"""Beads times instants of a plot, for the size of its file."""
+_FEWEST_INSTANTS = 150  # before instants are left out beyond this, walkers are
+_FLOOR, _LINES = 0xDFE5E8, 0x9AA6AE
+_AROUND = 1.15  # extent of the view over that of the beads
+_VIEW, _ASPECT = 30.0, 1.5  # degrees, of the camera's view; width of a picture over its height, at least
+_LANE = 1.25  # lengths of a walker between the lanes of independent ones
+_GRID = 2.0**-13
+"""mm, to which places are rounded: 0.1 µm. What is rounded to powers of two can be packed."""
+
+
+@dataclass(frozen=True)
+class Player:
+    """A K3D plot (in notebooks a widget), its first and last instant (s), and what is to be said beside it.
+
+    ``cameras`` are where one may look from, by name: place, target and upward direction of a camera, mm.
+    """
+
+    plot: k3d.Plot
+    begin: float
+    end: float
+    cameras: dict[str, list[float]]
+    captions: list[str]
+
+
+def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int = 480) -> Player:
+    """The player of a run directory or the motion in it, so many pixels high.
+
+    Beads times instants are so many ``places`` at most: instants are left out evenly, and walkers if they are many.
+    """
+    import k3d
+
+    read = run if isinstance(run, Motion) else read_motion(run)
+    motion, stride, captions = _thinned(gathered(read, lane=_LANE).driven, places)
+    if len(motion.walkers) < len(read.walkers):
+        first = "The first walker is" if len(motion.walkers) == 1 else f"The first {len(motion.walkers)} walkers are"
+        captions.append(f"{first} shown, of {len(read.walkers)}.")
+    scene = Scene.around(motion, np.eye(3), rolling=True)
+    shown = motion.select(slice(None, None, stride))
+    chosen = np.asarray(scene.pointed_out[::stride].any(axis=0))
+    colours = scene.colours(chosen).round() @ [0x10000, 0x100, 1]
+    cameras = cameras_of(motion)
+    look: dict[str, Any] = {"grid_visible": False, "axes": ["x", "y", "z"], "background_color": 0xFFFFFF}
+    plot = k3d.plot(height=height, name=motion.case.name, fps=30.0, camera_fov=_VIEW, camera_auto_fit=False, **look)
+    if scene.turns is None:
+        captions.append("Beads do not show how they roll: their frames are too far apart for it.")
+        parts = [*_walls(motion), _points(shown, colours[0])]
+    else:
+        parts = [*_walls(motion), *_balls(shown, scene.turns.turned[::stride], colours)]
+    for part in parts:
+        plot += part
+    plot.fps_meter, plot.camera = False, next(iter(cameras.values()))
+    # Plays the run in so many seconds in K3D's own player, which goes by its time speed.
+    plot.time = begin = float(shown.time[0])
+    end = float(shown.time[-1])
+    plot.time_speed = (end - begin) / 12.0 or 1.0
+    return Player(plot, begin, end, cameras, captions)
+
+
+def cameras_of(motion: Motion) -> dict[str, list[float]]:
+    """Where to look from so that everything is in view, gravity downward: `Player.cameras`."""
+    closed, upward = motion.case.boundary.closed, against_gravity(motion)
+    steep = upward[2] < 0.5
+    ways = {
+        "as at first": ([-0.25, -1.0, 0.2] if closed else [-0.1, -0.7, 0.9] if steep else [-0.55, -0.8, 0.6], upward),
+        "from the side": ([0.0, -1.0, 0.0], upward),
+        "onto the floor": ([0.0, 0.0, 1.0], upward if steep else np.array([0.0, 1.0, 0.0])),
+    }
+    cameras = {}
+    for name, (way, up) in ways.items():
+        seen = Scene.around(motion, axes_toward(np.array(way), up), _AROUND, shaken=False)
+        distance = seen.height(_ASPECT) / 2.0 / tan(radians(_VIEW / 2.0)) + float(seen.high[2] - seen.low[2]) / 2.0
+        cameras[name] = np.concatenate(seen.camera(distance)).tolist()
+    return cameras
+
+
+def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
+    """The motion of fewer walkers, of how many frames one is shown, and that in words."""
+    beads, count = len(motion.radius), len(motion.walkers)
+    if motion.case.apart and count > 2:
+        instants = min(len(motion.time), _FEWEST_INSTANTS)
+        motion = motion.of_walkers(motion.walkers[: max(2, places * count // (instants * beads))])
+    stride, samples = ceil(len(motion.time) * len(motion.radius) / places), motion.case.run.samples_per_cycle
+    # Of a divisor of the samples in a cycle, or of whole cycles, the phases are the same in each cycle.
+    divisors = (number for number in range(stride, samples + 1) if samples % number == 0)
+    stride = next(divisors, ceil(stride / samples) * samples)
+    if stride == 1:
+        return motion, stride, []
+    often = f"{samples // stride} instants a cycle are" if stride < samples else f"every {stride // samples}th cycle is"
+    return motion, stride, [f"{often.capitalize()} shown, with what is between them."]
+
+
+def _balls(motion: Motion, turned: FloatArray, colours: FloatArray) -> list[Any]:
+    """A ball a bead, its matrix a series in time, between whose instants K3D turns it on."""
+    import k3d
+    from scipy.spatial.transform import Rotation
+
+    points, triangles, pale = beach_ball(24, motion)
+    balls = []
+    for bead, radius in enumerate(motion.radius * 1e3):
+        matrices = np.tile(np.eye(4), (len(motion.time), 1, 1))
+        matrices[:, :3, :3] = np.round(Rotation.from_quat(turned[:, bead]).as_matrix() * radius / _GRID) * _GRID
+        matrices[:, :3, 3] = np.round(motion.position[:, bead] * 1e3 / _GRID) * _GRID
+        ball = k3d.mesh(
+            points.astype(np.float32),
+            triangles.astype(np.uint32),
+            normals=points.astype(np.float32),
+            colors=colours[pale, bead].astype(np.uint32),
+            flat_shading=False,
+            roughness=0.6,
+            name=f"bead {bead}",
+        )
+        ball.model_matrix = _series(motion, matrices)
+        balls.append(ball)
+    return balls
+
+
+def _points(motion: Motion, colours: FloatArray) -> Any:
+    """All beads as points with a size."""
+    import k3d
+
+    points = k3d.points(
+        np.zeros((len(motion.radius), 3), dtype=np.float32),
+        point_sizes=(2e3 * motion.radius).astype(np.float32),
+        colors=colours.astype(np.uint32),
+        shader="3d",
+        roughness=0.5,
+        name="beads",
+    )
+    coarse = 8.0 * _GRID  # beads are many
+    points.positions = _series(motion, np.round(motion.position * 1e3 / coarse) * coarse)
+    return points
+
+
+def _series(motion: Motion, values: FloatArray) -> dict[str, Any]:
+    """Values through time, as K3D takes them."""
+    return {f"{time:.6f}": value for time, value in zip(motion.time, values.astype(np.float32), strict=True)}
+
+
+def _walls(motion: Motion) -> list[Any]:
+    """The boundary, transparent where it is upright, and lines on a bare floor that say how far beads go."""
+    import k3d
+
+    faces = [1e3 * corners for corners in walls_of(motion)]
+    parts = []
+    for name, opacity in (("floor", 1.0), ("walls", 0.12)):
+        chosen = [corners for corners in faces if (np.ptp(corners[:, 2]) < 1e-6) == (name == "floor")]
+        if chosen:
+            mesh = mesh_of(chosen).triangulate()
+            points = np.asarray(mesh.points) - [0.0, 0.0, 2e-3 * opacity]  # a hair below the beads that touch it
+            look = {"color": _FLOOR, "side": "double", "opacity": opacity, "roughness": 1.0, "name": name}
+            parts.append(k3d.mesh(points.astype(np.float32), mesh.regular_faces.astype(np.uint32), **look))
+    if motion.case.boundary.bare:
+        low, high = faces[0].min(axis=0), faces[0].max(axis=0)
+        step = round_below(float(high[0] - low[0]) / 8.0)
+        ends = floor_lines(low, high, step).reshape(-1, 3).astype(np.float32)
+        pairs = np.arange(len(ends), dtype=np.uint32).reshape(-1, 2)
+        look = {"indices_type": "segment", "shader": "simple", "color": _LINES, "name": f"every {step:g} mm"}
+        parts.append(k3d.lines(ends, pairs, **look))
+    return parts
