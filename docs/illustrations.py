@@ -26,10 +26,9 @@ from walkers.calibration.calibrate import calibrate
 from walkers.calibration.figures import draw
 from walkers.calibration.report import rows_of, write_tables
 from walkers.check.validate import validate
-from walkers.inputs.axes import flatten
 from walkers.inputs.calibration import load_calibration
 from walkers.inputs.case import Case
-from walkers.inputs.changes import settings_of
+from walkers.inputs.changes import flatten, settings_of
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import load_sweep

@@ -60,7 +60,7 @@ def test_the_largest_modulus_of_a_case_is_the_engines_own(tmp_path: Path) -> Non
     case = make_case(contact={"youngs_modulus": "1 GPa"}, run=QUICK, drive={"frequency": "2 kHz"})
     assert not run_case(case, tmp_path).cached
     assert "hard_particles" not in render_deck(case).text
-    with pytest.raises(InputError, match=r"contact\.youngs_modulus = .*: expected .*at most 1e\+09"):
+    with pytest.raises(InputError, match=r"contact\.youngs_modulus = .*: expected .*1e\+09"):
         make_case(contact={"youngs_modulus": "1.001 GPa"})
     deck = render_deck(replace(case, contact=replace(case.contact, youngs_modulus=1.001e9)))
     assert "hard_particles  yes" in deck.text

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 from pydantic import BaseModel, BeforeValidator
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError, PydanticUndefined
+from pydantic_core import PydanticUndefined
 from sphinx.application import Sphinx
 from sphinx.config import Config
 
@@ -92,8 +92,8 @@ def _refusal(validator: BeforeValidator | Kind) -> str | None:
         return validator.expectation.removeprefix("expected ")
     try:
         validator.func(object())  # type: ignore[call-arg]
-    except PydanticCustomError as error:
-        return error.message().removeprefix("expected ")
+    except ValueError as error:
+        return str(error).removeprefix("expected ")
     return None
 
 

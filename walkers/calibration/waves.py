@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.calibration.space import Space
-from walkers.inputs.axes import flatten
 from walkers.inputs.calibration import Calibration
+from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.schema import ALTERNATIVES
 from walkers.inputs.sweep import Sweep, expand

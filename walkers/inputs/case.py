@@ -17,7 +17,8 @@ from pydantic_core import to_jsonable_python
 from walkers.inputs.bodies import Body, Mixture, Placed, Standing, Walkers
 from walkers.inputs.boundary import Shape
 from walkers.inputs.drive import AXES, Drive, Vector
-from walkers.inputs.origins import Origin, origins_of
+from walkers.inputs.origins import Origin
+from walkers.physics.laws import LAWS
 from walkers.physics.matter import Contact, Liquid
 
 _SILENCE = 600.0  # s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds
@@ -29,7 +30,7 @@ FIRST_ATTEMPTS = (12, 24)
 BOUNDS = ("silence", "log_limit")
 """Of `Run`: upon these depends whether a run ends, not what it gives."""
 
-_TOLD = ("document", "recorded")
+_TOLD = ("document", "origins")
 
 
 def settling_of(cycles: int) -> int:
@@ -139,9 +140,8 @@ class Case:
     """Bodies on a boundary under a drive, resolved.
 
     Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²). ``seed`` is that of all that is drawn at
-    the start. ``name``, ``title`` and the `BOUNDS` of the run do not determine it. ``document`` (the tables that the
-    case was read from) and ``recorded`` (the `origins` that were written down with a run) are part of no comparison,
-    and are lost where `dataclasses.replace` changes the case: they would tell of another one.
+    the start. ``document`` (the tables that the case was read from) and ``origins`` (where its values come from) are
+    part of no comparison, and are lost where `dataclasses.replace` changes the case: they would tell of another one.
 
     Raises
     ------
@@ -164,7 +164,7 @@ class Case:
     seed: int
     run: Run
     document: Mapping[str, Any] = field(default_factory=dict, init=False, compare=False, repr=False)
-    recorded: tuple[Origin, ...] = field(default=(), init=False, compare=False, repr=False)
+    origins: tuple[Origin, ...] = field(default=(), init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse a drive that was changed alone: its step and sampling would be another's."""
@@ -176,29 +176,24 @@ class Case:
             )
 
     @property
-    def origins(self) -> tuple[Origin, ...]:
-        """Where each of its values comes from; empty for one that was not read, or was changed since."""
-        return self.recorded or origins_of(self)
-
-    @property
     def as_read(self) -> bool:
         """Whether it is what its document says: it was read, and not changed since."""
         return bool(self.document)
 
-    def read_from(self, document: Mapping[str, Any], recorded: tuple[Origin, ...] = ()) -> Case:
-        """The same with the tables that it was read from, and the origins that were written down with a run."""
+    def read_from(self, document: Mapping[str, Any], origins: tuple[Origin, ...]) -> Case:
+        """The same with the tables that it was read from, and where its values come from."""
         case = replace(self)
         object.__setattr__(case, "document", document)
-        object.__setattr__(case, "recorded", recorded)
+        object.__setattr__(case, "origins", origins)
         return case
 
     def renamed(self, name: str) -> Case:
         """The same case under another name."""
-        return replace(self, name=name).read_from(self.document, self.recorded)
+        return replace(self, name=name).read_from(self.document, self.origins)
 
     def for_cycles(self, cycles: int) -> Case:
         """The same for so many cycles at a stretch, of a case whose run ends when its walkers are steady."""
-        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.recorded)
+        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.origins)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -238,10 +233,7 @@ class Case:
     def standing(self) -> Iterator[tuple[int, Standing]]:
         """What stands at the start, each with the number of its body; walkers come first and are numbered through.
 
-        Raises
-        ------
-        ValueError
-            If the beads of a walker cannot stand so.
+        Raises `ValueError` if the beads of a walker cannot stand so.
         """
         first = 0
         for number, body in enumerate(self.bodies):
@@ -300,30 +292,26 @@ class Case:
         return -sum(one * along for one, along in zip(self.gravity_vector, self.drive_axis, strict=True))
 
     def determinants(self) -> dict[str, Any]:
-        """Everything that the run's outcome depends on, as plain JSON types."""
-        exclude: dict[str, Any] = {**dict.fromkeys(("name", "title", *_TOLD), True), "run": set(BOUNDS)}
-        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=exclude)
+        """Everything that the run's outcome depends on, as plain JSON types: no names, and no bound of the engine's."""
+        no_names: dict[str, Any] = {**dict.fromkeys(("name", "title", "material", *_TOLD), True), "run": set(BOUNDS)}
+        without = {**no_names, "boundary": {"material"}, "liquid": {"name"}}
+        if self.liquid.law in LAWS:  # none of which asks for the density; one of a user's own may
+            without["liquid"] = {"name", "density"}
+        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=without)
         return values
 
     def as_dict(self) -> dict[str, Any]:
-        """The whole case as plain JSON types, SI units, with the origins of its values."""
-        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=set(_TOLD))
-        values |= to_jsonable_python({"document": self.document, "recorded": self.origins})
-        return values
+        """The whole case as plain JSON types, SI units, with the tables it was read from and its values' origins."""
+        told: dict[str, Any] = to_jsonable_python({"document": self.document, "origins": self.origins})
+        return {**_adapter().dump_python(self, mode="json", exclude=set(_TOLD)), **told}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Case:
-        """Rebuild a case from `as_dict` (a run directory's ``case.json``).
-
-        Raises
-        ------
-        ValueError
-            If it is none.
-        """
+        """Rebuild a case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
         try:
             case = _adapter().validate_python(values)
             return case.read_from(
-                *_told_adapter().validate_python((values.get("document", {}), values.get("recorded", ())))
+                *_told_adapter().validate_python((values.get("document", {}), values.get("origins", ())))
             )
         except ValidationError as error:
             first = error.errors()[0]

@@ -122,7 +122,7 @@ def _text_of_case(case: dict[str, Any]) -> str:
     """A resolved case, one line per value: its key, the value in the units of a case file, where it comes from."""
     lines = [printable(f"{case['name']}: {case['title']}").rstrip(": ")]
     table = None
-    for one in case["recorded"]:
+    for one in case["origins"]:
         within, _, key = one["key"].rpartition(".")
         if within != table:
             table = within

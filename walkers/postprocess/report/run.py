@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from walkers.inputs.case import Case
+from walkers.inputs.changes import dotted
 from walkers.inputs.origins import Origin, text_of
-from walkers.inputs.readable import dotted
 from walkers.postprocess.analysis import analyses_in, current_result, quantities_of, warnings_of
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.report.page import NAME, check_report, fill, packed_plots, packed_scene, write_page
