@@ -14,9 +14,7 @@ from tests.conftest import REFERENCE, make_case
 from walkers.inputs import resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads
-from walkers.postprocess.meetings import groups_of
 from walkers.templates.placement import place
-from walkers.theory.prediction import describe, predict
 
 MM_PER_S = 1e-3
 FIG1B: dict[str, Any] = {
@@ -99,19 +97,6 @@ def test_a_chain_of_two_is_a_dimer() -> None:
     np.testing.assert_allclose(*([bead.centre for bead in place((case,))[0].beads] for case in cases), atol=1e-15)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("arrangement", "sizes", "speed"), [("fan", "Lss", 0.615), ("chain", "Lss", 1.09), ("diamond", "Lsss", 0.639)]
-)
-def test_clusters_turn_to_the_axis_and_walk(arrangement: str, sizes: str, speed: float, tmp_path: Path) -> None:
-    """From 0° and 20°, the large bead leading; speeds as measured (test_crosscheck has the fan)."""
-    tables = [cluster(arrangement, sizes, angle=angle) for angle in ("0 deg", "20 deg")]
-    done = walkers.run(of_tables(*tables, run={"cycles": 120, "settling_cycles": 80}), tmp_path)
-    for make in done.result["makes"]:
-        assert make["velocity"]["mean"] == pytest.approx(speed * MM_PER_S, rel=0.02)
-        assert abs(np.degrees(make["orientation_end"]["largest"])) < 6.0
-
-
 def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     """A dimer beside trimers walks as it does alone, and each make has its part of the result."""
     tables = cluster("fan", "Lss"), cluster("chain", "Lss", replicates=1)
@@ -152,11 +137,6 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     first = tray.result["groups_at_end"][0]
     apart = np.linalg.norm(centre[-12:, first[1]] - centre[-12:, first[0]], axis=-1)
     assert apart.max() < 1.1 * group.make.length  # they hold on to each other, however they turn
-
-
-def test_groups_are_connected_components() -> None:
-    assert sorted(groups_of(frozenset({(0, 1), (1, 3)}), 5)) == [[0, 1, 3], [2], [4]]
-    assert groups_of(frozenset(), 2) == [[0], [1]]
 
 
 @pytest.mark.parametrize("width", ["1.4 mm", "0.5998 mm"])
@@ -219,17 +199,6 @@ def test_a_rest_before_the_drive_is_one(tmp_path: Path, frequency: str) -> None:
     assert done.trajectory["time"].min() == 0.0
     assert np.abs(done.motion.velocity[resting]).max() < 1e-4
     assert speeds[1] == pytest.approx(speeds[0], rel=0.01)
-
-
-def test_walkers_on_a_slope_are_told_apart_by_where_they_go(tmp_path: Path) -> None:
-    """Up 0.60, down 1.64 mm/s: the mean is no walker's, and theory is set beside those that go up."""
-    boundary = {**FIG1B["boundary"], "tilt": "5 deg"}
-    done = walkers.run(of_tables(dimers=dimers(2), boundary=boundary, run=BRIEF), tmp_path)
-    assert "velocity   facing up 0.60" in done.describe()
-    assert describe(predict(done.case), done.result).count("engine                            0.60") == 1
-    assert len(repr(done.motion)) < 100 > len(repr(done.motion.groups[0]))
-    with pytest.raises(FileNotFoundError, match="has no table bed; it has trajectory, walkers, bridges"):
-        done.table("bed")
 
 
 def test_walkers_placed_beads_and_a_mixture_share_a_box(tmp_path: Path) -> None:

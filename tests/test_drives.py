@@ -15,7 +15,6 @@ from walkers.inputs.boundary import Plane
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive, Harmonic, common_frequency
 from walkers.postprocess import read_result
-from walkers.postprocess.gait import Walk
 
 BRIEF = {"cycles": 20, "settling_cycles": 8, "samples_per_cycle": 10}
 
@@ -36,16 +35,12 @@ def test_a_cycle_is_the_common_period(frequencies: list[float], common: float) -
     assert common_frequency(frequencies) == pytest.approx(common, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("frequencies", "told"),
-    [
-        ([1.0, 23 / 24, 22 / 23, 21 / 22, 19 / 20, 17 / 18], "common period"),
-        *(([80.0, other], "no ratio of whole numbers") for other in (80.0 * 25, 80.0 * 2**0.5, 81.3)),
-    ],
-)
-def test_frequencies_without_a_cycle_are_refused(frequencies: list[float], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
-        common_frequency(frequencies)
+def test_frequencies_without_a_cycle_are_refused() -> None:
+    for other in (80.0 * 25, 80.0 * 2**0.5, 81.3):
+        with pytest.raises(ValueError, match="no ratio of whole numbers"):
+            common_frequency([80.0, other])
+    with pytest.raises(ValueError, match="common period"):
+        common_frequency([1.0, 23 / 24, 22 / 23, 21 / 22, 19 / 20, 17 / 18])
 
 
 def test_a_drive_is_its_largest_harmonic_where_one_number_is_asked_for() -> None:
@@ -82,18 +77,6 @@ def test_a_triangle_is_the_sum_of_its_harmonics() -> None:
     assert np.abs(summed - triangle).max() < 0.045 * 39.2
     flank = np.abs(triangle) < 0.8 * 39.2
     assert np.abs(summed - triangle)[flank].max() < 0.01 * 39.2
-
-
-def test_a_triangle_walks_slower_than_its_fundamental_alone(walked: Callable[..., Walk]) -> None:
-    """Its higher harmonics, a sixth of the acceleration, are in the way: 0.842 against 0.886 mm/s at 4 g as shipped."""
-    shipped = {"liquid": {"name": "Si AK5"}, "dimers": {"replicates": 1}}
-    base = {key: value for key, value in document().items() if key not in ("liquid", "contact")}
-    speeds = []
-    for drive in ({"waveform": "triangle"}, {"peak_acceleration": f"{4.0 * 8.0 / np.pi**2} g", "frame": "container"}):
-        tables = {**base, **shipped, "drive": {**base["drive"], **drive}}
-        tables["dimers"] = {**base["dimers"], **shipped["dimers"]}
-        speeds.append(walked(resolve_case(tables, name="triangle")).velocity[0])
-    assert speeds == pytest.approx([0.842e-3, 0.886e-3], rel=0.01)
 
 
 def _two_tone(phase: float) -> Drive:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import walkers
-from tests.conftest import REFERENCE, call, make_case, to_toml
+from tests.conftest import REFERENCE, call, document, make_case, to_toml
 from walkers.inputs import InputError, library, load_case, shipped_cases
 from walkers.inputs.case import Case
 from walkers.inputs.changes import changed, settings_of
@@ -163,8 +163,8 @@ def test_a_case_changed_after_it_was_read_tells_nothing_of_its_values(tmp_path: 
 
 def test_what_is_called_uncertain_keeps_where_it_comes_from() -> None:
     ranges = {"liquid.surface_tension": ["15 mN/m", "25 mN/m"], "contact.friction.bead_wall": [0.2, 0.4]}
-    document = load_case("fig1b").document
-    case = resolve_case({**document, "uncertain": {**ranges, "dimers.radii[1]": ["0.19 mm", "0.21 mm"]}})
+    tables = load_case("fig1b").document
+    case = resolve_case({**tables, "uncertain": {**ranges, "dimers.radii[1]": ["0.19 mm", "0.21 mm"]}})
     found = origins(case)
     tension, friction, radius = (found[key] for key in (*ranges, "dimers.radii[1]"))
     assert (tension.origin, tension.text, tension.range) == ("library", "19.2 mN/m", ("15 mN/m", "25 mN/m"))
@@ -217,13 +217,15 @@ def test_a_sweep_with_a_setting_has_a_directory_of_its_own(in_folder: Path) -> N
 
 def test_names_and_what_no_law_asks_for_do_not_determine_a_run() -> None:
     case = make_case(liquid={"dynamic_viscosity": "4.6 mPa*s"})
-    named = make_case(
+    tables = document(
         title="other",
         beads={"material": "rubies", "density": "4.0 g/cm^3"},
         boundary={"material": "chromium"},
-        liquid={"name": None, "surface_tension": "19.2 mN/m", "dynamic_viscosity": "4.6 mPa*s"},
-        run={"cycles": 24, "settling_cycles": 8, "settled_below": "1 mm/s", "silence": "20 s"},
+        liquid={"surface_tension": "19.2 mN/m", "dynamic_viscosity": "4.6 mPa*s"},
+        run={"settled_below": "1 mm/s", "silence": "20 s"},
     )
+    del tables["liquid"]["name"]
+    named = resolve_case(tables)
     assert named != case
     assert named.determinants() == case.determinants()
     assert make_case(run={"seed": 2}).determinants() != make_case().determinants()

@@ -1,4 +1,4 @@
-"""What beads stand on and lie in: planes, channels, boxes, cylinders. To add one, write a class, name it in `SHAPES`.
+"""What beads stand on and lie in: planes, channels, boxes, cylinders. To add one, write a class, name it in `Shape`.
 
 Most have a floor, the plane z = 0 in their own frame, and may have side walls.
 """
@@ -9,7 +9,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, cos, hypot, inf, pi, sin, sqrt
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 from walkers.inputs.drive import Vector
 
@@ -326,7 +326,7 @@ class Cylinder(Container):
 
 Shape = Plane | Channel | Groove | Box | Cylinder
 """The boundaries that there are."""
-SHAPES: Mapping[str, type[Shape]] = {one.shape: one for one in (Plane, Channel, Groove, Box, Cylinder)}
+SHAPES: Mapping[str, type[Shape]] = {one.shape: one for one in get_args(Shape)}
 """By the names that case files use."""
 
 

@@ -5,9 +5,9 @@ This is what the deck is rendered from, what a run directory stores as ``case.js
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property, partial
 from math import cos, hypot, inf, isclose, sin
 from typing import Annotated, Any
 
@@ -30,7 +30,7 @@ FIRST_ATTEMPTS = (12, 24)
 BOUNDS = ("silence", "log_limit")
 """Of `Run`: upon these depends whether a run ends, not what it gives."""
 
-_TOLD = ("document", "origins")
+_TOLD = ("document", "told")
 
 
 def settling_of(cycles: int) -> int:
@@ -42,33 +42,20 @@ def settling_of(cycles: int) -> int:
 class Run:
     """How long, how fine and in which segments; a cycle is a whole multiple of the sampling interval.
 
-    Attributes
-    ----------
-    time_step, steps_per_cycle
-        s; steps in a cycle of the drive.
-    cycles, settling_cycles, until_steady
-        Cycles driven, and of these before velocities are measured; whether fewer do if the walkers are steady after
-        them (`walkers.postprocess.steady_state.are_steady`).
-    samples_per_cycle, cycles_per_sample, samples_per_bridge_sample
-        Beads are recorded this often a cycle, or once in so many cycles (one of them is 1), bridges with one of so
-        many samples.
-    cycles_per_segment
-        The run is made in segments of so many cycles, each with a restart file at its end if there are several.
-    settled_below, longest_settling
-        Before the drive the beads rest until their root mean square velocity (m/s) is below, or so many s are over;
-        of walkers, which stand from the first, 0 s.
-    ranks
-        MPI processes.
-    silence, log_limit
-        An engine is ended that writes nothing for so long (s), or a log of so many bytes; None: as `longest_silence`
-        and `most_log` say.
+    Before the drive loose beads rest until their root mean square velocity is below `settled_below` (m/s), or for
+    `longest_settling` (s; 0 of walkers, which stand from the first). Beads are recorded `samples_per_cycle` times a
+    cycle, or once in `cycles_per_sample` (one of the two is 1), bridges with one of so many samples. If there are
+    several segments, each has a restart file at its end.
     """
 
     time_step: float
+    """s."""
     steps_per_cycle: int
     cycles: int
     settling_cycles: int
+    """Of the cycles, those before velocities are measured."""
     until_steady: bool
+    """Whether fewer do if the walkers are steady after them (`walkers.postprocess.steady_state.are_steady`)."""
     samples_per_cycle: int
     cycles_per_sample: int
     samples_per_bridge_sample: int
@@ -76,8 +63,11 @@ class Run:
     settled_below: float
     longest_settling: float
     ranks: int
+    """MPI processes."""
     silence: float | None = None
+    """s for which an engine may write nothing before it is ended; None: as `longest_silence` says."""
     log_limit: float | None = None
+    """Bytes of a log beyond which an engine is ended; None: as `most_log` says."""
 
     @property
     def period(self) -> float:
@@ -140,7 +130,7 @@ class Case:
     """Bodies on a boundary under a drive, resolved.
 
     Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²). ``seed`` is that of all that is drawn at
-    the start. ``document`` (the tables that the case was read from) and ``origins`` (where its values come from) are
+    the start. ``document`` (the tables that the case was read from) and ``told`` (of which `origins` are made) are
     part of no comparison, and are lost where `dataclasses.replace` changes the case: they would tell of another one.
 
     Raises
@@ -164,7 +154,7 @@ class Case:
     seed: int
     run: Run
     document: Mapping[str, Any] = field(default_factory=dict, init=False, compare=False, repr=False)
-    origins: tuple[Origin, ...] = field(default=(), init=False, compare=False, repr=False)
+    told: Callable[[], tuple[Origin, ...]] = field(default=tuple, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse a drive that was changed alone: its step and sampling would be another's."""
@@ -180,20 +170,25 @@ class Case:
         """Whether it is what its document says: it was read, and not changed since."""
         return bool(self.document)
 
-    def read_from(self, document: Mapping[str, Any], origins: tuple[Origin, ...]) -> Case:
-        """The same with the tables that it was read from, and where its values come from."""
+    @cached_property
+    def origins(self) -> tuple[Origin, ...]:
+        """Where its values come from; nothing of a case that was not read, or was changed since."""
+        return self.told()
+
+    def read_from(self, document: Mapping[str, Any], told: Callable[[], tuple[Origin, ...]]) -> Case:
+        """The same with the tables that it was read from, and what tells where its values come from."""
         case = replace(self)
         object.__setattr__(case, "document", document)
-        object.__setattr__(case, "origins", origins)
+        object.__setattr__(case, "told", told)
         return case
 
     def renamed(self, name: str) -> Case:
         """The same case under another name."""
-        return replace(self, name=name).read_from(self.document, self.origins)
+        return replace(self, name=name).read_from(self.document, self.told)
 
     def for_cycles(self, cycles: int) -> Case:
         """The same for so many cycles at a stretch, of a case whose run ends when its walkers are steady."""
-        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.origins)
+        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.told)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -310,9 +305,9 @@ class Case:
         """Rebuild a case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
         try:
             case = _adapter().validate_python(values)
-            return case.read_from(
-                *_told_adapter().validate_python((values.get("document", {}), values.get("origins", ())))
-            )
+            told = values.get("document", {}), values.get("origins", ())
+            document, origins = _told_adapter().validate_python(told)
+            return case.read_from(document, partial(tuple, origins))
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error

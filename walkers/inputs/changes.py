@@ -9,6 +9,7 @@ import copy
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 from walkers.inputs.errors import InputError, Problem, unusable
@@ -18,9 +19,10 @@ Value = Any
 MISSING = object()
 
 
-def parts_of(key: str) -> list[str | int]:
+@lru_cache(maxsize=4096)
+def parts_of(key: str) -> tuple[str | int, ...]:
     """Names of tables and places in lists."""
-    return [int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", key)]
+    return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", key))
 
 
 def joined(parts: Sequence[str | int]) -> str:
@@ -128,11 +130,11 @@ def _put(tables: dict[str, Any], key: str, value: Value, without: Sequence[str])
     place: Any = tables
     parts = parts_of(key)
     for number, part in enumerate(parts):
-        here = joined(parts[:number])
         if isinstance(part, int):
             if not isinstance(place, list) or part >= len(place):
-                raise unusable(key, f"the base case has no {here} of that length", value)
+                raise unusable(key, f"the base case has no {joined(parts[:number])} of that length", value)
         elif isinstance(place, list):
+            here = joined(parts[:number])
             raise unusable(key, f"{here} is a list: say which one, such as {here}[0]", value)
         elif not isinstance(place, dict):  # the base case is wrong there, which its own check tells
             return

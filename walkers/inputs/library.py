@@ -27,7 +27,7 @@ class Known:
 
     Attributes
     ----------
-    value, text, source
+    value, written, source
         SI; as the library has it, with its unit; where it is from.
     range
         Ends between which a calibrated number may lie as well (5 to 95 % of the posterior), as a case would write them.
@@ -36,7 +36,7 @@ class Known:
     """
 
     value: float
-    text: str
+    written: Any
     source: str = ""
     range: tuple[Any, Any] | None = None
     calibrated_with: tuple[str, ...] = ()
@@ -63,7 +63,7 @@ def _known(key: str, entry: Mapping[str, Any], liquids: tuple[str, ...] = ()) ->
     kind, value = _KINDS.get(key.rpartition(".")[2]), entry["value"]
     number = units.parse_quantity(value, kind) if kind else float(value)
     source = f"calibrated with {' and '.join(liquids)}" if liquids else entry.get("source", "")
-    return Known(number, str(value), source, _range(entry), liquids)
+    return Known(number, value, source, _range(entry), liquids)
 
 
 def _range(entry: Mapping[str, Any]) -> tuple[Any, Any] | None:

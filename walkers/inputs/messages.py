@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 
 from walkers.inputs.changes import MISSING, joined, parts_of, value_at
 from walkers.inputs.errors import InputError, Problem, shown, unusable
-from walkers.inputs.library import suggestion
+from walkers.inputs.library import suggestion, surface_pairs
 from walkers.inputs.schema import CaseFile
 
 File = TypeVar("File", bound=BaseModel)
@@ -26,6 +26,13 @@ _EXAMPLES = {
     "mixture.large": 'two radii, such as ["0.5 mm", "0.59 mm"]',
     "clusters.at": 'two places, ahead and to the left, such as ["0.2 mm", "0 mm"]',
     "placed.at": 'three places, x, y and z, such as ["5 mm", "-3 mm", "0.3 mm"]',
+    "beads.density": 'such as "4.0 g/cm^3", or a material of the library',
+    "liquid.surface_tension": 'such as "19.2 mN/m", or a liquid of the library by name',
+    **dict.fromkeys(
+        ("contact.friction", "contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction"),
+        f"numbers: the library has it for {'; '.join(map(' on '.join, surface_pairs()))} only "
+        "(if it is a guess, say in [uncertain] between which ends)",
+    ),
     "liquid": 'a [liquid] table, such as name = "Si AK5"',
     "boundary": 'a [boundary] table, such as material = "chromium-coated glass"',
     "boundary.material": 'such as "chromium-coated glass"',

@@ -136,45 +136,33 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> Case:
-    """Validate a case given as nested tables and fill in what the library supplies.
+    """A case given as the tables of a case file, quantities as strings with units.
 
-    Parameters
-    ----------
-    document
-        The tables of a case file, quantities as strings with units.
-    source, name
-        What an error message calls the input, and the name of the case, with which its run directory begins.
-
-    Raises
-    ------
-    InputError
-        If anything in it cannot be used.
+    ``source`` is what messages call it; run directories begin with its ``name``. Raises `InputError` if anything in it
+    cannot be used.
     """
     # Not above: that there is no such file is told before all that a case may say is built.
-    from walkers.inputs.messages import blaming, validated
+    from walkers.inputs.changes import changed
+    from walkers.inputs.matter import supplied
+    from walkers.inputs.messages import blaming, check_key, validated
+    from walkers.inputs.origins import Notes
     from walkers.inputs.resolving import resolve
     from walkers.inputs.schema import CaseFile
 
-    file = validated(CaseFile, document, source)
-    try:
-        with blaming(source, document):
-            case = resolve(file, name, document)
-    except ArithmeticError as error:
-        raise InputError(source, [Problem("", None, f"inconsistent values: {error}")]) from error
-    _check_uncertain(file.uncertain, document, source)
-    return case
-
-
-def _check_uncertain(ranges: Mapping[str, Any], document: Mapping[str, Any], source: str) -> None:
-    """Refuse ranges of what is no key of the case, or whose ends it could not say."""
-    from walkers.inputs.changes import changed
-    from walkers.inputs.messages import check_key, validated
-    from walkers.inputs.schema import CaseFile
-
-    for key, given in ranges.items():
+    notes = Notes()
+    with blaming(source, document):
+        tables = supplied(document, notes)
+        file = validated(CaseFile, tables, source)
         try:
-            check_key(key)
-            for end in next(iter(given.values())):
-                validated(CaseFile, changed(document, {key: end}), source)
-        except InputError as error:
-            raise InputError(source, [replace(one, key=f"uncertain.{one.key}") for one in error.problems]) from error
+            case = resolve(file, name, document, notes)
+        except ArithmeticError as error:
+            raise InputError(source, [Problem("", None, f"inconsistent values: {error}")]) from error
+        for key, given in file.uncertain.items():  # it is a key of the case, which could say both ends
+            try:
+                check_key(key)
+                for end in next(iter(given.values())):
+                    validated(CaseFile, changed(tables, {key: end}), source)
+            except InputError as error:
+                problems = [replace(one, key=f"uncertain.{one.key}") for one in error.problems]
+                raise InputError(source, problems) from error
+    return case

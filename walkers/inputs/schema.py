@@ -1,7 +1,7 @@
 """What a case file may say: keys, types, defaults and bounds, as pydantic models.
 
-A quantity is written as a string with its unit and held here as a number in SI units. Keys that the library of
-materials and liquids can supply are optional; `walkers.inputs.resolving` fills them in.
+A quantity is written as a string with its unit and held here as a number in SI units. What the library of materials
+and liquids supplies (`walkers.inputs.matter.SUPPLIED`) has been filled in before.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class BeadsTable(Table):
     """``[beads]``: what all beads are made of."""
 
     material: str | None = None
-    density: units.Density | None = None
+    density: units.Density
 
 
 class WalkersTable(Table):
@@ -166,18 +166,17 @@ class LiquidTable(Table):
     """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
 
     ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag. ``law`` is that
-    of the bridges, one of `walkers.physics.laws` or a function of yours, ``file.py:function``. The three before it,
-    left out, are the library's for the surfaces, else as in `walkers.inputs.matter_tables`.
+    of the bridges, one of `walkers.physics.laws` or a function of yours, ``file.py:function``.
     """
 
     name: str | None = None
-    surface_tension: units.SurfaceTension | None = None
+    surface_tension: units.SurfaceTension
     density: units.Density | None = None
     kinematic_viscosity: units.KinematicViscosity | None = None
     dynamic_viscosity: units.DynamicViscosity | None = None
-    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] | None = None
-    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)] | None = None
-    contact_angle: UpToRightAngle | None = None
+    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)]
+    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)]
+    contact_angle: UpToRightAngle
     law: str = DEFAULT_LAW
 
 
@@ -200,25 +199,24 @@ class BoundaryTable(Table):
 
 
 class FrictionTable(Table):
-    """``[contact.friction]``: Coulomb coefficients; left out, the library's value for the two materials holds."""
+    """``[contact.friction]``: Coulomb coefficients."""
 
-    bead_bead: Coefficient | None = None
-    bead_wall: Coefficient | None = None
+    bead_bead: Coefficient
+    bead_wall: Coefficient
 
 
 class ContactTable(Table):
     """``[contact]``: the model of the contacts.
 
     The engine takes no restitution of 0.05 or less and no modulus above 1 GPa; contacts below 5 MPa change speeds.
-    ``restitution`` and ``minimum_separation_ratio``, left out, are the library's for the surfaces, else 0.3 and 0.01.
     """
 
-    friction: FrictionTable = FrictionTable()
-    rolling_friction: Coefficient | None = None
-    restitution: Annotated[Number, Field(gt=0.05, le=1)] | None = None
+    friction: FrictionTable
+    rolling_friction: Coefficient
+    restitution: Annotated[Number, Field(gt=0.05, le=1)]
     youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=1e9)] = 5e7
     poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = 0.3
-    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] | None = None
+    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)]
 
 
 class HarmonicTable(Table):
@@ -295,7 +293,7 @@ class CaseFile(Table):
     boundary: BoundaryTable
     drive: DriveTable
     liquid: LiquidTable
-    contact: ContactTable = ContactTable()
+    contact: ContactTable
     run: RunTable = RunTable()
     environment: EnvironmentTable = EnvironmentTable()
     uncertain: Ranges = {}

@@ -160,17 +160,8 @@ def shipped_sweeps() -> dict[str, Path]:
 def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) -> Sweep:
     """Read a sweep file, or a shipped sweep such as ``fig2``, and expand it.
 
-    Parameters
-    ----------
-    sweep
-        The file or the name.
-    changes
-        Values put beside those of its ``[set]``, by dotted keys; the sweep's name tells of them.
-
-    Raises
-    ------
-    InputError
-        If there is no such file or anything in it cannot be used. Its points are checked by `Sweep.cases`.
+    ``changes`` are put beside its ``[set]``, by dotted keys; its name tells of them. Raises `InputError` if there
+    is no such file or anything in it cannot be used; its points are checked by `Sweep.cases`.
     """
     path = find_input(sweep, "sweep")
     document, name = read_toml(path), path.stem
@@ -199,19 +190,9 @@ def _name_with(name: str, changes: Mapping[str, Value]) -> str:
 
 
 def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Sweep:
-    """Expand a sweep given as nested tables.
+    """Expand a sweep given as nested tables; raises `InputError` if anything in it cannot be used.
 
-    Parameters
-    ----------
-    document, source, name
-        The tables of a sweep file, what messages call it, and the name of the sweep.
-    folder
-        Where a base case given as a file is looked up.
-
-    Raises
-    ------
-    InputError
-        If anything in it cannot be used.
+    ``source`` is what messages call it, ``folder`` where a base case given as a file is looked up.
     """
     file = validated(SweepFile, document, source, "a sweep")
     base = _base(file.case, source, folder)
