@@ -27,9 +27,9 @@ from walkers import load_case, run
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.report import write_outcome
 from walkers.check.validate import validate
-from walkers.inputs.axes import flatten
 from walkers.inputs.calibration import load_calibration
 from walkers.inputs.case import Case
+from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures

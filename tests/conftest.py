@@ -24,8 +24,9 @@ from tomli_w import dumps as to_toml
 
 from walkers import run as run_case
 from walkers.inputs import resolve_case
-from walkers.inputs.axes import flatten, is_axis
+from walkers.inputs.axes import is_axis
 from walkers.inputs.case import Case
+from walkers.inputs.changes import flatten
 from walkers.inputs.reading import read_toml
 from walkers.inputs.sweep import expand, shipped_sweeps
 from walkers.main import main

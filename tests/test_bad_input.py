@@ -33,54 +33,29 @@ def bead(radius: str, x: str, z: str = "1 mm") -> dict[str, Any]:
 HARMONICS = {"harmonics": [{"frequency": "80 Hz", "peak_acceleration": "1 g"}]}
 # Changed tables (None: left out), and what the message says after the file.
 BAD: list[tuple[dict[str, Any], str]] = [
-    # Quantities
+    # Quantities: of which kinds test_units tells
     ({"dimers": {"radii": ["0.3", "0.2 mm"]}}, 'dimers.radii[0] = "0.3": expected a length with its unit'),
-    ({"dimers": {"radii": [0.3, "0.2 mm"]}}, "dimers.radii[0] = 0.3: expected a length"),
-    ({"dimers": {"radii": ["0.3 g", "0.2 mm"]}}, 'dimers.radii[0] = "0.3 g": expected a length'),
-    ({"dimers": {"radii": ["-0.3 mm", "0.2 mm"]}}, "must be more than zero"),
-    ({"dimers": {"radii": ["0.3 mm", "0 mm"]}}, 'dimers.radii[1] = "0 mm": expected a length'),
-    ({"dimers": {"radii": ["0,3 mm", "0.2 mm"]}}, 'dimers.radii[0] = "0,3 mm": expected a length'),
-    ({"dimers": {"radii": ["0.3 mmm", "0.2 mm"]}}, 'dimers.radii[0] = "0.3 mmm": expected a length'),
-    ({"dimers": {"radii": ["mm", "0.2 mm"]}}, 'dimers.radii[0] = "mm": expected a length'),
-    ({"dimers": {"radii": ["0.3 mm; 2", "0.2 mm"]}}, 'dimers.radii[0] = "0.3 mm; 2": expected a length'),
+    ({"dimers": {"radii": ["0.3 mm", "0 mm"]}}, "must be more than zero"),
     ({"dimers": {"radii": ["1e999 mm", "0.2 mm"]}}, 'dimers.radii[0] = "1e999 mm": expected a length'),
     ({"beads": {"density": 4000}}, "beads.density = 4000: expected a density with its unit"),
-    ({"liquid": {"contact_angle": "0.5"}}, 'liquid.contact_angle = "0.5": expected an angle'),
-    ({"liquid": {"surface_tension": "-19 mN/m"}}, "liquid.surface_tension = "),
     ({"drive": {"peak_acceleration": "4 kg"}}, 'drive.peak_acceleration = "4 kg": expected an acceleration'),
-    ({"drive": {"peak_acceleration": "4"}}, 'drive.peak_acceleration = "4": expected an acceleration'),
     ({"drive": {"peak_acceleration": "-4 g"}}, "must be zero or more"),
-    ({"drive": {"frequency": "80 mm"}}, 'drive.frequency = "80 mm": expected a frequency with its unit'),
     ({"drive": {"frequency": "500 rad/s"}}, "(cycles a second, not an angular frequency)"),
-    ({"contact": {"youngs_modulus": "50 kg/m^3"}}, 'contact.youngs_modulus = "50 kg/m^3": expected a modulus'),
-    ({"run": {"time_step": "2"}}, 'run.time_step = "2": expected a time with its unit'),
-    ({"boundary": {"tilt": 30}}, "boundary.tilt = 30: expected an angle with its unit"),
+    ({"contact": {"youngs_modulus": "1 MPa"}}, "must lie within 5e+06 and 1e+09 Pa"),
+    ({"liquid": {"contact_angle": "120 deg"}}, "must lie within 0 and 1.5708 rad"),
     # Numbers, lists, tables, names
-    ({"dimers": {"radii": ["0.3 mm"]}}, 'dimers.radii = ["0.3 mm"]: expected two radii'),
+    ({"dimers": {"radii": ["0.3 mm"]}}, 'dimers.radii = ["0.3 mm"]: too short; expected two radii'),
     ({"dimers": {"radii": ["0.3 mm"] * 3}}, "expected two radii"),
     ({"dimers": {"radii": "0.3 mm"}}, 'dimers.radii = "0.3 mm": expected a list'),
     ({"beads": {"material": 3}}, "beads.material = 3: expected text"),
     ({"liquid": {"volume_fraction": "1 %"}}, 'liquid.volume_fraction = "1 %": expected a plain number'),
-    ({"liquid": {"volume_fraction": 0}}, "liquid.volume_fraction = 0: expected at least "),
-    ({"liquid": {"volume_fraction": 1.0}}, "expected at most 0.5"),
-    ({"liquid": {"viscosity_ratio": -1}}, "liquid.viscosity_ratio = -1: expected at least 0"),
-    ({"liquid": {"contact_angle": "120 deg"}}, 'liquid.contact_angle = "120 deg": expected at most'),
-    ({"contact": {"friction": {"bead_wall": -0.1}}}, "contact.friction.bead_wall = -0.1: expected at least 0"),
-    ({"contact": {"friction": {"bead_wall": "0.1"}}}, "expected a plain number"),
+    ({"liquid": {"volume_fraction": 1e-320}}, "liquid.volume_fraction = 1e-320: expected at least "),
     ({"contact": {"friction": 0.1}}, "contact.friction = 0.1: expected a table"),
     ({"contact": {"restitution": 1.2}}, "contact.restitution = 1.2: expected at most 1"),
     ({"contact": {"restitution": 0}}, "expected more than 0.05"),
-    ({"contact": {"youngs_modulus": "1 MPa"}}, "expected at least 5e+06 Pa"),
-    ({"contact": {"minimum_separation_ratio": 0}}, "contact.minimum_separation_ratio = 0: expected at least "),
-    ({"boundary": {"tilt": "100 deg"}}, 'boundary.tilt = "100 deg": expected at most'),
     ({"drive": {"axis": "w"}}, "drive.axis = \"w\": expected 'x', 'y' or 'z'"),
-    ({"drive": {"axis": [0, 0, 0]}}, "drive.axis = [0, 0, 0]: expected"),
-    ({"drive": {"axis": [1, 0]}}, "such as [1, 0, 1]"),
     ({"drive": {"frame": "labs"}}, 'did you mean "lab"'),
-    ({"dimers": {"replicates": 0}}, "dimers.replicates = 0: expected at least 1"),
     ({"dimers": {"replicates": 1.5}}, "expected a whole number"),
-    ({"dimers": {"replicates": True}}, "dimers.replicates = true: expected a whole number"),
-    ({"dimers": {"facing": "north"}}, "'both', 'right', 'left'"),
     ({"run": {"allow_unstable": "yes please"}}, "expected true or false"),
     ({"drive": "x"}, 'drive = "x": expected a table'),
     ({"beads": {"material": "rubi"}}, 'beads.material = "rubi": not in the library'),
@@ -102,7 +77,6 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"run": {"cycles": 20, "frames_per_second": 4.0}}, "run.frames_per_second"),
     ({"run": {"ranks": 2}}, "run.ranks = 2"),
     # Bodies and boundaries
-    ({"dimers": {"radii": None, "sin_delta": 0.2}}, "dimers.mean_radius: missing"),
     ({"dimers": {"radii": None, "mean_radius": "0.2 mm"}}, "dimers.sin_delta: missing"),
     ({"dimers": {"sin_delta": 0.2}}, "dimers.sin_delta = 0.2: expected either the radii or"),
     ({"dimers": {"gap": "1 um"}}, 'dimers.gap = "1 um": expected zero or less'),
@@ -121,41 +95,20 @@ BAD: list[tuple[dict[str, Any], str]] = [
     (at(["0 mm", "0.3 mm"], ["0 mm", "-0.3 mm"], radii=("0.3 mm", "0.3 mm")), "this has no heading"),
     ({"dimers": {"radii": ["0.5 mm", "0.2 mm"]}, "boundary": {"shape": "groove", "opening": "30 deg"}},
      "so unlike beads rest at heights at which they do not touch"),
-    ({"boundary": {"shape": "channel", "width": "0.5 mm"}}, "boundary.width"),
-    ({"boundary": {"shape": "channel", **GLASS}}, "boundary.width: missing"),
     ({"boundary": {"shape": "groove", **GLASS}}, "boundary.opening: missing"),
     ({"boundary": {"width": "1 mm", **GLASS}}, 'boundary.width = "1 mm": expected none of a plane'),
     ({**cluster("fan", "0.3 mm", "0.2 mm", "0.2 mm"), "boundary": {"shape": "channel", "width": "0.7 mm"}},
      "do not fit between the walls"),
     ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]}, "overlaps with placed[0]"),
-    ({"placed": [bead("1 mm", "-1 mm")]}, "placed[0].at = "),
     ({"placed": [bead("1 mm", "9 mm", "0.9 mm")]}, "expected a bead within the boundary"),
     # What is missing
-    ({"beads": None}, "beads: missing"),
-    ({"liquid": None}, "liquid: missing"),
-    ({"boundary": None}, "boundary: missing"),
-    ({"drive": None}, "drive: missing"),
     ({"dimers": None}, "dimers: missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"),
-    ({"dimers": {"radii": None}}, "dimers.radii: missing"),
-    ({"beads": {"material": None}}, "beads.material: missing"),
+    ({"beads": {"material": None}}, "beads.density: missing; expected such as"),
     ({"liquid": {"name": None}}, "liquid.surface_tension: missing"),
     ({"boundary": {"material": None}}, "boundary.material: missing"),
     ({"drive": {"frequency": None}}, "drive.frequency: missing"),
     ({"drive": {"peak_acceleration": None}}, "drive.peak_acceleration: missing"),
-    ({"beads": {"material": "polystyrene"}, "contact": {"friction": None}}, "contact.friction.bead_bead: missing"),
-    # Numbers beyond anything physical
-    ({"dimers": {"radii": ["1e200 m", "0.2 mm"]}}, "dimers.radii[0] = "),
-    ({"dimers": {"radii": ["0.3 mm", "1e-120 mm"]}}, "dimers.radii[1] = "),
-    ({"beads": {"density": "1e300 g/cm^3"}}, "beads.density = "),
-    ({"liquid": {"volume_fraction": 1e-320}}, "liquid.volume_fraction = "),
-    ({"liquid": {"dynamic_viscosity": "1e305 Pa*s"}}, "liquid.dynamic_viscosity = "),
-    ({"contact": {"youngs_modulus": "1e200 Pa"}}, "contact.youngs_modulus = "),
-    ({"contact": {"minimum_separation_ratio": 1e-310}}, "contact.minimum_separation_ratio = "),
-    ({"drive": {"peak_acceleration": "1e300 g"}}, "drive.peak_acceleration = "),
-    ({"drive": {"frequency": "1e-200 Hz"}}, "drive.frequency = "),
-    ({"run": {"time_step": "1e-320 s"}}, "run.time_step = "),
-    ({"run": {"cycles": 10**30}}, "run.cycles = "),
-    ({"dimers": {"spacing": "1e300 m"}}, "dimers.spacing = "),
+    ({"beads": {"material": "polystyrene"}, "contact": {"friction": None}}, "contact.friction: missing"),
 ]  # fmt: skip
 
 
@@ -165,9 +118,8 @@ def _said(tables: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in said.items() if value is not None}
 
 
-@pytest.mark.parametrize("number", range(len(BAD)))
-def test_bad_values(number: int) -> None:
-    changes, told = BAD[number]
+@pytest.mark.parametrize(("changes", "told"), BAD)
+def test_bad_values(changes: dict[str, Any], told: str) -> None:
     with pytest.raises(InputError) as caught:
         resolve_case(_said(document(**changes)), source="bad.toml")
     message = str(caught.value)
@@ -201,7 +153,9 @@ def test_a_substrate_of_ones_own_needs_its_friction(name: str) -> None:
         resolve_case(values)
 
 
-def test_a_liquid_may_have_no_viscosity() -> None:
+def test_a_liquid_may_have_no_viscosity_and_wet_no_better_than_to_90_degrees() -> None:
+    assert make_case(liquid={"contact_angle": "90 deg"}).liquid.contact_angle == pytest.approx(1.5707963)
+    assert make_case(run={"time_step": "20 us", "allow_unstable": True}).run.time_step > 19e-6
     case = make_case(liquid={"viscosity_ratio": 0})
     assert case.liquid.dynamic_viscosity == 0.0
     tables = render_deck(case).files["bridges.txt"].splitlines()
@@ -210,36 +164,30 @@ def test_a_liquid_may_have_no_viscosity() -> None:
     assert not any(map(any, resistances))
 
 
-def test_limits_that_may_be_touched() -> None:
-    assert make_case(liquid={"contact_angle": "90 deg"}).liquid.contact_angle == pytest.approx(1.5707963)
-    assert make_case(run={"time_step": "20 us", "allow_unstable": True}).run.time_step > 19e-6
+CONTENTS = {
+    b"[dimers\nradii = 3": "line 1",
+    b'[dimers]\nradii = ["0.3 mm", \xff]': "UTF-8",
+    b"": "beads: missing",
+    b"\x00\x01\x02": "not TOML",
+    b"a = " + b"9" * 5000: "not TOML",
+    b"a = " + b"[" * 5000: "not TOML",
+}
 
 
-@pytest.mark.parametrize(
-    ("contents", "expected"),
-    [
-        (b"[dimers\nradii = 3", "line 1"),
-        (b'[dimers]\nradii = ["0.3 mm", \xff]', "UTF-8"),
-        (b"[dimers]\nradii = 1\nradii = 2", "not TOML"),
-        (b"", "beads: missing"),
-        (b"\x00\x01\x02", "not TOML"),
-        (b"a = " + b"9" * 5000, "not TOML"),
-        (b"a = " + b"[" * 5000, "not TOML"),
-    ],
-)
-def test_files_that_are_no_cases(contents: bytes, expected: str, tmp_path: Path) -> None:
+def test_files_that_are_no_cases_or_not_there(tmp_path: Path) -> None:
     file = tmp_path / "bad.toml"
-    file.write_bytes(contents)
-    message = _message("show", str(file))
-    assert str(file) in message
-    assert expected in message
-
-
-def test_files_that_are_not_there(tmp_path: Path) -> None:
-    assert "no such file" in _message("show", str(tmp_path / "nothing.toml"))
-    assert 'did you mean "fig1b"' in _message("show", "fig1")
-    assert "cannot be read" in _message("show", str(tmp_path))
-    assert "cannot be read" in _message("show", "x" * 300)
+    for contents, expected in CONTENTS.items():
+        file.write_bytes(contents)
+        message = _message("show", str(file))
+        assert message.startswith(f"walkers: {file}: ")
+        assert expected in message
+    for name, told in (
+        (str(tmp_path / "nothing.toml"), "no such file"),
+        ("fig1", 'did you mean "fig1b"'),
+        (str(tmp_path), "cannot be read"),
+        ("x" * 300, "cannot be read"),
+    ):
+        assert told in _message("show", name)
 
 
 @pytest.mark.parametrize("command", ["result", "plot", "vtk", "render", "film", "paraview"])
@@ -247,45 +195,34 @@ def test_runs_that_are_not_there(command: str, in_folder: Path) -> None:
     assert "no finished run in runs; first do: walkers run fig1b" in _message(command, "fig1b")
     (in_folder / "empty").mkdir()
     assert "not a finished run" in _message(command, "empty")
-    (in_folder / "broken").mkdir()
-    (in_folder / "broken" / "manifest.json").write_text("{")
-    assert "manifest.json cannot be read" in _message(command, "broken")
+    (in_folder / "empty" / "manifest.json").write_text("{")
+    assert "manifest.json cannot be read" in _message(command, "empty")
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [["show"], ["shw", "fig1b"], ["run", "fig1b", "--limit", "-1"], ["run", "fig1b", "--no-such-option"], ["run"]],
-)
-def test_misuse_of_the_program(arguments: list[str]) -> None:
-    assert _message(*arguments).strip()
-    if arguments == ["show"]:
-        words = [sys.executable, "-m", "walkers.main", *arguments]
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
-        assert (done.returncode, done.stdout, "Traceback" in done.stderr) == (2, "", False)
+def test_misuse_of_the_program() -> None:
+    for arguments in (
+        ["shw", "fig1b"],
+        ["run", "fig1b", "--limit", "-1"],
+        ["run", "fig1b", "--no-such-option"],
+        ["run"],
+    ):
+        assert _message(*arguments).strip()
+    done = subprocess.run([sys.executable, "-m", "walkers.main", "show"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, "Traceback" in done.stderr) == (2, "", False)
 
 
-LONG = "x" * 100_000
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("show", "base.toml", "--set", f"drive.frequency={LONG}"),
-        ("show", "base.toml", "--set", f"{LONG}=3"),
-        ("show", "base.toml", "--set", f"liquid.name={LONG}"),
-        ("sweep", "value.toml"),
-        ("sweep", "key.toml"),
-        ("sweep", "lines.toml"),
-        ("plot", "base.toml", "--format", LONG),
-    ],
-)
-def test_long_values_and_those_of_several_lines_are_quoted_on_one(words: tuple[str, ...], in_folder: Path) -> None:
+def test_long_values_and_those_of_several_lines_are_quoted_on_one(in_folder: Path) -> None:
+    long = "x" * 100_000
     (in_folder / "base.toml").write_text(to_toml(document()))
-    (in_folder / "value.toml").write_text(f'case = "base.toml"\n[axes]\ndrive.frequency = ["{LONG}"]\n')
-    (in_folder / "key.toml").write_text(f'case = "base.toml"\n[axes]\n"{LONG}" = [1]\n')
+    (in_folder / "value.toml").write_text(f'case = "base.toml"\n[axes]\ndrive.frequency = ["{long}"]\n')
+    (in_folder / "key.toml").write_text(f'case = "base.toml"\n[axes]\n"{long}" = [1]\n')
     (in_folder / "lines.toml").write_text('case = "one\\ntwo\\u001b[31m"\n')
-    message = _message(*words)
-    assert message.count("\n") == 1
-    assert message.rstrip("\n").isprintable()
-    assert any(part in message for part in ("xxx", "one two", "no finished run"))
-    assert len(message) < 1500
+    settings = (f"drive.frequency={long}", f"{long}=3", f"liquid.name={long}")
+    words = [("show", "base.toml", "--set", one) for one in settings]
+    words += [("sweep", f"{name}.toml") for name in ("value", "key", "lines")]
+    for arguments in (*words, ("plot", "base.toml", "--format", long)):
+        message = _message(*arguments)
+        assert message.count("\n") == 1
+        assert message.rstrip("\n").isprintable()
+        assert any(part in message for part in ("xxx", "one two", "no finished run"))
+        assert len(message) < 1500

@@ -26,6 +26,7 @@ from walkers.postprocess.report.run import result_html
 from walkers.runner.directory import CASE_NAME, case_of
 from walkers.runner.files import write_json
 from walkers.runner.manifest import record_tables
+from walkers.runner.summary import describe, summarise
 from walkers.templates.deck import render_deck
 
 EACH = pytest.mark.parametrize("name", HOSTILE)
@@ -98,13 +99,6 @@ def test_a_title_is_no_line_of_a_script_for_paraview(name: str, run_directory: C
     assert ast.literal_eval(folder_line.partition(" else ")[2]) == str(folder)
 
 
-def test_a_script_for_paraview_runs_nothing_of_a_title(in_folder: Path, stranger: Callable[[str], Path]) -> None:
-    call("paraview", str(stranger(HOSTILE["three double quotes"])), "--to", "shown", check=True)
-    script = (in_folder / "shown" / "show.py").read_text("utf-8")
-    exec(compile(script.partition("import os")[0], "head", "exec"), {})
-    assert not (in_folder / "pwned").exists()
-
-
 @EACH
 def test_a_result_in_a_notebook_has_the_tags_of_any_other(name: str, stranger: Callable[[str], Path]) -> None:
     pages = [result_html(place, current_result(place)) for place in map(stranger, ("plain", HOSTILE[name]))]
@@ -165,8 +159,6 @@ def test_a_calibrations_title_is_no_line_of_its_report(name: str) -> None:
 
 @EACH
 def test_a_summary_of_a_case_has_no_line_of_its_title(name: str) -> None:
-    from walkers.runner.summary import describe, summarise
-
     case = make_case(run=SHORT)
     plain, odd = (describe(summarise(replace(case, title=title))) for title in ("plain", HOSTILE[name]))
     assert len(odd.splitlines()) == len(plain.splitlines())

@@ -1,7 +1,6 @@
 """Sweep files: what may be varied and how, and what is said of one that makes no sense."""
 
 from collections.abc import Callable
-from math import asin
 from pathlib import Path
 from typing import Any
 
@@ -38,13 +37,8 @@ def test_axes_multiply_and_the_last_runs_fastest(make: Make) -> None:
     found = [(case.drive.frequency, case.drive.peak_acceleration) for case in _cases(sweep)]
     assert found == [(f, pytest.approx(9.8 * a)) for f in (60.0, 80.0) for a in (1, 2, 4)]
     assert sweep.units == ("Hz", "g")
-
-
-def test_dotted_and_nested_keys_are_the_same(make: Make) -> None:
-    nested = make(axes={"contact": {"friction": {"bead_wall": [0.1, 0.2]}}})
-    assert nested.keys == make(axes={"contact.friction.bead_wall": [0.1, 0.2]}).keys == ("contact.friction.bead_wall",)
-    assert nested.units == (None,)
-    assert [case.contact.friction_bead_wall for case in _cases(nested)] == [0.1, 0.2]
+    dotted = make(axes={"drive.frequency": ["60 Hz", "80 Hz"], "drive.peak_acceleration": ["1 g", "2 g", "4 g"]})
+    assert (dotted.keys, dotted.rows) == (sweep.keys, sweep.rows)
 
 
 def test_linspace_and_geomspace_are_numpys(make: Make) -> None:
@@ -61,12 +55,8 @@ def test_linspace_and_geomspace_are_numpys(make: Make) -> None:
     np.testing.assert_allclose(accelerations, np.linspace(0.5, 10, 20), rtol=1e-12)
     fractions = [case.liquid.volume_fraction for case in cases[:5]]
     np.testing.assert_allclose(fractions, np.geomspace(1e-3, 1e-1, 5), rtol=1e-11)
-
-
-def test_whole_numbers_stay_whole(make: Make) -> None:
-    axes = {"run.seed": {"linspace": [1, 4, 4]}, "run.cycles": {"geomspace": [10, 40, 3]}}
-    cases = _cases(make(set={"run.settling_cycles": 2}, axes=axes))
-    assert [(case.seed, case.run.cycles) for case in cases] == [(s, c) for s in (1, 2, 3, 4) for c in (10, 20, 40)]
+    whole = make(axes={"run.seed": {"linspace": [1, 4, 4]}, "run.cycles": {"geomspace": [10, 40, 3]}})
+    assert whole.rows == [(seed, cycles) for seed in (1, 2, 3, 4) for cycles in (10, 20, 40)]
 
 
 def test_zipped_keys_go_together(make: Make) -> None:
@@ -90,15 +80,7 @@ def test_samplers_are_scipys_and_seeded(make: Make, method: str, sampler: type[q
     np.testing.assert_allclose(np.array(sweep.rows, dtype=float), expected, rtol=1e-11)
     again = make(sample=[{"method": method, "points": 8, "seed": 6, "ranges": ranges}])
     assert again.rows != sweep.rows
-
-
-def test_samples_of_quantities_keep_their_unit(make: Make) -> None:
-    ranges = {
-        "drive.peak_acceleration": {"uniform": ["1 g", "2 g"]},
-        "dimers.radii[0]": {"uniform": ["0.3 mm", "0.4 mm"]},
-    }
-    cases = _cases(make(sample=[{"points": 4, "ranges": ranges}]))
-    assert all(9.8 <= case.drive.peak_acceleration <= 19.6 for case in cases)
+    cases = _cases(make(sample=[{"points": 4, "ranges": {"dimers.radii[0]": {"uniform": ["0.3 mm", "0.4 mm"]}}}]))
     assert all(3e-4 <= case.walkers[0].radii[0] <= 4e-4 and case.walkers[0].radii[1] == 2e-4 for case in cases)
 
 
@@ -123,24 +105,19 @@ def test_shipped_sweeps_are_the_papers() -> None:
     assert {case.drive.frequency for case in fig2} == {60.0, 70.0, 80.0, 90.0}
     accelerations = {round(case.drive.peak_acceleration / 9.8, 9) for case in fig2}
     assert (min(accelerations), max(accelerations)) == (0.5, 10.0)
-    assert {case.walkers[0].replicates for case in fig2} == {6}
-    fig3 = _cases(load_sweep("fig3"))
-    assert [round(dimer_of(case).sin_delta, 3) for case in fig3] == [0.0, 0.111, 0.143, 0.2, 0.273, 0.333]
-    assert all(dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(0.5) for case in fig3)
-    assert len({case.drive.peak_acceleration for case in fig3}) == 6
+    fig3 = [(dimer_of(case), case.drive.peak_acceleration) for case in load_sweep("fig3").cases()]
+    assert [round(dimer.sin_delta, 3) for dimer, _ in fig3] == [0.0, 0.111, 0.143, 0.2, 0.273, 0.333]
+    assert all(dimer.gamma0(peak) == pytest.approx(0.5) for dimer, peak in fig3)
     turned = _cases(load_sweep("alignment"))
     assert {round(np.degrees(case.walkers[0].angle)) for case in turned} == set(range(0, 91, 15))
-    assert {dimer_of(case).sin_delta == 0 for case in turned} == {True, False}
     modes = _cases(load_sweep("modes"))
-    assert {round(asin(dimer_of(case).sin_delta), 6) for case in modes} == {round(asin(s / 20), 6) for s in range(9)}
+    assert {round(dimer_of(case).sin_delta, 6) for case in modes} == {step / 20 for step in range(9)}
 
 
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"axes": {"drive.frequncy": ["60 Hz"]}}, 'drive.frequncy: unknown key; .*did you mean "frequency"'),
     ({"axes": {"drive": ["60 Hz"]}}, "drive: is a table of a case"),
     ({"axes": {"drive.frequency": []}}, "drive.frequency = \\[\\]: expected at least one value"),
-    ({"axes": {"drive.frequency": "60 Hz"}}, "expected a list of values"),
-    ({"axes": {"drive.frequency": {"linspace": ["60 Hz", "90 Hz"]}}}, "first value, last value and number"),
     ({"axes": {"drive.frequency": {"linspace": ["60 Hz", "90 Hz", 2.5]}}}, "first value, last value and number"),
     ({"axes": {"drive.frequency": {"linspace": ["60 Hz", "9 kHz", 3]}}}, "one unit throughout"),
     ({"axes": {"drive.frequency": {"linspace": ["fast", "90 Hz", 3]}}}, "expected a number"),
@@ -151,27 +128,19 @@ BAD: list[tuple[dict[str, Any], str]] = [
      "1998000 points"),
     ({"axes": {"run.seed": [1]}, "zip": [{"run.seed": [1]}]}, "varies on two axes"),
     ({"zip": [{"run.seed": [1, 2], "dimers.angle": ["0 deg"]}]}, "as many values .*seed has 2, dimers.angle has 1"),
-    ({"zip": [{}]}, "keys and their values"),
     ({"sample": [{"points": 4, "method": "sobbol", "ranges": {}}]}, 'did you mean "sobol"'),
     ({"sample": [{"points": 4, "ranges": {"run.seed": [1, 2]}}]}, "uniform"),
     ({"sample": [{"points": 4, "ranges": {}}]}, "keys and their ranges"),
     ({"sample": [{"points": 0, "ranges": {"contact.restitution": {"uniform": [0.1, 0.2]}}}]}, "at least 1"),
     ({"descend": {"from": "1 g", "to": "2 g", "step": "0.1 g", "until_below": "1 um/s"}}, "must not be below"),
-    ({"descend": {"from": "1 g", "to": "0 g", "step": "0 g", "until_below": "1 um/s"}}, "must not be below"),
     ({"descend": {"from": "1 g", "to": "0 g", "step": "fast", "until_below": "1 um/s"}}, "descend.step"),
     ({"descend": {"from": "1 g", "to": "0 g", "step": "0.1 g", "until_below": "1 um"}}, "descend.until_below.*speed"),
-    ({"descend": {"from": "1 g", "to": "0 g", "until_below": "1 um/s"}}, "descend.step: missing"),
     ({"descend": {"from": float("inf"), "to": 0, "step": 1, "until_below": "1 um/s"}}, "descend.from = .*a number"),
-    ({"descend": {"from": True, "to": 0, "step": 1, "until_below": "1 um/s"}}, "from = true: expected a number"),
     ({"descend": {"from": "1 g", "to": "0 g", "step": "1e-320 g", "until_below": "1 um/s"}}, "must not be below"),
-    ({"axes": {"contact.restitution": {"linspace": [0, float("inf"), 3]}}}, "expected a number"),
-    ({"axes": {"contact.restitution": {"linspace": [0, 10**400, 3]}}}, "expected a number"),
     ({"axes": {"drive": {"frequency": ["60 Hz"]}, "drive.frequency": ["70 Hz"]}}, "drive.frequency: is given twice"),
     ({"axes": {"dimers.radii": [["0.3 mm", "0.2 mm"]], "dimers.radii[1]": ["0.1 mm"]}}, "radii.*varies on two axes"),
-    ({"axes": {"dimers.radii[1]": ["0.1 mm"], "dimers.radii": [["0.3 mm", "0.2 mm"]]}}, "radii.*varies on two axes"),
     ({"axes": {".": [1]}}, "is no key of a case"),
     ({"case": ""}, 'case = "": no such file'),
-    ({"case": "x" * 5000}, "case = .*cannot be read"),
     ({"sample": {"points": 4}}, r"sample = .*\[\[name\]\]"),
     ({"axis": {}}, 'unknown key; a sweep takes .*did you mean "axes"'),
     ({"case": "fig1c"}, 'case = "fig1c": no such file, nor a shipped case .*did you mean "fig1b"'),

@@ -12,11 +12,12 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 from pydantic import BaseModel, BeforeValidator
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError, PydanticUndefined
+from pydantic_core import PydanticUndefined
 from sphinx.application import Sphinx
 from sphinx.config import Config
 
 import walkers.inputs
+from walkers.inputs.matter import SUPPLIED
 from walkers.inputs.reading import read_toml
 from walkers.inputs.schema import AUTO, CaseFile
 from walkers.inputs.units import Kind
@@ -89,11 +90,12 @@ def _expected(hint: Any) -> str:
 
 def _refusal(validator: BeforeValidator | Kind) -> str | None:
     if isinstance(validator, Kind):
-        return validator.expectation.removeprefix("expected ")
+        ends = f"{validator.smallest:g} to {validator.largest:g} {validator.unit}"
+        return f"{validator.expectation.removeprefix('expected ')}; {ends}"
     try:
         validator.func(object())  # type: ignore[call-arg]
-    except PydanticCustomError as error:
-        return error.message().removeprefix("expected ")
+    except ValueError as error:
+        return str(error).removeprefix("expected ")
     return None
 
 
@@ -114,7 +116,11 @@ def _keys() -> str:
         own = {key: field for key, field in model.model_fields.items() if not _tables_in(hints[key])}
         if own:
             text.append(f"\n## {name or 'at the top'}\n\n{inspect.getdoc(model)}\n".replace("``", "`"))
-            rows = ((f"`{key}`", _expected(hints[key]), _default(field)) for key, field in own.items())
+            supplied = {key for key in own if f"{name.strip('[]')}.{key}" in SUPPLIED}
+            rows = (
+                (f"`{key}`", _expected(hints[key]), "the library's" if key in supplied else _default(field))
+                for key, field in own.items()
+            )
             text.append(_table(["key", "expects", "default"], rows))
         for key in model.model_fields:
             for inner in _tables_in(hints[key])[:1]:

@@ -18,8 +18,8 @@ from scipy.stats import norm
 
 from walkers.calibration.emulator import LARGEST, Emulators, FloatArray, Space, fit_emulators, spread_out
 from walkers.calibration.posterior import Density, Posterior, sample_posterior
-from walkers.inputs.axes import flatten
 from walkers.inputs.calibration import QUANTITIES, Calibration, Speed
+from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.schema import ALTERNATIVES
 from walkers.inputs.sweep import Sweep, expand

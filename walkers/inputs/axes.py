@@ -6,14 +6,15 @@ writing an axis, add it to `values_of`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import isfinite, log, prod
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.changes import Value
-from walkers.inputs.errors import UnusableKeyError
+from walkers.inputs.changes import Value, flatten
+from walkers.inputs.errors import unusable
 from walkers.inputs.units import split_quantity
 
 if TYPE_CHECKING:
@@ -33,27 +34,9 @@ class Axis:
     rows: tuple[tuple[Value, ...], ...]
 
     @classmethod
-    def of(cls, key: str, values: Sequence[Value]) -> Axis:
-        """An axis of one key."""
-        return cls((key,), tuple((value,) for value in values))
-
-
-def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool], prefix: str = "") -> dict[str, Any]:
-    """Dotted keys of nested tables: ``{"drive": {"frequency": …}}`` and ``{"drive.frequency": …}`` are the same.
-
-    Raises
-    ------
-    UnusableKeyError
-        If a key is given both ways.
-    """
-    flat: dict[str, Any] = {}
-    for name, value in table.items():
-        key = f"{prefix}.{name}" if prefix else name
-        below = flatten(value, is_leaf, key) if isinstance(value, Mapping) and not is_leaf(value) else {key: value}
-        if twice := flat.keys() & below.keys():
-            raise UnusableKeyError(twice.pop(), "is given twice")
-        flat |= below
-    return flat
+    def of(cls, columns: Mapping[str, Sequence[Value]]) -> Axis:
+        """An axis of the values of each key."""
+        return cls(tuple(columns), tuple(zip(*columns.values(), strict=True)))
 
 
 def is_axis(value: object) -> bool:
@@ -64,29 +47,22 @@ def is_axis(value: object) -> bool:
 def values_of(key: str, axis: object) -> list[Value]:
     """The values of an axis: a list, ``{ linspace = [first, last, number] }`` or ``{ geomspace = [...] }``.
 
-    Raises
-    ------
-    UnusableKeyError
-        If it is something else.
+    Raises `InputError` if it is something else.
     """
     if isinstance(axis, list):
         if not axis:
-            raise UnusableKeyError(key, "expected at least one value", axis)
+            raise unusable(key, "expected at least one value", axis)
         unit_of(key, axis)
         return axis
-    if isinstance(axis, Mapping) and len(axis) == 1 and (kind := next(iter(axis))) in _SPACINGS:
-        return _spaced(key, kind, axis[kind])
-    raise UnusableKeyError(
-        key, "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }", axis
-    )
-
-
-def _spaced(key: str, kind: str, given: object) -> list[Value]:
+    if not (isinstance(axis, Mapping) and len(axis) == 1 and (kind := next(iter(axis))) in _SPACINGS):
+        told = "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
+        raise unusable(key, told, axis)
     import numpy as np
 
+    given = axis[kind]
     if not (isinstance(given, list) and len(given) == 3 and type(given[2]) is int and 1 <= given[2] <= MOST_POINTS):
         told = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
-        raise UnusableKeyError(key, told, {kind: given})
+        raise unusable(key, told, axis)
     first, last, unit = _range(key, given[:2], positive=kind == "geomspace")
     numbers = [written(float(one), unit) for one in getattr(np, kind)(first, last, given[2])]
     # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
@@ -98,36 +74,34 @@ def _spaced(key: str, kind: str, given: object) -> list[Value]:
 def _range(key: str, given: list[Value], *, positive: bool) -> tuple[float, float, str | None]:
     """Both ends of a range and their unit."""
     unit = unit_of(key, given)
-    first, last = (number_of(key, end)[0] for end in given)
+    first, last = (number_of(key, end) for end in given)
     if positive and not (first > 0 and last > 0):
-        raise UnusableKeyError(key, "expected two values above zero", given)
+        raise unusable(key, "expected two values above zero", given)
     return first, last, unit
 
 
 def _quantity(value: Value) -> tuple[float, str | None] | None:
     """A value as number and unit (None: a plain number), or None if it is no finite number."""
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        return None
     try:
-        if isinstance(value, str):
-            number, unit = split_quantity(value)
-            return (number, unit) if isfinite(number) else None
-        if isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(float(value)):
-            return float(value), None
+        number, unit = split_quantity(value) if isinstance(value, str) else (float(value), None)
     except (ValueError, OverflowError):
-        pass
-    return None
+        return None
+    return (number, unit) if isfinite(number) else None
 
 
-def number_of(key: str, value: Value) -> tuple[float, str | None]:
-    """A value as number and unit; the unit of a plain number is None.
-
-    Raises
-    ------
-    UnusableKeyError
-        If it is no finite number.
-    """
+def number_of(key: str, value: Value) -> float:
+    """The number of a value, without its unit; raises `InputError` if it is no finite number."""
     if (found := _quantity(value)) is None:
-        raise UnusableKeyError(key, "expected a number, or a number with its unit in quotes", value)
-    return found
+        raise unusable(key, "expected a number, or a number with its unit in quotes", value)
+    return found[0]
+
+
+def plain(value: Value) -> Any:
+    """A value without its unit: a number where it is a quantity, else as it is."""
+    found = _quantity(value) if isinstance(value, str) else None
+    return value if found is None else found[0]
 
 
 def written(number: float, unit: str | None) -> Value:
@@ -141,50 +115,39 @@ def unit_of(key: str, values: Sequence[Value]) -> str | None:
 
     Raises
     ------
-    UnusableKeyError
+    InputError
         If they are in several units.
     """
     parts = [part for value in values for part in (value if isinstance(value, list) else [value])]
     units = {found[1] for found in map(_quantity, parts) if found is not None}
     if len(units) > 1:
-        raise UnusableKeyError(key, "expected one unit throughout", list(values))
+        raise unusable(key, "expected one unit throughout", list(values))
     return units.pop() if units else None
 
 
-def plain(value: Value) -> Any:
-    """A value without its unit: a number where it is a quantity, else as it is."""
-    found = _quantity(value) if isinstance(value, str) else None
-    return value if found is None else found[0]
-
-
-def different(key: str, values: Sequence[Value]) -> Sequence[Value]:
-    """The values of an axis, if no two of them are the same.
-
-    Raises
-    ------
-    UnusableKeyError
-        If there are equal ones: points would be there twice.
-    """
+def listed(key: str, given: object) -> Axis:
+    """An axis of one key, whose values differ: else points would be there twice."""
+    values = values_of(key, given)
     known: set[str] = set()
     for value in values:
         same = repr([_quantity(part) or part for part in (value if isinstance(value, list) else [value])])
         if same in known:
-            raise UnusableKeyError(key, "expected different values: this one is there twice", value)
+            raise unusable(key, "expected different values: this one is there twice", value)
         known.add(same)
-    return values
+    return Axis.of({key: values})
 
 
 def zipped(table: Mapping[str, Any]) -> Axis:
     """Keys whose values go together, the first with the first."""
     columns = {key: values_of(key, axis) for key, axis in flatten(table, is_axis).items()}
     if not columns:
-        raise UnusableKeyError("zip", "expected keys and their values", dict(table))
+        raise unusable("zip", "expected keys and their values", dict(table))
     lengths = {key: len(values) for key, values in columns.items()}
     if len(set(lengths.values())) > 1:
         *_, (key, values) = columns.items()
         told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise UnusableKeyError(key, f"expected as many values for each key of a zip: {told}", values)
-    return Axis(tuple(columns), tuple(zip(*columns.values(), strict=True)))
+        raise unusable(key, f"expected as many values for each key of a zip: {told}", values)
+    return Axis.of(columns)
 
 
 def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
@@ -203,39 +166,34 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
 
     ends = ends_of(ranges)
     if not ends:
-        raise UnusableKeyError("sample.ranges", "expected keys and their ranges", dict(ranges))
-    columns = []
+        raise unusable("sample.ranges", "expected keys and their ranges", dict(ranges))
+    columns = {}
     shares = unit_cube(method, len(ends), points, seed).T
-    for share, (low, high, unit, logarithmic) in zip(shares, ends.values(), strict=True):
+    for share, (key, (low, high, unit, logarithmic)) in zip(shares, ends.items(), strict=True):
         numbers = np.exp(log(low) + share * log(high / low)) if logarithmic else low + share * (high - low)
-        columns.append([written(float(number), unit) for number in numbers])
-    return Axis(tuple(ends), tuple(zip(*columns, strict=True)))
+        columns[key] = [written(float(number), unit) for number in numbers]
+    return Axis.of(columns)
 
 
 def ends_of(ranges: Mapping[str, Any]) -> dict[str, tuple[float, float, str | None, bool]]:
     """Both ends of the ranges of several keys, their unit, and whether they are of magnitudes.
 
-    Raises
-    ------
-    UnusableKeyError
-        If one is no ``{ uniform = [low, high] }`` or ``{ loguniform = [low, high] }``.
+    Raises `InputError` if one is no ``{ uniform = [low, high] }`` or ``{ loguniform = [low, high] }``.
     """
-    ends: dict[str, tuple[float, float, str | None, bool]] = {}
+    ends = {}
     for key, given in flatten(ranges, is_axis).items():
         kind = next(iter(given)) if isinstance(given, Mapping) and len(given) == 1 else ""
         if kind not in _DISTRIBUTIONS or not (isinstance(given[kind], list) and len(given[kind]) == 2):
-            raise UnusableKeyError(key, "expected { uniform = [low, high] } or { loguniform = [low, high] }", given)
+            raise unusable(key, "expected { uniform = [low, high] } or { loguniform = [low, high] }", given)
         low, high, unit = _range(key, given[kind], positive=kind == "loguniform")
         if low >= high:
-            raise UnusableKeyError(key, "expected the smaller value first", given)
+            raise unusable(key, "expected the smaller value first", given)
         ends[key] = (low, high, unit, kind == "loguniform")
     return ends
 
 
 def unit_cube(method: str, dimensions: int, points: int, seed: int) -> npt.NDArray[np.float64]:
     """Points of a sampler in the unit cube, shape (points, dimensions); as for `sampled`."""
-    import warnings
-
     import numpy as np
     from scipy.stats import qmc
 
@@ -249,16 +207,13 @@ def unit_cube(method: str, dimensions: int, points: int, seed: int) -> npt.NDArr
 def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Value, ...]]]:
     """The keys of all axes, and for each combination of their points, the last axis running fastest, one value a key.
 
-    Raises
-    ------
-    UnusableKeyError
-        If a key is on two axes, or there are too many combinations.
+    Raises `InputError` if a key is on two axes, or there are too many combinations.
     """
     keys = tuple(key for axis in axes for key in axis.keys)
     for number, key in enumerate(keys):
         list_of = key.partition("[")[0]
         if any(other in (key, list_of) or other.partition("[")[0] == key for other in keys[:number]):
-            raise UnusableKeyError(key, "varies on two axes")
+            raise unusable(key, "varies on two axes")
     if (many := prod(len(axis.rows) for axis in axes)) > MOST_POINTS:
-        raise UnusableKeyError("axes", f"{many} points; expected at most {MOST_POINTS}")
+        raise unusable("axes", f"{many} points; expected at most {MOST_POINTS}")
     return keys, [tuple(value for row in rows for value in row) for rows in product(*(axis.rows for axis in axes))]

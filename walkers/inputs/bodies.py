@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from math import asin, atan2, cos, hypot, inf, pi, sin, sqrt
+from itertools import combinations
+from math import asin, atan2, cos, dist, hypot, inf, pi, sin, sqrt
 from typing import TYPE_CHECKING, Literal
 
 from walkers.inputs.arrangements import ARRANGEMENTS, Pairs, Places, touching
@@ -50,20 +51,18 @@ class Standing:
 
 @dataclass(frozen=True)
 class Walkers:
-    """Walkers of one make: dimers, or clusters of more beads.
+    """Walkers of one make: dimers, or clusters of more beads; m and rad.
 
     Attributes
     ----------
     radii, arrangement, places
-        Of the beads of each, m; how they stand (`walkers.inputs.arrangements`), or ``given``: at places (m).
+        Of the beads of each; how they stand (`walkers.inputs.arrangements`), or ``given``: at places.
     replicates, spacing, meet
-        How many, how far from one to the next, m; whether they are meant to meet, or are replicates that must not.
-    facing
-        Where they are to face: along the drive axis (right), against it (left), or every other one (both).
-    angle, angle_spread
-        From there at the start, and how far each may be off, rad.
+        How many, how far from one to the next; whether they are meant to meet, or are replicates that must not.
+    facing, angle, angle_spread
+        Along the drive axis (right), against it (left), or every other one (both); how far off, and each at random.
     gap, gap_spread
-        Of all contacts at the start (m, negative: touching; None: where forces balance), and its relative spread.
+        Of all contacts at the start (negative: touching; None: where forces balance), and its relative spread.
     """
 
     radii: tuple[float, ...]
@@ -104,27 +103,25 @@ class Walkers:
             neighbours[other].append(self.radii[one])
         return list(zip(self.radii, neighbours, strict=True))
 
+    @cached_property
+    def design(self) -> Places:
+        """Where the beads stand, in the walker's own frame, were they rigid and on a plane, m."""
+        return list(self.places) or ARRANGEMENTS[self.arrangement].places(self.radii, self._rigid)
+
     def _rigid(self, one: int, other: int) -> float:
         """Distance seen from above of two beads that touch each other and the floor without overlap, m."""
         first, second = self.radii[one], self.radii[other]
         return (first + second) * cos(asin((first - second) / (first + second)))
 
     @cached_property
-    def design(self) -> Places:
-        """Where the beads stand, in the walker's own frame, were they rigid and on a plane, m."""
-        return list(self.places) or ARRANGEMENTS[self.arrangement].places(self.radii, self._rigid)
-
-    @cached_property
     def length(self) -> float:
         """From the outermost point of one bead to that of another, seen from above, m."""
-        places, radii = self.design, self.radii
         known = {} if self.places else {pair: self._rigid(*pair) for pair in self.pairs}
-        return max(
-            known.get((one, other), hypot(places[one][0] - places[other][0], places[one][1] - places[other][1]))
-            + (radii[one] + radii[other])
-            for one in range(len(radii))
-            for other in range(one + 1, len(radii))
-        )
+        extents = []
+        for one, other in combinations(range(len(self.radii)), 2):
+            apart = known.get((one, other), dist(self.design[one], self.design[other]))
+            extents.append(apart + (self.radii[one] + self.radii[other]))
+        return max(extents)
 
     @cached_property
     def front(self) -> tuple[float, ...]:
@@ -154,27 +151,30 @@ class Walkers:
         return weights if hypot(*lever) > _LEAST_LEVER * self.length else self.front
 
     def stand(self, case: Case, first: int) -> list[Standing]:
-        """Each walker about the point over which its first two beads touch; ``first`` is the first one's number."""
-        return [self._stand(case, first + number) for number in range(self.replicates)]
+        """Each walker about the point over which its first two beads touch; ``first`` is the first one's number.
 
-    def _stand(self, case: Case, number: int) -> Standing:
-        """A walker whose angle and contacts are drawn from a stream of its own, whoever shares the deck."""
-        facing = {"right": 1, "left": -1}.get(self.facing, 1 if number % 2 == 0 else -1)
-        turn, press = _draws(case.seed, number)
-        angle, factor = self.angle + self.angle_spread * turn, 1.0 + self.gap_spread * press
-        loads = contact_loads(case, self)
-        overlaps = [(overlap if self.gap is None else -self.gap) * factor for overlap in loads.overlaps]
-        axis = case.drive_axis
-        heading = atan2(axis[1], axis[0]) + angle + (0.0 if facing > 0 else pi)
-        sunk = [radius - overlap for radius, overlap in zip(self.radii, overlaps, strict=False)]
-        heights = [case.boundary.rest_height(radius) for radius in sunk]
-        beads = tuple(
-            StandingBead(
-                along * cos(heading) - aside * sin(heading), along * sin(heading) + aside * cos(heading), *rest
-            )
-            for (along, aside), *rest in zip(self._places(heights, overlaps), heights, self.radii, strict=True)
-        )
-        return Standing(beads, facing, angle, walks=True)
+        Its angle and contacts are drawn from a stream of its own, whoever shares the deck.
+        """
+        standing, (x, y, _) = [], case.drive_axis
+        for number in range(first, first + self.replicates):
+            facing = {"right": 1, "left": -1}.get(self.facing, 1 if number % 2 == 0 else -1)
+            turn, press = _draws(case.seed, number)
+            angle, factor = self.angle + self.angle_spread * turn, 1.0 + self.gap_spread * press
+            resting = contact_loads(case, self).overlaps
+            overlaps = [(overlap if self.gap is None else -self.gap) * factor for overlap in resting]
+            heading = atan2(y, x) + angle + (0.0 if facing > 0 else pi)
+            heights = [
+                case.boundary.rest_height(radius - overlap)
+                for radius, overlap in zip(self.radii, overlaps, strict=False)
+            ]
+            beads = [
+                StandingBead(
+                    along * cos(heading) - aside * sin(heading), along * sin(heading) + aside * cos(heading), *rest
+                )
+                for (along, aside), *rest in zip(self._places(heights, overlaps), heights, self.radii, strict=True)
+            ]
+            standing.append(Standing(tuple(beads), facing, angle, walks=True))
+        return standing
 
     def _places(self, heights: Sequence[float], overlaps: Sequence[float]) -> Places:
         """Where the beads of a walker stand, in its own frame, given their heights and the overlaps of contacts, m."""
@@ -206,10 +206,9 @@ def _beside(one: float, other: float) -> list[tuple[float, list[float]]]:
 
 @dataclass(frozen=True)
 class Mixture:
-    """Beads of two size classes, mixed and poured.
+    """Beads of two size classes, mixed and poured: the radii of either class, m, and the number of its beads.
 
-    ``small`` and ``large`` are the radii of either class, m, each occurring equally often (the engine is given no
-    distributions), ``counts`` the number of small and of large beads.
+    Each of its radii occurs equally often (the engine is given no distributions).
     """
 
     small: tuple[float, ...]

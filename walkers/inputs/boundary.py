@@ -1,16 +1,15 @@
 """What beads stand on and lie in: planes, channels, boxes, cylinders. To add one, write a class, name it in `Shape`.
 
-Most have a floor, the plane z = 0 in their own frame, and may have side walls. A boundary may lean: `tilt` is the angle
-of its floor to the horizontal, `uphill` the direction of the steepest way up within the floor.
+Most have a floor, the plane z = 0 in their own frame, and may have side walls.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, cos, hypot, inf, pi, sin, sqrt
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 from walkers.inputs.drive import Vector
 
@@ -36,6 +35,10 @@ class Flat:
     normal: Vector
     name: str = FLOOR
 
+    def clearance(self, *place: float) -> float:
+        """Distance of a place (x, y, z in m) from it, m."""
+        return sum((one - at) * along for one, at, along in zip(place, self.point, self.normal, strict=True))
+
     def distances(self, places: FloatArray) -> FloatArray:
         """Of places, shape (..., 3), m."""
         found: FloatArray = (places - self.point) @ self.normal
@@ -52,6 +55,10 @@ class Round:
 
     radius: float
     name: str = "side"
+
+    def clearance(self, *place: float) -> float:
+        """Distance of a place (x, y, z in m) from it, m."""
+        return self.radius - hypot(*place[:2])
 
     def distances(self, places: FloatArray) -> FloatArray:
         """Of places, shape (..., 3), m."""
@@ -124,47 +131,49 @@ class Boundary:
     def walls(self) -> tuple[Wall, ...]:
         """The floor first, if there is one, then the side walls."""
 
+    @abstractmethod
+    def room(self, span: Span) -> Room:
+        """The simulation box for beads that need so much."""
+
     @property
     def bare(self) -> bool:
         """Whether it is a floor without any side walls."""
-        return [wall.name for wall in self.walls] == [FLOOR]
+        return self.walls == (BOTTOM,)
 
-    @abstractmethod
-    def room(self, span: Span) -> Room:
-        """The simulation box for beads that need so much, on so many MPI processes."""
+    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
+        """Distance of a place from the nearest side wall, m."""
+        return min((wall.clearance(x, y, z) for wall in self.walls if wall.name != FLOOR), default=inf)
 
-    @abstractmethod
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
-        """Places for walkers that stand ``spacing`` (m) apart."""
+        """Places for walkers that stand ``spacing`` (m) apart: a square grid about the origin."""
+        columns = ceil(sqrt(number))
+        rows = ceil(number / columns)
+        cells = (divmod(place, columns) for place in range(number))
+        return [((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing) for row, column in cells]
 
     def rest_height(self, radius: float) -> float:
         """Height above the origin at which a bead of a radius (m) rests, m."""
         return radius
 
-    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
-        """Distance of a place from the nearest side wall, m."""
-        del x, y, z
-        return inf
-
     @property
     def inner_width(self) -> float:
         """Between upright side walls, m."""
-        return 2.0 * self.side_clearance(0.0, 0.0, inf)
+        return inf
 
     @property
     def top(self) -> float:
         """Height up to which beads may be placed, m."""
         return inf
 
-    def layer(self, largest: float) -> Layer:
-        """Places from which beads up to a radius (m) are poured."""
-        del largest
-        raise ValueError(f"nothing can be poured into a {type(self).__name__}")
-
     @property
     def cross_section(self) -> float:
         """Inner area, m²."""
         return inf
+
+    def layer(self, largest: float) -> Layer:
+        """Places from which beads up to a radius (m) are poured."""
+        del largest
+        raise ValueError(f"nothing can be poured into a {type(self).__name__}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,16 +193,9 @@ class Plane(Boundary):
         x, y = span.half_x + wide, span.half_y + wide
         return (-x, -y, -span.margin), (x, y, span.height + wide)
 
-    def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
-        """A square grid about the origin."""
-        columns = ceil(sqrt(number))
-        rows = ceil(number / columns)
-        cells = (divmod(place, columns) for place in range(number))
-        return [((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing) for row, column in cells]
-
 
 class _Row(Boundary):
-    """What has no end along x: walkers stand in a row."""
+    """What has no end along x."""
 
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
         """A row along x."""
@@ -210,18 +212,17 @@ class Channel(_Row):
     @property
     def walls(self) -> tuple[Wall, ...]:
         """The floor and two walls."""
-        half = self.width / 2.0
-        return (BOTTOM, Flat((0.0, -half, 0.0), (0.0, 1.0, 0.0), "-y"), Flat((0.0, half, 0.0), (0.0, -1.0, 0.0), "+y"))
+        return (BOTTOM, *_facing_walls("y", self.width))
+
+    @property
+    def inner_width(self) -> float:
+        """Between the walls, m."""
+        return self.width
 
     def room(self, span: Span) -> Room:
         """A box about the walkers' ways."""
         half_x, half_y = span.half_x + 2.0 * span.margin, self.width / 2.0 + span.margin
         return _room_above((half_x, half_y), max(span.height + 2.0 * span.margin, self.width), span.largest)
-
-    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
-        """Distance from the nearer wall, m."""
-        del x, z
-        return self.width / 2.0 - abs(y)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -240,11 +241,6 @@ class Groove(_Row):
     def rest_height(self, radius: float) -> float:
         """Height at which a bead touches both walls, m."""
         return radius / sin(self.opening / 2.0)
-
-    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
-        """Distance from the nearer wall, m."""
-        del x
-        return z * sin(self.opening / 2.0) - abs(y) * cos(self.opening / 2.0)
 
     def room(self, span: Span) -> Room:
         """A box about the walkers' ways."""
@@ -266,6 +262,11 @@ class Container(Boundary):
     closed: ClassVar[bool] = True
 
     @property
+    def inner_width(self) -> float:
+        """Between the walls, m."""
+        return self.width
+
+    @property
     def top(self) -> float:
         """The height, m."""
         return self.height
@@ -274,10 +275,6 @@ class Container(Boundary):
         """The container and a little more; climbers may rise above the rim."""
         edge = self.width / 2.0 + _RIM
         return _room_above((edge, edge), 2.0 * self.height, span.largest)
-
-    def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
-        """A square grid about the middle."""
-        return Plane(material=self.material).grid(number, spacing)
 
     def layer(self, largest: float) -> Layer:
         """A square lattice as wide as the container."""
@@ -296,15 +293,7 @@ class Box(Container):
     @property
     def walls(self) -> tuple[Wall, ...]:
         """The floor and four walls."""
-        half = self.width / 2.0
-        across = Flat((-half, 0.0, 0.0), (1.0, 0.0, 0.0), "-x"), Flat((half, 0.0, 0.0), (-1.0, 0.0, 0.0), "+x")
-        along = Flat((0.0, -half, 0.0), (0.0, 1.0, 0.0), "-y"), Flat((0.0, half, 0.0), (0.0, -1.0, 0.0), "+y")
-        return (BOTTOM, *across, *along)
-
-    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
-        """Distance from the nearest wall, m."""
-        del z
-        return self.width / 2.0 - max(abs(x), abs(y))
+        return (BOTTOM, *_facing_walls("x", self.width), *_facing_walls("y", self.width))
 
     @property
     def cross_section(self) -> float:
@@ -323,10 +312,10 @@ class Cylinder(Container):
         """The floor and the side."""
         return (BOTTOM, Round(self.width / 2.0))
 
-    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
-        """Distance from the side, m."""
-        del z
-        return self.width / 2.0 - hypot(x, y)
+    @property
+    def cross_section(self) -> float:
+        """Inner area, m²."""
+        return self.width**2 * (pi / 4.0)
 
     def layer(self, largest: float) -> Layer:
         """The places of a box that lie within; the wall cuts the outer ones, whose beads stray less."""
@@ -334,14 +323,19 @@ class Cylinder(Container):
         within = self.width / 2.0 - LOOSE * largest
         return Layer([(x, y) for x, y in square.places if hypot(x, y) <= within], square.pitch, tight=True)
 
-    @property
-    def cross_section(self) -> float:
-        """Inner area, m²."""
-        return self.width**2 * (pi / 4.0)
-
 
 Shape = Plane | Channel | Groove | Box | Cylinder
 """The boundaries that there are."""
+SHAPES: Mapping[str, type[Shape]] = {one.shape: one for one in get_args(Shape)}
+"""By the names that case files use."""
+
+
+def _facing_walls(axis: Literal["x", "y"], apart: float) -> tuple[Flat, Flat]:
+    """Two upright walls across an axis, so far apart (m)."""
+    half = apart / 2.0
+    if axis == "x":
+        return Flat((-half, 0.0, 0.0), (1.0, 0.0, 0.0), "-x"), Flat((half, 0.0, 0.0), (-1.0, 0.0, 0.0), "+x")
+    return Flat((0.0, -half, 0.0), (0.0, 1.0, 0.0), "-y"), Flat((0.0, half, 0.0), (0.0, -1.0, 0.0), "+y")
 
 
 def _room_above(half: tuple[float, float], top: float, largest: float) -> Room:

@@ -26,15 +26,14 @@ from math import degrees
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field, ValidationInfo, field_validator
 
-from walkers.inputs.axes import flatten
-from walkers.inputs.changes import Value
+from walkers.inputs.changes import Value, flatten
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.inputs.messages import validated
-from walkers.inputs.reading import check_kind, find_input, read_toml
-from walkers.inputs.schema import Number, Whole
+from walkers.inputs.reading import find_input, read_toml
+from walkers.inputs.schema import Number, Table, Whole
 from walkers.inputs.units import ANGLE, SPEED, Kind, parse_quantity
 
 _MOST = 10_000
@@ -45,86 +44,32 @@ QUANTITIES: dict[str, Kind] = {
     "misalignment": ANGLE,
 }
 """What an observation may be of: a column of a sweep's table, or the largest angle of a walker to the drive axis."""
+Names = Annotated[list[str], Field(min_length=1)]
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ParameterTable(_Table):
+class ParameterTable(Table):
     """``[parameters.NAME]``: keys of the case that take its value, its range, and what is assumed beforehand.
 
-    Numbers are in its ``unit``, if it has one.
+    Numbers are in its ``unit``, if it has one; those of a ``log`` range, and its median, are above zero.
     """
 
-    keys: Annotated[list[str], Field(min_length=1)]
+    keys: Names
+    log: bool = False
     range: tuple[Number, Number]
     unit: str = ""
-    log: bool = False
-    experiments: list[str] | None = None
+    experiments: Names | None = None
     symbol: str = ""
     normal: tuple[Number, Annotated[Number, Field(gt=0)]] | None = None
 
-
-class ObservationTable(_Table):
-    """``[[observations]]``: a mean over experiments, or its ratio to the mean over others.
-
-    One that is ``derived`` follows from others: it is told of, but does not weigh in the posterior a second time.
-    """
-
-    name: str
-    group: str
-    title: str = ""
-    quantity: Literal[Speed, "misalignment"] = "velocity"
-    of: Annotated[list[str], Field(min_length=1)]
-    over: list[str] = []
-    value: str | Number
-    deviation: str | Number
-    derived: bool = False
-
-
-class SharedError(_Table):
-    """``[shared_errors.NAME]``: observations whose published values are wrong together, and by how much of the whole.
-
-    ``share`` of the variance of each is shared: so large is the correlation of any two of them.
-    """
-
-    observations: Annotated[list[str], Field(min_length=2)]
-    share: Annotated[Number, Field(gt=0, lt=1)]
-
-
-class Band(_Table):
-    """``[[bands]]``: a picture of a quantity of some experiments against a column of their sweep's table."""
-
-    title: str = ""
-    of: Annotated[list[str], Field(min_length=1)]
-    against: Literal["peak_acceleration", "gamma0", "frequency", "sin_delta"]
-    quantity: Speed = "velocity"
-
-
-class DesignTable(_Table):
-    """``[design]``: sizes of the waves and of the predictive check, and how many points of the prior are weighed."""
-
-    seed: Annotated[Whole, Field(ge=0)] = 1
-    waves: Annotated[list[Annotated[Whole, Field(ge=4, le=_MOST)]], Field(min_length=1)] = [64]
-    predictive: Annotated[Whole, Field(ge=2, le=1000)] = 8
-    points: Annotated[Whole, Field(ge=100, le=1_000_000)] = 20_000
-
-
-class CalibrationFile(_Table):
-    """A calibration file."""
-
-    title: str = ""
-    case: str
-    set: dict[str, Any] = {}
-    parameters: Annotated[dict[str, ParameterTable], Field(min_length=1)]
-    experiments: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
-    observations: Annotated[list[ObservationTable], Field(min_length=1)]
-    shared_errors: dict[str, SharedError] = {}
-    guesses: list[dict[str, Number]] = []
-    bands: list[Band] = []
-    held_out: dict[str, list[str]] = {}
-    design: DesignTable = DesignTable()
+    @field_validator("range", "normal")
+    @classmethod
+    def _check(cls, value: tuple[float, float] | None, info: ValidationInfo) -> tuple[float, float] | None:
+        low, high = value or (1.0, 2.0)
+        if info.field_name == "range" and low >= high:
+            raise ValueError("expected a smaller and a larger number")
+        if info.data.get("log") and low <= 0.0:
+            raise ValueError("expected numbers above zero: log is that of magnitudes")
+        return value
 
 
 class Parameter(ParameterTable):
@@ -134,11 +79,83 @@ class Parameter(ParameterTable):
     experiments: list[str]
 
 
-class Observation(ObservationTable):
-    """A published number: its table, value and deviation in SI units, angles in degrees."""
+class Observation(Table):
+    """``[[observations]]``: a mean over experiments, or its ratio to the mean over others.
 
+    One that is ``derived`` follows from others: it is told of, but does not weigh in the posterior a second time.
+    ``value`` and ``deviation`` are in SI units, angles in degrees.
+    """
+
+    name: str
+    group: str
+    title: str = Field(default_factory=lambda given: str(given.get("name", "")))
+    quantity: Literal[Speed, "misalignment"] = "velocity"
+    of: Names
+    over: list[str] = Field([])
     value: Number
-    deviation: Number
+    deviation: Annotated[Number, Field(gt=0)]
+    derived: bool = False
+
+
+class ObservationTable(Observation):
+    """An observation as a file has it: numbers with their unit, but of a ratio, which has none."""
+
+    @field_validator("value", "deviation", mode="before")
+    @classmethod
+    def _number(cls, value: Any, info: ValidationInfo) -> Any:
+        if info.data.get("over"):
+            if isinstance(value, str):
+                raise ValueError("expected a plain number: a ratio has no unit")
+            return value
+        kind = QUANTITIES[info.data.get("quantity", "velocity")]
+        if not isinstance(value, str):
+            raise ValueError(kind.expectation)
+        number = parse_quantity(value, kind)
+        return degrees(number) if kind is ANGLE else number
+
+
+class SharedError(Table):
+    """``[shared_errors.NAME]``: observations whose published values are wrong together, and by how much of the whole.
+
+    ``share`` of the variance of each is shared: so large is the correlation of any two of them.
+    """
+
+    observations: Annotated[list[str], Field(min_length=2)]
+    share: Annotated[Number, Field(gt=0, lt=1)]
+
+
+class Band(Table):
+    """``[[bands]]``: a picture of a quantity of some experiments against a column of their sweep's table."""
+
+    title: str = ""
+    of: Names
+    against: Literal["peak_acceleration", "gamma0", "frequency", "sin_delta"]
+    quantity: Speed = "velocity"
+
+
+class DesignTable(Table):
+    """``[design]``: sizes of the waves and of the predictive check, and how many points of the prior are weighed."""
+
+    seed: Annotated[Whole, Field(ge=0)] = 1
+    waves: Annotated[list[Annotated[Whole, Field(ge=4, le=_MOST)]], Field(min_length=1)] = Field([64])
+    predictive: Annotated[Whole, Field(ge=2, le=1000)] = 8
+    points: Annotated[Whole, Field(ge=100, le=1_000_000)] = 20_000
+
+
+class CalibrationFile(Table):
+    """A calibration file."""
+
+    title: str = ""
+    case: str
+    set: dict[str, Any] = Field({})
+    parameters: Annotated[dict[str, ParameterTable], Field(min_length=1)]
+    experiments: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
+    observations: Annotated[list[ObservationTable], Field(min_length=1)]
+    shared_errors: dict[str, SharedError] = Field({})
+    guesses: list[dict[str, Number]] = Field([])
+    bands: list[Band] = Field([])
+    held_out: dict[str, list[str]] = Field({})
+    design: DesignTable = DesignTable()
 
 
 @dataclass(frozen=True)
@@ -151,12 +168,10 @@ class Calibration:
         Of the file.
     file
         What it says.
-    parameters, observations
-        What is free and what it is to give.
+    parameters
+        What is free, with the experiments that each belongs to.
     experiments
         Values of the same keys for each.
-    guesses
-        Sets that the first wave has beside those that fill the ranges: values in the order of the parameters.
     """
 
     name: str
@@ -164,9 +179,17 @@ class Calibration:
     folder: Path
     file: CalibrationFile
     parameters: tuple[Parameter, ...]
-    observations: tuple[Observation, ...]
     experiments: Mapping[str, Mapping[str, Value]]
-    guesses: tuple[tuple[float, ...], ...]
+
+    @property
+    def observations(self) -> tuple[Observation, ...]:
+        """What the parameters are to give."""
+        return tuple(self.file.observations)
+
+    @property
+    def guesses(self) -> tuple[tuple[float, ...], ...]:
+        """Sets that the first wave has beside those that fill the ranges: values in the order of the parameters."""
+        return tuple(tuple(guess[label] for label in self.file.parameters) for guess in self.file.guesses)
 
     @property
     def design(self) -> DesignTable:
@@ -177,12 +200,8 @@ class Calibration:
 def load_calibration(calibration: str | Path) -> Calibration:
     """Read a calibration file, or a shipped calibration such as ``ruby``.
 
-    Raises
-    ------
-    InputError
-        If there is no such file or anything in it cannot be used.
+    Raises `InputError` if there is no such file or anything in it cannot be used.
     """
-    check_kind(calibration, "calibration")
     path = find_input(calibration, "calibration")
     return read_calibration(read_toml(path), source=str(calibration), name=path.stem, folder=path.parent)
 
@@ -190,36 +209,25 @@ def load_calibration(calibration: str | Path) -> Calibration:
 def read_calibration(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Calibration:
     """A calibration given as nested tables; parameters and errors as for `walkers.inputs.sweep.expand`."""
     file = validated(CalibrationFile, document, source, "a calibration")
-    if problems := list(_problems(file)):
+    if problems := [
+        *_unknown_names(file),
+        *_contradictions(file),
+        *_problems_of_guesses(file),
+        *_problems_of_keys(file),
+    ]:
         raise InputError(source, problems)
+    parameters = {
+        label: {**vars(table), "symbol": table.symbol or label, "experiments": _experiments(file, table)}
+        for label, table in file.parameters.items()
+    }
     return Calibration(
         name=name,
         source=source,
         folder=folder,
         file=file,
-        parameters=tuple(
-            Parameter(
-                **{**vars(table), "symbol": table.symbol or label, "experiments": _experiments(file, table)}, name=label
-            )
-            for label, table in file.parameters.items()
-        ),
-        observations=tuple(map(_observation, file.observations)),
-        experiments={label: flatten(table, lambda _: False) for label, table in file.experiments.items()},
-        guesses=tuple(tuple(guess[label] for label in file.parameters) for guess in file.guesses),
+        parameters=tuple(Parameter(**values, name=label) for label, values in parameters.items()),
+        experiments={label: flatten(table) for label, table in file.experiments.items()},
     )
-
-
-def _observation(table: ObservationTable) -> Observation:
-    value, deviation = (_number(one, table.quantity) for one in (table.value, table.deviation))
-    named = {"title": table.title or table.name, "value": value, "deviation": deviation}
-    return Observation(**{**vars(table), **named})
-
-
-def _number(value: str | float, quantity: str) -> float:
-    if not isinstance(value, str):
-        return float(value)
-    number = parse_quantity(value, QUANTITIES[quantity])
-    return degrees(number) if QUANTITIES[quantity] is ANGLE else number
 
 
 def _experiments(file: CalibrationFile, table: ParameterTable) -> list[str]:
@@ -227,39 +235,72 @@ def _experiments(file: CalibrationFile, table: ParameterTable) -> list[str]:
     return list(file.experiments) if table.experiments is None else table.experiments
 
 
-def _problems(file: CalibrationFile) -> Iterator[Problem]:
-    """What pydantic cannot see."""
-    yield from _problems_of_experiments(file)
-    for name, table in file.parameters.items():
-        yield from _problems_of_parameter(file, name, table)
-    names = [observation.name for observation in file.observations]
-    for number, observation in enumerate(file.observations):
+def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
+    """Names of what the file does not have."""
+    observations, groups = ([getattr(one, key) for one in file.observations] for key in ("name", "group"))
+    named: list[tuple[str, Collection[str], Collection[str], str]] = []
+    for label, parameter in file.parameters.items():
+        place = f"parameters.{label}.experiments"
+        named.append((place, _experiments(file, parameter), file.experiments, "an experiment"))
+    for number, one in enumerate(file.observations):
         place = f"observations[{number}]"
-        if names.index(observation.name) != number:
-            yield Problem(f"{place}.name", f'"{observation.name}"', "expected a name of its own")
-        for key in ("of", "over"):
-            yield from _unknown(f"{place}.{key}", getattr(observation, key), file.experiments, "an experiment")
-        if observation.over and set(observation.over) == set(observation.of):
-            yield Problem(f"{place}.over", None, "expected other experiments than in of: the ratio would be 1")
-        for key in ("value", "deviation"):
-            yield from _unreadable(f"{place}.{key}", getattr(observation, key), observation)
-    if all(observation.derived for observation in file.observations):
-        yield Problem("observations", None, "expected one that is not derived")
-    yield from _problems_of_shared_errors(file, names)
+        named.append((f"{place}.of", one.of, file.experiments, "an experiment"))
+        named.append((f"{place}.over", one.over, file.experiments, "an experiment"))
+    for label, error in file.shared_errors.items():
+        named.append((f"shared_errors.{label}.observations", error.observations, observations, "an observation"))
     for number, guess in enumerate(file.guesses):
-        yield from _problems_of_guess(file, f"guesses[{number}]", guess)
+        named += [(f"guesses[{number}].{label}", [label], file.parameters, "a parameter") for label in guess]
     for number, band in enumerate(file.bands):
-        yield from _unknown(f"bands[{number}].of", band.of, file.experiments, "an experiment")
-    groups = {observation.group for observation in file.observations}
-    for name, held in file.held_out.items():
-        yield from _unknown(f"held_out.{name}", held, groups, "a group of observations")
-        if set(held) >= {observation.group for observation in file.observations if not observation.derived}:
-            yield Problem(f"held_out.{name}", None, "expected to leave a group to calibrate on")
+        named.append((f"bands[{number}].of", band.of, file.experiments, "an experiment"))
+    for label, held in file.held_out.items():
+        named.append((f"held_out.{label}", held, groups, "a group of observations"))
+    for place, given, known, what in named:
+        for name in given:
+            if name not in known:
+                expected = f"expected {what}: one of {', '.join(sorted(set(known)))}{suggestion(name, known)}"
+                yield Problem(place, f'"{name}"', expected)
 
 
-def _problems_of_experiments(file: CalibrationFile) -> Iterator[Problem]:
+def _contradictions(file: CalibrationFile) -> Iterator[Problem]:
+    """What is there twice, is missing or contradicts something else."""
+    names = [one.name for one in file.observations]
+    for number, one in enumerate(file.observations):
+        if names.index(one.name) != number:
+            yield Problem(f"observations[{number}].name", f'"{one.name}"', "expected a name of its own")
+        if one.over and set(one.over) == set(one.of):
+            told = "expected other experiments than in of: the ratio would be 1"
+            yield Problem(f"observations[{number}].over", None, told)
+    if all(one.derived for one in file.observations):
+        yield Problem("observations", None, "expected one that is not derived")
+    for label, error in file.shared_errors.items():
+        for name in sorted({name for name in error.observations if error.observations.count(name) > 1}):
+            yield Problem(f"shared_errors.{label}.observations", f'"{name}"', "expected each observation once")
+    for name in names:
+        having = {label: error.share for label, error in file.shared_errors.items() if name in error.observations}
+        if (whole := sum(having.values())) >= 1.0:
+            told = f"expected {name} to have an error of its own: the shares of {', '.join(having)} are {whole:g} of it"
+            yield Problem("shared_errors", None, told)
+    weighed = {one.group for one in file.observations if not one.derived}
+    for label, held in file.held_out.items():
+        if set(held) >= weighed:
+            yield Problem(f"held_out.{label}", None, "expected to leave a group to calibrate on")
+
+
+def _problems_of_guesses(file: CalibrationFile) -> Iterator[Problem]:
+    """A guess has all parameters, each within its range."""
+    for number, guess in enumerate(file.guesses):
+        for label, table in file.parameters.items():
+            place, (low, high) = f"guesses[{number}].{label}", table.range
+            if label not in guess:
+                yield Problem(place, None, "missing; a guess has all parameters")
+            elif not low <= guess[label] <= high:
+                told = f"expected a number within the parameter's range, {low:g} to {high:g}"
+                yield Problem(place, f"{guess[label]:g}", told)
+
+
+def _problems_of_keys(file: CalibrationFile) -> Iterator[Problem]:
     """All experiments have the same keys, each of a parameter too, and of one parameter alone."""
-    first, *others = [(label, set(flatten(table, lambda _: False))) for label, table in file.experiments.items()]
+    first, *others = [(label, set(flatten(table))) for label, table in file.experiments.items()]
     for label, keys in others:
         for key in sorted(keys ^ first[1]):
             told = f"expected the same keys in every experiment; {first[0]} and {label} differ in {key}"
@@ -276,66 +317,3 @@ def _problems_of_experiments(file: CalibrationFile) -> Iterator[Problem]:
         if lacking := [experiment for experiment in file.experiments if experiment not in having]:
             told = f"no parameter gives {key} to {', '.join(lacking)}: all experiments have it or none"
             yield Problem("parameters", None, told)
-
-
-def _problems_of_parameter(file: CalibrationFile, name: str, table: ParameterTable) -> Iterator[Problem]:
-    place, (low, high) = f"parameters.{name}", table.range
-    if low >= high or (table.log and low <= 0.0):
-        expected = "expected a smaller and a larger number" + (", both above zero" if table.log else "")
-        yield Problem(f"{place}.range", f"[{low:g}, {high:g}]", expected)
-    if table.normal is not None and table.log and table.normal[0] <= 0.0:
-        expected = "expected a median above zero: the prior is one of the logarithm"
-        yield Problem(f"{place}.normal", f"[{table.normal[0]:g}, {table.normal[1]:g}]", expected)
-    if table.experiments is not None and not table.experiments:
-        yield Problem(f"{place}.experiments", "[]", "expected at least one experiment")
-    yield from _unknown(f"{place}.experiments", _experiments(file, table), file.experiments, "an experiment")
-
-
-def _problems_of_shared_errors(file: CalibrationFile, names: list[str]) -> Iterator[Problem]:
-    for label, error in file.shared_errors.items():
-        place = f"shared_errors.{label}.observations"
-        yield from _unknown(place, error.observations, names, "an observation")
-        for name in dict.fromkeys(error.observations):
-            if error.observations.count(name) > 1:
-                yield Problem(place, f'"{name}"', "expected each observation once")
-    for name in names:
-        having = [label for label, error in file.shared_errors.items() if name in error.observations]
-        whole = sum(file.shared_errors[label].share for label in having)
-        if whole >= 1.0:
-            told = f"expected {name} to have an error of its own: the shares of {', '.join(having)} are {whole:g} of it"
-            yield Problem("shared_errors", None, told)
-
-
-def _problems_of_guess(file: CalibrationFile, place: str, guess: Mapping[str, float]) -> Iterator[Problem]:
-    yield from (one for name in guess for one in _unknown(f"{place}.{name}", [name], file.parameters, "a parameter"))
-    for name, table in file.parameters.items():
-        low, high = table.range
-        if name not in guess:
-            yield Problem(f"{place}.{name}", None, "missing; a guess has all parameters")
-        elif not low <= guess[name] <= high:
-            told = f"expected a number within the parameter's range, {low:g} to {high:g}"
-            yield Problem(f"{place}.{name}", f"{guess[name]:g}", told)
-
-
-def _unknown(place: str, given: Collection[str], known: Collection[str], what: str) -> Iterator[Problem]:
-    for name in given:
-        if name not in known:
-            expected = f"expected {what}: one of {', '.join(sorted(known))}{suggestion(name, known)}"
-            yield Problem(place, f'"{name}"', expected)
-
-
-def _unreadable(place: str, given: str | float, observation: ObservationTable) -> Iterator[Problem]:
-    kind, wrong = QUANTITIES[observation.quantity], ""
-    if observation.over:
-        wrong = "expected a plain number: a ratio has no unit" if isinstance(given, str) else ""
-    elif not isinstance(given, str):
-        wrong = kind.expectation
-    else:
-        try:
-            parse_quantity(given, kind)
-        except ValueError as error:
-            wrong = str(error)
-    if not wrong and place.endswith("deviation") and _number(given, observation.quantity) <= 0.0:
-        wrong = "expected more than zero"
-    if wrong:
-        yield Problem(place, f'"{given}"' if isinstance(given, str) else f"{given:g}", wrong)

@@ -5,9 +5,9 @@ This is what the deck is rendered from, what a run directory stores as ``case.js
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property, partial
 from math import cos, hypot, inf, isclose, sin
 from typing import Annotated, Any
 
@@ -17,7 +17,8 @@ from pydantic_core import to_jsonable_python
 from walkers.inputs.bodies import Body, Mixture, Placed, Standing, Walkers
 from walkers.inputs.boundary import Shape
 from walkers.inputs.drive import AXES, Drive, Vector
-from walkers.inputs.origins import Origin, origins_of
+from walkers.inputs.origins import Origin
+from walkers.physics.laws import LAWS
 from walkers.physics.matter import Contact, Liquid
 
 _SILENCE = 600.0  # s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds
@@ -29,7 +30,7 @@ FIRST_ATTEMPTS = (12, 24)
 BOUNDS = ("silence", "log_limit")
 """Of `Run`: upon these depends whether a run ends, not what it gives."""
 
-_TOLD = ("document", "recorded")
+_TOLD = ("document", "told")
 
 
 def settling_of(cycles: int) -> int:
@@ -41,33 +42,20 @@ def settling_of(cycles: int) -> int:
 class Run:
     """How long, how fine and in which segments; a cycle is a whole multiple of the sampling interval.
 
-    Attributes
-    ----------
-    time_step, steps_per_cycle
-        s; steps in a cycle of the drive.
-    cycles, settling_cycles, until_steady
-        Cycles driven, and of these before velocities are measured; whether fewer do if the walkers are steady after
-        them (`walkers.postprocess.steady_state.are_steady`).
-    samples_per_cycle, cycles_per_sample, samples_per_bridge_sample
-        Beads are recorded this often a cycle, or once in so many cycles (one of them is 1), bridges with one of so
-        many samples.
-    cycles_per_segment
-        The run is made in segments of so many cycles, each with a restart file at its end if there are several.
-    settled_below, longest_settling
-        Before the drive the beads rest until their root mean square velocity (m/s) is below, or so many s are over;
-        of walkers, which stand from the first, 0 s.
-    ranks
-        MPI processes.
-    silence, log_limit
-        An engine is ended that writes nothing for so long (s), or a log of so many bytes; None: as `longest_silence`
-        and `most_log` say.
+    Before the drive loose beads rest until their root mean square velocity is below `settled_below` (m/s), or for
+    `longest_settling` (s; 0 of walkers, which stand from the first). Beads are recorded `samples_per_cycle` times a
+    cycle, or once in `cycles_per_sample` (one of the two is 1), bridges with one of so many samples. If there are
+    several segments, each has a restart file at its end.
     """
 
     time_step: float
+    """s."""
     steps_per_cycle: int
     cycles: int
     settling_cycles: int
+    """Of the cycles, those before velocities are measured."""
     until_steady: bool
+    """Whether fewer do if the walkers are steady after them (`walkers.postprocess.steady_state.are_steady`)."""
     samples_per_cycle: int
     cycles_per_sample: int
     samples_per_bridge_sample: int
@@ -75,8 +63,11 @@ class Run:
     settled_below: float
     longest_settling: float
     ranks: int
+    """MPI processes."""
     silence: float | None = None
+    """s for which an engine may write nothing before it is ended; None: as `longest_silence` says."""
     log_limit: float | None = None
+    """Bytes of a log beyond which an engine is ended; None: as `most_log` says."""
 
     @property
     def period(self) -> float:
@@ -139,9 +130,8 @@ class Case:
     """Bodies on a boundary under a drive, resolved.
 
     Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²). ``seed`` is that of all that is drawn at
-    the start. ``name``, ``title`` and the `BOUNDS` of the run do not determine it. ``document`` (the tables that the
-    case was read from) and ``recorded`` (the `origins` that were written down with a run) are part of no comparison,
-    and are lost where `dataclasses.replace` changes the case: they would tell of another one.
+    the start. ``document`` (the tables that the case was read from) and ``told`` (of which `origins` are made) are
+    part of no comparison, and are lost where `dataclasses.replace` changes the case: they would tell of another one.
 
     Raises
     ------
@@ -164,7 +154,7 @@ class Case:
     seed: int
     run: Run
     document: Mapping[str, Any] = field(default_factory=dict, init=False, compare=False, repr=False)
-    recorded: tuple[Origin, ...] = field(default=(), init=False, compare=False, repr=False)
+    told: Callable[[], tuple[Origin, ...]] = field(default=tuple, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse a drive that was changed alone: its step and sampling would be another's."""
@@ -176,29 +166,29 @@ class Case:
             )
 
     @property
-    def origins(self) -> tuple[Origin, ...]:
-        """Where each of its values comes from; empty for one that was not read, or was changed since."""
-        return self.recorded or origins_of(self)
-
-    @property
     def as_read(self) -> bool:
         """Whether it is what its document says: it was read, and not changed since."""
         return bool(self.document)
 
-    def read_from(self, document: Mapping[str, Any], recorded: tuple[Origin, ...] = ()) -> Case:
-        """The same with the tables that it was read from, and the origins that were written down with a run."""
+    @cached_property
+    def origins(self) -> tuple[Origin, ...]:
+        """Where its values come from; nothing of a case that was not read, or was changed since."""
+        return self.told()
+
+    def read_from(self, document: Mapping[str, Any], told: Callable[[], tuple[Origin, ...]]) -> Case:
+        """The same with the tables that it was read from, and what tells where its values come from."""
         case = replace(self)
         object.__setattr__(case, "document", document)
-        object.__setattr__(case, "recorded", recorded)
+        object.__setattr__(case, "told", told)
         return case
 
     def renamed(self, name: str) -> Case:
         """The same case under another name."""
-        return replace(self, name=name).read_from(self.document, self.recorded)
+        return replace(self, name=name).read_from(self.document, self.told)
 
     def for_cycles(self, cycles: int) -> Case:
         """The same for so many cycles at a stretch, of a case whose run ends when its walkers are steady."""
-        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.recorded)
+        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.told)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -238,10 +228,7 @@ class Case:
     def standing(self) -> Iterator[tuple[int, Standing]]:
         """What stands at the start, each with the number of its body; walkers come first and are numbered through.
 
-        Raises
-        ------
-        ValueError
-            If the beads of a walker cannot stand so.
+        Raises `ValueError` if the beads of a walker cannot stand so.
         """
         first = 0
         for number, body in enumerate(self.bodies):
@@ -300,31 +287,27 @@ class Case:
         return -sum(one * along for one, along in zip(self.gravity_vector, self.drive_axis, strict=True))
 
     def determinants(self) -> dict[str, Any]:
-        """Everything that the run's outcome depends on, as plain JSON types."""
-        exclude: dict[str, Any] = {**dict.fromkeys(("name", "title", *_TOLD), True), "run": set(BOUNDS)}
-        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=exclude)
+        """Everything that the run's outcome depends on, as plain JSON types: no names, and no bound of the engine's."""
+        no_names: dict[str, Any] = {**dict.fromkeys(("name", "title", "material", *_TOLD), True), "run": set(BOUNDS)}
+        without = {**no_names, "boundary": {"material"}, "liquid": {"name"}}
+        if self.liquid.law in LAWS:  # none of which asks for the density; one of a user's own may
+            without["liquid"] = {"name", "density"}
+        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=without)
         return values
 
     def as_dict(self) -> dict[str, Any]:
-        """The whole case as plain JSON types, SI units, with the origins of its values."""
-        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=set(_TOLD))
-        values |= to_jsonable_python({"document": self.document, "recorded": self.origins})
-        return values
+        """The whole case as plain JSON types, SI units, with the tables it was read from and its values' origins."""
+        told: dict[str, Any] = to_jsonable_python({"document": self.document, "origins": self.origins})
+        return {**_adapter().dump_python(self, mode="json", exclude=set(_TOLD)), **told}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Case:
-        """Rebuild a case from `as_dict` (a run directory's ``case.json``).
-
-        Raises
-        ------
-        ValueError
-            If it is none.
-        """
+        """Rebuild a case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
         try:
             case = _adapter().validate_python(values)
-            return case.read_from(
-                *_told_adapter().validate_python((values.get("document", {}), values.get("recorded", ())))
-            )
+            told = values.get("document", {}), values.get("origins", ())
+            document, origins = _told_adapter().validate_python(told)
+            return case.read_from(document, partial(tuple, origins))
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error

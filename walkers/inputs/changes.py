@@ -1,19 +1,74 @@
-"""Values beside a case file: ``drive.frequency=70Hz`` from the command line, a mapping in Python, a sweep's points."""
+"""Dotted keys, such as ``drive.harmonics[1].phase``, and values put under them beside a case file's own.
+
+They come from the command line (``drive.frequency=70Hz``), a mapping in Python, or a sweep's points.
+"""
 
 from __future__ import annotations
 
 import copy
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
-from walkers.inputs.errors import InputError, Problem, UnusableKeyError
+from walkers.inputs.errors import InputError, Problem, unusable
 
 Value = Any
 """A TOML value: text with a unit, a number, or a list of such."""
+MISSING = object()
 
-_PART = re.compile(r"(?P<name>[^.\[\]]+)(?:\[(?P<index>\d+)\])?")
+
+@lru_cache(maxsize=4096)
+def parts_of(key: str) -> tuple[str | int, ...]:
+    """Names of tables and places in lists."""
+    return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", key))
+
+
+def joined(parts: Sequence[str | int]) -> str:
+    """A dotted key of its parts."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")
+
+
+def value_at(document: Any, parts: Sequence[str | int]) -> Any:
+    """What nested tables and lists have at a place; `MISSING` if there is none."""
+    for part in parts:
+        try:
+            document = document[part]
+        except (KeyError, IndexError, TypeError):
+            return MISSING
+    return document
+
+
+def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda _: False) -> dict[str, Any]:
+    """Dotted keys of nested tables: ``{"drive": {"frequency": …}}`` and ``{"drive.frequency": …}`` are the same.
+
+    Raises
+    ------
+    InputError
+        If a key is given both ways.
+    """
+    flat: dict[str, Any] = {}
+    for name, value in table.items():
+        below = {name: value}
+        if isinstance(value, Mapping) and not is_leaf(value):
+            below = {f"{name}.{key}": one for key, one in flatten(value, is_leaf).items()}
+        if twice := flat.keys() & below.keys():
+            raise unusable(twice.pop(), "is given twice")
+        flat |= below
+    return flat
+
+
+def dotted(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """Values of nested tables by dotted keys, entries of lists of tables one by one."""
+    if isinstance(value, Mapping):
+        for name, one in value.items():
+            yield from dotted(one, f"{key}.{name}" if key else name)
+    elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+        for number, one in enumerate(value):
+            yield from dotted(one, f"{key}[{number}]")
+    else:
+        yield key, value
 
 
 def settings_of(words: Iterable[str]) -> dict[str, Value]:
@@ -50,64 +105,41 @@ def _value(text: str) -> Value:
     return text
 
 
-def check_key(key: str) -> None:
-    """Refuse a key that no case has.
-
-    Raises
-    ------
-    UnusableKeyError
-        If it is one.
-    """
-    from walkers.inputs.messages import suggested_key
-
-    if "" in key.split("."):
-        raise UnusableKeyError(key, "is no key of a case")
-    if unknown := suggested_key(re.sub(r"\[\d+\]", "", key)):
-        raise UnusableKeyError(key, unknown)
-
-
 def changed(document: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[str, Any]:
     """A case's tables with dotted keys (``dimers.radii[0]`` for one of a list) given other values.
 
+    What a new value stands for in other words (`walkers.inputs.schema.ALTERNATIVES`) goes, unless it changes too.
+
     Raises
     ------
-    UnusableKeyError
+    InputError
         If there is no such place in a list.
-
-    What a new value stands for in other words (`walkers.inputs.schema.ALTERNATIVES`) goes, unless it changes too.
     """
     from walkers.inputs.schema import ALTERNATIVES
 
     tables = copy.deepcopy(dict(document))
     for key, value in changes.items():
-        place, _, name = key.rpartition(".")
+        *table, name = parts_of(key)
         others = [other.rpartition(".")[2] for other in ALTERNATIVES.get(f"{key.split('.')[0]}.{name}", ())]
-        _put(tables, key, value, [other for other in others if f"{place}.{other}" not in changes])
+        _put(tables, key, value, [other for other in others if joined([*table, other]) not in changes])
     return tables
 
 
-def _put(document: dict[str, Any], key: str, value: Value, without: Sequence[str]) -> None:
-    """Give the place of a dotted key, such as ``drive.harmonics[1].phase``, another value; other keys there go."""
-    *tables, (last, last_index) = [(match["name"], match["index"]) for match in _PART.finditer(key)]
-    table: Any = document
-    for name, index in tables:
-        table = table.setdefault(name, {}) if index is None else _entries(table, name, index, key, value)[int(index)]
-        if isinstance(table, list):
-            raise UnusableKeyError(key, f"{name} is a list: say which one, such as {name}[0]", value)
-        if not isinstance(table, dict):  # the base case is wrong there, which its own check tells
+def _put(tables: dict[str, Any], key: str, value: Value, without: Sequence[str]) -> None:
+    """Give the place of a dotted key another value; other keys there go."""
+    place: Any = tables
+    parts = parts_of(key)
+    for number, part in enumerate(parts):
+        if isinstance(part, int):
+            if not isinstance(place, list) or part >= len(place):
+                raise unusable(key, f"the base case has no {joined(parts[:number])} of that length", value)
+        elif isinstance(place, list):
+            here = joined(parts[:number])
+            raise unusable(key, f"{here} is a list: say which one, such as {here}[0]", value)
+        elif not isinstance(place, dict):  # the base case is wrong there, which its own check tells
             return
+        if number + 1 < len(parts):
+            place = place[part] if isinstance(part, int) else place.setdefault(part, {})
     for other in without:
-        table.pop(other, None)
-    if last_index is None:
-        table[last] = value
-    else:
-        entries = _entries(table, last, last_index, key, value)
-        table[last] = [value if place == int(last_index) else one for place, one in enumerate(entries)]
-
-
-def _entries(table: dict[str, Any], name: str, index: str, key: str, value: Value) -> list[Any]:
-    entries = table.get(name)
-    if not isinstance(entries, list) or int(index) >= len(entries):
-        listed = re.sub(r"\[\d+\][^\[]*$", "", key)
-        raise UnusableKeyError(key, f"the base case has no {listed} of that length", value)
-    return entries
+        place.pop(other, None)
+    place[parts[-1]] = value

@@ -86,13 +86,7 @@ class Drive:
 
     @property
     def frequency(self) -> float:
-        """Of the cycle, the common period of the harmonics, Hz.
-
-        Raises
-        ------
-        ValueError
-            If they have none.
-        """
+        """Of the cycle, the common period of the harmonics, Hz; raises `ValueError` if they have none."""
         return common_frequency([one.frequency for one in self.harmonics])
 
     @property
@@ -136,10 +130,7 @@ class Drive:
 def common_frequency(frequencies: list[float]) -> float:
     """Frequency of the common period of several, Hz.
 
-    Raises
-    ------
-    ValueError
-        If one is in no ratio of whole numbers up to `LARGEST_RATIO` to the first, or a cycle is too long.
+    Raises `ValueError` if one has no ratio of whole numbers up to `LARGEST_RATIO` to the first, or a cycle is too long.
     """
     first = frequencies[0]
     if len(frequencies) == 1:  # asked for at every turn of a sweep's plan
@@ -170,13 +161,7 @@ def waveform(name: str, first: Harmonic) -> tuple[Harmonic, ...]:
 
 
 def unit_vector(vector: Vector) -> Vector:
-    """A direction of length one.
-
-    Raises
-    ------
-    ValueError
-        If the vector is zero.
-    """
+    """A direction of length one; raises `ValueError` if the vector is zero."""
     length = hypot(*vector)
     if not 1e-100 < length < 1e100:
         raise ValueError("expected a direction such as [1, 0, 1]")

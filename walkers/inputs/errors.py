@@ -6,6 +6,7 @@ an engine runs derives from `WalkersError` too and is listed in `walkers.runner.
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,26 +45,6 @@ class Problem:
         return f"{where}: {expected}" if where else expected
 
 
-def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
-    """A text as a message quotes it."""
-    return text if len(text) <= longest else f"{text[: longest - 3]}..."
-
-
-def check_utf8(word: str | Path) -> None:
-    """Refuse a path or a word that is no UTF-8, which neither tables nor decks could name.
-
-    Raises
-    ------
-    InputError
-        If it is one; its odd bytes are written out.
-    """
-    try:
-        str(word).encode("utf-8")
-    except UnicodeEncodeError as error:
-        shown = os.fsencode(str(word)).decode("utf-8", "backslashreplace")
-        raise InputError(shown, [Problem("", None, "expected UTF-8 text")]) from error
-
-
 class InputError(WalkersError):
     """An input that cannot be used: names the file (or other source), and all that is wrong with it, at least one."""
 
@@ -74,9 +55,31 @@ class InputError(WalkersError):
         super().__init__("\n".join(f"{named}: {problem}" for problem in self.problems))
 
 
-class UnusableKeyError(ValueError):
-    """What cannot be used under a key, and the value if it is not the document's; the reader adds file and value."""
+def unusable(key: str, expected: str, value: object = None) -> InputError:
+    """What cannot be used under a key; who reads the file adds its name and the value there (`messages.blaming`)."""
+    return InputError("", [Problem(key, None if value is None else shown(value), expected)])
 
-    def __init__(self, key: str, expected: str, value: object = None) -> None:
-        self.key, self.expected, self.value = key, expected, value
-        super().__init__(expected)
+
+def shown(value: object) -> str:
+    """A value as the user may have written it, shortened."""
+    try:
+        return shortened(json.dumps(value, ensure_ascii=False, default=str))
+    except (ValueError, RecursionError):  # integers of thousands of digits, brackets without end
+        return "..."
+
+
+def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
+    """A text as a message quotes it."""
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
+
+
+def check_utf8(word: str | Path) -> None:
+    """Refuse a path or a word that is no UTF-8, which neither tables nor decks could name, its odd bytes written out.
+
+    Raises `InputError` if it is one.
+    """
+    try:
+        str(word).encode("utf-8")
+    except UnicodeEncodeError as error:
+        odd = os.fsencode(str(word)).decode("utf-8", "backslashreplace")
+        raise InputError(odd, [Problem("", None, "expected UTF-8 text")]) from error

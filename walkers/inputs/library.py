@@ -21,31 +21,14 @@ _KINDS = {
 }
 
 
-@cache
-def _contents() -> dict[str, Any]:
-    return tomllib.loads(resources.files("walkers.inputs").joinpath("library.toml").read_text("utf-8"))
-
-
-def materials() -> tuple[str, ...]:
-    """Names of the materials."""
-    return tuple(_contents()["materials"])
-
-
-def liquids() -> tuple[str, ...]:
-    """Names of the liquids."""
-    return tuple(_contents()["liquids"])
-
-
 @dataclass(frozen=True)
 class Known:
     """A number of the library.
 
     Attributes
     ----------
-    value, text
-        SI, and as the library has it, with its unit.
-    source
-        Where it is from.
+    value, written, source
+        SI; as the library has it, with its unit; where it is from.
     range
         Ends between which a calibrated number may lie as well (5 to 95 % of the posterior), as a case would write them.
     calibrated_with
@@ -53,7 +36,7 @@ class Known:
     """
 
     value: float
-    text: str
+    written: Any
     source: str = ""
     range: tuple[Any, Any] | None = None
     calibrated_with: tuple[str, ...] = ()
@@ -71,36 +54,42 @@ class Unmeasured:
     logarithmic: bool
 
 
-def _known(key: str, value: Any, entry: Mapping[str, Any], liquids: tuple[str, ...] = ()) -> Known:
-    kind = _KINDS.get(key.rpartition(".")[2])
+@cache
+def _contents() -> dict[str, Any]:
+    return tomllib.loads(resources.files("walkers.inputs").joinpath("library.toml").read_text("utf-8"))
+
+
+def _known(key: str, entry: Mapping[str, Any], liquids: tuple[str, ...] = ()) -> Known:
+    kind, value = _KINDS.get(key.rpartition(".")[2]), entry["value"]
     number = units.parse_quantity(value, kind) if kind else float(value)
     source = f"calibrated with {' and '.join(liquids)}" if liquids else entry.get("source", "")
-    between = (entry["range"][0], entry["range"][1]) if "range" in entry else None
-    return Known(number, str(value), source, between, liquids)
+    return Known(number, value, source, _range(entry), liquids)
+
+
+def _range(entry: Mapping[str, Any]) -> tuple[Any, Any] | None:
+    return (entry["range"][0], entry["range"][1]) if "range" in entry else None
+
+
+def materials() -> tuple[str, ...]:
+    """Names of the materials."""
+    return tuple(_contents()["materials"])
+
+
+def liquids() -> tuple[str, ...]:
+    """Names of the liquids."""
+    return tuple(_contents()["liquids"])
 
 
 @cache
 def material(name: str) -> Mapping[str, Known]:
-    """Density (kg/m³), Young's modulus (Pa) and Poisson's ratio of a material.
-
-    Raises
-    ------
-    KeyError
-        If the library has no such material.
-    """
-    return {key: _known(key, entry["value"], entry) for key, entry in _contents()["materials"][name].items()}
+    """Density (kg/m³), Young's modulus (Pa) and Poisson's ratio of a material (KeyError: there is none)."""
+    return {key: _known(key, entry) for key, entry in _contents()["materials"][name].items()}
 
 
 @cache
 def liquid(name: str) -> Mapping[str, Known]:
-    """Surface tension (N/m), kinematic viscosity (m²/s) and density (kg/m³) of a liquid.
-
-    Raises
-    ------
-    KeyError
-        If the library has no such liquid.
-    """
-    return {key: _known(key, entry["value"], entry) for key, entry in _contents()["liquids"][name].items()}
+    """Surface tension (N/m), kinematic viscosity (m²/s) and density (kg/m³) of a liquid (KeyError: there is none)."""
+    return {key: _known(key, entry) for key, entry in _contents()["liquids"][name].items()}
 
 
 @cache
@@ -112,28 +101,24 @@ def surface_pair(first: str | None, second: str | None) -> Mapping[str, Known]:
     """
     for pair in _contents()["surface_pairs"]:
         if sorted(pair["materials"]) == sorted([first or "", second or ""]):
-            numbers = {key: one for key, one in pair.items() if isinstance(one, dict)}
             liquids = tuple(pair["calibrated_with"])
-            return {key: _known(key, one["value"], one, liquids) for key, one in numbers.items()}
+            return {key: _known(key, one, liquids) for key, one in pair.items() if isinstance(one, dict)}
     return {}
-
-
-@cache
-def unmeasured() -> Mapping[str, Unmeasured]:
-    """What nobody measures, by the keys of a case."""
-    return {
-        key: Unmeasured(
-            _known(key, entry["usual"], {}) if "usual" in entry else None,
-            (entry["range"][0], entry["range"][1]),
-            entry.get("log", False),
-        )
-        for key, entry in _contents()["unmeasured"].items()
-    }
 
 
 def surface_pairs() -> list[tuple[str, str]]:
     """The pairs of materials whose friction the library has."""
     return [(entry["materials"][0], entry["materials"][1]) for entry in _contents()["surface_pairs"]]
+
+
+@cache
+def unmeasured() -> Mapping[str, Unmeasured]:
+    """What nobody measures, by the keys of a case."""
+    found = {}
+    for key, entry in _contents()["unmeasured"].items():
+        usual = _known(key, {"value": entry["usual"]}) if "usual" in entry else None
+        found[key] = Unmeasured(usual, (entry["range"][0], entry["range"][1]), entry.get("log", False))
+    return found
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

@@ -18,13 +18,7 @@ if TYPE_CHECKING:
 
 
 def dimer_of(case: Case) -> Dimer:
-    """The dimer of a case whose first walkers are such.
-
-    Raises
-    ------
-    ValueError
-        If they are not.
-    """
+    """The dimer of a case whose first walkers are such; raises `ValueError` if they are not."""
     radii = case.walkers[0].radii if case.walkers else ()
     if len(radii) != 2:
         raise ValueError("bodies: expected dimers")

@@ -2,176 +2,154 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
 from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from walkers.inputs.errors import InputError, Problem, UnusableKeyError, shortened
-from walkers.inputs.library import suggestion
+from walkers.inputs.changes import MISSING, joined, parts_of, value_at
+from walkers.inputs.errors import InputError, Problem, shown, unusable
+from walkers.inputs.library import suggestion, surface_pairs
 from walkers.inputs.schema import CaseFile
 
 File = TypeVar("File", bound=BaseModel)
 
 _EXAMPLES = {
     "beads": 'a [beads] table, such as material = "ruby"',
-    "dimers.radii": 'such as ["0.3 mm", "0.2 mm"]',
+    "dimers.radii": 'two radii, such as ["0.3 mm", "0.2 mm"]',
+    "mixture.small": 'two radii, such as ["0.3 mm", "0.315 mm"]',
+    "mixture.large": 'two radii, such as ["0.5 mm", "0.59 mm"]',
+    "clusters.at": 'two places, ahead and to the left, such as ["0.2 mm", "0 mm"]',
+    "placed.at": 'three places, x, y and z, such as ["5 mm", "-3 mm", "0.3 mm"]',
+    "beads.density": 'such as "4.0 g/cm^3", or a material of the library',
+    "liquid.surface_tension": 'such as "19.2 mN/m", or a liquid of the library by name',
+    **dict.fromkeys(
+        ("contact.friction", "contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction"),
+        f"numbers: the library has it for {'; '.join(map(' on '.join, surface_pairs()))} only "
+        "(if it is a guess, say in [uncertain] between which ends)",
+    ),
     "liquid": 'a [liquid] table, such as name = "Si AK5"',
     "boundary": 'a [boundary] table, such as material = "chromium-coated glass"',
     "boundary.material": 'such as "chromium-coated glass"',
     "drive": "a [drive] table with a frequency and a peak_acceleration or gamma0",
     "drive.frequency": 'such as "80 Hz"',
+    "walltime": 'hours, minutes and seconds, such as "02:00:00"',
     "case": 'a case file, or the name of a shipped case, such as "fig1b"',
     "descend.from": 'where the descent begins, such as "4 g"',
     "descend.to": 'where it ends at the latest, such as "0.5 g"',
     "descend.step": 'such as "0.1 g"',
     "descend.until_below": 'the speed below which walkers count as at rest, such as "0.02 mm/s"',
 }
-
-
-_BOUNDS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
-_BOUND_UNITS = {
-    "contact.youngs_modulus": " Pa (softer contacts change the speed, harder ones the engine refuses)",
-    "liquid.contact_angle": " rad",
-    "boundary.tilt": " rad (90 degrees, a wall)",
-    "boundary.opening": " rad (from 30 to 177 degrees)",
+_WORDS = {
+    "Input should be": "expected",
+    "greater than or equal to": "at least",
+    "greater than": "more than",
+    "less than or equal to": "at most",
+    "a valid tuple": "a list",
+    "a valid list": "a list (a table of tables is written [[name]])",
+    "a valid string": "text in quotes",
+    "a valid boolean": "true or false",
 }
-_PLAIN = {
-    "tuple_type": "expected a list",
-    "bool_type": "expected true or false",
-    "bool_parsing": "expected true or false",
-    "string_type": "expected text in quotes",
-    "finite_number": "expected a finite number",
-    "string_pattern_mismatch": 'expected hours, minutes and seconds, such as "02:00:00"',
-    "list_type": "expected a list (a table of tables is written [[name]])",
-}
+"""What pydantic says, and what this does."""
 
 
-def _shown(value: Any) -> str:
-    """A value as the user may have written it, shortened."""
-    try:
-        text = json.dumps(value, ensure_ascii=False, default=str)
-    except (ValueError, RecursionError):  # integers of thousands of digits, brackets without end
-        return "..."
-    return shortened(text)
-
-
-def quoted(document: Mapping[str, Any], location: Sequence[str | int]) -> str | None:
+def quoted(document: Mapping[str, Any], parts: Sequence[str | int]) -> str | None:
     """The value at a place of a document, quoted; None if there is none."""
-    value: Any = document
-    for part in location:
-        known = value if isinstance(value, Mapping) else dict(enumerate(value)) if isinstance(value, list) else {}
-        if part not in known:
-            return None
-        value = known[part]
-    return _shown(value)
+    value = value_at(document, parts)
+    return None if value is MISSING else shown(value)
 
 
 @contextmanager
 def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[None]:
-    """Tell an `UnusableKeyError` as an `InputError` of a source, with the value at fault or the document's there."""
+    """Add to errors that name no source this one, and the value at fault as the document has it."""
     try:
         yield
-    except UnusableKeyError as error:
-        parts = [int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", error.key)]
-        value = quoted(document or {}, parts) if error.value is None else _shown(error.value)
-        raise InputError(source, [Problem(error.key, value, error.expected)]) from error
+    except InputError as error:
+        if error.source:
+            raise
+        found = [(one, one.value or quoted(document or {}, parts_of(one.key))) for one in error.problems]
+        raise InputError(source, [replace(one, value=value) for one, value in found]) from error
 
 
 def validated(model: type[File], document: Mapping[str, Any], source: str, whole: str = "a case") -> File:
     """Nested tables as a kind of file; ``source`` and ``whole`` are what messages call it, and any of its kind.
 
-    Raises
-    ------
-    InputError
-        With all that pydantic finds wrong.
+    Raises `InputError` with all that pydantic finds wrong.
     """
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        raise InputError(source, [_problem_of(one, document, model, whole) for one in error.errors()]) from error
+        problems = dict.fromkeys(_problem_of(one, document, model, whole) for one in error.errors())
+        raise InputError(source, list(problems)) from error
 
 
 def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel], whole: str) -> Problem:
-    location = details["loc"]
-    key = _dotted(location)
-    if details["type"] == "missing":
-        if isinstance(location[-1], int):
-            return Problem(_dotted(location[:-1]), quoted(document, location[:-1]), _entries(_dotted(location[:-1])))
-        return Problem(key, None, f"missing; expected {_EXAMPLES.get(key, 'a value')}")
-    return Problem(key, quoted(document, location), _expectation(details, key, file, whole))
-
-
-def _entries(key: str) -> str:
-    """What is wrong with a list of places or radii that is too short or too long."""
-    if key.startswith("placed"):
-        return "expected three places: x, y, z"
-    if key.startswith("clusters"):
-        return "expected two places: ahead and to the left"
-    return "expected two radii" if "radii" in key or key.startswith("mixture") else "expected two numbers"
-
-
-def _dotted(location: Sequence[str | int]) -> str:
-    key = ""
-    for part in location:
-        key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else str(part)
-    return key
-
-
-def _expectation(details: ErrorDetails, key: str, file: type[BaseModel], whole: str) -> str:
-    kind, context = details["type"], details.get("ctx", {})
-    if kind == "too_long":
+    location, kind, context = details["loc"], details["type"], details.get("ctx", {})
+    told = details["msg"]
+    for pydantics, ours in _WORDS.items():
+        told = told.replace(pydantics, ours)
+    short_list = kind == "missing" and isinstance(location[-1], int)
+    key = joined(location[:-1] if short_list else location)
+    example = _EXAMPLES.get(re.sub(r"\[\d+\]", "", key))
+    if kind == "missing":
+        told = (
+            f"too short; expected {example or 'two numbers'}"
+            if short_list
+            else f"missing; expected {example or 'a value'}"
+        )
+    elif kind == "too_long":
         most = context["max_length"]
-        return _entries(key) if "radii" in key or most == 2 else f"expected at most {most} entries"
-    if kind in _PLAIN:
-        return _PLAIN[kind] + (f", {_EXAMPLES[key]}" if kind == "tuple_type" and key in _EXAMPLES else "")
-    if kind == "extra_forbidden":
-        return _unknown_key([str(part) for part in details["loc"] if isinstance(part, str)], file, whole)
-    if kind == "literal_error":
-        choices = str(context["expected"]).replace(" or ", ", ").replace("'", "").split(", ")
-        return f"expected {context['expected']}{suggestion(str(details['input']), choices)}"
-    if kind in ("model_type", "dict_type", "model_attributes_type"):
-        return f"expected a table [{key}]"
-    bounds = " and ".join(f"{words} {context[name]:g}" for name, words in _BOUNDS.items() if name in context)
-    return f"expected {bounds}{_BOUND_UNITS.get(key, '')}" if bounds else details["msg"]
+        told = f"too long; expected {example or ('two numbers' if most == 2 else f'at most {most} entries')}"
+    elif kind == "value_error":
+        told = str(context["error"])
+    elif kind == "extra_forbidden":
+        told = _unknown_key([str(part) for part in location if isinstance(part, str)], file, whole)
+    elif kind == "literal_error":
+        told += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
+    elif kind in ("model_type", "dict_type", "model_attributes_type"):
+        told = f"expected a table [{key}]"
+    elif example:
+        told += f", {example}"
+    return Problem(key, quoted(document, parts_of(key)), told)
 
 
-def _nested(annotation: Any) -> tuple[type[BaseModel], str] | None:
+def _table_in(annotation: Any) -> tuple[type[BaseModel] | None, str]:
     """The model that a field holds, alone or in a list, or by names of the user's (then with ``.*``), or None."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation, ""
     for inner in get_args(annotation):
-        if (found := _nested(inner)) is not None:
-            return found[0], ".*" if get_origin(annotation) is dict else found[1]
-    return None
-
-
-def _walk(table: type[BaseModel], prefix: str) -> Iterator[tuple[str, type[BaseModel] | None]]:
-    for name, field in table.model_fields.items():
-        inner, named = _nested(field.annotation) or (None, "")
-        yield f"{prefix}{name}", None if named else inner
-        if named:
-            yield f"{prefix}{name}{named}", inner
-        if inner is not None:
-            yield from _walk(inner, f"{prefix}{name}{named}.")
+        table, named = _table_in(inner)
+        if table is not None:
+            return table, ".*" if get_origin(annotation) is dict else named
+    return None, ""
 
 
 @cache
 def keys_of(file: type[BaseModel]) -> Mapping[str, type[BaseModel] | None]:
     """All dotted keys of a kind of file; those of tables with the table's model."""
-    return {"": file, **dict(_walk(file, ""))}
+    found: dict[str, type[BaseModel] | None] = {"": file}
+    for name, field in file.model_fields.items():
+        table, named = _table_in(field.annotation)
+        found[name] = None if named else table
+        below = keys_of(table) if table else {}
+        found |= {f"{name}{named}.{key}".rstrip("."): one for key, one in below.items()}
+    return found
 
 
-def suggested_key(key: str, file: type[BaseModel] = CaseFile) -> str | None:
-    """What to say of a dotted key of a kind of case file if there is no such key; None if there is."""
-    if key in keys_of(file):
-        return "is a table of a case; expected one of its keys" if keys_of(file)[key] else None
-    return _unknown_key(key.split("."), file, "a case")
+def check_key(key: str) -> None:
+    """Refuse a key that no case has; raises `InputError` if it is one."""
+    parts, known = re.sub(r"\[\d+\]", "", key).split("."), keys_of(CaseFile)
+    if "" in parts:
+        raise unusable(key, "is no key of a case")
+    if ".".join(parts) not in known:
+        raise unusable(key, _unknown_key(parts, CaseFile, "a case"))
+    if known[".".join(parts)]:
+        raise unusable(key, "is a table of a case; expected one of its keys")
 
 
 def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:

@@ -9,6 +9,7 @@ import stat
 import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,6 @@ from walkers.inputs.library import suggestion
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
-    from walkers.inputs.schema import CaseFile
 
 _HERE = Path(__file__).parent
 _MOST_BYTES = 16 << 20
@@ -39,34 +39,6 @@ def shipped(kind: str) -> dict[str, Path]:
 def shipped_cases() -> dict[str, Path]:
     """The cases that come with the project: name to file."""
     return shipped("case")
-
-
-def check_kind(name: str | Path, wanted: str) -> None:
-    """Refuse what is known to be another kind of input (case, sweep, calibration) than is wanted.
-
-    Raises
-    ------
-    InputError
-        With what it is, and the command that takes it.
-    """
-    found = _kind_of(name)
-    if found not in (None, wanted):
-        raise InputError(str(name), [Problem("", None, f"is {_COMMANDS[str(found)].format(name)}")])
-
-
-def _kind_of(name: str | Path) -> str | None:
-    """The kind, None where it is not known; files come before shipped names."""
-    path = Path(name)
-    with suppress(OSError, InputError):
-        if path.is_dir():
-            return next((file for file in ("sweep.json", "case.json") if (path / file).is_file()), None)
-        if path.is_file():
-            document = read_toml(path) if path.stem not in (".", "..") else {}  # refused for its name
-            if document.keys() & {"beads", "boundary", "drive", "liquid"}:
-                return "case"
-            of_calibrations = document.keys() & {"parameters", "experiments", "observations"}
-            return ("calibration" if of_calibrations else "sweep") if "case" in document else None
-    return next((kind for kind in ("case", "sweep", "calibration") if str(name) in shipped(kind)), None)
 
 
 def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Case:
@@ -97,13 +69,11 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
     >>> load_case("fig1b", {"drive.frequency": "70 Hz", "dimers.radii[1]": "0.25 mm"}).walkers[0].radii
     (0.0003, 0.00025)
     """
-    if str(case) not in shipped_cases():
-        check_kind(case, "case")
     path = find_input(case, "case")
     document = read_toml(path)
     if changes:
-        from walkers.inputs.changes import changed, check_key
-        from walkers.inputs.messages import blaming
+        from walkers.inputs.changes import changed
+        from walkers.inputs.messages import blaming, check_key
 
         with blaming(str(case)):
             for key in changes:
@@ -115,13 +85,13 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
 def find_input(name: str | Path, kind: str) -> Path:
     """A file of a kind (case, sweep, calibration) by its path, or a shipped one by its name.
 
-    Raises
-    ------
-    InputError
-        If there is neither.
+    Raises `InputError` if there is neither, or if it is known to be of another kind: with the command that takes it.
     """
     check_utf8(name)
     path, known = Path(name), shipped(kind)
+    found = None if str(name) in known else _kind_of(path)
+    if found not in (None, kind):
+        raise InputError(str(name), [Problem("", None, f"is {_COMMANDS[str(found)].format(name)}")])
     try:
         if path.is_file() or (path.exists() and str(name) not in known):
             if path.stem in (".", ".."):  # of "...toml"
@@ -135,14 +105,22 @@ def find_input(name: str | Path, kind: str) -> Path:
     raise InputError(str(name), [Problem("", None, told)])
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file.
+def _kind_of(path: Path) -> str | None:
+    """The kind of what is at a path, or shipped under that name; None where it is not known."""
+    with suppress(OSError, InputError):
+        if path.is_dir():
+            return next((file for file in ("sweep.json", "case.json") if (path / file).is_file()), None)
+        if path.is_file():
+            document = read_toml(path) if path.stem not in (".", "..") else {}  # refused for its name
+            if document.keys() & {"beads", "boundary", "drive", "liquid"}:
+                return "case"
+            of_calibrations = document.keys() & {"parameters", "experiments", "observations"}
+            return ("calibration" if of_calibrations else "sweep") if "case" in document else None
+    return next((kind for kind in ("case", "sweep", "calibration") if str(path) in shipped(kind)), None)
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, is no TOML, no regular file, or larger than 16 MB.
-    """
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file; an `InputError` if it cannot be read, is no TOML, no regular file, or larger than 16 MB."""
     try:
         about = path.stat()
         if not stat.S_ISDIR(about.st_mode) and (not stat.S_ISREG(about.st_mode) or about.st_size > _MOST_BYTES):
@@ -158,48 +136,33 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> Case:
-    """Validate a case given as nested tables and fill in what the library supplies.
+    """A case given as the tables of a case file, quantities as strings with units.
 
-    Parameters
-    ----------
-    document
-        The tables of a case file, quantities as strings with units.
-    source, name
-        What an error message calls the input, and the name of the case, with which its run directory begins.
-
-    Raises
-    ------
-    InputError
-        If anything in it cannot be used.
+    ``source`` is what messages call it; run directories begin with its ``name``. Raises `InputError` if anything in it
+    cannot be used.
     """
     # Not above: that there is no such file is told before all that a case may say is built.
-    from walkers.inputs.messages import blaming, validated
+    from walkers.inputs.changes import changed
+    from walkers.inputs.matter import supplied
+    from walkers.inputs.messages import blaming, check_key, validated
+    from walkers.inputs.origins import Notes
     from walkers.inputs.resolving import resolve
     from walkers.inputs.schema import CaseFile
 
-    file = validated(CaseFile, document, source)
-    try:
-        with blaming(source, document):
-            case = resolve(file, name).read_from(document)
-    except ArithmeticError as error:
-        raise InputError(source, [Problem("", None, f"inconsistent values: {error}")]) from error
-    _check_uncertain(file, document, source)
-    return case
-
-
-def _check_uncertain(file: CaseFile, document: Mapping[str, Any], source: str) -> None:
-    """Refuse ranges of what is no key of the case, or whose ends it could not say."""
-    from walkers.inputs.changes import changed, check_key
-    from walkers.inputs.messages import blaming, validated
-
-    for key, given in file.uncertain.items():
-        (ends,) = given.values()
-        for end in ends:
+    notes = Notes()
+    with blaming(source, document):
+        tables = supplied(document, notes)
+        file = validated(CaseFile, tables, source)
+        try:
+            case = resolve(file, name, document, notes)
+        except ArithmeticError as error:
+            raise InputError(source, [Problem("", None, f"inconsistent values: {error}")]) from error
+        for key, given in file.uncertain.items():  # it is a key of the case, which could say both ends
             try:
-                with blaming(source):
-                    check_key(key)
-                    document = changed(document, {key: end})
-                validated(type(file), document, source)
+                check_key(key)
+                for end in next(iter(given.values())):
+                    validated(CaseFile, changed(tables, {key: end}), source)
             except InputError as error:
-                told = [Problem(f"uncertain.{one.key}", one.value, one.expected) for one in error.problems]
-                raise InputError(source, told) from error
+                problems = [replace(one, key=f"uncertain.{one.key}") for one in error.problems]
+                raise InputError(source, problems) from error
+    return case

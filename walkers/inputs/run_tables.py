@@ -5,10 +5,13 @@ from __future__ import annotations
 from math import ceil, inf
 
 from walkers.inputs.bodies import Walkers
+from walkers.inputs.boundary import Shape
 from walkers.inputs.case import Case, Run, settling_of
 from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector, waveform
-from walkers.inputs.errors import UnusableKeyError
+from walkers.inputs.errors import unusable
+from walkers.inputs.origins import Notes
 from walkers.inputs.schema import DriveTable, HarmonicTable, RunTable
+from walkers.inputs.units import ACCELERATION, DURATION, FILE_SIZE, SPEED, TIME
 from walkers.physics.dimer import Dimer
 from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 
@@ -20,64 +23,57 @@ _NEARLY_SYMMETRIC = 0.08
 _ASLANT = 0.1
 """… and start angle (rad) from which walkers turn for longer than a few cycles: both run in full."""
 _LONGEST_SETTLING = 0.5
+_SETTLED_BELOW = 5e-3
 _FRAMES_PER_SECOND = 60.0
 
 
-def resolve_drive(table: DriveTable, axis: str, dimer: Dimer | None) -> Drive:
-    """A drive of one harmonic or of several.
+def resolve_drive(table: DriveTable, boundary: Shape, dimer: Dimer | None, notes: Notes) -> Drive:
+    """A drive of one harmonic or of several; ``dimer`` is whose Γ0 it may be given by, None where there is none.
 
-    Parameters
-    ----------
-    table
-        What the case says.
-    axis
-        Along which it is shaken if the case does not say.
-    dimer
-        Whose Γ0 a drive may be given by; None where there is none.
-
-    Raises
-    ------
-    UnusableKeyError
-        If something is missing, said twice or contradictory.
+    Raises `InputError` if something is missing, said twice or contradictory.
     """
     besides = sorted(table.model_fields_set - {"harmonics", "frame"})
     if table.harmonics and besides:
         instead = f": write drive.harmonics[0].{besides[0]}" if besides[0] in HarmonicTable.model_fields else ""
-        raise UnusableKeyError(f"drive.{besides[0]}", f"expected none beside drive.harmonics{instead}")
+        raise unusable(f"drive.{besides[0]}", f"expected none beside drive.harmonics{instead}")
     if table.harmonics:
-        harmonics = tuple(
-            _harmonic(one, f"drive.harmonics[{number}]", axis, dimer) for number, one in enumerate(table.harmonics)
-        )
+        tables = {f"drive.harmonics[{number}]": one for number, one in enumerate(table.harmonics)}
+        harmonics = tuple(_harmonic(one, key, boundary, dimer) for key, one in tables.items())
     else:
-        harmonics = waveform(table.waveform, _harmonic(table, "drive", axis, dimer))
+        first = _harmonic(table, "drive", boundary, dimer)
+        harmonics = waveform(table.waveform, first)
+        notes.default("drive.axis", boundary.drive_axis, source=f"of a {boundary.shape}")
+        peak = first.peak_acceleration
+        notes.derived("drive.peak_acceleration", peak, "from gamma0, the dimer and the liquid", ACCELERATION)
     try:
         common_frequency([one.frequency for one in harmonics])
     except ValueError as error:
-        raise UnusableKeyError("drive.harmonics", f"expected frequencies with a common period: {error}") from error
+        raise unusable("drive.harmonics", f"expected frequencies with a common period: {error}") from error
     drive = Drive(harmonics, table.frame or "container")
+    notes.default("drive.frame", drive.frame)
     if table.frame == "lab" and not drive.is_plain:
         told = "several harmonics, or one with a phase, are driven in the container's frame"
-        raise UnusableKeyError("drive.frame", f'expected "container": {told}')
+        raise unusable("drive.frame", f'expected "container": {told}')
     return drive
 
 
-def _harmonic(table: DriveTable | HarmonicTable, key: str, axis: str, dimer: Dimer | None) -> Harmonic:
+def _harmonic(table: HarmonicTable, key: str, boundary: Shape, dimer: Dimer | None) -> Harmonic:
+    acceleration, gamma0 = table.peak_acceleration, table.gamma0
     if table.frequency is None:
-        raise UnusableKeyError(f"{key}.frequency", 'missing; expected such as "80 Hz"')
-    if dimer is None and table.gamma0 is not None:
-        raise UnusableKeyError(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")
-    if (table.peak_acceleration is None) == (table.gamma0 is None):
-        if table.gamma0 is None:
-            raise UnusableKeyError(f"{key}.peak_acceleration", 'missing; expected it (such as "4 g") or gamma0')
-        raise UnusableKeyError(f"{key}.gamma0", "expected either peak_acceleration or gamma0, not both")
-    acceleration = table.peak_acceleration
+        raise unusable(f"{key}.frequency", 'missing; expected such as "80 Hz"')
+    if gamma0 is not None and dimer is None:
+        raise unusable(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")
+    if gamma0 is not None and acceleration is not None:
+        raise unusable(f"{key}.gamma0", "expected either peak_acceleration or gamma0, not both")
+    if gamma0 is not None and dimer is not None:
+        acceleration = dimer.peak_acceleration(gamma0)
     if acceleration is None:
-        acceleration = dimer.peak_acceleration(table.gamma0 or 0.0) if dimer else 0.0
-    given = axis if table.axis is None else table.axis
+        raise unusable(f"{key}.peak_acceleration", 'missing; expected it (such as "4 g") or gamma0')
+    axis = boundary.drive_axis if table.axis is None else table.axis
     try:
-        direction = AXES[given] if isinstance(given, str) else unit_vector(given)
+        direction = AXES[axis] if isinstance(axis, str) else unit_vector(axis)
     except ValueError as error:
-        raise UnusableKeyError(f"{key}.axis", str(error)) from error
+        raise unusable(f"{key}.axis", str(error)) from error
     return Harmonic(direction, table.frequency, acceleration, table.phase)
 
 
@@ -87,35 +83,30 @@ def limits_of(case: Case) -> TimeStepLimits:
     return time_step_limits(bridged, case.density, case.contact, case.liquid, case.drive.peak_velocity)
 
 
-def resolve_run(table: RunTable, case: Case) -> Run:
-    """The time step, the length and the sampling of a run, given the rest of the case."""
+def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
+    """The time step, the length and the sampling of a run, given the rest of the case.
+
+    Raises `InputError` if they contradict each other, or the time step is beyond its limits.
+    """
     frequency, loose = case.drive.frequency, case.loose
     samples, cycles_per_sample = _sampling(table, case)
     time_step, steps = fit_into_cycle(_largest_time_step(table, case), frequency, samples)
-    cycles = _cycles(table, case, cycles_per_sample)
-    until_steady = _until_steady(table, case, cycles_per_sample)
+    cycles, until_steady = _cycles(table, case, cycles_per_sample), _until_steady(table, case, cycles_per_sample)
     settling = table.settling_cycles
     if settling is None:
         settling = settling_of(cycles) if case.walkers else 0
-    length = "run.duration" if table.duration is not None else "run.cycles"
-    if cycles < 2:
-        raise UnusableKeyError(length, f"expected at least two cycles of the drive, {2.0 / frequency:.4g} s")
-    if cycles - settling < 2:
-        raise UnusableKeyError("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
-    if case.walkers and cycles // cycles_per_sample <= -(-settling // cycles_per_sample):
-        told = f"expected more: one frame in {cycles_per_sample} cycles leaves none after {settling} settling ones"
-        raise UnusableKeyError("run.frames_per_second", told)
     rest = table.longest_settling
     if rest is None:
         rest = _LONGEST_SETTLING if loose else 0.0
+    _check_length(table, case, cycles, settling, cycles_per_sample)
     most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
     if cycles > most:
-        told = "too long" if table.duration is not None else f"expected at most {most}"
-        raise UnusableKeyError(length, f"{told}: the engine counts steps up to 2^31")
+        key, told = ("cycles", f"expected at most {most}") if table.duration is None else ("duration", "too long")
+        raise unusable(f"run.{key}", f"{told}: the engine counts steps up to 2^31")
     segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if loose else inf
     # Segments end with a sample, so that each begins where the last one ended.
     samples_of_segment = max(1, round(min(segment * frequency, cycles) / cycles_per_sample))
-    return Run(
+    run = Run(
         time_step=time_step,
         steps_per_cycle=steps,
         cycles=cycles,
@@ -125,12 +116,45 @@ def resolve_run(table: RunTable, case: Case) -> Run:
         cycles_per_sample=cycles_per_sample,
         samples_per_bridge_sample=_bridge_sampling(table, case, samples),
         cycles_per_segment=min(samples_of_segment * cycles_per_sample, cycles),
-        settled_below=table.settled_below,
+        settled_below=(table.settled_below or _SETTLED_BELOW) if rest else 0.0,
         longest_settling=rest,
         ranks=table.ranks,
         silence=table.silence,
         log_limit=table.log_limit,
     )
+    _note_run(run, table, case, notes)
+    return run
+
+
+def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
+    often = run.samples_per_cycle if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
+    cycles = f"until steady, at most {run.cycles}" if run.until_steady else run.cycles
+    whence = "from the duration" if table.duration else "walkers are looked at after 12 and 24"
+    silence = run.longest_silence(case.count)
+    notes.default("run.samples_per_cycle", often)
+    if case.loose:
+        notes.derived("run.samples_per_cycle", often, "from frames_per_second")
+        notes.derived("run.segment", run.cycles_per_segment / case.drive.frequency, "about 0.5 s", DURATION)
+        notes.default("run.longest_settling", run.longest_settling, DURATION, "of loose beads")
+    if run.rests:
+        notes.default("run.settled_below", run.settled_below, SPEED)
+    notes.derived("run.time_step", run.time_step, "auto: its share of the limits, fitted into a cycle", TIME)
+    notes.derived("run.cycles", cycles, whence)
+    notes.derived("run.settling_cycles", run.settling_cycles, "a third of the cycles, at most 20")
+    notes.derived("run.silence", silence, "an engine that writes nothing for so long is ended", DURATION)
+    notes.derived("run.log_limit", run.most_log, "an engine that writes a longer log is ended", FILE_SIZE)
+
+
+def _check_length(table: RunTable, case: Case, cycles: int, settling: int, cycles_per_sample: int) -> None:
+    """At least two cycles are measured, and one frame of walkers."""
+    if cycles < 2:
+        key = "run.duration" if table.duration is not None else "run.cycles"
+        raise unusable(key, f"expected at least two cycles of the drive, {2.0 / case.drive.frequency:.4g} s")
+    if cycles - settling < 2:
+        raise unusable("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
+    if case.walkers and cycles // cycles_per_sample <= -(-settling // cycles_per_sample):
+        told = f"expected more: one frame in {cycles_per_sample} cycles leaves none after {settling} settling ones"
+        raise unusable("run.frames_per_second", told)
 
 
 def _largest_time_step(table: RunTable, case: Case) -> float:
@@ -141,14 +165,14 @@ def _largest_time_step(table: RunTable, case: Case) -> float:
     if (exceeded := limits.exceeded_by(given)) and not table.allow_unstable:
         allowed = f"{min(limits.as_dict().values()) * 1e6:.3g} us"
         told = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
-        raise UnusableKeyError("run.time_step", f'{told}"auto", or allow_unstable = true')
+        raise unusable("run.time_step", f'{told}"auto", or allow_unstable = true')
     return given
 
 
 def _sampling(table: RunTable, case: Case) -> tuple[int, int]:
     """Samples a cycle and cycles a sample, one of which is 1."""
     if table.samples_per_cycle is not None and table.frames_per_second is not None:
-        raise UnusableKeyError("run.frames_per_second", "expected either samples_per_cycle or frames_per_second")
+        raise unusable("run.frames_per_second", "expected either samples_per_cycle or frames_per_second")
     if table.samples_per_cycle is not None or (table.frames_per_second is None and not case.loose):
         return table.samples_per_cycle or 20, 1
     wanted = case.drive.frequency / (table.frames_per_second or _FRAMES_PER_SECOND)
@@ -160,39 +184,36 @@ def _bridge_sampling(table: RunTable, case: Case, samples: int) -> int:
     if bridges is None:
         return 1 if case.loose else samples
     if case.loose:
-        raise UnusableKeyError(key, "expected none: bridges of loose beads are in every frame")
+        raise unusable(key, "expected none: bridges of loose beads are in every frame")
     if samples % bridges:
-        raise UnusableKeyError(key, f"expected a divisor of samples_per_cycle = {samples}")
+        raise unusable(key, f"expected a divisor of samples_per_cycle = {samples}")
     return samples // bridges
 
 
 def _cycles(table: RunTable, case: Case, cycles_per_sample: int) -> int:
     """Cycles of a run, whole samples of them."""
     if table.cycles is not None and table.duration is not None:
-        raise UnusableKeyError("run.duration", "expected either cycles or a duration")
+        raise unusable("run.duration", "expected either cycles or a duration")
     cycles: float = table.cycles or table.most_cycles or _MOST_CYCLES
     if table.duration is not None:
         cycles = table.duration * case.drive.frequency * (1.0 - 1e-12)
     elif table.cycles is None and case.loose:
-        raise UnusableKeyError("run.duration", 'missing; expected such as "4 s"')
+        raise unusable("run.duration", 'missing; expected such as "4 s"')
     return ceil(cycles / cycles_per_sample) * cycles_per_sample
 
 
 def _until_steady(table: RunTable, case: Case, cycles_per_sample: int) -> bool:
     """Whether a run may end when its walkers are steady: not one that says how long it is, and in which parts.
 
-    Raises
-    ------
-    UnusableKeyError
-        If a case asks for what cannot be, or for its contrary as well.
+    Raises `InputError` if a case asks for what cannot be, or for its contrary as well.
     """
     asked = ["cycles"] if "cycles" in table.model_fields_set and table.cycles is None else []
     asked += ["most_cycles"] if table.most_cycles is not None else []
     given = [key for key in ("cycles", "duration", "settling_cycles", "segment") if getattr(table, key) is not None]
     if given and asked:
-        raise UnusableKeyError(f"run.{given[0]}", f"expected none where run.{asked[0]} lets walkers run until steady")
+        raise unusable(f"run.{given[0]}", f"expected none where run.{asked[0]} lets walkers run until steady")
     if asked and not case.apart:
-        raise UnusableKeyError(f"run.{asked[0]}", "expected run.duration: only walkers apart can be steady")
+        raise unusable(f"run.{asked[0]}", "expected run.duration: only walkers apart can be steady")
     alone = case.apart and not given and table.ranks == 1 and cycles_per_sample == 1
     return alone and all(_settles_soon(walkers) for walkers in case.walkers)
 

@@ -1,40 +1,66 @@
 """What a case file may say: keys, types, defaults and bounds, as pydantic models.
 
-A quantity is written as a string with its unit and held here as a number in SI units. Keys that the library of
-materials and liquids can supply are optional; `walkers.inputs.reading` fills them in.
+A quantity is written as a string with its unit and held here as a number in SI units. What the library of materials
+and liquids supplies (`walkers.inputs.matter.SUPPLIED`) has been filled in before.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from dataclasses import replace
+from math import isfinite, radians
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from walkers.inputs import units
-from walkers.inputs.errors import UnusableKeyError
-from walkers.inputs.units import Angle, Duration, Length, NonNegativeAngle, Radius, SignedLength, refusal
+from walkers.inputs.axes import ends_of, is_axis
+from walkers.inputs.changes import flatten
+from walkers.inputs.errors import InputError
+from walkers.inputs.units import Angle, Duration, Length, NonNegativeAngle, Radius, SignedLength
 from walkers.physics.matter import DEFAULT_LAW
 
 
 def _auto(value: object) -> object:
-    if isinstance(value, str) and value.strip().lower() == "auto":
-        return None
-    return value
+    return None if isinstance(value, str) and value.strip().lower() == "auto" else value
 
 
 def _plain_number(value: object) -> object:
     """Accept TOML's integers and floats only: neither "0.3" nor true is a coefficient."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise refusal("expected a plain number without a unit")
+        raise ValueError("expected a plain number without a unit")
     return value
 
 
 def _whole_number(value: object) -> object:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise refusal("expected a whole number")
+        raise ValueError("expected a whole number")
     return value
+
+
+def _axis(value: object) -> object:
+    """An axis by its name, or a direction by its components."""
+    if value in ("x", "y", "z"):
+        return value
+    if isinstance(value, list) and len(value) == 3 and any(value):
+        numbers = tuple(float(one) for one in value if type(one) in (int, float) and isfinite(one))
+        if len(numbers) == 3:
+            return numbers
+    raise ValueError("expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]")
+
+
+def _ranges(value: object) -> object:
+    """Ranges by dotted keys: each two values of one unit, the smaller first."""
+    if not isinstance(value, dict):
+        return value
+    try:
+        ranges = {key: one if is_axis(one) else {"uniform": one} for key, one in flatten(value, is_axis).items()}
+        ends_of(ranges)
+    except InputError as error:
+        (problem,) = error.problems
+        told = problem.expected.replace("{ uniform = [low, high] }", "[low, high]")
+        raise ValueError(f"{problem.key}: {told}") from error
+    return ranges
 
 
 _SAME: Sequence[Sequence[tuple[str, ...]]] = (
@@ -58,7 +84,12 @@ AUTO = BeforeValidator(_auto)
 """Reads "auto" as None."""
 Number = Annotated[float, BeforeValidator(_plain_number), Field(allow_inf_nan=False)]
 Whole = Annotated[int, BeforeValidator(_whole_number)]
+UpToRightAngle = Annotated[float, replace(units.ANGLE, largest=1.5708, sign=units.NOT_NEGATIVE)]
 Coefficient = Annotated[Number, Field(ge=0, le=1e3)]
+Axis = Annotated[Any, BeforeValidator(_axis)]
+"""The name of an axis, or a direction: its components, in any length."""
+Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
+"""As a sweep's samplers take them: for each key ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``."""
 
 
 class Table(BaseModel):
@@ -71,7 +102,7 @@ class BeadsTable(Table):
     """``[beads]``: what all beads are made of."""
 
     material: str | None = None
-    density: units.Density | None = None
+    density: units.Density
 
 
 class WalkersTable(Table):
@@ -83,7 +114,7 @@ class WalkersTable(Table):
     replicates: Annotated[Whole, Field(ge=1, le=1000)] = 6
     facing: Literal["both", "right", "left", "up", "down"] = "both"
     angle: Angle = 0.0
-    angle_spread: NonNegativeAngle = 0.017453292519943295
+    angle_spread: NonNegativeAngle = radians(1.0)
     gap: Annotated[SignedLength | None, AUTO] = None
     gap_spread: Annotated[Number, Field(ge=0, lt=1)] = 0.2
     spacing: Annotated[Length | None, AUTO] = None
@@ -135,18 +166,17 @@ class LiquidTable(Table):
     """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
 
     ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag. ``law`` is that
-    of the bridges, one of `walkers.physics.laws` or a function of yours, ``file.py:function``. The three before it,
-    left out, are the library's for the surfaces, else as in `walkers.inputs.matter_tables`.
+    of the bridges, one of `walkers.physics.laws` or a function of yours, ``file.py:function``.
     """
 
     name: str | None = None
-    surface_tension: units.SurfaceTension | None = None
+    surface_tension: units.SurfaceTension
     density: units.Density | None = None
     kinematic_viscosity: units.KinematicViscosity | None = None
     dynamic_viscosity: units.DynamicViscosity | None = None
-    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] | None = None
-    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)] | None = None
-    contact_angle: Annotated[NonNegativeAngle, Field(le=1.5708)] | None = None
+    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)]
+    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)]
+    contact_angle: UpToRightAngle
     law: str = DEFAULT_LAW
 
 
@@ -161,48 +191,32 @@ class BoundaryTable(Table):
 
     shape: Literal["plane", "channel", "groove", "box", "cylinder"] = "plane"
     material: str
-    opening: Annotated[NonNegativeAngle, Field(ge=0.5, le=3.1)] | None = None
+    opening: Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)] | None = None
     width: Length | None = None
     height: Length | None = None
-    tilt: Annotated[NonNegativeAngle, Field(le=1.5708)] = 0.0
+    tilt: UpToRightAngle = 0.0
     uphill: Angle = 0.0
 
 
 class FrictionTable(Table):
-    """``[contact.friction]``: Coulomb coefficients; left out, the library's value for the two materials holds."""
+    """``[contact.friction]``: Coulomb coefficients."""
 
-    bead_bead: Coefficient | None = None
-    bead_wall: Coefficient | None = None
+    bead_bead: Coefficient
+    bead_wall: Coefficient
 
 
 class ContactTable(Table):
     """``[contact]``: the model of the contacts.
 
     The engine takes no restitution of 0.05 or less and no modulus above 1 GPa; contacts below 5 MPa change speeds.
-    ``restitution`` and ``minimum_separation_ratio``, left out, are the library's for the surfaces, else 0.3 and 0.01.
     """
 
-    friction: FrictionTable = FrictionTable()
-    rolling_friction: Coefficient | None = None
-    restitution: Annotated[Number, Field(gt=0.05, le=1)] | None = None
-    youngs_modulus: Annotated[units.Modulus, Field(ge=5e6, le=1e9)] = 5e7
+    friction: FrictionTable
+    rolling_friction: Coefficient
+    restitution: Annotated[Number, Field(gt=0.05, le=1)]
+    youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=1e9)] = 5e7
     poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = 0.3
-    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] | None = None
-
-
-def _axis(value: object) -> object:
-    """An axis by its name, or a direction by its components."""
-    if value in ("x", "y", "z"):
-        return value
-    if isinstance(value, list) and len(value) == 3 and any(value):
-        numbers = tuple(float(one) for one in value if type(one) in (int, float) and isfinite(one))
-        if len(numbers) == 3:
-            return numbers
-    raise refusal("expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]")
-
-
-Axis = Annotated[Any, BeforeValidator(_axis)]
-"""The name of an axis, or a direction: its components, in any length."""
+    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)]
 
 
 class HarmonicTable(Table):
@@ -215,7 +229,7 @@ class HarmonicTable(Table):
     phase: Angle = 0.0
 
 
-class DriveTable(Table):
+class DriveTable(HarmonicTable):
     """``[drive]``: one harmonic by its keys, or several as ``[[drive.harmonics]]``.
 
     The ``waveform`` is that of the acceleration. ``axis``, left out, is x on a plane, the vertical z in containers.
@@ -223,11 +237,7 @@ class DriveTable(Table):
     walls move, which they can for one harmonic without a phase.
     """
 
-    axis: Axis | None = None
-    frequency: units.Frequency | None = None
-    peak_acceleration: units.Acceleration | None = None
-    gamma0: Coefficient | None = None
-    phase: Angle = 0.0
+    frequency: units.Frequency | None = None  # type: ignore[assignment]
     waveform: Literal["sine", "triangle"] = "sine"
     frame: Literal["lab", "container"] | None = None
     harmonics: Annotated[list[HarmonicTable], Field(max_length=24)] = []
@@ -253,7 +263,7 @@ class RunTable(Table):
     bridge_samples_per_cycle: Annotated[Whole, Field(ge=1, le=1000)] | None = None
     frames_per_second: Annotated[Number, Field(gt=0, le=1e6)] | None = None
     segment: Duration | None = None
-    settled_below: units.Speed = 5e-3
+    settled_below: units.Speed | None = None
     longest_settling: units.NonNegativeDuration | None = None
     ranks: Annotated[Whole, Field(ge=1, le=64)] = 1
     seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 1
@@ -265,26 +275,6 @@ class EnvironmentTable(Table):
     """``[environment]``."""
 
     gravity: units.Acceleration = 9.81
-
-
-def _ranges(value: object) -> object:
-    """Ranges by dotted keys: each two values of one unit, the smaller first."""
-    from walkers.inputs.axes import ends_of, flatten, is_axis
-
-    if not isinstance(value, dict):
-        return value
-    try:
-        given = flatten(value, is_axis)
-        ranges = {key: one if is_axis(one) else {"uniform": one} for key, one in given.items()}
-        ends_of(ranges)
-    except UnusableKeyError as unusable:
-        told = f"{unusable.key}: {unusable.expected}".replace("{ uniform = [low, high] }", "[low, high]")
-        raise refusal(told) from unusable
-    return ranges
-
-
-Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
-"""As a sweep's samplers take them: for each key ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``."""
 
 
 class CaseFile(Table):
@@ -303,7 +293,7 @@ class CaseFile(Table):
     boundary: BoundaryTable
     drive: DriveTable
     liquid: LiquidTable
-    contact: ContactTable = ContactTable()
+    contact: ContactTable
     run: RunTable = RunTable()
     environment: EnvironmentTable = EnvironmentTable()
     uncertain: Ranges = {}

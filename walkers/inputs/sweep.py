@@ -24,21 +24,19 @@ from walkers.inputs.axes import (
     MOST_POINTS,
     Axis,
     combinations,
-    different,
-    flatten,
     is_axis,
+    listed,
     number_of,
     sampled,
     unit_of,
-    values_of,
     written,
     zipped,
 )
 from walkers.inputs.case import BOUNDS, Case
-from walkers.inputs.changes import Value, changed, check_key
-from walkers.inputs.errors import InputError, Problem, UnusableKeyError
-from walkers.inputs.messages import blaming, validated
-from walkers.inputs.reading import check_kind, find_input, read_toml, resolve_case, shipped
+from walkers.inputs.changes import Value, changed, flatten
+from walkers.inputs.errors import InputError, Problem, unusable
+from walkers.inputs.messages import blaming, check_key, validated
+from walkers.inputs.reading import find_input, read_toml, resolve_case, shipped
 from walkers.inputs.schema import Table, Whole
 from walkers.inputs.units import Speed
 
@@ -65,6 +63,17 @@ class DescendTable(Table):
     step: Any
     until_below: Speed
 
+    def values(self) -> list[Value]:
+        """From the start down."""
+        given = {"descend.from": self.start, "descend.to": self.to, "descend.step": self.step}
+        start, to, step = (number_of(name, value) for name, value in given.items())
+        unit = unit_of(self.key, list(given.values()))
+        if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
+            told = "`from` must not be below `to`, and `step` must be positive"
+            raise unusable("descend", told, f"{self.start} to {self.to}")
+        number = int((start - to) / step + 1e-9) + 1
+        return [written(start - step * count, unit) for count in range(number)]
+
 
 class SweepFile(Table):
     """A sweep file."""
@@ -76,6 +85,13 @@ class SweepFile(Table):
     zip: list[dict[str, Any]] = Field([])
     sample: list[SampleTable] = Field([])
     descend: DescendTable | None = None
+
+    def all_axes(self) -> list[Axis]:
+        """In the order in which they run, the last one fastest: that of a descent."""
+        axes = [listed(key, given) for key, given in flatten(self.axes, is_axis).items()]
+        axes += [zipped(table) for table in self.zip]
+        axes += [sampled(table.method, table.points, table.seed, table.ranges) for table in self.sample]
+        return axes + ([Axis.of({self.descend.key: self.descend.values()})] if self.descend else [])
 
 
 @dataclass(frozen=True)
@@ -126,13 +142,7 @@ class Sweep:
     file: Mapping[str, Any] = field(default_factory=dict)
 
     def cases(self) -> Iterator[Case]:
-        """The case of each point, resolved.
-
-        Raises
-        ------
-        InputError
-            If a point cannot be used; it says which.
-        """
+        """The case of each point, resolved; raises `InputError` if a point cannot be used; it says which."""
         for number, row in enumerate(self.rows):
             changes = dict(zip(self.keys, row, strict=True))
             told = ", ".join(f"{key} = {value}" for key, value in changes.items())
@@ -148,28 +158,18 @@ def shipped_sweeps() -> dict[str, Path]:
 
 
 def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) -> Sweep:
-    """Read a sweep file and expand it.
+    """Read a sweep file, or a shipped sweep such as ``fig2``, and expand it.
 
-    Parameters
-    ----------
-    sweep
-        A TOML file, or the name of a shipped sweep such as ``fig2``.
-    changes
-        Values put beside those of its ``[set]``, by dotted keys; the sweep's name tells of them.
-
-    Raises
-    ------
-    InputError
-        If there is no such file or anything in it cannot be used. Its points are checked by `Sweep.cases`.
+    ``changes`` are put beside its ``[set]``, by dotted keys; its name tells of them. Raises `InputError` if there
+    is no such file or anything in it cannot be used; its points are checked by `Sweep.cases`.
     """
-    check_kind(sweep, "sweep")
     path = find_input(sweep, "sweep")
     document, name = read_toml(path), path.stem
     if changes:
-        try:
-            document = {**document, "set": {**flatten(document.get("set", {}), lambda _: False), **changes}}
-        except (AttributeError, UnusableKeyError) as error:
-            raise InputError(str(sweep), [Problem("set", None, f"expected a table of keys ({error})")]) from error
+        with blaming(str(sweep)):
+            if not isinstance(document.get("set", {}), Mapping):
+                raise unusable("set", "expected a table of keys")
+            document = {**document, "set": {**flatten(document.get("set", {})), **changes}}
         name = _name_with(name, changes)
     made = expand(document, source=str(sweep), name=name, folder=path.parent)
     told = "varies in this sweep: it cannot be set as well"
@@ -190,35 +190,29 @@ def _name_with(name: str, changes: Mapping[str, Value]) -> str:
 
 
 def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Sweep:
-    """Expand a sweep given as nested tables.
+    """Expand a sweep given as nested tables; raises `InputError` if anything in it cannot be used.
 
-    Parameters
-    ----------
-    document, source, name
-        The tables of a sweep file, what messages call it, and the name of the sweep.
-    folder
-        Where a base case given as a file is looked up.
-
-    Raises
-    ------
-    InputError
-        If anything in it cannot be used.
+    ``source`` is what messages call it, ``folder`` where a base case given as a file is looked up.
     """
     file = validated(SweepFile, document, source, "a sweep")
     base = _base(file.case, source, folder)
     try:
         with blaming(source):
-            keys, rows, units, descent = _points(file)
-            settings = flatten(file.set, lambda _: False)
+            axes, settings = file.all_axes(), flatten(file.set)
+            keys, rows = combinations(axes)
+            units = [
+                unit_of(axis.keys[at], [row[at] for row in axis.rows]) for axis in axes for at in range(len(axis.keys))
+            ]
+            for key in keys:
+                if key in _SAME_RUN:
+                    raise unusable(key, f"does not vary: points with another {key} alone are the same run")
             for key in (*settings, *keys):
-                if key in _SAME_RUN and key in keys:
-                    told = f"does not vary: points with another {key} alone are the same run"
-                    raise UnusableKeyError(key, told)
                 check_key(key)
             tables = changed(read_toml(base), settings)
             changed(tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
         raise InputError(source, [Problem("", None, "has tables within tables without end")]) from error
+    descend = file.descend
     return Sweep(
         name=name,
         title=file.title,
@@ -226,48 +220,18 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         case_name=base.stem,
         document=tables,
         keys=keys,
-        units=units,
+        units=tuple(units),
         rows=rows,
-        descent=descent,
+        descent=Descent(descend.key, len(axes[-1].rows), descend.until_below) if descend else None,
         file=document,
     )
 
 
 def _base(case: str, source: str, folder: Path) -> Path:
-    beside = folder / case
     try:
+        beside = folder / case
         return beside if case and beside.is_file() else find_input(case or "no name", "case")
     except OSError as error:
         raise InputError(source, [Problem("case", f'"{case[:40]}…"', f"cannot be read: {error.strerror}")]) from error
     except InputError as error:
         raise InputError(source, [Problem("case", f'"{case}"', error.problems[0].expected)]) from error
-
-
-def _points(
-    file: SweepFile,
-) -> tuple[tuple[str, ...], list[tuple[Value, ...]], tuple[str | None, ...], Descent | None]:
-    """Keys, points and units of all axes, and how the points depend on each other."""
-    lists = flatten(file.axes, is_axis).items()
-    axes = [Axis.of(key, different(key, values_of(key, given))) for key, given in lists]
-    axes += [zipped(table) for table in file.zip]
-    axes += [sampled(table.method, table.points, table.seed, table.ranges) for table in file.sample]
-    descent = None
-    if (table := file.descend) is not None:
-        axes.append(Axis.of(table.key, _descending(table)))
-        descent = Descent(table.key, len(axes[-1].rows), table.until_below)
-    keys, rows = combinations(axes)
-    columns = [
-        (key, column) for axis in axes for key, column in zip(axis.keys, zip(*axis.rows, strict=True), strict=True)
-    ]
-    return keys, rows, tuple(unit_of(key, column) for key, column in columns), descent
-
-
-def _descending(table: DescendTable) -> list[Value]:
-    given = {"descend.from": table.start, "descend.to": table.to, "descend.step": table.step}
-    start, to, step = (number_of(name, value)[0] for name, value in given.items())
-    unit = unit_of(table.key, list(given.values()))
-    if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
-        told = "`from` must not be below `to`, and `step` must be positive"
-        raise UnusableKeyError("descend", told, f"{table.start} to {table.to}")
-    number = int((start - to) / step + 1e-9) + 1
-    return [written(start - step * count, unit) for count in range(number)]

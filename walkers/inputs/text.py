@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -38,20 +38,8 @@ def printable(text: str) -> str:
     return "".join(one if one.isprintable() else repr(one)[1:-1] for one in " ".join(text.split()))
 
 
-def _number(value: float) -> str:
-    return repr(float(value))
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join([repr(float(value)) for value in values])
-
-
 def _formatted(value: float | None, form: str, missing: str = "-") -> str:
     return missing if value is None or not isfinite(value) else f"{value:{form}}"
-
-
-def _cell(text: object) -> str:
-    return str(text).replace("|", "\\|")
 
 
 def _plain(text: str) -> str:
@@ -59,10 +47,10 @@ def _plain(text: str) -> str:
 
 
 _FILTERS: Mapping[str, Callable[..., Any]] = {
-    "number": _number,
-    "numbers": _numbers,
+    "number": lambda value: repr(float(value)),
+    "numbers": lambda values: " ".join([repr(float(value)) for value in values]),
     "format": _formatted,
-    "cell": _cell,
+    "cell": lambda text: str(text).replace("|", "\\|"),
     "code": repr,
     "plain": _plain,
     "any": any,

@@ -15,7 +15,7 @@ from math import pi
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from pydantic import GetCoreSchemaHandler
-from pydantic_core import CoreSchema, PydanticCustomError
+from pydantic_core import CoreSchema
 from pydantic_core.core_schema import no_info_before_validator_function
 
 if TYPE_CHECKING:
@@ -28,8 +28,6 @@ ACCELERATION_OF_ONE_G = 9.8
 _NUMBER_AND_UNIT = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s%,;][^%,;]*)")
 _GRAM_SYMBOL = re.compile(r"(?<![A-Za-z_])g(?![A-Za-z_0-9])")
 _ANGLE_UNITS = frozenset({"degree", "radian", "milliradian", "arcminute", "arcsecond"})
-
-
 _USUAL: Mapping[str, tuple[str, float]] = {
     **{"m": ("m", 1.0), "cm": ("m", 1e-2), "mm": ("m", 1e-3), "um": ("m", 1e-6), "µm": ("m", 1e-6), "nm": ("m", 1e-9)},
     **{"mHz": ("Hz", 1e-3), "Hz": ("Hz", 1.0), "kHz": ("Hz", 1e3)},
@@ -74,23 +72,36 @@ class Kind:
 
     def _read(self, value: object) -> float:
         if not isinstance(value, str):
-            raise refusal(self.expectation)
-        try:
-            number = parse_quantity(value, self)
-        except ValueError as error:
-            raise refusal(str(error)) from error
-        if (self.sign and number < 0.0) or (number == 0.0 and self.sign == _POSITIVE):
-            raise refusal(f"{self.expectation}; it must be {self.sign}")
+            raise ValueError(self.expectation)
+        number = parse_quantity(value, self)
+        if (self.sign and number < 0.0) or (number == 0.0 and self.sign == POSITIVE):
+            raise ValueError(f"{self.expectation}; it must be {self.sign}")
         return number
 
 
-def refusal(expected: str) -> PydanticCustomError:
-    """What a validator raises, with the end of the message."""
-    return PydanticCustomError("expected", "{expected}", {"expected": expected})
+def parse_quantity(text: str, kind: Kind) -> float:
+    """Read a quantity of a kind, such as ``"0.3 mm"``, as a number in SI units; of an acceleration ``g`` is 9.8 m/s².
+
+    Raises
+    ------
+    ValueError
+        If the text is no quantity, has no unit, or has the dimension of something else.
+    """
+    match = _NUMBER_AND_UNIT.fullmatch(text.strip())
+    if match is None:
+        raise ValueError(kind.expectation)
+    unit, factor = _USUAL.get(match["unit"]) or (kind.unit, _by_pint(match["unit"], kind))
+    if unit != kind.unit:
+        raise ValueError(kind.expectation)
+    # Rounded: 4.0 g/cm³ is 4000 kg/m³, not 3999.9999999999995.
+    value = float(f"{float(match['number']) * factor:.15g}")
+    if value != 0.0 and not kind.smallest <= abs(value) <= kind.largest:
+        raise ValueError(f"{kind.expectation}; it must lie within {kind.smallest:g} and {kind.largest:g} {kind.unit}")
+    return value
 
 
 @cache
-def registry() -> UnitRegistry[float]:
+def _registry() -> UnitRegistry[float]:
     """Pint's registry with the ``gee`` (9.8 m/s²) added.
 
     Pint could keep the parsed definitions in the user's cache, a tenth of a second faster; two programs that fill that
@@ -103,42 +114,10 @@ def registry() -> UnitRegistry[float]:
     return units
 
 
-def parse_quantity(text: str, kind: Kind) -> float:
-    """Read a quantity.
-
-    Parameters
-    ----------
-    text
-        A number with its unit, such as ``"0.3 mm"``. For an acceleration ``g`` means 9.8 m/s².
-    kind
-        What the quantity must be; the value is in its unit.
-
-    Raises
-    ------
-    ValueError
-        If the text is no quantity, has no unit, or has the dimension of something else.
-    """
-    match = _NUMBER_AND_UNIT.fullmatch(text.strip())
-    if match is None:
-        raise ValueError(kind.expectation)
-    # Rounded: 4.0 g/cm³ is 4000 kg/m³, not 3999.9999999999995.
-    value = float(f"{float(match['number']) * _si_units_in(match['unit'], kind):.15g}")
-    if value != 0.0 and not kind.smallest <= abs(value) <= kind.largest:
-        raise ValueError(f"{kind.expectation}; it must lie within {kind.smallest:g} and {kind.largest:g} {kind.unit}")
-    return value
-
-
-def _si_units_in(symbol: str, kind: Kind) -> float:
-    """How many of the kind's SI unit a unit is."""
-    unit, factor = _USUAL.get(symbol) or (kind.unit, _by_pint(symbol, kind))
-    if unit != kind.unit:
-        raise ValueError(kind.expectation)
-    return factor
-
-
 @lru_cache(maxsize=1024)  # a sweep reads thousands of quantities in the same few units
 def _by_pint(symbol: str, kind: Kind) -> float:
-    units = registry()
+    """How many of the kind's SI unit a unit is that is not among the usual ones."""
+    units = _registry()
     try:
         unit = units.parse_units(_GRAM_SYMBOL.sub("gee", symbol) if kind.unit == ACCELERATION.unit else symbol)
         factor = float(units.Quantity(1.0, unit).to(kind.unit).magnitude)
@@ -156,13 +135,7 @@ def _by_pint(symbol: str, kind: Kind) -> float:
 
 
 def split_quantity(text: str) -> tuple[float, str]:
-    """The number and the unit of a quantity, whatever the unit is.
-
-    Raises
-    ------
-    ValueError
-        If the text is no number with a unit.
-    """
+    """The number and the unit of a quantity, whatever the unit is; raises `ValueError` if it is none."""
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:
         raise ValueError(f"no quantity: {text!r}")
@@ -183,21 +156,21 @@ def kind_in(annotations: Iterable[Any]) -> Kind | None:
     return None
 
 
-_POSITIVE, _NOT_NEGATIVE = "more than zero", "zero or more"
+POSITIVE, NOT_NEGATIVE = "more than zero", "zero or more"
 
-LENGTH = Kind("length", "m", "0.3 mm", 1.0, 1e-9, _POSITIVE)
-FREQUENCY = Kind("frequency", "Hz", "80 Hz", 1e6, 1e-2, _POSITIVE)
-ACCELERATION = Kind("acceleration", "m/s^2", "4 g", 1e6, 1e-9, _NOT_NEGATIVE)
-SPEED = Kind("speed", "m/s", "0.02 mm/s", 1e4, 1e-12, _POSITIVE)
-TIME = Kind("time", "s", "2 us", 1.0, 1e-12, _POSITIVE)
-DURATION = Kind("duration", "s", "4 s", 1e4, 1e-6, _POSITIVE)
+LENGTH = Kind("length", "m", "0.3 mm", 1.0, 1e-9, POSITIVE)
+FREQUENCY = Kind("frequency", "Hz", "80 Hz", 1e6, 1e-2, POSITIVE)
+ACCELERATION = Kind("acceleration", "m/s^2", "4 g", 1e6, 1e-9, NOT_NEGATIVE)
+SPEED = Kind("speed", "m/s", "0.02 mm/s", 1e4, 1e-12, POSITIVE)
+TIME = Kind("time", "s", "2 us", 1.0, 1e-12, POSITIVE)
+DURATION = Kind("duration", "s", "4 s", 1e4, 1e-6, POSITIVE)
 ANGLE = Kind("angle", "rad", "10 deg", 1e3)
-DENSITY = Kind("density", "kg/m^3", "4.0 g/cm^3", 1e5, 1.0, _POSITIVE)
-SURFACE_TENSION = Kind("surface tension", "N/m", "19.2 mN/m", 10.0, 1e-9, _POSITIVE)
-KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0, sign=_NOT_NEGATIVE)
-DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4, sign=_NOT_NEGATIVE)
-MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3, _POSITIVE)
-FILE_SIZE = Kind("size of a file", "byte", "64 MB", 1e15, 1.0, _POSITIVE)
+DENSITY = Kind("density", "kg/m^3", "4.0 g/cm^3", 1e5, 1.0, POSITIVE)
+SURFACE_TENSION = Kind("surface tension", "N/m", "19.2 mN/m", 10.0, 1e-9, POSITIVE)
+KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0, sign=NOT_NEGATIVE)
+DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4, sign=NOT_NEGATIVE)
+MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3, POSITIVE)
+FILE_SIZE = Kind("size of a file", "byte", "64 MB", 1e15, 1.0, POSITIVE)
 
 Length = Annotated[float, LENGTH]
 Radius = Annotated[float, replace(LENGTH, largest=0.02, smallest=1e-6)]
@@ -207,9 +180,9 @@ Acceleration = Annotated[float, ACCELERATION]
 Speed = Annotated[float, SPEED]
 Time = Annotated[float, TIME]
 Duration = Annotated[float, DURATION]
-NonNegativeDuration = Annotated[float, replace(DURATION, sign=_NOT_NEGATIVE)]
+NonNegativeDuration = Annotated[float, replace(DURATION, sign=NOT_NEGATIVE)]
 Angle = Annotated[float, ANGLE]
-NonNegativeAngle = Annotated[float, replace(ANGLE, sign=_NOT_NEGATIVE)]
+NonNegativeAngle = Annotated[float, replace(ANGLE, sign=NOT_NEGATIVE)]
 Density = Annotated[float, DENSITY]
 SurfaceTension = Annotated[float, SURFACE_TENSION]
 KinematicViscosity = Annotated[float, KINEMATIC_VISCOSITY]

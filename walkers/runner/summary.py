@@ -129,7 +129,7 @@ def describe(summary: dict[str, Any]) -> str:
 def _text_of_case(case: dict[str, Any]) -> list[str]:
     """A resolved case, a line for each value: its key, the value in the units of a case file, where it comes from."""
     lines, table = [printable(f"{case['name']}: {case['title']}").rstrip(": ")], None
-    for one in case["recorded"]:
+    for one in case["origins"]:
         within, _, key = one["key"].rpartition(".")
         if within != table:
             table = within

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from walkers.inputs.changes import dotted
 from walkers.inputs.errors import InputError, Problem
-from walkers.inputs.readable import dotted
 from walkers.postprocess.clusters import ClimbCriteria
 from walkers.postprocess.piles import Pile, analyse, classified
 from walkers.runner.directory import CASE_NAME, FinishedRun, finished_places, finished_run

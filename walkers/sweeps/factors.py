@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.axes import flatten, is_axis
+from walkers.inputs.axes import is_axis
+from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.sweeps.record import SweepRecord

@@ -8,8 +8,9 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.axes import flatten, sampled, unit_cube, unit_of
+from walkers.inputs.axes import sampled, unit_cube, unit_of
 from walkers.inputs.case import Case
+from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin

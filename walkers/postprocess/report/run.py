@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from walkers.inputs.case import Case
+from walkers.inputs.changes import dotted
 from walkers.inputs.origins import Origin, text_of
-from walkers.inputs.readable import dotted
 from walkers.postprocess.analysis import analyses_in, current_result, quantities_of, warnings_of
 from walkers.postprocess.report.page import NAME, check_report, fill, packed_plots, write_page
 from walkers.postprocess.report.player import MOST_PLACES, player_of
