@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.distance import cdist
 from scipy.special import log_expit
-from scipy.stats import norm, qmc
+from scipy.stats import qmc, truncnorm, uniform
 
 from walkers.inputs.calibration import Observation, Parameter
 
@@ -63,16 +63,22 @@ class Space:
         """Points of the unit cube at values of the parameters, shape (..., D)."""
         return np.asarray((self._scaled(values) - self._ends[0]) / (self._ends[1] - self._ends[0]))
 
+    @cached_property
+    def priors(self) -> list[Any]:
+        """Distributions of scipy's, over the unit interval, of what is assumed of each coordinate beforehand."""
+        found = []
+        for one, low, width in zip(self.parameters, self._ends[0], self._ends[1] - self._ends[0], strict=True):
+            if one.normal is None:
+                found.append(uniform())
+                continue
+            mean, deviation = one.normal
+            middle, scale = ((np.log(mean) if one.log else mean) - low) / width, deviation / width
+            found.append(truncnorm(-middle / scale, (1.0 - middle) / scale, middle, scale))
+        return found
+
     def log_prior(self, unit: FloatArray) -> FloatArray:
-        """Logarithm of the density that is assumed beforehand, but for a constant, shape (...); -inf outside."""
-        unit = np.asarray(unit)
-        total = np.where(np.all((unit >= 0.0) & (unit <= 1.0), axis=-1), 0.0, -np.inf)
-        scaled = self._scaled(self.values(unit))
-        for place, one in enumerate(self.parameters):
-            if one.normal is not None:
-                mean, deviation = one.normal
-                total = total + norm.logpdf(scaled[..., place], np.log(mean) if one.log else mean, deviation)
-        return total
+        """Logarithm of their density at points of the unit cube, shape (...); -inf outside."""
+        return np.asarray(np.sum([one.logpdf(unit[..., place]) for place, one in enumerate(self.priors)], axis=0))
 
     def design(self, points: int, seed: int) -> FloatArray:
         """A space-filling first wave, shape (points, D): a scrambled Sobol sequence (`scipy.stats.qmc`)."""

@@ -71,7 +71,10 @@ def record_of(found: Outcome) -> dict[str, Any]:
     rows = [_row(found, place) for place in range(len(emulators.each))]
     own = [row["agrees"] for row in rows if not row["derived"]]
     values = np.percentile(found.space.values(posterior.unit), (5.0, 50.0, 95.0), axis=0).T.tolist()
-    narrowed = dict(zip(names, _narrowing(found.space, posterior), strict=True))
+    # Of each parameter the 5 to 95 % interval over that of the prior: 1 if nothing was learned.
+    widths = np.ptp(np.percentile(posterior.unit, (5.0, 95.0), axis=0), axis=0)
+    priors = np.array([np.ptp(one.ppf((0.05, 0.95))) for one in found.space.priors])
+    narrowed = dict(zip(names, (widths / priors).tolist(), strict=True))
     mean, deviation = emulators.predict(found.predictive.unit)
     seen = [
         transformed(values, one.observation)
@@ -159,21 +162,6 @@ def _worth(posterior: Posterior) -> dict[str, Any]:
 
 def _labelled(parameter: Parameter) -> str:
     return f"{parameter.symbol} ({parameter.unit})" if parameter.unit else parameter.symbol
-
-
-def _narrowing(space: Space, posterior: Posterior) -> list[float]:
-    """Of each parameter the posterior's 5 to 95 % interval over that of the prior: 1 if nothing was learned.
-
-    In logarithms where the parameter's range is one of these.
-    """
-    fine, shares = np.linspace(0.0, 1.0, 2001), []
-    for place, samples in enumerate(posterior.unit.T):
-        points = np.full((len(fine), space.dimensions), 0.5)
-        points[:, place] = fine
-        below = np.cumsum(np.exp(space.log_prior(points)))
-        prior = np.interp([0.05, 0.95], below / below[-1], fine)
-        shares.append(float(np.ptp(np.percentile(samples, (5.0, 95.0))) / np.ptp(prior)))
-    return shares
 
 
 def words_of(share: float, *, converged: bool) -> str:

@@ -204,7 +204,6 @@ def compose(plan: Plan) -> Deck:
     sight = largest + 2.0 * smallest + skin
     most_neighbours = max(_LEAST_NEIGHBOURS, ceil((sight**3 - largest**3) / smallest**3))
     space = prod(high - low for low, high in zip(scene.lower, scene.upper, strict=True))
-    rolling = " rolling_friction cdt" if case.contact.rolling_friction > 0 else ""
     pair_columns = " ".join(PAIR_BRIDGES).split()
     moduli = [*(contact.youngs_modulus for contact in contacts), case.contact.youngs_modulus]
     text = rendered(
@@ -214,19 +213,15 @@ def compose(plan: Plan) -> Deck:
         scene=scene,
         layout=layout,
         recording=plan.recording,
-        deck_name=DECK_NAME,
-        output_name=OUTPUT_NAME,
         layout_name=LAYOUT_NAME,
         bridges_name=BRIDGES_NAME,
         run_name=RUN_NAME,
-        contact_model=f"hertz tangential history cohesion bridge{rolling}",
         types=len(surfaces) + 1,
         moduli=moduli,
         stiff=max(moduli) > _STIFFEST,
         friction=_pairs([(one.friction_bead_bead, one.friction_bead_wall) for one in contacts]),
         rolling_friction=_pairs([(one.rolling_friction,) * 2 for one in contacts]),
         restitution=_pairs([(one.restitution,) * 2 for one in contacts]),
-        bounds=("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"),
         down=[component / case.gravity for component in case.gravity_vector] if case.gravity else [],
         plan=plan,
         shaken=plan.drive_from is not None,
