@@ -115,7 +115,7 @@ def calibrate(
     options, engine, allow_failed_audit
         As for `walkers.sweeps.run.run_sweep`.
     progress_of
-        As for `walkers.paper.sources.make_sources`.
+        As `walkers.paper.sources.ProgressOf`.
 
     Returns
     -------
