@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from walkers.inputs.reading import read_toml
-from walkers.inputs.sweep import Sweep, expand, shipped_sweeps
+from walkers.inputs.sweep import Sweep, expand, load_sweep, shipped_sweeps
 from walkers.paper.comparison import compare
 from walkers.paper.make import COMPARED
-from walkers.paper.sources import Sources, make_sources
+from walkers.paper.sources import Sources
 from walkers.runner import find_engine
 from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Options
@@ -85,7 +85,9 @@ def main() -> None:
     """Print the table."""
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "runs")
     full = compare(make_in_full(out / "in-full"))
-    fast = compare(make_sources(COMPARED, out, Options(_WORKERS))[0])
+    for name in COMPARED:
+        run_sweep(load_sweep(name), out, Options(_WORKERS))
+    fast = compare(Sources(out))
     print(table(fast, full))
 
 

@@ -166,7 +166,7 @@ def calibrate(
         Folder of the run directories; each wave is a sweep there, and its design is kept in a folder of the
         calibration's name.
     progress_of
-        As for `walkers.paper.sources.make_sources`.
+        As `walkers.paper.sources.ProgressOf`.
 
     Raises
     ------

@@ -129,17 +129,17 @@ def compare(sources: Sources) -> list[dict[str, Any]]:
 
 
 def _value(number: Observation, sources: Sources) -> Value:
+    if number.key == "mathieu":
+        return Value(theory=max(one.v for one in paper_drives().values()))
+    if number.key == "mathieu_stable":
+        return Value(theory=largest_stable_v())
+    if number.quantity == "gamma0":
+        case = number.of[0].case()
+        gamma0 = dimer_of(case).gamma0(case.drive.peak_acceleration)
+        return Value(gamma0, gamma0, gamma0)
     try:
-        match number.key.partition("_")[0], number.quantity:
-            case "mathieu", _:
-                stable = number.key == "mathieu_stable"
-                return Value(theory=largest_stable_v() if stable else max(one.v for one in paper_drives().values()))
-            case _, "gamma0":
-                case = number.of[0].case()
-                gamma0 = dimer_of(case).gamma0(case.drive.peak_acceleration)
-                return Value(gamma0, gamma0, gamma0)
-            case _, "":
-                return _threshold(sources, by_frequency=number.key == "fig2_threshold_frequency")
+        if number.key.startswith("fig2_threshold"):
+            return _threshold(sources, by_frequency=number.key == "fig2_threshold_frequency")
         return evaluate(number, sources.finished(number.of[0].sweep))
     except NothingFinishedError:
         return Value()

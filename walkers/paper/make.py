@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.sweep import load_sweep
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
 from walkers.paper.figures import fig1b, fig2, fig3, fig4
 from walkers.paper.maps import fig_alignment, fig_climbing, fig_modes, fig_zoo
 from walkers.paper.sensitivity import fig_sensitivity
-from walkers.paper.sources import NothingFinishedError, ProgressOf, Sources, make_sources
+from walkers.paper.sources import NothingFinishedError, ProgressOf, Sources
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.runner.files import write_text
+from walkers.sweeps.run import run_sweep
 from walkers.sweeps.scheduler import Failure, Options
 
 if TYPE_CHECKING:
@@ -78,8 +81,8 @@ def make_figures(  # noqa: PLR0913
     ----------
     out, to
         Folders of the run directories and of the figures.
-    options, engine, allow_failed_audit, progress_of
-        As for `walkers.paper.sources.make_sources`.
+    options, engine, allow_failed_audit
+        As for `walkers.sweeps.run.run_sweep`.
     only
         Names of `FIGURES`, or ``comparison``; if empty, all but those that are drawn only if asked for.
     formats
@@ -102,24 +105,21 @@ def make_figures(  # noqa: PLR0913
         if folder.exists() and not folder.is_dir():
             raise InputError(option, [Problem("", None, f"expected a folder, {folder} is a file")])
     needed = [FIGURES[name].sweeps if name in FIGURES else COMPARED for name in chosen]
-    sources, failures = make_sources(
-        dict.fromkeys(sweep for sweeps in needed for sweep in sweeps),
-        out,
-        options,
-        engine=engine,
-        allow_failed_audit=allow_failed_audit,
-        progress_of=progress_of,
-    )
+    failed: dict[str, list[Failure]] = {}
+    how: dict[str, Any] = {"engine": engine, "allow_failed_audit": allow_failed_audit}
+    for sweep in dict.fromkeys(sweep for sweeps in needed for sweep in sweeps):
+        with progress_of(sweep) if progress_of else nullcontext() as advance:
+            _, failures = run_sweep(load_sweep(sweep), out, options, on_progress=advance, **how)
+        failed |= {sweep: failures} if failures else {}
     figures = [name for name in chosen if name in FIGURES]
     # Processes of loky do not import the caller's script, as those of `multiprocessing` do.
     draw = joblib.Parallel(n_jobs=min(options.workers, len(figures) or 1))
     outcomes = draw(joblib.delayed(draw_figure)(name, out, to, formats) for name in figures)
     files = [path for outcome in outcomes if isinstance(outcome, list) for path in outcome]
     left_out = {name: one for name, one in zip(figures, outcomes, strict=True) if isinstance(one, str)}
-    failed = {name: points for name, points in failures.items() if points}
     if COMPARISON not in chosen:
         return Made(files, failed, left_out)
-    rows = compare(sources)
+    rows = compare(Sources(out))
     texts = {".md": as_markdown(rows), ".json": json.dumps(as_dict(rows), indent=2, ensure_ascii=False) + "\n"}
     to.mkdir(parents=True, exist_ok=True)
     for suffix, text in texts.items():

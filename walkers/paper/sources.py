@@ -1,24 +1,23 @@
-"""The sweeps that the figures are made from: run where they are missing, read once."""
+"""The sweeps that the figures are made from, read once."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from walkers.inputs.errors import WalkersError
-from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.motion import Group, read_motion
-from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Failure, Options, SweepProgress
+from walkers.sweeps.scheduler import SweepProgress
 from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
     import pandas as pd
 
 ProgressOf = Callable[[str], AbstractContextManager[Callable[[SweepProgress], None]]]
+"""Gives, for the name of a sweep, a context whose value is told of its progress."""
 
 
 class NothingFinishedError(WalkersError):
@@ -46,31 +45,3 @@ class Sources:
     def runs(self, *sweeps: str) -> list[str]:
         """Names of the finished runs of sweeps."""
         return [Path(run).name for sweep in sweeps for run in self.finished(sweep)["run"]]
-
-
-def make_sources(
-    names: Iterable[str],
-    out: Path,
-    options: Options,
-    *,
-    engine: str | None = None,
-    allow_failed_audit: bool = False,
-    progress_of: ProgressOf | None = None,
-) -> tuple[Sources, dict[str, list[Failure]]]:
-    """Run what is missing of shipped sweeps, by their names, as `walkers.sweeps.run.run_sweep` does.
-
-    ``progress_of`` gives, for the name of a sweep, a context whose value is told of its progress. Of each sweep the
-    points that failed are given too; figures leave them out.
-    """
-    failures = {}
-    for name in names:
-        with progress_of(name) if progress_of else nullcontext() as advance:
-            _, failures[name] = run_sweep(
-                load_sweep(name),
-                out,
-                options,
-                engine=engine,
-                allow_failed_audit=allow_failed_audit,
-                on_progress=advance,
-            )
-    return Sources(out), failures
