@@ -1,11 +1,8 @@
 """Reports: what is in the file, that it says what the result says, and what a user's words cannot do in it."""
 
 import base64
-import hashlib
 import html
-import json
 import re
-import shutil
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
@@ -74,19 +71,10 @@ def check_numbers(page: Page, result: dict[str, Any]) -> set[str]:
 
 
 @pytest.fixture(scope="session")
-def walked_run(run_directory: Callable[..., Path], once: Once) -> Path:
+def walked_run(run_directory: Callable[..., Path]) -> Path:
     """A run of two walkers, whose case calls itself something hostile."""
-
-    def make(folder: Path) -> None:
-        settings = {"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 20}
-        shutil.copytree(run_directory(dimers={"replicates": 2}, run=settings), folder / "run")
-        case, manifest = folder / "run" / "case.json", folder / "run" / "manifest.json"
-        case.write_text(json.dumps({**json.loads(case.read_text()), "title": HOSTILE}))
-        listed = json.loads(manifest.read_text())
-        listed["sha256"]["case.json"] = hashlib.sha256(case.read_bytes()).hexdigest()
-        manifest.write_text(json.dumps(listed))
-
-    return once("hostile", make) / "run"
+    settings = {"cycles": 9, "settling_cycles": 2, "samples_per_cycle": 20}  # no other test's run
+    return run_directory(dimers={"replicates": 2}, run=settings, title=HOSTILE)
 
 
 @pytest.fixture(scope="session")
@@ -133,19 +121,18 @@ def swept_report(swept: Path, once: Once) -> Path:
         ("pile", {"surface.end", "brazil_nut.end", "coordination.rest.contacts", "beads", "driven"}),
     ],
 )
-def test_every_number_of_a_report_is_the_results(name: str, wanted: set[str], request: pytest.FixtureRequest) -> None:
+def test_numbers_of_a_report_are_the_results_and_parameters_say_whence(
+    name: str, wanted: set[str], request: pytest.FixtureRequest
+) -> None:
     path, directory = (request.getfixturevalue(f"{name}_{what}") for what in ("report", "run"))
-    assert wanted <= check_numbers(Page(path), current_result(directory))
+    page = Page(path)
+    assert wanted <= check_numbers(page, current_result(directory))
     assert path.stat().st_size < LARGEST
-
-
-def test_parameters_say_where_they_come_from(walked_report: Path, walked_run: Path) -> None:
-    words = Page(walked_report).words
-    assert f"Written by granular-walkers {software().version}." in words
-    origins = walkers.find_run(walked_run).case.origins
+    assert f"Written by granular-walkers {software().version}." in page.words
+    origins = walkers.find_run(directory).case.origins
     assert len(origins) > 20
     for said in ("given", "library", "default", *(told for one in origins for told in (one.key, one.text))):
-        assert said in words
+        assert said in page.words
 
 
 @pytest.mark.parametrize("name", ["walked_report", "pile_report", "swept_report"])
@@ -234,24 +221,21 @@ def test_words_and_numbers() -> None:
     assert "glass; 80 Hz" in summary_of(replace(case, liquid=replace(case.liquid, name=None)))
 
 
-@pytest.mark.parametrize("to", ["report.txt", "folder.html", "nowhere/report.html"])
-def test_a_report_that_has_no_place_is_refused(to: str, walked_run: Path, tmp_path: Path) -> None:
+def test_the_command_finds_what_a_name_means_and_refuses_what_is_no_place(
+    walked_run: Path, swept: Path, tmp_path: Path
+) -> None:
     (tmp_path / "folder.html").mkdir()
-    told = call("report", str(walked_run), "--to", str(tmp_path / to))
-    assert (told.returncode, told.stdout, told.stderr.count("\n")) == (2, "", 1)
-    assert told.stderr.startswith("walkers: --to: ")
+    to = tmp_path / "report.html"
+    refused = [(walked_run, tmp_path / name, "--to: ") for name in ("a.txt", "folder.html", "nowhere/a.html")]
+    for what, place, message in (*refused, (tmp_path, to, "not a finished run")):
+        told = call("report", str(what), "--to", str(place))
+        assert (told.returncode, told.stdout, told.stderr.count("\n")) == (2, "", 1)
+        assert message in told.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["folder.html"]
-
-
-def test_the_command_finds_what_a_name_means(walked_run: Path, swept: Path, tmp_path: Path) -> None:
-    for what in (str(walked_run), swept.name):
-        to = tmp_path / "report.html"
-        told = call("report", what, "--out", str(swept.parent), "--to", str(to), check=True)
+    for name in (str(walked_run), swept.name):
+        told = call("report", name, "--out", str(swept.parent), "--to", str(to), check=True)
         assert told.stdout == f"{to}\n"
         assert HOSTILE in Page(to).words
-    nothing = call("report", str(tmp_path), "--to", str(to))
-    assert (nothing.returncode, nothing.stderr.count("\n")) == (2, 1)
-    assert "not a finished run" in nothing.stderr
 
 
 def test_runs_show_themselves(walked_run: Path, tmp_path: Path) -> None:
@@ -264,11 +248,3 @@ def test_runs_show_themselves(walked_run: Path, tmp_path: Path) -> None:
     assert pictures == [tmp_path / "walk.png", tmp_path / "gait.png"]
     sources = re.findall(r'src="data:image/png;base64,([^"]+)"', pictures._repr_html_())
     assert [base64.b64decode(source) for source in sources] == [path.read_bytes() for path in pictures]
-
-
-def test_progress_is_shown_where_it_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    case, seen = make_case(run={"cycles": 8, "settling_cycles": 2}, drive={"frequency": "83 Hz"}), []
-    walkers.run(case, tmp_path, progress=False, force=True)
-    walkers.run(case, tmp_path, progress=lambda progress: seen.append(progress.step), force=True)
-    assert seen
-    assert capsys.readouterr().err == ""

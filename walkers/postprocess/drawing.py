@@ -71,8 +71,7 @@ def letter_panels(panels: Iterable[Axes]) -> None:
 def series_look(number: int) -> dict[str, Any]:
     """Colour, dashes and marker of a series of many, as options of `matplotlib.axes.Axes.plot`.
 
-    The first 120 have other looks; of the first 15 no two have the same dashes and marker, so that they can be told
-    apart without their colours.
+    The first 120 differ; the first 15 differ in dashes or marker, so that they can be told apart without colours.
     """
     return {
         "color": f"C{number}",
@@ -95,26 +94,14 @@ def legend_below(axes: Axes, lines: int = 2, **options: Any) -> Legend:
 
 
 def check_formats(formats: Sequence[str]) -> None:
-    """Refuse formats in which no figure can be written.
-
-    Raises
-    ------
-    InputError
-        If one is none of `FORMATS`.
-    """
+    """Refuse formats that are none of `FORMATS` by an InputError."""
     for form in formats:
         if form not in FORMATS:
             raise InputError("--format", [Problem("", None, f"{form!r}: expected one of {', '.join(FORMATS)}")])
 
 
 def check_place(path: Path, *suffixes: str) -> None:
-    """Refuse a place for a file that would be written as something else.
-
-    Raises
-    ------
-    InputError
-        If it has none of these suffixes or is a folder.
-    """
+    """Refuse a place for a file that is a folder or has none of these suffixes by an InputError."""
     if path.suffix.lower() not in suffixes or path.is_dir():
         expected = f"expected the name of a {' or '.join(suffixes)} file"
         raise InputError("--to", [Problem("", None, f"{path}: {expected}")])
@@ -127,21 +114,10 @@ def save_figure(
 
     Parameters
     ----------
-    figure
-        To write.
-    path
-        Where; the suffix is replaced by each format's.
-    sources
-        Names of the run directories that it shows, written into the file: they end in the hash of case and engine.
-    formats
-        Of `FORMATS`.
-    title
-        Written into the file.
-
-    Raises
-    ------
-    InputError
-        If there is no such format.
+    figure, path, formats
+        What is written where; the suffix is replaced by each format's, of `FORMATS`, else there is an InputError.
+    sources, title
+        Written into the file: names of the run directories that it shows, which end in the hash of case and engine.
     """
     check_formats(formats)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -25,12 +25,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MOST_NAMED = 12
-"""Walkers, or climbs, that a legend names."""
+_MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """How events are marked (`walkers.postprocess.events`)."""
-_FEWEST_SAMPLES = 8
-"""Samples a cycle below which a gait shows nothing."""
+_MARKERS = "so^vD"
+_FEWEST_SAMPLES = 8  # a cycle, below which a gait shows nothing
 _GREY, _OTHERS = "#5b6770", "#c78a2c"
 
 
@@ -97,17 +96,15 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
 
 def velocity_panel(groups: list[Group]) -> Panel:
     """The velocity of each walker with the standard error of its fit."""
-    facing = ways(uphill=groups[0].case.goes_uphill)
-    number, faced = (np.array([getattr(w, key) for one in groups for w in one.walkers]) for key in ("walker", "facing"))
-    walks = [walk(one) for one in groups]
-    velocity, error = (
-        1e3 * np.concatenate([getattr(one, key) for one in walks]) for key in ("velocity", "standard_error")
-    )
-    lines = [
-        Line(number[these], velocity[these], f"started facing {name}", colour, marker, width=0.0, error=error[these])
-        for (way, colour, marker), name in zip(((1, 0, "o"), (-1, 1, "s")), facing, strict=True)
-        if (these := faced == way).any()
-    ]
+    walkers = [walker for one in groups for walker in one.walkers]
+    number, faced = np.array([walker.walker for walker in walkers]), np.array([walker.facing for walker in walkers])
+    velocity = 1e3 * np.concatenate([walk(one).velocity for one in groups])
+    error = 1e3 * np.concatenate([walk(one).standard_error for one in groups])
+    lines = []
+    for way, told in zip((1, -1), ways(uphill=groups[0].case.goes_uphill), strict=True):
+        label, colour, marker = f"started facing {told}", int(way < 0), "o" if way > 0 else "s"
+        these = faced == way
+        lines.append(Line(number[these], velocity[these], label, colour, marker, width=0.0, error=error[these]))
     return Panel("Velocity of each walker, standard error of its fit", "number of the walker", "velocity (mm/s)", lines)
 
 
@@ -123,15 +120,12 @@ def gait_panels(group: Group) -> list[Panel]:
     cycles = (len(group.time) - 1) // samples
     last = slice((cycles - 2) * samples, cycles * samples + 1)
     phase = group.time[last] * group.case.drive.frequency - (cycles - 2)
-    series = [("walker", motion.velocity[last, 0], walk(group).velocity[0], "#c4473a", "s")]
-    marks = [("#1a1a1a", "o"), ("#1f3b73", "^"), ("#3f7f93", "v"), ("#808080", "D")]
-    series += [
-        (f"bead {bead + 1}", motion.rotation[last, 0, bead], mean, *marks[bead % len(marks)])
-        for bead, mean in enumerate(averages(group).rotation[0])
-    ]
+    names = ["walker", *(f"bead {bead + 1}" for bead in range(motion.rotation.shape[-1]))]
+    values = 1e3 * np.column_stack([motion.velocity[last, 0], motion.rotation[last, 0]])
+    means = 1e3 * np.array([walk(group).velocity[0], *averages(group).rotation[0]])
     lines = [
-        Line(phase, values * 1e3, f"{name} (mean {mean * 1e3:.2f} mm/s)", colour, marker)
-        for name, values, mean, colour, marker in series
+        Line(phase, values[:, number], f"{name} (mean {means[number]:.2f} mm/s)", number, _MARKERS[number % 5])
+        for number, name in enumerate(names)
     ]
     x = "time (cycles of the drive), the last two"
     panels = [Panel(f"walker {first.walker}", x, "velocity; beads:\n−R dφ/dt (mm/s)", lines)]
@@ -149,28 +143,18 @@ def pile_panels(found: PileAnalysis) -> list[Panel]:
     low, high = (
         Line(time, 1e3 * bed[f"surface_{side}"], "surface, 10th to\n90th percentile") for side in ("low", "high")
     )
-    agitation = Line(time, np.maximum(bed["mean_square_velocity"], 1e-12))
-
-    def pair(title: str, y: str, first: tuple[str, str], second: tuple[str, str]) -> Panel:
-        lines = [Line(time, bed[first[0]], first[1]), Line(time, bed[second[0]], second[1], 2, dashed=True)]
-        return Panel(title, x, y, lines)
-
-    return [
-        Panel("Clusters' leaders", x, "height (mm)", [surface, *_leaders(found), *_events(found)], (low, high)),
-        pair(
-            "Segregation: (z of large − z of small) / their sum",
-            "Brazil-nut\nindex",
-            ("brazil_nut", "all beads"),
-            ("brazil_nut_of_bulk", "bulk alone"),
-        ),
-        pair(
-            "Bridges and contacts with other beads",
-            "how many a bead,\nto other beads",
-            ("bridges", "bridges"),
-            ("contacts", "contacts"),
-        ),
-        Panel("Agitation, once a cycle", x, "mean square\nvelocity, strobed\n(m²/s²)", [agitation], log=True),
-    ]
+    panels = [Panel("Clusters' leaders", x, "height (mm)", [surface, *_leaders(found), *_events(found)], (low, high))]
+    segregation = {"brazil_nut": "all beads", "brazil_nut_of_bulk": "bulk alone"}
+    joined = {"bridges": "bridges", "contacts": "contacts"}
+    for title, y, columns in (
+        ("Segregation: (z of large − z of small) / their sum", "Brazil-nut\nindex", segregation),
+        ("Bridges and contacts with other beads", "how many a bead,\nto other beads", joined),
+        ("Agitation, once a cycle", "mean square\nvelocity, strobed\n(m²/s²)", {"mean_square_velocity": ""}),
+    ):
+        named = enumerate(columns.items())
+        lines = [Line(time, bed[name], told, 2 * number, dashed=number > 0) for number, (name, told) in named]
+        panels.append(Panel(title, x, y, lines, log=len(lines) == 1))
+    return panels
 
 
 def _leaders(found: PileAnalysis) -> Iterator[Line]:
@@ -199,35 +183,18 @@ def _events(found: PileAnalysis) -> Iterator[Line]:
             yield Line(times, heights * 1e3, kind, _GREY, marker, width=0.0)
 
 
+@styled
 def walk_figures(groups: list[Group]) -> dict[str, Figure]:
-    """The figures of the walkers of a run.
+    """The figures of the walkers of a run, by name.
 
-    Returns
-    -------
-    dict
-        ``walk``, strobed positions, distance walked and orientation against time; and, if the run was sampled at least
-        eight times a cycle, ``gait``, velocity and rotation velocities through two cycles, as in Fig. 4 of Khan et al.,
-        and the substrate's velocity.
+    ``walk``: strobed positions, distance walked and orientation; and, if the run was sampled at least eight times a
+    cycle, ``gait``: velocity and rotation velocities through two cycles, as in Fig. 4 of Khan et al., and the
+    substrate's velocity.
     """
-    panels = gait_panels(groups[0])
-    return {"walk": _walk_figure(groups), **({"gait": _gait_figure(groups[0], panels)} if panels else {})}
-
-
-@styled
-def climb_figure(found: PileAnalysis) -> Figure:
-    """What a pile did: `pile_panels`, one below the other."""
-    case = found.motion.case
-    figure, axes = _stacked(pile_panels(found), 8.0, [2, 1, 1, 1])
-    axes[2].set_ylim(0.0, None)
-    figure.suptitle(f"{plain_text(case.title or case.name)}\n{case.count} beads, {case.drive.described()}")
-    return figure
-
-
-@styled
-def _walk_figure(groups: list[Group]) -> Figure:
     rows = [["strobe", "walked"], ["strobe", "turned"]]
     figure, axes = new_figure(TWO_COLUMNS, 5.2, mosaic=rows, width_ratios=[1, 1.6])
-    figure.suptitle(_title(groups[0].case))
+    title = _title(groups[0].case)
+    figure.suptitle(title)
     _draw_strobe(axes["strobe"], groups[0])
     for name, panel in zip(("walked", "turned"), walk_panels(groups), strict=False):
         _draw(axes[name], panel)
@@ -239,23 +206,30 @@ def _walk_figure(groups: list[Group]) -> Figure:
     letter_panels(axes.values())
     more = f" (the first {_MOST_NAMED})" if sum(len(group.walkers) for group in groups) > _MOST_NAMED else ""
     handles = axes["walked"].get_legend_handles_labels()
-    title = f"walker: facing at the start, velocity{more}"
-    figure.legend(*handles, loc="outside lower center", ncols=4, title=title)
-    return figure
+    told = f"walker: facing at the start, velocity{more}"
+    figure.legend(*handles, loc="outside lower center", ncols=4, title=told)
+    figures = {"walk": figure}
+    if panels := gait_panels(groups[0]):
+        figures["gait"], below = _stacked(panels, title, 3.0 + 1.3 * len(panels), [2.5, 1.0][: len(panels)])
+        for one in below:
+            one.axhline(0.0, color="0.4", lw=0.6)
+    return figures
 
 
 @styled
-def _gait_figure(group: Group, panels: Sequence[Panel]) -> Figure:
-    figure, axes = _stacked(panels, 3.0 + 1.3 * len(panels), [2.5, 1.0][: len(panels)])
-    figure.suptitle(_title(group.case))
-    for one in axes:
-        one.axhline(0.0, color="0.4", lw=0.6)
+def climb_figure(found: PileAnalysis) -> Figure:
+    """What a pile did: `pile_panels`, one below the other."""
+    case = found.motion.case
+    title = f"{plain_text(case.title or case.name)}\n{case.count} beads, {case.drive.described()}"
+    figure, axes = _stacked(pile_panels(found), title, 8.0, [2, 1, 1, 1])
+    axes[2].set_ylim(0.0, None)
     return figure
 
 
-def _stacked(panels: Sequence[Panel], height: float, ratios: Sequence[float]) -> tuple[Figure, Any]:
+def _stacked(panels: Sequence[Panel], title: str, height: float, ratios: Sequence[float]) -> tuple[Figure, Any]:
     """Panels one below the other, their legends beside them."""
     figure, axes = new_figure(TWO_COLUMNS, height, nrows=len(panels), height_ratios=ratios, sharex=True, squeeze=False)
+    figure.suptitle(title)
     for one, panel in zip(axes[:, 0], panels, strict=True):
         _draw(one, panel)
         one.set_title(panel.title)

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.units import DURATION, parse_quantity
@@ -33,20 +32,14 @@ _LEAST_SEEN = 10.0  # recorded frames a second of such a film, where moments bet
 _COLOURS, _SAMPLES = 40, 6  # in a GIF; pictures from which they are taken
 
 
-class FilmFailed(WalkersError):
-    """A film that could not be written as a whole."""
-
-
 @dataclass(frozen=True)
 class FilmOptions:
     """How a film is made.
 
     Attributes
     ----------
-    size
-        Pixels across and up.
-    fps
-        Pictures a second.
+    size, fps
+        Pixels across and up; pictures a second.
     slowdown
         How many times slower than in reality; if None, 1, 2, 5, 10 … such that the film lasts 5 to 10 s.
     walker
@@ -74,33 +67,27 @@ def render_film(
 
     Parameters
     ----------
-    directory
-        A run directory.
-    destination
-        The MP4 or GIF to write; ``film.mp4`` in the run directory if None.
-    options
-        How; `FilmOptions` as they are if None.
-    on_progress
-        Called with the number of pictures made and of all.
+    directory, destination
+        A run directory, and the MP4 or GIF to write; ``film.mp4`` in the directory if None.
+    options, on_progress
+        How; called with the number of pictures made and of all.
 
     Raises
     ------
-    InputError
-        If the format cannot hold it, there is no such walker, or nothing is between begin and end.
-    FilmFailed
-        If ffmpeg could not write all of it.
+    InputError, WalkersError
+        If the format cannot hold it, there is no such walker, or nothing is between begin and end; if ffmpeg could not
+        write all of it.
     """
     path, options = destination or directory / "film.mp4", options or FilmOptions()
     _check_format(path, options)
     motion = _shown(read_motion(directory).driven, options.walker)
     times = film_times(motion, options)
-    count, frames = len(times.time), slice(int(times.frame[0]), int(times.frame[-1]) + 2)
+    count, frames = len(times.time), slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
     window = Window(Scene.around(motion, camera_axes(motion), _AROUND, frames, rolling=True), options.size)
     write = _captions(motion, times, window.pixels_per_mm, options.size)
 
     def picture(number: int) -> Picture:
-        scene = window.picture(int(times.frame[number]), float(times.share[number]))
-        return write(scene, float(times.time[number]))
+        return write(window.picture(times.frame[number]), times.time[number])
 
     def pictures() -> Iterator[Picture]:
         for number in range(count):
@@ -122,13 +109,7 @@ def render_film(
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Read a size of pictures, such as ``720p`` or ``1280x720``, pixels across and up.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
+    """Read a size of pictures, ``720p`` or ``1280x720``, as pixels across and up; an InputError if it is none."""
     numbers = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower())
     if numbers and min(map(int, numbers.groups())) >= 64:
         return int(numbers[1]), int(numbers[2])
@@ -139,13 +120,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def parse_time(option: str, text: str) -> float:
-    """Read a physical time that an option gives, such as ``0.1 s``.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
+    """Read a physical time that an option gives, ``0.1 s``, in s; an InputError if it is none."""
     try:
         return parse_quantity(text, DURATION)
     except ValueError as error:
@@ -183,14 +158,13 @@ def _shown(motion: Motion, walker: int | None) -> Motion:
 class FilmTimes(NamedTuple):
     """The moments of a film, of K pictures.
 
-    ``time`` is physical (s), ``frame`` the number of the frame of the motion that is shown, or that comes before it,
-    ``share`` how far it is from there to the next one, 0 to 1. The film is ``slowdown`` times slower than in reality;
-    if it is ``stroboscopic`` all pictures are at one phase of the drive.
+    ``time`` is physical (s); ``frame`` the number of the frame of the motion, between two a fraction where the motion
+    between them is known. The film is ``slowdown`` times slower than in reality; if it is ``stroboscopic`` all pictures
+    are at one phase of the drive.
     """
 
     time: FloatArray
-    frame: npt.NDArray[np.int64]
-    share: FloatArray
+    frame: FloatArray
     slowdown: float
     stroboscopic: bool
 
@@ -200,12 +174,7 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
 
     Pictures that are half a cycle apart or more are moved to whole cycles, as a stroboscope would show them; else the
     shaking would beat with the pictures. Where frames are so rare that they do not follow a cycle each picture is the
-    nearest frame.
-
-    Raises
-    ------
-    InputError
-        If nothing of the run is between begin and end.
+    nearest frame. If nothing of the run is between begin and end there is an InputError.
     """
     last, begin = float(motion.time[-1]), options.begin
     end = last if options.end is None else min(options.end, last)
@@ -223,15 +192,11 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
     strobed = interval >= cycle / 2.0
     if strobed:
         time = np.round(time / cycle) * cycle
-    time = np.clip(time, motion.time[0], last)
-    if follows:
-        frame = np.clip(np.searchsorted(motion.time, time + 1e-12, side="right") - 1, 0, len(motion.time) - 2)
-        share = (time - motion.time[frame]) / (motion.time[frame + 1] - motion.time[frame])
-    else:
-        frame = np.abs(motion.time[:, None] - time).argmin(axis=0)
-        time, share = motion.time[frame], np.zeros(len(frame))
+    numbers = np.arange(len(motion.time))
+    frame = np.interp(time, motion.time, numbers)
+    frame = frame if follows else frame.round()
     one_phase = strobed or motion.case.run.samples_per_cycle == 1
-    return FilmTimes(time, frame.astype(np.int64), np.clip(share, 0.0, 1.0), slowdown, one_phase)
+    return FilmTimes(np.interp(frame, numbers, motion.time), frame, slowdown, one_phase)
 
 
 def _captions(
@@ -292,7 +257,7 @@ def _write_mp4(path: Path, pictures: Iterator[Picture], options: FilmOptions, co
     except (RuntimeError, OSError):
         written = 0
     if written != count:
-        raise FilmFailed(f"ffmpeg wrote {written} of the {count} pictures of {path.parent}: is the disk full?")
+        raise WalkersError(f"ffmpeg wrote {written} of the {count} pictures of {path.parent}: is the disk full?")
 
 
 def _write_gif(path: Path, pictures: Iterator[Picture], fps: int, samples: Picture) -> None:

@@ -20,8 +20,8 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.text import rendered
 from walkers.postprocess.analysis import analyses_of
 from walkers.postprocess.motion import Bridges, Motion, gathered, read_bridges, read_motion
-from walkers.postprocess.scene import Scene, camera_axes, lines_between, mesh_of, walls_of
-from walkers.runner.files import write_text
+from walkers.postprocess.scene import Scene, camera_axes, mesh_of, walls_of
+from walkers.runner.files import write_bytes, write_text
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -45,27 +45,21 @@ def write_vtk(
 
     Parameters
     ----------
-    directory
-        A run directory.
+    directory, destination
+        A run directory; folder to write, replaced if it holds nothing but files of this function, else an InputError
+        is raised: ``vtk`` in the run directory if None.
     every
-        Take one of so many samples of the drive; one a cycle if left out. Bridges are in the frames in which they were
+        Take one of so many samples of the drive, if None one a cycle. Bridges are in the frames in which they were
         recorded.
     vtu
         Also write the beads as ``.vtu`` (through meshio).
     as_placed
         Leave independent walkers where the deck has them, centimetres apart, instead of drawing them side by side.
-    destination
-        Folder to write, replaced if it holds nothing but files of this function; ``vtk`` in the run directory if None.
 
     Returns
     -------
     Path
         The ``.pvd`` file: its times are seconds; part 0 the beads, part 1 the boundary, part 2 the bridges.
-
-    Raises
-    ------
-    InputError
-        If the folder holds anything else than such files.
     """
     destination = destination or directory / "vtk"
     motion, place = _shown(directory, as_placed=as_placed), destination.resolve()
@@ -87,7 +81,7 @@ def write_vtk(
                 pv.save_meshio(beside / f"beads_{frame:06d}.vtu", meshes["beads"])
         head = '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>'
         lines = ["<?xml version='1.0' encoding='utf-8'?>", head, *entries, "  </Collection>", "</VTKFile>"]
-        (beside / _COLLECTION).write_text("\n".join(lines), encoding="utf-8")
+        write_text(beside / _COLLECTION, "\n".join(lines))
         if place.exists():
             shutil.rmtree(place)
         beside.rename(place)
@@ -102,17 +96,8 @@ def write_paraview(
 ) -> Path:
     """Write a run for ParaView, with a script that shows it.
 
-    Parameters
-    ----------
-    directory, destination, options
-        See `write_vtk`.
-    colour
-        Array by which beads are coloured; if None, ``walker`` where there are walkers, else ``speed``.
-
-    Raises
-    ------
-    InputError
-        If there is no such array, or the folder holds anything else than such files.
+    Beads are coloured by an array; if None, by ``walker`` where there are walkers, else ``speed``. If there is no such
+    array an InputError is raised. All else is as in `write_vtk`; what is returned is the script.
     """
     driven = _shown(directory, as_placed=options.get("as_placed", False)).driven
     names = set(beads_at(driven, 0).array_names)
@@ -128,13 +113,7 @@ def write_paraview(
 
 
 def open_paraview(script: Path) -> None:
-    """Start ParaView with a script, and do not wait for it.
-
-    Raises
-    ------
-    InputError
-        If there is no ParaView.
-    """
+    """Start ParaView with a script, and do not wait for it; an InputError if there is none."""
     program = shutil.which("paraview")
     if program is None:
         told = f"no program paraview is installed; {script} shows the run in one"
@@ -157,7 +136,7 @@ def _save(mesh: pv.PolyData, path: Path) -> None:
     writer.SetDataModeToBinary()
     writer.WriteToOutputStringOn()
     writer.Write()
-    path.write_text(writer.GetOutputString(), encoding="utf-8")
+    write_bytes(path, writer.GetOutputString().encode(), at_once=False)
 
 
 def _check_replaceable(place: Path) -> None:
@@ -200,14 +179,13 @@ def beads_at(motion: Motion, frame: int) -> pv.PolyData:
     import pyvista as pv
 
     mesh = pv.PolyData(motion.position[frame] + motion.substrate[frame])
-    velocity = motion.velocity[frame]
     arrays: dict[str, npt.NDArray[Any]] = {
         "bead": np.arange(len(motion.radius)),
         "walker": motion.walker_of,
         "radius": motion.radius,
         "large": motion.large.astype(np.int64),
-        "velocity": velocity,
-        "speed": np.linalg.norm(velocity, axis=1),
+        "velocity": motion.velocity[frame],
+        "speed": np.linalg.norm(motion.velocity[frame], axis=1),
         "omega": motion.spin[frame],
     }
     for name, values in arrays.items():
@@ -220,13 +198,15 @@ def bridges_at(motion: Motion, bridges: Bridges) -> pv.PolyData:
 
     A line joins two centres, or a centre and the nearest point of the wall.
     """
+    import pyvista as pv
+
     centres = motion.position[bridges.frame]
     held = centres[bridges.wall_beads]
     feet = np.stack([held - wall.distances(held)[:, None] * wall.normals(held) for wall in motion.case.boundary.walls])
     walls = np.stack([held, feet[bridges.walls, np.arange(len(held))]], axis=1)
-    mesh = lines_between(np.concatenate([centres[bridges.beads], walls]) + motion.substrate[bridges.frame])
-    gap = np.concatenate([bridges.gap, bridges.wall_gap])
-    mesh.cell_data["gap"] = gap
+    ends = np.concatenate([centres[bridges.beads], walls]) + motion.substrate[bridges.frame]
+    mesh = pv.line_segments_from_points(ends.reshape(-1, 3))
+    gap = mesh.cell_data["gap"] = np.concatenate([bridges.gap, bridges.wall_gap])
     mesh.cell_data["normal_force"] = np.concatenate([bridges.force, bridges.wall_force])
     mesh.cell_data["touching"] = (gap <= 0.0).astype(np.int64)
     mesh.cell_data["walker"] = motion.walker_of[np.concatenate([bridges.beads[:, 0], bridges.wall_beads])]

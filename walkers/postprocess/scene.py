@@ -47,18 +47,9 @@ _STEEP, _ASIDE = pi / 4.0, radians(25.0)
 class Scene:
     """Beads and walls, and a view of them without perspective.
 
-    Attributes
-    ----------
-    motion
-        Of the beads.
-    axes : ndarray, shape (3, 3)
-        Unit vectors to the right in the picture, up, and toward the camera.
-    low, high : ndarray, shape (3,)
-        What the camera takes in, along these axes, mm.
-    shaken
-        Whether the camera rests in the laboratory, else on the boundary.
-    rolling
-        Whether beads are two-coloured where it is known how they roll.
+    ``axes`` are unit vectors to the right in the picture, up, and toward the camera, as rows; ``low`` and ``high`` what
+    the camera takes in along them, mm. It rests in the laboratory if the boundary is seen ``shaken``, else on the
+    boundary. ``rolling`` beads are two-coloured where it is known how they roll.
     """
 
     motion: Motion
@@ -165,11 +156,12 @@ def walls_of(motion: Motion) -> list[FloatArray]:
     """
     from scipy.spatial import HalfspaceIntersection
 
-    boundary, margin = motion.case.boundary, 4.0 * float(motion.radius.max())
+    boundary, margin, inside = motion.case.boundary, 4.0 * float(motion.radius.max()), motion.position[0, 0]
     low, high = motion.position.min(axis=(0, 1)) - margin, motion.position.max(axis=(0, 1)) + margin
     if boundary.closed:
         wide = 1.01 * boundary.inner_width / 2.0  # edges of the prism lie beyond the round wall
-        low, high = np.array([-wide, -wide, min(low[2], -wide)]), np.array([wide, wide, boundary.top])
+        low, high = np.full(3, -wide), np.array([wide, wide, boundary.top])
+        inside = np.array([0.0, 0.0, boundary.top / 2.0])
     planes: list[tuple[Any, Any]] = []
     for wall in boundary.walls:
         if isinstance(wall, Flat):
@@ -180,7 +172,7 @@ def walls_of(motion: Motion) -> list[FloatArray]:
     ends = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]
     points, normals = (np.array(each) for each in zip(*planes, *ends, strict=True))
     spaces = np.column_stack([-normals, np.einsum("px,px->p", normals, points)])
-    room = HalfspaceIntersection(spaces, motion.position[0, 0])
+    room = HalfspaceIntersection(spaces, inside)
     faces = []
     for number, normal in enumerate(normals[: len(planes)]):
         corners = room.intersections[[number in meeting for meeting in room.dual_facets]]
@@ -195,28 +187,19 @@ def mesh_of(faces: Sequence[FloatArray]) -> pv.PolyData:
     """Polygons with these corners."""
     import pyvista as pv
 
-    sizes = [len(corners) for corners in faces]
-    first = np.cumsum([0, *sizes[:-1]])
-    cells = [[size, *range(begin, begin + size)] for begin, size in zip(first, sizes, strict=True)]
-    return pv.PolyData(np.concatenate(faces), faces=np.concatenate(cells))
-
-
-def lines_between(ends: FloatArray) -> pv.PolyData:
-    """Lines between pairs of points, shape (K, 2, 3)."""
-    import pyvista as pv
-
-    lines = np.insert(np.arange(2 * len(ends)).reshape(-1, 2), 0, 2, axis=1)
-    return pv.PolyData(np.ascontiguousarray(ends.reshape(-1, 3)), lines=lines.ravel())
+    points, sizes = np.concatenate(faces), np.array([len(corners) for corners in faces])
+    cells = np.insert(np.arange(len(points)), np.cumsum(sizes) - sizes, sizes)
+    return pv.PolyData(points, faces=cells)
 
 
 def floor_lines(low: FloatArray, high: FloatArray, step: float) -> FloatArray:
-    """Ends of lines on the floor between two corners, along x and y at multiples of a step, shape (K, 2, 3)."""
+    """Ends of lines on the floor between two corners, along x and y at multiples of a step, shape (2 K, 3)."""
     lines = []
     for along, across in ((0, 1), (1, 0)):
         marks = step * np.arange(np.ceil(low[across] / step), np.floor(high[across] / step) + 1)
         ends = np.zeros((len(marks), 2, 3))
         ends[:, :, along], ends[:, :, across] = (low[along], high[along]), marks[:, None]
-        lines.append(ends)
+        lines.append(ends.reshape(-1, 3))
     return np.concatenate(lines)
 
 
@@ -227,17 +210,10 @@ def round_below(value: float) -> float:
 
 
 def beach_ball(rounds: int, motion: Motion) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """A unit ball of so many cells around (a multiple of six), whose turning shows from every side.
+    """Points of a unit ball of two-coloured lunes, of so many cells around (a multiple of six), triangles, and colours.
 
-    Its axis is that about which walkers roll, in containers y, toward which one looks.
-
-    Returns
-    -------
-    points : ndarray, shape (V, 3)
-        Its normals too.
-    triangles : ndarray, shape (T, 3)
-    pale
-        1 where a point is of one of the paler lunes, else 0, shape (V,).
+    The points, shape (V, 3), are its normals too; triangles have the shape (T, 3); colours are 1 for the points of the
+    paler lunes, else 0. Its axis is that about which walkers roll, in containers y, toward which one looks.
     """
     import pyvista as pv
 
@@ -254,7 +230,8 @@ def beach_ball(rounds: int, motion: Motion) -> tuple[FloatArray, npt.NDArray[np.
         for begin, end in pairwise(np.linspace(0.0, 360.0, _LUNES + 1))
     ]
     ball = pv.merge(lunes, merge_points=False)
-    points = ball.points / np.linalg.norm(ball.points, axis=1, keepdims=True)
+    points = np.asarray(ball.points)
+    points = points / np.linalg.norm(points, axis=1, keepdims=True)
     return points, ball.regular_faces, np.repeat(np.arange(_LUNES) % 2, len(points) // _LUNES)
 
 
@@ -286,18 +263,18 @@ class Window:
         points, triangles, self._pale = beach_ball(rounds, scene.motion)
         self._beads = _Copies(self._plotter, points, triangles, radius, specular=0.4)
 
-    def picture(self, frame: int, share: float = 0.0) -> Picture:
-        """The beads at a share of the way from a frame to the next one, on the cubic through places and velocities."""
-        motion, shift = self._scene.motion, np.zeros(3)
-        place, time = motion.position[frame], motion.time[frame]
+    def picture(self, frame: float) -> Picture:
+        """The beads in a frame, or between two on the cubic through their places and velocities."""
+        motion, shift, number = self._scene.motion, np.zeros(3), int(frame)
+        place, time, share = motion.position[number], motion.time[number], frame - number
         if share:
-            place = motion.select(slice(frame, frame + 2)).between(share).position[0]
-            time += share * (motion.time[frame + 1] - time)
+            place = motion.select(slice(number, number + 2)).between(share).position[0]
+            time += share * (motion.time[number + 1] - time)
         if self._scene.shaken:
             shift = 1e3 * boundary_motion(motion.case.drive, np.array([time]))[0][0]
         turns = self._scene.turns
-        self._beads.colour(self._scene.colours(self._scene.pointed_out[frame])[self._pale].swapaxes(0, 1))
-        self._beads.move(1e3 * place + shift, None if turns is None else turns.at(frame, share))
+        self._beads.colour(self._scene.colours(self._scene.pointed_out[number])[self._pale].swapaxes(0, 1))
+        self._beads.move(1e3 * place + shift, None if turns is None else turns.at(number, share))
         if self._bare:
             self._shadows.move(1e3 * place * [1.0, 1.0, 0.0] + shift)
         for actor in self._around:
@@ -315,7 +292,7 @@ class Window:
 
         half, middle = _BEYOND * wide / 2.0, self._scene.camera(0.0)[1] * [1.0, 1.0, 0.0]
         floor = pv.Plane(center=middle - [0.0, 0.0, 2e-3 * wide], i_size=2.0 * half, j_size=2.0 * half)
-        lines = lines_between(floor_lines(middle - half, middle + half, round_below(wide / 8.0)))
+        lines = pv.line_segments_from_points(floor_lines(middle - half, middle + half, round_below(wide / 8.0)))
         lines.translate([0.0, 0.0, -1e-3 * wide], inplace=True)
         return [
             self._plotter.add_mesh(floor, color=_GROUND, lighting=False),

@@ -16,8 +16,19 @@ from walkers.inputs.readable import readable_unit
 from walkers.postprocess.gait import distance_walked
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.quantities import rounded
-from walkers.postprocess.report.page import LARGEST, NAME, check_report, fill, overhead, packed_plots, write_page
-from walkers.postprocess.report.plots import COLOURS, error_bars, new_plot, with_legend
+from walkers.postprocess.report.page import (
+    COLOURS,
+    LARGEST,
+    NAME,
+    check_report,
+    error_bars,
+    fill,
+    new_plot,
+    overhead,
+    packed_plots,
+    with_legend,
+    write_page,
+)
 from walkers.postprocess.report.run import RunReport
 from walkers.postprocess.tables import read_table
 from walkers.sweeps.factors import value_text, with_unit

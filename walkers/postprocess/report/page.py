@@ -10,54 +10,46 @@ import base64
 import json
 import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from walkers.inputs.errors import InputError, Problem
 from walkers.postprocess.drawing import check_place
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.figures import Panel
 from walkers.runner.files import write_text
 from walkers.runner.provenance import PROJECT, software
 
 if TYPE_CHECKING:
     from bokeh.models import Model
+    from bokeh.plotting import figure as Figure  # noqa: N812
     from jinja2 import Environment
 
 _PACKAGE = "walkers.postprocess.report"
 NAME = "report.html"
 LARGEST = 5_000_000
 """Bytes that a report may have: what any mail takes along."""
+COLOURS = ("#b0203c", "#1f3b73", "#3f7f93", "#c78a2c", "#5b6770", "#7a4a8c", "#4c8c4a", "#1d2429")
+_MARKERS = {"o": "circle", "s": "square", "^": "triangle", "v": "inverted_triangle", "D": "diamond", "x": "x"}
+"""What Bokeh calls them; others are diamonds."""
+_MOST_POINTS = 600
+"""Of a line; what is longer is thinned out."""
 
 
 def check_report(path: Path) -> None:
-    """Refuse a place for a report that is none.
-
-    Raises
-    ------
-    InputError
-        If its name does not end in .html, it is a folder, or there is no folder for it.
-    """
+    """Refuse a place for a report that is no .html file in a folder that there is by an InputError."""
     check_place(path, ".html", ".htm")
     if not path.absolute().parent.is_dir():
         raise InputError("--to", [Problem("", None, f"{path.absolute().parent}: there is no such folder")])
 
 
 def write_page(path: Path, title: str, body: str, carried: Mapping[str, str]) -> Path:
-    """Write a page beside its place and rename it.
-
-    Parameters
-    ----------
-    path
-        The file.
-    title
-        As plain text.
-    body
-        As HTML, of a template.
-    carried
-        What scripts unpack, by id: packed plots and players.
-    """
+    """Write a page beside its place and rename it: a plain title, a body of HTML, and by id what scripts unpack."""
     libraries = {f"library-{name}": _library(name) for name in ("bokeh", "k3d")} if carried else {}
     page = fill(
         "page.html.j2",
@@ -88,6 +80,69 @@ def packed_plots(plots: Model) -> str:
     from bokeh.embed import json_item
 
     return _packed(json.dumps(json_item(plots)))
+
+
+def drawn(panel: Panel) -> Figure:
+    """A panel as an interactive plot (Bokeh)."""
+    from bokeh.models.annotations import BoxAnnotation
+
+    plot = new_plot(panel.title, panel.x, panel.y.replace("\n", " "), y_axis_type="log" if panel.log else "linear")
+    if panel.settled:
+        plot.add_layout(BoxAnnotation(left=0.0, right=panel.settled, fill_color="#888888", fill_alpha=0.12))
+    if panel.band:
+        low, high = panel.band
+        plot.varea(low.x, low.y, high.y, color="#5b6770", alpha=0.2, legend_label=low.label.replace("\n", " "))
+    for line in panel.lines:
+        look: dict[str, Any] = {"legend_label": line.label.replace("\n", " ")} if line.label else {}
+        look["color"] = line.colour if isinstance(line.colour, str) else COLOURS[line.colour % len(COLOURS)]
+        if line.width:
+            thin = slice(None, None, -(-len(line.x) // _MOST_POINTS) or None)
+            dash = "dashed" if line.dashed else "solid"
+            plot.line(line.x[thin], line.y[thin], line_width=line.width, line_dash=dash, **look)
+        else:
+            plot.scatter(line.x, line.y, marker=_MARKERS.get(line.marker, "diamond"), size=8, **look)
+        if line.error is not None:
+            error_bars(plot, line.x, line.y, line.error)
+    return with_legend(plot)
+
+
+def new_plot(title: str, x: str, y: str, *, height: int = 300, **options: Any) -> Figure:
+    """An empty plot as wide as the page."""
+    from bokeh.models.annotations import Title
+    from bokeh.plotting import figure
+
+    plot = figure(
+        title=Title(text=title, text_font_size="14px"),
+        x_axis_label=x,
+        y_axis_label=y,
+        height=height,
+        sizing_mode="stretch_width",
+        tools="pan,box_zoom,wheel_zoom,reset,save,hover",
+        active_scroll=None,  # the wheel scrolls the page
+        **options,
+    )
+    plot.toolbar.logo = None
+    return plot
+
+
+def with_legend(plot: Figure) -> Figure:
+    """The plot with its legend beside it, by which lines can be hidden."""
+    if plot.legend:
+        plot.add_layout(plot.legend[0], "right")
+        plot.legend.click_policy = "hide"
+        plot.legend.label_text_font_size = "11px"
+        plot.legend.spacing = 0
+    return plot
+
+
+def error_bars(plot: Figure, x: Sequence[Any] | FloatArray, y: FloatArray, error: FloatArray) -> None:
+    """Whiskers of one standard error."""
+    from bokeh.models import ColumnDataSource
+    from bokeh.models.annotations import Whisker
+
+    known = np.isfinite(error)
+    columns: dict[str, Any] = {"x": np.asarray(x)[known], "low": (y - error)[known], "high": (y + error)[known]}
+    plot.add_layout(Whisker(source=ColumnDataSource(columns), base="x", lower="low", upper="high"))
 
 
 def picture_uri(path: Path) -> str:

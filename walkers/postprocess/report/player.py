@@ -66,10 +66,8 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
     if len(motion.walkers) < len(read.walkers):
         first = "The first walker is" if len(motion.walkers) == 1 else f"The first {len(motion.walkers)} walkers are"
         captions.append(f"{first} shown, of {len(read.walkers)}.")
-    scene = Scene.around(motion, np.eye(3), rolling=True)
-    shown = motion.select(slice(None, None, stride))
-    chosen = np.asarray(scene.pointed_out[::stride].any(axis=0))
-    colours = scene.colours(chosen).round() @ [0x10000, 0x100, 1]
+    scene, shown = Scene.around(motion, np.eye(3), rolling=True), motion.select(slice(None, None, stride))
+    colours = scene.colours(np.any(scene.pointed_out[::stride], axis=0)).round() @ [0x10000, 0x100, 1]
     cameras = cameras_of(motion)
     look: dict[str, Any] = {"grid_visible": False, "axes": ["x", "y", "z"], "background_color": 0xFFFFFF}
     plot = k3d.plot(height=height, name=motion.case.name, fps=30.0, camera_fov=_VIEW, camera_auto_fit=False, **look)
@@ -101,7 +99,8 @@ def cameras_of(motion: Motion) -> dict[str, list[float]]:
     for name, (way, up) in ways.items():
         seen = Scene.around(motion, axes_toward(np.array(way), up), _AROUND, shaken=False)
         distance = seen.height(_ASPECT) / 2.0 / tan(radians(_VIEW / 2.0)) + float(seen.high[2] - seen.low[2]) / 2.0
-        cameras[name] = np.concatenate(seen.camera(distance)).tolist()
+        place, middle, _ = seen.camera(distance)
+        cameras[name] = np.concatenate([place, middle, up]).tolist()
     return cameras
 
 
@@ -174,17 +173,16 @@ def _walls(motion: Motion) -> list[Any]:
 
     faces = [1e3 * corners for corners in walls_of(motion)]
     parts = []
-    for name, opacity in (("floor", 1.0), ("walls", 0.12)):
-        chosen = [corners for corners in faces if (np.ptp(corners[:, 2]) < 1e-6) == (name == "floor")]
-        if chosen:
-            mesh = mesh_of(chosen).triangulate()
-            points = np.asarray(mesh.points) - [0.0, 0.0, 2e-3 * opacity]  # a hair below the beads that touch it
-            look = {"color": _FLOOR, "side": "double", "opacity": opacity, "roughness": 1.0, "name": name}
-            parts.append(k3d.mesh(points.astype(np.float32), mesh.regular_faces.astype(np.uint32), **look))
+    for corners in faces:
+        level = bool(np.ptp(corners[:, 2]) < 1e-6)
+        mesh, opacity = mesh_of([corners]).triangulate(), 1.0 if level else 0.12
+        points = (np.asarray(mesh.points) - [0.0, 0.0, 2e-3 * level]).astype(np.float32)  # below beads that touch it
+        look = {"color": _FLOOR, "side": "double", "roughness": 1.0, "name": "floor" if level else "wall"}
+        parts.append(k3d.mesh(points, mesh.regular_faces.astype(np.uint32), opacity=opacity, **look))
     if motion.case.boundary.bare:
         low, high = faces[0].min(axis=0), faces[0].max(axis=0)
         step = round_below(float(high[0] - low[0]) / 8.0)
-        ends = floor_lines(low, high, step).reshape(-1, 3).astype(np.float32)
+        ends = floor_lines(low, high, step).astype(np.float32)
         pairs = np.arange(len(ends), dtype=np.uint32).reshape(-1, 2)
         look = {"indices_type": "segment", "shader": "simple", "color": _LINES, "name": f"every {step:g} mm"}
         parts.append(k3d.lines(ends, pairs, **look))

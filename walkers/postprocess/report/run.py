@@ -10,48 +10,53 @@ from typing import Any
 from walkers.inputs.case import Case
 from walkers.inputs.changes import dotted
 from walkers.inputs.origins import Origin, text_of
-from walkers.postprocess.analysis import analyses_in, current_result, quantities_of, warnings_of
-from walkers.postprocess.report.page import NAME, check_report, fill, packed_plots, write_page
+from walkers.postprocess.analysis import analyses_in, analyses_of, current_result, quantities_of, warnings_of
+from walkers.postprocess.figures import Panel, gait_panels, pile_panels, velocity_panel, walk_panels
+from walkers.postprocess.motion import read_motion
+from walkers.postprocess.piles import analyse
+from walkers.postprocess.report.page import NAME, check_report, drawn, fill, packed_plots, write_page
 from walkers.postprocess.report.player import MOST_PLACES, player_of
-from walkers.postprocess.report.plots import plots_of
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
+
+Origins = tuple[Origin, ...] | None
+"""Where the values of a case come from; None: as the run recorded it."""
 
 
 class RunReport:
     """What a page shows of a run, for its template; what the page's scripts unpack is ``carried``.
 
-    Parameters
-    ----------
-    directory
-        The run directory.
-    id
-        Of its section in the page.
-    places
-        Beads times instants of its player at most.
-    origins
-        Where the values of the case come from; None: as the run recorded it.
+    The page has it in a section of its own, and in its player so many places at most (`player_of`).
     """
 
     def __init__(
-        self,
-        directory: Path,
-        id: str = "run",
-        places: int = MOST_PLACES,
-        origins: tuple[Origin, ...] | None = None,
+        self, directory: Path, section: str = "run", places: int = MOST_PLACES, origins: Origins = None
     ) -> None:
+        from bokeh.layouts import column
+
         case = case_of(directory)
-        self.id, self.name, self.title = id, directory.resolve().name, case.title or case.name
+        self.id, self.name, self.title = section, directory.resolve().name, case.title or case.name
         self.shown = shown_of(directory, current_result(directory), origins)
         self.manifest = read_json(directory / MANIFEST_NAME)
-        self.player, plots = player_of(directory, places=places), plots_of(directory)
-        self.carried = {f"player-{id}": base64.b64encode(self.player.plot.get_binary_snapshot(9)).decode()}
-        if plots is not None:
-            self.carried[f"plots-{id}"] = packed_plots(plots)
+        self.player = player_of(directory, places=places)
+        self.carried = {f"player-{section}": base64.b64encode(self.player.plot.get_binary_snapshot(9)).decode()}
+        if panels := _panels(directory):
+            plots = column(*map(drawn, panels), sizing_mode="stretch_width")
+            self.carried[f"plots-{section}"] = packed_plots(plots)
 
 
-def report_run(directory: Path, to: Path | None = None, origins: tuple[Origin, ...] | None = None) -> Path:
+def _panels(directory: Path) -> list[Panel]:
+    """What is plotted of a run."""
+    names = {one.name for one in analyses_of(case_of(directory))}
+    panels: list[Panel] = []
+    if "walking" in names:
+        groups = read_motion(directory).groups
+        panels += [*walk_panels(groups), velocity_panel(groups), *gait_panels(groups[0])]
+    return [*panels, *(pile_panels(analyse(directory)) if "pile" in names else [])]
+
+
+def report_run(directory: Path, to: Path | None = None, origins: Origins = None) -> Path:
     """Write the report of a run: one HTML file to mail, which needs no network.
 
     Parameters
@@ -63,10 +68,8 @@ def report_run(directory: Path, to: Path | None = None, origins: tuple[Origin, .
 
     Raises
     ------
-    InputError
-        If the name is none of an HTML file, or there is no folder for it.
-    postprocess.dump.DumpError
-        If the dumps cannot be read.
+    InputError, postprocess.dump.DumpError
+        If the name is none of an HTML file, or there is no folder for it; if the dumps cannot be read.
     """
     path = to or directory / NAME
     check_report(path)
@@ -87,21 +90,14 @@ def summary_of(case: Case) -> str:
     return f"{', '.join(bodies)} {boundary} of {case.boundary.material}{liquid}; {case.drive.described()}."
 
 
-def shown_of(directory: Path, result: dict[str, Any], origins: tuple[Origin, ...] | None = None) -> dict[str, Any]:
+def shown_of(directory: Path, result: dict[str, Any], origins: Origins = None) -> dict[str, Any]:
     """Of a result the warnings and quantities; of its case a summary, the parameters, and those that are guessed.
 
     Of runs that did not keep where their values come from, the parameters are in SI units.
     """
     case = case_of(directory)
     parameters = [
-        {
-            "key": one.key,
-            "text": one.text,
-            "origin": one.origin,
-            "source": one.source,
-            "range": " … ".join(map(text_of, one.range or ())),
-            "guessed": one.guessed,
-        }
+        vars(one) | {"range": " … ".join(map(text_of, one.range or ())), "guessed": one.guessed}
         for one in (case.origins if origins is None else origins)
     ]
     return {
@@ -118,7 +114,7 @@ def flat(values: Any) -> Iterator[tuple[str, Any]]:
     return ((key, value) for key, value in dotted(values) if value not in (None, "", [], ()))
 
 
-def result_html(directory: Path, result: dict[str, Any], origins: tuple[Origin, ...] | None = None) -> str:
+def result_html(directory: Path, result: dict[str, Any], origins: Origins = None) -> str:
     """A result as a piece of HTML: a table with errors and units, warnings, and the parameters folded in."""
     headline = next((line for one in analyses_in(result) for line in one.lines(result)), result["case"])
     return fill("result.html.j2", headline=headline, shown=shown_of(directory, result, origins), run=directory.name)
