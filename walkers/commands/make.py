@@ -30,8 +30,7 @@ from walkers.commands.arguments import (
 from walkers.pipeline import DEFAULT_OUT
 
 if TYPE_CHECKING:
-    from walkers.check.audit import Checked
-    from walkers.check.validate import Chapter
+    from walkers.check.report import Chapter
     from walkers.inputs.case import Case as Resolved
     from walkers.pipeline import Run
 
@@ -286,8 +285,8 @@ def audit(
     from walkers.runner.binary import find_engine
     from walkers.runner.failures import EngineMissing
 
-    def told(checked: Checked) -> None:
-        tell(f"{checked.name} ({checked.seconds:.1f} s)")
+    def told(chapter: Chapter) -> None:
+        tell(f"{chapter.name} ({chapter.seconds:.1f} s)")
 
     checks = selected(only or (), quick=quick)
     try:
@@ -319,8 +318,9 @@ def crosscheck(
 ) -> int:
     """Compare a case's run with an engine of our own, written from the published formulas; exit 1 if they differ."""
     from walkers import pipeline
-    from walkers.check.comparison import crosscheck, describe, shortened
+    from walkers.check.crosscheck import crosscheck, shortened
     from walkers.check.engine import TERMS
+    from walkers.check.report import as_dict
     from walkers.inputs.errors import InputError, Problem
     from walkers.progress import progress_of
 
@@ -340,12 +340,11 @@ def crosscheck(
             return pipeline.run(one, folder, engine=engine, progress=advance, allow_failed_audit=allow_failed_audit)
 
     found = crosscheck(loaded, out, without or (), seeds=seeds, make=make)
-    if as_json:
-        print(json.dumps(found.as_dict(), ensure_ascii=False))
-    else:
-        print(describe(found))
-        tell(*(f"{loaded.name}: differs: {one}" for one in found.disagreements))
-    return 1 if found.disagreements else 0
+    chapter = found.chapter()
+    print_as(as_json, lambda: as_dict([chapter], case=loaded.name, without=list(found.without)), chapter.as_text)
+    if not as_json:
+        tell(*(f"{loaded.name}: differs: {line.what}" for line in chapter.failures))
+    return 1 if chapter.failures else 0
 
 
 def validate(
@@ -357,6 +356,7 @@ def validate(
     as_json: Json = False,
 ) -> int:
     """Check the decks against published benchmarks, exact solutions and a second engine, and write a page of it."""
+    from walkers.check.report import as_dict
     from walkers.check.validate import validate
     from walkers.sweeps.site import cores_here
 
@@ -368,7 +368,6 @@ def validate(
         tell(f"{chapter.name} done")
 
     made = validate(out, folder, only=chapters or (), quick=quick, jobs=jobs or cores_here(), on_done=told)
-    numbers = {chapter.name: dict(chapter.numbers) for chapter in made.chapters}
-    print_as(as_json, lambda: numbers, lambda: "\n".join(map(str, made.files)))
+    print_as(as_json, lambda: as_dict(made.chapters), lambda: "\n".join(map(str, made.files)))
     tell(*(f"not as expected: {statement}" for statement in made.failed))
     return 1 if made.failed else 0
