@@ -93,10 +93,6 @@ bench: setup ## Measure what docs/explanation/performance.md states
 bench-accuracy: setup ## The comparison's numbers against decks of one point, 2 µs and 60 cycles (a quarter of an hour)
 	.venv/bin/python -m tests.benchmark_accuracy $(OUT)
 
-.PHONY: bench-sweeps
-bench-sweeps: setup ## Measure what docs/explanation/performance.md states of sweeps
-	.venv/bin/python tests/benchmark_sweeps.py
-
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/api docs/reference/generated

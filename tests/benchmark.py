@@ -26,11 +26,11 @@ from walkers.inputs.case import Case
 from walkers.runner import find_engine
 from walkers.runner.binary import plugin_of
 from walkers.runner.directory import write_deck
-from walkers.sweeps.record import read_record
 from walkers.templates.deck import DECK_NAME, Segment, render_deck
 from walkers.templates.engine import ALONE
 from walkers.theory.motion import Friction, Walker, walk
 
+_PROGRAM = str(Path(sys.executable).with_name("walkers"))
 _REPEATS = 3
 _STOCK_DECKS = Path(__file__).with_name("benchmark_decks.tar.xz")
 RATIOS = Path(__file__).with_name("benchmark_ratios.json")
@@ -44,6 +44,21 @@ DECKS: Decks = {
     "pile-1630": lambda: (load_case("pile-fig1a", {"run.ranks": 1}), Segment(0, 12_000, 0)),
 }
 """Of the same cases and steps as the stock engine's decks; piles are shaken from where they were poured."""
+_GRID = """
+case = "fig1b"
+[axes]
+drive.frequency         = { linspace = ["60 Hz", "90 Hz", 100] }
+drive.peak_acceleration = { linspace = ["0.5 g", "10 g", 100] }
+"""
+_TRIVIAL = """
+case = "fig1b"
+[set]
+dimers.replicates   = 1
+run.cycles          = 2
+run.settling_cycles = 0
+[axes]
+dimers.angle = { linspace = ["0 deg", "90 deg", 1000] }
+"""
 
 
 def _seconds(command: Sequence[str], folder: Path) -> float:
@@ -89,13 +104,12 @@ def _loop(folder: Path, environment: Mapping[str, str]) -> float:
 
 def measure_program(folder: Path) -> None:
     """Time of ``walkers --help`` and of everything in ``walkers run fig1b`` that is not the engine process."""
-    program = str(Path(sys.executable).with_name("walkers"))
     print("| | seconds |\n|---|---|")
-    print(f"| `walkers --help` | {min(_seconds([program, '--help'], folder) for _ in range(_REPEATS)):.2f} |")
+    print(f"| `walkers --help` | {min(_seconds([_PROGRAM, '--help'], folder) for _ in range(_REPEATS)):.2f} |")
     overheads, engines = [], []
     for _ in range(_REPEATS):
         shutil.rmtree(folder / "runs", ignore_errors=True)
-        total = _seconds([program, "run", "fig1b", "--json"], folder)
+        total = _seconds([_PROGRAM, "run", "fig1b", "--json"], folder)
         (manifest,) = folder.glob("runs/*/manifest.json")
         engine = json.loads(manifest.read_text())["seconds"]["engine"]
         overheads.append(total - engine)
@@ -103,23 +117,44 @@ def measure_program(folder: Path) -> None:
     print(f"| `walkers run fig1b`, the engine process | {min(engines):.2f} |")
     print(f"| `walkers run fig1b`, everything else | {min(overheads):.2f} |")
     for command in ("plot", "vtk", "render"):
-        print(f"| `walkers {command} fig1b` | {_seconds([program, command, 'fig1b'], folder):.2f} |")
+        print(f"| `walkers {command} fig1b` | {_seconds([_PROGRAM, command, 'fig1b'], folder):.2f} |")
 
 
 def measure_figures(folder: Path) -> None:
     """Time of ``walkers figures`` from nothing, and of the engines within it."""
-    program, out = str(Path(sys.executable).with_name("walkers")), folder / "figures-runs"
-    seconds = _seconds([program, "figures", "--out", str(out), "--to", str(folder / "figures")], folder)
-    manifests = {path.parent.name: json.loads(path.read_text()) for path in out.glob("*/manifest.json")}
-    deck_of = {name: run.get("shared_deck", {}).get("first", name) for name, run in manifests.items()}
-    loops = {deck_of[name]: run["seconds"]["engine_loop"] for name, run in manifests.items()}
-    fig2 = {deck_of[name] for name in read_record(out / "fig2").runs}
+    command = [_PROGRAM, "figures", "--out", str(folder / "of-figures"), "--to", str(folder / "figures")]
+    seconds, again = _seconds(command, folder), _seconds(command, folder)
+    loops = _loops(folder / "of-figures")
     print("\n| | |\n|---|---|")
     print(f"| `walkers figures` from nothing, wall time | {seconds:.0f} s |")
     print(f"| of the engines' loops, on all cores | {sum(loops.values()):.0f} core-seconds in {len(loops)} decks |")
-    print(f"| of the 480 walkers of Fig. 2 | {sum(loops[name] for name in fig2):.1f} core-seconds |")
-    again = _seconds([program, "figures", "--out", str(out), "--to", str(folder / "figures")], folder)
     print(f"| the same again, all runs finished | {again:.0f} s |")
+
+
+def _loops(out: Path) -> dict[str, float]:
+    """Time in the engine's loop of each deck, s."""
+    manifests = {path.parent.name: json.loads(path.read_text()) for path in out.glob("*/manifest.json")}
+    return {
+        run.get("shared_deck", {}).get("first", name): run["seconds"]["engine_loop"] for name, run in manifests.items()
+    }
+
+
+def measure_sweeps(folder: Path) -> None:
+    """What a point costs beside the engine, what planning ten thousand does, and the sweep of Fig. 2."""
+    (folder / "grid.toml").write_text(_GRID)
+    (folder / "trivial.toml").write_text(_TRIVIAL)
+    print("\n| | seconds |\n|---|---|")
+    for name, command in {
+        "dry run of 10,000 points": ["sweep", "grid.toml", "--dry-run"],
+        "1,000 points of two cycles, two decks at once": ["sweep", "trivial.toml", "-j", "2", "--out", "of-points"],
+        "the same again, all finished": ["sweep", "trivial.toml", "--out", "of-points"],
+        "its table": ["table", "of-points/trivial", "--csv"],
+        "`fig2`, 80 points of 6 walkers, two decks at once": ["sweep", "fig2", "-j", "2", "--out", "of-fig2"],
+    }.items():
+        print(f"| {name} | {_seconds([_PROGRAM, *command], folder):.2f} |", flush=True)
+    for name in ("of-points", "of-fig2"):
+        loops = _loops(folder / name)
+        print(f"| {name}: the engines' loops in {len(loops)} decks | {sum(loops.values()):.2f} |")
 
 
 def measure_theory() -> None:
@@ -146,6 +181,7 @@ def main() -> None:
         measure_program(Path(folder))
         measure_decks(Path(folder))
         measure_figures(Path(folder))
+        measure_sweeps(Path(folder))
     measure_theory()
 
 

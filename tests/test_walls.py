@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkers.check.bench import DRY, FLOOR, Bench, bench_case, bench_recording, bench_scene
-from walkers.check.scenes import over, prescribed
+from walkers.check.scenes import DRY, FLOOR, Bench, bench_case, over, prescribed, recording, standing
 from walkers.inputs.boundary import Flat, Round, Wall
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.postprocess.dump import FloatArray
@@ -32,7 +31,7 @@ def _rows(bench: Bench, plan: Plan) -> tuple[FloatArray, FloatArray]:
     plan = replace(plan, recording=replace(plan.recording, wall_bridge_columns=WALL_BRIDGES))
     series = bench.run(plan)
     *_, (_, rows) = local_frames(series.directory / "bridges.walls.txt", WALL_BRIDGES)
-    return rows, series.position[-1]
+    return rows, series.frames[-1, :, :3]
 
 
 def test_a_bead_at_rest_in_a_cylinder_presses_with_its_weight(bench: Bench) -> None:
@@ -44,7 +43,7 @@ def test_a_bead_at_rest_in_a_cylinder_presses_with_its_weight(bench: Bench) -> N
     wall, weight = Round(3e-3), 4.0 / 3.0 * pi * RADIUS**3 * case.density * GRAVITY
     overlap = hertz_overlap(weight, RADIUS, reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio))
     bead = Bead(0, (0.0, -(wall.radius - RADIUS + overlap), 5e-3), RADIUS)
-    (row,), _ = _rows(bench, Plan(case, bench_scene([bead], [FLOOR, wall]), bench_recording(20_000, 20_000)))
+    (row,), _ = _rows(bench, Plan(case, standing([bead], [FLOOR, wall]), recording(20_000, 20_000)))
     told = dict(zip(WALL_BRIDGES, row.tolist(), strict=True))
     assert told["overlap"] == pytest.approx(overlap, rel=1e-4)
     assert (told["fx"], told["fy"], told["fz"]) == pytest.approx((0.0, weight, 0.0), rel=1e-4, abs=1e-6 * weight)
@@ -57,7 +56,7 @@ def test_walls_are_as_far_as_the_boundary_says(bench: Bench) -> None:
     walls: list[Wall] = [Flat((1e-4, 2e-4, -3e-4), (0.48, -0.36, 0.8), "leaning"), Round(2.5e-3)]
     turn, out = 2.0, 2.5e-3 - RADIUS + 1e-6
     beads = [over(walls[0], -1e-6, RADIUS), Bead(0, (out * cos(turn), out * sin(turn), 4e-3), RADIUS)]  # type: ignore[arg-type]
-    rows, places = _rows(bench, prescribed(bench_case(), bench_scene(beads, walls), 3))
+    rows, places = _rows(bench, prescribed(bench_case(), standing(beads, walls), 3))
     assert rows[:, WALL_BRIDGES.index("wall")].tolist() == [0, 1]
     for wall, row, place in zip(walls, rows, places, strict=True):
         distance, normal = float(wall.distances(place)), wall.normals(place)
@@ -82,7 +81,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("command", REFUSED)
 def test_commands_that_are_refused(bench: Bench, command: str) -> None:
-    deck = compose(prescribed(bench_case(), bench_scene([over(FLOOR, 0.0, RADIUS)]), 3))
+    deck = compose(prescribed(bench_case(), standing([over(FLOOR, 0.0, RADIUS)]), 3))
     lines = deck.text.replace("&\n", " ").splitlines()
     changed = [f"fix walls all wall/bridge {command}" if "wall/bridge" in line else line for line in lines]
     with pytest.raises(EngineError, match=REFUSED[command]):
@@ -91,9 +90,9 @@ def test_commands_that_are_refused(bench: Bench, command: str) -> None:
 
 def test_a_restart_with_other_walls_is_refused(bench: Bench) -> None:
     case, beads = bench_case(), [over(FLOOR, -1e-6, RADIUS)]
-    first = prescribed(case, bench_scene(beads), 10, checkpoint=Checkpoint(write="half.restart"))
+    first = prescribed(case, standing(beads), 10, checkpoint=Checkpoint(write="half.restart"))
     carry = bench.run(first).directory / "half.restart"
-    scene = bench_scene(beads, [FLOOR, Round(2.5e-3)])
-    recording = replace(bench_recording(20), begin=10)
+    scene = standing(beads, [FLOOR, Round(2.5e-3)])
+    second = replace(first, recording=replace(recording(20), begin=10), checkpoint=Checkpoint(read="half.restart"))
     with pytest.raises(EngineError, match="another number of walls"):
-        bench.run(replace(first, scene=scene, recording=recording, checkpoint=Checkpoint(read="half.restart")), carry)
+        bench.run(replace(second, scene=scene), carry)

@@ -4,42 +4,17 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
-from walkers.check import motions, scenes
-from walkers.check.bench import Bench
-from walkers.check.lines import Line, Verdict
+from walkers.check.report import Chapter, Line, Verdict, as_dict, count, outcome
+from walkers.check.scenes import CHECKS, LONG, Bench
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.runner.binary import AuditRecord, Engine, find_engine, write_audit
-
-CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
-    "scenes": scenes.scene_lines,
-    "restart": scenes.restart_lines,
-    "ranks": scenes.rank_lines,
-    "stock": scenes.stock_lines,
-    "thrown": motions.thrown_lines,
-    "flight": motions.flight_lines,
-    "company": motions.company_lines,
-    "step": motions.step_lines,
-}
-"""Each runs decks on a bench and gives lines; the first line of its docstring is its title."""
-LONG = ("step",)
-"""Those that ``--quick`` leaves out."""
-
-
-@dataclass(frozen=True)
-class Checked:
-    """A check that was run: its name, its lines, and the seconds that it took."""
-
-    name: str
-    lines: tuple[Line, ...]
-    seconds: float
 
 
 @dataclass(frozen=True)
@@ -48,70 +23,22 @@ class AuditReport:
 
     engine: Engine
     version: str
-    checked: tuple[Checked, ...]
-
-    @property
-    def lines(self) -> list[Line]:
-        """All lines."""
-        return [line for checked in self.checked for line in checked.lines]
+    chapters: tuple[Chapter, ...]
 
     @property
     def failures(self) -> list[Line]:
         """The lines that fail, or could not be measured."""
-        return [line for line in self.lines if line.verdict in (Verdict.FAIL, Verdict.ERROR)]
-
-    def count(self, verdict: Verdict) -> int:
-        """How many lines have a verdict."""
-        return sum(line.verdict is verdict for line in self.lines)
+        return [line for chapter in self.chapters for line in chapter.failures]
 
     def as_text(self) -> str:
-        """A line a measurement, grouped, with a verdict at the end."""
-        rows = []
-        for checked in self.checked:
-            rows.append(f"\n{checked.name}: {_title(checked.name)}")
-            rows += [_as_text(line) for line in checked.lines]
-        passed, failed = self.count(Verdict.PASS), self.count(Verdict.FAIL)
-        outcome = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
-        for other, words in ((Verdict.ERROR, "could not be measured"), (Verdict.SKIPPED, "skipped")):
-            outcome += f", {self.count(other)} {words}" if self.count(other) else ""
-        told = f"{self.version}, binary and contact model {self.engine.sha256[:12]}: {outcome}"
-        return "\n".join(rows).lstrip("\n") + f"\n\n{told}"
+        """A table for each check, and the outcome."""
+        told = f"{self.version}, binary and contact model {self.engine.sha256[:12]}: {outcome(self.chapters)}"
+        return "\n\n".join([*(chapter.as_text() for chapter in self.chapters), told])
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types; numbers that are none become null."""
+        """Plain JSON types."""
         engine = {"path": str(self.engine.path), "sha256": self.engine.sha256, "version": self.version}
-        checks = [
-            {
-                "name": checked.name,
-                "title": _title(checked.name),
-                "seconds": checked.seconds,
-                "lines": [_as_dict(line) for line in checked.lines],
-            }
-            for checked in self.checked
-        ]
-        return {"engine": engine, "passed": not self.failures, "checks": checks}
-
-
-def _title(name: str) -> str:
-    lines = str(CHECKS[name].__doc__).splitlines()
-    return lines[0].rstrip(".")
-
-
-def _number(value: float) -> str:
-    return f"{value:.5g}" if isfinite(value) else "-"
-
-
-def _as_text(line: Line) -> str:
-    numbers = f"{_number(line.expected):>9} {_number(line.measured):>9} {line.unit:3}"
-    return f"{line.verdict:7} {line.what:90} {numbers} error {_number(line.error)} of {line.tolerance:.0e}"
-
-
-def _as_dict(line: Line) -> dict[str, Any]:
-    numbers = {"expected": line.expected, "measured": line.measured, "error": line.error}
-    finite = {name: value if isfinite(value) else None for name, value in numbers.items()}
-    return {
-        "what": line.what, "unit": line.unit, **finite, "tolerance": line.tolerance, "verdict": str(line.verdict)
-    }  # fmt: skip
+        return as_dict(self.chapters, engine=engine)
 
 
 def selected(only: Collection[str] = (), *, quick: bool = False) -> tuple[str, ...]:
@@ -133,42 +60,32 @@ def run_audit(
     names: Collection[str] = tuple(CHECKS),
     *,
     engine: Engine | None = None,
-    on_done: Callable[[Checked], None] | None = None,
+    on_done: Callable[[Chapter], None] | None = None,
 ) -> AuditReport:
-    """Run checks on an engine.
-
-    Parameters
-    ----------
-    names
-        Which of the `CHECKS`.
-    engine
-        The binary; the installed one if None.
-    on_done
-        Called with each check as it is done.
-    """
+    """Run some of the `CHECKS` on an engine, the installed one if None is given; ``on_done`` is told of each."""
     binary = engine or find_engine()
     with tempfile.TemporaryDirectory(prefix="walkers-audit-") as folder:
         bench = Bench(binary, Path(folder))
 
-        def measure(name: str) -> Checked:
-            begin = time.perf_counter()
+        def measure(name: str) -> Chapter:
+            begin, title = time.perf_counter(), (CHECKS[name].__doc__ or "").rstrip(".")
             try:
                 lines = tuple(CHECKS[name](bench))
             except Exception as failure:  # whatever another build of the engine does, the table must come
                 reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
-                lines = (Line(f"{_title(name)}: {reason}", nan, nan, 0.0, unmeasured=Verdict.ERROR),)
-            checked = Checked(name, lines, time.perf_counter() - begin)
+                lines = (Line.without_number(f"{title}: {reason}", Verdict.ERROR),)
+            chapter = Chapter(name, title, lines, seconds=time.perf_counter() - begin)
             if on_done:
-                on_done(checked)
-            return checked
+                on_done(chapter)
+            return chapter
 
         pool = ThreadPoolExecutor(2)
         try:
-            checked = tuple(pool.map(measure, names))
+            chapters = tuple(pool.map(measure, names))
         finally:
             bench.stop.set()
             pool.shutdown(cancel_futures=True)
-        return AuditReport(binary, bench.version, checked)
+        return AuditReport(binary, bench.version, chapters)
 
 
 def record(report: AuditReport, *, quick: bool) -> AuditRecord | None:
@@ -176,15 +93,15 @@ def record(report: AuditReport, *, quick: bool) -> AuditRecord | None:
 
     A report with a line that could not be measured says something of the machine, not of the binary: it is not kept.
     """
-    if report.count(Verdict.ERROR):
+    if count(report.chapters, Verdict.ERROR):
         return None
     kept = AuditRecord(
         engine=report.engine.sha256,
         version=report.version,
         scope="quick" if quick else "full",
-        lines=len(report.lines),
+        lines=sum(len(chapter.lines) for chapter in report.chapters),
         failures=tuple(line.what for line in report.failures),
-        skipped=report.count(Verdict.SKIPPED),
+        skipped=count(report.chapters, Verdict.SKIPPED),
         date=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
     )
     write_audit(kept)

@@ -1,48 +1,119 @@
-"""Published laws of bridges beside the Young–Laplace equation, and walkers by other laws."""
+"""Published laws of bridges beside the Young–Laplace equation, and walkers by other laws.
+
+A published law gives the pull over the surface tension, F/γ, of a bridge of constant volume at gaps, in Derjaguin's
+way (`walkers.physics.capillary.derjaguin_radius`) where it was made for equal spheres. Coefficients and numbers of
+equations are those in the source of YADE (its ViscElCapPhys) and, for Bagheri et al., of MercuryDPM, by these authors.
+
+References
+----------
+Soulié et al. (2006), Willett et al. (2000), Rabinovich et al. (2005), Lambert et al. (2008): in `walkers.physics`.
+T. Weigert, S. Ripperger, Part. Part. Syst. Charact. 16 (1999) 238–242,
+doi 10.1002/(SICI)1521-4117(199910)16:5<238::AID-PPSC238>3.0.CO;2-E.
+M. Bagheri, S. Roy, T. Pöschel, Comput. Part. Mech. 11 (2024) 2179–2190, doi 10.1007/s40571-024-00772-5.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
-from math import acos, degrees, inf, pi, radians
+from math import acos, cos, degrees, inf, log, pi, radians, sin, sqrt
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from walkers.check.bridge_laws import LAWS, Law
-from walkers.check.validate import Chapter
+from walkers.check.report import Chapter, Line
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.physics.bridge import Surfaces
-from walkers.physics.laplace import ForceCurve, force_curve
+from walkers.physics import capillary, rabinovich, soulie, willett, young_laplace
+from walkers.physics.bridge import FloatArray, Surfaces
+from walkers.physics.capillary import derjaguin_radius
+from walkers.physics.laplace import force_curve
 from walkers.pipeline import run
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, series_look, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-CASES = ("fig1b", "fig4a", "climber-dimer")
-"""Whose Bond numbers are told."""
-COMPARED = ("fig1b", "climber-dimer")
-"""With whose bridges published laws are compared: of the walkers' liquid, and of the piles'."""
-WALKED = ("fig1b", "fig4a")
-WALKED_BY = ("young-laplace", "willett", "rabinovich", "soulie")
+CASES, COMPARED = ("fig1b", "fig4a", "climber-dimer"), ("fig1b", "climber-dimer")
+"""Whose Bond numbers are told; with whose bridges, of the walkers' liquid and of the piles', laws are compared."""
+WALKED, WALKED_BY = ("fig1b", "fig4a"), ("young-laplace", "willett", "rabinovich", "soulie")
 """Cases and laws of the velocities."""
 _FRACTIONS, _ANGLES = (0.01, 0.05, 0.25), (0.0, radians(40.0))
-_GAPS = 280
-
-Shape = tuple[float, float, float, float]
+_GAPS, _FIT = 280, 0.04
 
 
-def shapes(names: tuple[str, ...] = CASES) -> dict[str, Surfaces]:
-    """Bridges of the dimers of shipped cases: between their beads, and of the large one at a wall.
+def weigert(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
+    """Weigert and Ripperger (1999), Eqs. 5, 6, 15–17, 21, 22: a toroid, its filling angle by a fit."""
+    radius = derjaguin_radius(radius_1, radius_2)
+    spread = (1.0 + 3.0 * gaps / radius) * (1.0 + 1.1 * sin(contact_angle))
+    angle = np.arcsin(np.minimum(1.0, (volume / (0.96 * radius**3 * spread)) ** 0.25))
+    meridian = (2.0 * radius * (1.0 - np.cos(angle)) + gaps) / (2.0 * np.cos(angle + contact_angle))
+    neck = radius * np.sin(angle) + meridian * (np.sin(angle + contact_angle) - 1.0)
+    line = radius * np.sin(angle)
+    pressure = 1.0 / meridian - 1.0 / neck
+    return pi * line**2 * pressure + 2.0 * pi * line * np.sin(angle + contact_angle)
 
-    In units of the bead's radius that at a wall is the same for all beads.
+
+def bagheri(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
+    """Bagheri, Roy and Pöschel (2024), Eqs. 24–30, with the gap over `walkers.physics.willett.rupture`."""
+    radius = derjaguin_radius(radius_1, radius_2)
+    v, t = volume / radius**3, contact_angle
+    a, b = 0.4158 * v**0.2835 + 0.6474, -0.2087 * v**0.3113 + 2.267
+    touching = 2.0 * pi * (1.0 - 0.3823 * v**0.2586) * (1.0 - a * sin(t) ** b)
+    a_s = -0.3319 * v**0.4974 + 0.6717 * v**0.1995
+    b_s = 13.84 * v**-0.3909 - 12.11 * v**-0.3945
+    cubic = -0.007815 * log(v) ** 2 - 0.2105 * log(v) - 1.426
+    linear = -1.78 * v**0.8351 + 0.6669 * v**-0.01391
+    b_s *= cubic * t**3 + linear * t + 1.0
+    s = gaps / willett.rupture(radius_1, radius_2, volume, contact_angle)
+    return np.asarray(radius * touching * (1.0 + a_s * s) / (1.0 + b_s * a_s * s + b_s * s**2))
+
+
+def willett_simple(
+    radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray
+) -> FloatArray:
+    """Willett et al. (2000), Eq. 12, for small volumes: F = 2πRγ cos θ / (1 + 2.1 s + 10 s²)."""
+    radius = derjaguin_radius(radius_1, radius_2)
+    s = gaps / 2.0 / sqrt(volume / radius)
+    return 2.0 * pi * radius * cos(contact_angle) / (1.0 + 2.1 * s + 10.0 * s**2)
+
+
+def rupture_of_lian(radius_1: float, radius_2: float, volume: float, contact_angle: float) -> float:  # noqa: ARG001
+    """Lian, Thornton and Adams (1993), whatever the radii."""
+    return capillary.rupture_distance(volume, contact_angle)
+
+
+class Law(NamedTuple):
+    """A published law: its ``pull`` (radii, volume, contact angle, gaps → F/γ) and its ``rupture`` distance.
+
+    Those that give no rupture distance have Lian et al.'s.
     """
+
+    name: str
+    pull: Callable[[float, float, float, float, FloatArray], FloatArray]
+    rupture: Callable[[float, float, float, float], float]
+
+
+SOULIE = Law("Soulié 2006 (stock engine)", soulie.pull, rupture_of_lian)
+FITS = (Law("Willett 2000", willett.pull, willett.rupture), Law("Bagheri 2024", bagheri, willett.rupture))
+"""Those made of solutions of the equation."""
+LAWS = (
+    SOULIE,
+    FITS[0],
+    Law("Willett 2000, Eq. 12", willett_simple, willett.rupture),
+    Law("Rabinovich 2005", rabinovich.pull, rupture_of_lian),
+    Law("Lambert 2008", rabinovich.lambert, rupture_of_lian),
+    Law("Weigert 1999", weigert, rupture_of_lian),
+    FITS[1],
+)
+
+
+def shapes(names: tuple[str, ...]) -> dict[str, Surfaces]:
+    """Bridges of the dimers of shipped cases: between their beads, and of the large one at a wall."""
     found = {}
     for name in names:
         case = load_case(name)
@@ -52,15 +123,20 @@ def shapes(names: tuple[str, ...] = CASES) -> dict[str, Surfaces]:
     return found
 
 
-def shape_of(surfaces: Surfaces) -> Shape:
+def shape_of(surfaces: Surfaces) -> tuple[float, float, float, float]:
     """Arguments of a law's: radii, m, volume, m³, and contact angle, rad."""
     return surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle
 
 
-@cache
-def reference(shape: Shape) -> ForceCurve:
-    """Young–Laplace's curve, lengths in m."""
-    return force_curve(*shape)
+def exact(surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
+    """Gaps from contact to rupture, m, and Young–Laplace's F/γ there, m."""
+    curve = young_laplace.law(surfaces)
+    gaps = _even(curve.rupture)
+    return gaps, curve.forces(gaps).pull / surfaces.liquid.surface_tension
+
+
+def _even(rupture: float) -> FloatArray:
+    return 0.5 * rupture * (1.0 - np.cos(np.linspace(0.0, pi, _GAPS)))
 
 
 class Deviation(NamedTuple):
@@ -73,44 +149,44 @@ class Deviation(NamedTuple):
 
 def deviation(law: Law, surfaces: Surfaces) -> Deviation:
     """A law over Young–Laplace for a bridge."""
-    shape = shape_of(surfaces)
-    exact, rupture = reference(shape), law.rupture(*shape)
-    gaps = 0.5 * rupture * (1.0 - np.cos(np.linspace(0.0, pi, _GAPS)))
+    shape, (places, true) = shape_of(surfaces), exact(surfaces)
+    gaps = _even(law.rupture(*shape))
     forces = law.pull(*shape, gaps)
-    return Deviation(
-        pull=float(forces[0] / exact.forces[0]),
-        work=float(np.trapezoid(forces, gaps)) / exact.work,
-        rupture=rupture / exact.rupture,
-    )
+    work = float(np.trapezoid(forces, gaps) / np.trapezoid(true, places))
+    return Deviation(float(forces[0] / true[0]), work, float(gaps[-1] / places[-1]))
 
 
 def chapter(out: Path, *, quick: bool = False) -> Chapter:
-    """Published laws beside the Young–Laplace equation, and walkers by other laws.
-
-    Parameters
-    ----------
-    out
-        Folder of the run directories.
-    quick
-        No walkers.
-    """
+    """Published laws beside the Young–Laplace equation, and, unless ``quick``, walkers by other laws."""
     compared = shapes(COMPARED)
-    numbers = {
-        "laws": [
-            {"name": law.name, **{key: deviation(law, one)._asdict() for key, one in compared.items()}} for law in LAWS
-        ],
-        "soulie_at_walls": [deviation(LAWS[0], one)._asdict() for one in _walls()],
-        "velocities": {} if quick else _velocities(out),
-        "bond_numbers": {name: _bond_number(load_case(name)) for name in CASES},
-        "coverage": _coverage(CASES[0]),
-    }
-    return Chapter(
-        name="bridges",
-        title="Capillary bridges by the Young–Laplace equation",
-        text=_text_of(numbers, compared),
-        figures={"bridges": figure(compared)},
-        numbers=numbers,
+    laws = {law: {key: deviation(law, one) for key, one in compared.items()} for law in LAWS}
+    lines = []
+    for law, found in laws.items():
+        for key, one in found.items():
+            what, allowed = f"{law.name}, {key}", _FIT if law in FITS else inf
+            lines.append(Line(f"{what}: pull at contact over Young–Laplace's", 1.0, one.pull, allowed))
+            lines.append(Line(f"{what}: work over Young–Laplace's", 1.0, one.work))
+    velocities: dict[str, dict[str, float]] = {}
+    for name in () if quick else WALKED_BY:
+        runs = {case: run(load_case(case, {"liquid.law": name}), out) for case in WALKED}
+        velocities[name] = {case: one.result["velocity"]["mean"] for case, one in runs.items()}
+    text = rendered(
+        "walkers.check",
+        "bridges.md.j2",
+        degrees=degrees,
+        compared=compared,
+        laws={law.name: found for law, found in laws.items()},
+        best_pull=max(abs(one.pull - 1.0) for law in FITS for one in laws[law].values()),
+        soulie_at_walls=[deviation(SOULIE, one) for one in _walls()],
+        fractions=_FRACTIONS,
+        angles=_ANGLES,
+        walked=WALKED,
+        velocities=velocities,
+        bond_numbers={name: _bond_numbers(load_case(name)) for name in CASES},
+        coverage=_coverage(CASES[0]),
     )
+    title = "Capillary bridges by the Young–Laplace equation"
+    return Chapter("bridges", title, tuple(lines), text, {"bridges": figure(compared)})
 
 
 def _walls() -> list[Surfaces]:
@@ -120,57 +196,22 @@ def _walls() -> list[Surfaces]:
     return [Surfaces.of(1.0, inf, liquid, case.contact.minimum_separation_ratio) for liquid in liquids]
 
 
-def _velocities(out: Path) -> dict[str, dict[str, float]]:
-    """Velocities of walkers by law and case, m/s."""
-    return {
-        law: {name: run(load_case(name, {"liquid.law": law}), out).result["velocity"]["mean"] for name in WALKED}
-        for law in WALKED_BY
-    }
-
-
-def _bond_number(case: Case) -> dict[str, float]:
+def _bond_numbers(case: Case) -> tuple[float, float]:
     """ρgR²/γ of the largest bead, and what the drive's peak acceleration makes of it."""
     liquid, radius = case.liquid, max(dimer_of(case).radii)
-    if liquid.density is None:
-        raise ValueError("liquid.density: expected, for a Bond number")
+    assert liquid.density is not None, case.name
     at_rest = liquid.density * ACCELERATION_OF_ONE_G * radius**2 / liquid.surface_tension
-    return {"at_rest": at_rest, "driven": at_rest * case.drive.peak_acceleration / ACCELERATION_OF_ONE_G}
+    return at_rest, at_rest * case.drive.peak_acceleration / ACCELERATION_OF_ONE_G
 
 
 def _coverage(name: str) -> dict[str, float]:
     """How far bridges at contact reach around the beads of a dimer, rad, and the room between wall and other bead."""
     beads, wall = shapes((name,)).values()
-    small, large = _filling_angles(beads)
-    apart = acos((beads.other_radius - beads.radius) / (beads.other_radius + beads.radius))
-    return {
-        "wall": _filling_angles(wall)[0],
-        "large": large,
-        "large_room": apart,
-        "small": small,
-        "small_room": pi - apart,
-    }
-
-
-def _filling_angles(surfaces: Surfaces) -> list[float]:
-    """Angles from the axis to the wetting lines at contact, rad."""
-    arcs = reference(shape_of(surfaces)).arcs[0].tolist()
-    return [arc / radius for arc, radius in zip(arcs, (surfaces.radius, surfaces.other_radius), strict=True)]
-
-
-def _text_of(numbers: dict[str, Any], compared: dict[str, Surfaces]) -> str:
-    """The chapter's Markdown."""
-    fits = [row for row in numbers["laws"] if row["name"] in {LAWS[1].name, LAWS[-1].name}]
-    return rendered(
-        "walkers.check",
-        "bridges.md.j2",
-        degrees=degrees,
-        compared=compared,
-        walked=WALKED,
-        fractions=_FRACTIONS,
-        angles=_ANGLES,
-        best_pull=max(abs(row[key]["pull"] - 1.0) for row in fits for key in compared),
-        **numbers,
+    (small, large), (at_wall, _) = (
+        force_curve(*shape_of(one), [0.0]).bridges[0, :2] / (one.radius, one.other_radius) for one in (beads, wall)
     )
+    apart = acos((beads.other_radius - beads.radius) / (beads.other_radius + beads.radius))
+    return {"wall": at_wall, "large": large, "large_room": apart, "small": small, "small_room": pi - apart}
 
 
 @styled
@@ -178,14 +219,13 @@ def figure(compared: dict[str, Surfaces]) -> Figure:
     """Pull against gap by Young–Laplace and by the published laws."""
     drawing, axes = new_figure(TWO_COLUMNS, 5.0, nrows=2, ncols=2, sharex=True, sharey=True)
     for panel, (name, surfaces) in zip(axes.flat, compared.items(), strict=True):
-        shape = shape_of(surfaces)
-        exact = reference(shape)
+        shape, (places, true) = shape_of(surfaces), exact(surfaces)
         for number, law in enumerate(LAWS):
             gaps = np.linspace(0.0, law.rupture(*shape), _GAPS)
-            pull = law.pull(*shape, gaps) / exact.forces[0]
-            panel.plot(gaps / exact.rupture, pull, label=law.name, **{**series_look(number), "marker": ""})
-        panel.plot(exact.gaps / exact.rupture, exact.forces / exact.forces[0], "k", lw=2.0, label="Young–Laplace")
-        panel.plot(1.0, exact.forces[-1] / exact.forces[0], "ko", ms=5)
+            pull = law.pull(*shape, gaps) / true[0]
+            panel.plot(gaps / places[-1], pull, label=law.name, **{**series_look(number), "marker": ""})
+        panel.plot(places / places[-1], true / true[0], "k", lw=2.0, label="Young–Laplace")
+        panel.plot(1.0, true[-1] / true[0], "ko", ms=5)
         panel.set(
             title=f"{name}: liquid {surfaces.liquid.volume_fraction:g}, {degrees(shape[3]):.3g}°",
             xlabel="gap / rupture distance\nby Young–Laplace",

@@ -1,43 +1,254 @@
-"""The second engine's chapter of docs/explanation/validation.md: cases of all kinds in both engines, and other laws."""
+"""A finished run of LIGGGHTS beside the second engine: the same start, the same samples, the same analysis.
+
+`crosscheck` compares a case, `chapter` cases of all kinds for docs/explanation/validation.md.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import warnings
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from math import degrees
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
+from scipy.stats import ks_2samp
 
-from walkers.check.comparison import FEWEST_SEEDS, Comparison, crosscheck, shortened, simulate
-from walkers.check.validate import Chapter
+from walkers.check.engine import TERMS, SecondEngine
+from walkers.check.kernels import FloatArray
+from walkers.check.report import Chapter, Line, Verdict
 from walkers.inputs import resolve_case
-from walkers.inputs.case import Case
+from walkers.inputs.case import Case, settling_of
 from walkers.inputs.reading import load_case, read_toml, shipped_cases
 from walkers.inputs.text import rendered
-from walkers.pipeline import run
-from walkers.postprocess.gait import walk
+from walkers.pipeline import Run, run
+from walkers.postprocess.gait import averages, walk
+from walkers.postprocess.motion import Group, Motion
 
-_ALONE = {"replicates": 2, "facing": "right"}
-_PILE_CYCLES = 24
-_IN_GROOVE = "groove of 120°"
-SUPPOSITIONS: dict[str, tuple[str, ...]] = {
-    "the decks' laws": (),
-    "no lubrication": ("lubrication",),
-    "no rolling friction": ("rolling-friction",),
-    "no damping of contacts": ("damping",),
-}
-"""What if: each with the terms that are left out."""
+SPEED, GAIT, ORIENTATION = 1e-4, 1e-3, 0.1
+"""How far the second engine may differ: relative, of walkers' velocities; of rotation and sliding, relative to the
+fastest of them (of small differences these are, where contacts open); at the end, in degrees."""
+SPEED_FLOOR = 2e-3
+"""mm/s, of walkers that hardly move: differences that are always allowed."""
+ONE = 0.01
+"""Of the smallest radius: places that are no farther apart are those of one motion."""
+SIGNIFICANCE = 0.01
+"""Distributions differ if a Kolmogorov-Smirnov test says so with a smaller p …"""
+FEWEST = 5
+"""… which it can from so many starts on."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """Both motions from one start: LIGGGHTS's, and the second engine's at the same samples."""
+
+    first: Motion
+    second: Motion
+
+    @cached_property
+    def apart(self) -> FloatArray:
+        """Largest distance of a bead in one from itself in the other, m, of each frame."""
+        return np.asarray(np.linalg.norm(self.first.position - self.second.position, axis=-1).max(axis=1))
+
+    @property
+    def together(self) -> float | None:
+        """Cycles of the drive after which they are no longer one; None if they are to the end."""
+        over = np.flatnonzero(self.apart > ONE * float(self.first.radius.min()))
+        return float(self.first.time[over[0]]) * self.first.case.drive.frequency if len(over) else None
+
+    def line(self) -> Line:
+        """How they part; piles, which are chaotic, fail if they do in the first cycle."""
+        case, cycles = self.first.case, self.together
+        told = "one motion to the end" if cycles is None else f"one motion until cycle {cycles:.1f}"
+        name = f"start {case.seed}, " if case.mixture is not None else ""
+        early = case.mixture is not None and cycles is not None and cycles < 1.0
+        farthest = 1e6 * float(self.apart.max())
+        given = Verdict.FAIL if early else None
+        return Line(f"{name}{told}; places at most apart", 0.0, farthest, unit="µm", given=given)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A case in both engines: lines, the one to look at first (of a pile means over the starts), and the runs."""
+
+    case: Case
+    without: tuple[str, ...]
+    lines: tuple[Line, ...]
+    starts: tuple[Start, ...]
+
+    def chapter(self) -> Chapter:
+        """What is printed."""
+        case = self.case
+        laws = f"without {', '.join(self.without)}" if self.without else "with the decks' laws"
+        title = f"{case.drive.described()}, {case.run.cycles} cycles; LIGGGHTS, and the second engine {laws}"
+        return Chapter(case.name, title, (*self.lines, *(start.line() for start in self.starts)))
+
+
+def crosscheck(
+    case: Case,
+    out: Path,
+    without: Sequence[str] = (),
+    *,
+    seeds: int = 1,
+    make: Callable[[Case, Path], Run] = run,
+) -> Comparison:
+    """Compare a case's run, and of a pile those of so many ``seeds`` from its own on, with the second engine.
+
+    ``out`` is the folder of the run directories, ``without`` terms that the second engine leaves out
+    (`walkers.check.engine.TERMS`), ``make`` makes the run of a case if it is missing.
+
+    Raises
+    ------
+    runner.EngineFailure
+        If the engine fails in one of the known ways.
+
+    Examples
+    --------
+    >>> crosscheck(load_case("fig1b"), tmp).chapter().failures
+    []
+    """
+    return compare([make(replace(case, seed=case.seed + number), out).motion for number in range(seeds)], without)
+
+
+def compare(motions: Sequence[Motion], without: Sequence[str] = ()) -> Comparison:
+    """Compare finished runs of a case, one a start, with the second engine without some terms."""
+    starts = tuple(Start(motion, simulate(motion, without)) for motion in motions)
+    case, first, second = motions[0].case, starts[0].first, starts[0].second
+    if case.mixture is not None:
+        lines = list(_pile_lines(starts))
+    else:
+        lines = [] if first.groups else list(_drift(first, second))
+        for number, groups in enumerate(zip(first.groups, second.groups, strict=True)):
+            lines += _walker_lines(*groups, f" ({number + 1})" if len(first.groups) > 1 else "")
+    return Comparison(case, tuple(term for term in TERMS if term in without), tuple(lines), starts)
+
+
+def shortened(case: Case, cycles: int) -> Case:
+    """The case for so many cycles at a stretch, a third of them to settle.
+
+    Raises
+    ------
+    ValueError
+        If samples are taken more rarely, or there would be too few.
+    """
+    rare = case.run.cycles_per_sample
+    least = 3 * rare
+    if cycles < least or cycles % rare:
+        raise ValueError(f"expected at least {least}" + (f", a multiple of {rare}" if rare > 1 else ""))
+    whole = case.run.cycles_per_segment >= case.run.cycles
+    segment = cycles if whole else min(case.run.cycles_per_segment, cycles)
+    lengths = {"cycles": cycles, "settling_cycles": settling_of(cycles), "cycles_per_segment": segment}
+    return replace(case, run=replace(case.run, until_steady=False, **lengths))
+
+
+def simulate(motion: Motion, without: Collection[str] = ()) -> Motion:
+    """Move the beads of a run's first frame by the second engine for as long as the run was, without some terms.
+
+    Where the run went on from a restart file the second engine does as LIGGGHTS does there.
+    """
+    first = np.concatenate([motion.position[:1], motion.velocity[:1], motion.spin[:1]], axis=-1)
+    clock = round(float(motion.time[0]) / motion.case.run.time_step)
+    engine = SecondEngine(motion.case, motion.radius, first[0], clock=clock, without=without)
+    parts = [(first, np.zeros_like(motion.spin[:1])), *_advanced(engine, motion)]
+    frames, spins = (np.concatenate([part[which] for part in parts]) for which in (0, 1))
+    position, velocity, spin = (frames[..., column : column + 3] for column in (0, 3, 6))
+    return replace(motion, position=position, velocity=velocity, spin=spin, mean_spin=spins if motion.groups else None)
+
+
+def _advanced(engine: SecondEngine, motion: Motion) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """The frames after the first and the mean spins since those before, in parts.
+
+    Of walkers, whose spins are averaged over all steps, a part is a cycle; of other beads a segment of the run.
+    """
+    steps = np.rint(motion.time / motion.case.run.time_step).astype(np.int64)
+    segments = [segment for segment, _ in motion.frames]
+    if motion.groups:
+        begins = list(range(1, len(steps), motion.case.run.samples_per_cycle))[1:]
+    else:
+        begins = [frame for frame in range(2, len(steps)) if segments[frame] != segments[frame - 1]]
+    for begin, end in pairwise([1, *begins, len(steps)]):
+        if segments[begin] != segments[begin - 1]:
+            engine.evaluate()
+        length = int(steps[end - 1] - steps[begin - 1])
+        every = length // (end - begin)
+        dense = engine.run(length, 1 if motion.groups else every)
+        frames = dense[every - 1 :: every].copy() if motion.groups else dense
+        yield frames, dense[..., 6:].reshape(end - begin, -1, dense.shape[1], 3).mean(axis=1)
+
+
+def _drift(first: Motion, second: Motion) -> Iterator[Line]:
+    """Mean velocity of the mass centre of beads that are no walkers'."""
+    weights = first.radius**3 / np.sum(first.radius**3)
+    speeds = [1e3 * weights @ (one.position[-1] - one.position[0]) / np.ptp(one.time) for one in (first, second)]
+    allowed = max(GAIT * float(np.linalg.norm(speeds[0])), SPEED_FLOOR)
+    for axis, one, two in reversed(list(zip("xyz", *speeds, strict=True))):
+        yield Line(f"mass centre along {axis}", float(one), float(two), allowed, "mm/s", scale=1.0)
+
+
+def _walker_lines(first: Group, second: Group, label: str) -> Iterator[Line]:
+    """Velocity, rotation, sliding and open shares of a make's walkers, means over them."""
+    speed, other = (1e3 * float(walk(one).velocity.mean()) for one in (first, second))
+    yield Line(f"velocity{label}", speed, other, max(SPEED * abs(speed), SPEED_FLOOR), "mm/s", scale=1.0)
+    beads = [f"bead {bead + 1}" for bead in range(len(first.radii))]
+    contacts = [*beads, *(f"beads {one + 1}-{two + 1}" for one, two in first.make.pairs)]
+    both = averages(first), averages(second)
+
+    def means(what: str, names: list[str], factor: float) -> list[tuple[str, float, float]]:
+        one, two = ((factor * getattr(found, what).mean(axis=0)).tolist() for found in both)
+        return [(f"{what} {name}{label}", *of) for name, *of in zip(names, one, two, strict=True)]
+
+    found = [*means("rotation", beads, 1e3), *means("sliding", contacts, 1e3)]
+    allowed = max(GAIT * max(abs(speed), *(abs(one) for _, one, _ in found)), SPEED_FLOOR)
+    for name, one, two in found:
+        yield Line(name, one, two, allowed, "mm/s", scale=1.0)
+    for name, one, two in means("open", contacts, 100.0):
+        if one or two:
+            yield Line(name, one, two, unit="%")
+    end, other = (degrees(float(one.orientation[-1].mean())) for one in (first, second))
+    yield Line(f"orientation at the end{label}", end, other, ORIENTATION, "°", scale=1.0)
+
+
+def _pile_lines(starts: Sequence[Start]) -> Iterator[Line]:
+    """Means of piles over the second half of the drive, and whether they are distributed alike over the starts."""
+    measures: dict[str, tuple[str, Callable[[Motion], Any]]] = {
+        "height of the beads": ("mm", lambda motion: 1e3 * motion.position[..., 2].mean()),
+        "root mean square velocity": (
+            "mm/s", lambda motion: 1e3 * np.sqrt(np.mean(np.sum(motion.velocity**2, axis=-1))),
+        ),
+        "touching pairs a bead": ("", _touching),
+    }  # fmt: skip
+
+    def later(motion: Motion) -> Motion:
+        return motion.select(slice(int(np.searchsorted(motion.time, motion.time[-1] / 2.0)), None))
+
+    halves = [(later(start.first), later(start.second)) for start in starts]
+    for name, (unit, of) in measures.items():
+        values = np.array([[of(motion) for motion in both] for both in halves], dtype=np.float64)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # where nothing differs there is no exact p
+            p = float(ks_2samp(*values.T).pvalue)
+        verdict = Verdict.PASS if p >= SIGNIFICANCE else Verdict.FAIL
+        told = f"{name}, p = {p:.2g} by Kolmogorov and Smirnov"
+        one, two = values.mean(axis=0).tolist()
+        yield Line(told, one, two, unit=unit, given=verdict if len(starts) >= FEWEST else None)
+
+
+def _touching(motion: Motion) -> float:
+    """Pairs of beads that touch, over beads."""
+    reach, radius, found = 2.0 * float(motion.radius.max()), motion.radius, 0
+    for place in motion.position:
+        near = cKDTree(place).query_pairs(reach, output_type="ndarray")
+        apart = np.linalg.norm(place[near[:, 0]] - place[near[:, 1]], axis=1)
+        found += int(np.sum(apart < radius[near].sum(axis=1)))
+    return found / len(motion.position) / len(radius)
 
 
 def chapter(out: Path, *, quick: bool = False) -> Chapter:
-    """Run cases of all kinds in both engines.
-
-    Parameters
-    ----------
-    out
-        Folder of the run directories.
-    quick
-        A short run of one walker alone.
+    """Run cases of all kinds in both engines, or only a short run of one walker.
 
     Raises
     ------
@@ -45,71 +256,32 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
         If the engine fails in one of the known ways.
     """
     cases = {"fig1b": shortened(load_case("fig1b"), 6)} if quick else full_cases()
-    found = {
-        name: crosscheck(case, out, seeds=1 if case.mixture is None else FEWEST_SEEDS) for name, case in cases.items()
-    }
-    whatif = {} if quick else suppose(out)
-    text = rendered(
-        "walkers.check",
-        "crosscheck.md.j2",
-        single={name: one for name, one in found.items() if one.case.mixture is None},
-        piles={name: one for name, one in found.items() if one.case.mixture is not None},
-        whatif=whatif,
-        jitter=_jitter(found[_IN_GROOVE]) if _IN_GROOVE in found else None,
-    )
-    numbers = {"cases": {name: one.as_dict() for name, one in found.items()}, "what_if": whatif}
-    failed = tuple(f"{name}: {told}" for name, one in found.items() for told in one.disagreements)
-    return Chapter("crosscheck", "A second engine", text, {}, numbers, failed)
+    found = {name: crosscheck(case, out, seeds=FEWEST if case.mixture else 1) for name, case in cases.items()}
+    lines = [replace(line, what=f"{name}: {line.what}") for name, one in found.items() for line in one.chapter().lines]
+    text = rendered("walkers.check", "crosscheck.md.j2", found=found)
+    return Chapter("crosscheck", "A second engine", tuple(lines), text)
 
 
 def full_cases() -> dict[str, Case]:
     """Walkers, climbers, clusters, other drives and walls, and a small pile."""
-    fan = {"clusters": [{"arrangement": "fan", "radii": ["0.3 mm", "0.2 mm", "0.2 mm"], "angle": "20 deg", **_ALONE}]}
+    alone = {"dimers.replicates": 2, "dimers.facing": "right"}
+    walker, symmetric = (read_toml(shipped_cases()[name]) for name in ("fig1b", "symmetric"))
+    fan = {"arrangement": "fan", "radii": ["0.3 mm", "0.2 mm", "0.2 mm"], "angle": "20 deg", "replicates": 2}
+    clusters = {**{name: table for name, table in walker.items() if name != "dimers"}, "clusters": [fan]}
     tones = [
         {"frequency": "80 Hz", "peak_acceleration": "4 g"},
         {"frequency": "160 Hz", "peak_acceleration": "3 g", "phase": "90 deg"},
     ]
-    return {
-        **{name: load_case(name) for name in ("fig1b", "fig4a", "fig4b")},
-        "alignment from 30°": _changed("fig1b", 40, dimers={"angle": "30 deg", **_ALONE}),
-        "symmetric from 30°": _changed("symmetric", 40, dimers={"angle": "30 deg", **_ALONE}),
-        "fan of three": _changed("fig1b", 24, ("dimers",), **fan),
-        "two tones": _changed("symmetric", 24, dimers=_ALONE, drive={"harmonics": tones}),
-        "slope of 5°": _changed("fig1b", 24, boundary={"tilt": "5 deg"}),
-        _IN_GROOVE: _changed("fig1b", 24, boundary={"shape": "groove", "opening": "120 deg"}),
-        "climber": shortened(load_case("climber"), 20),
-        "cluster in a corner": shortened(load_case("cluster"), 21),
-        "pile-ci": shortened(load_case("pile-ci"), _PILE_CYCLES),
+    shorter = {
+        "alignment from 30°": (load_case("fig1b", {"dimers.angle": "30 deg", **alone}), 40),
+        "symmetric from 30°": (load_case("symmetric", {"dimers.angle": "30 deg", **alone}), 40),
+        "fan of three": (resolve_case(clusters, name="fig1b"), 24),
+        "two tones": (resolve_case({**symmetric, "drive": {"harmonics": tones}}, name="symmetric"), 24),
+        "slope of 5°": (load_case("fig1b", {"boundary.tilt": "5 deg"}), 24),
+        "groove of 120°": (load_case("fig1b", {"boundary.shape": "groove", "boundary.opening": "120 deg"}), 24),
+        "climber": (load_case("climber"), 20),
+        "cluster in a corner": (load_case("cluster"), 21),
+        "pile-ci": (load_case("pile-ci"), 24),
     }
-
-
-def _changed(shipped: str, cycles: int, without: tuple[str, ...] = (), **tables: Any) -> Case:
-    """A shipped case for so many cycles, with changes merged into its tables; harmonics replace the drive."""
-    document = {name: table for name, table in read_toml(shipped_cases()[shipped]).items() if name not in without}
-    for name, table in tables.items():
-        if isinstance(table, dict) and "harmonics" not in table:
-            document[name] = {**document.get(name, {}), **table}
-        else:
-            document[name] = table
-    return shortened(resolve_case(document, name=shipped), cycles)
-
-
-def suppose(out: Path) -> dict[str, dict[str, float]]:
-    """Velocities of the paper's walkers by the second engine under other laws, mm/s."""
-    motions = {name: run(load_case(name), out).motion for name in ("fig1b", "fig4a", "fig4b")}
-    return {
-        told: {
-            name: 1e3 * float(walk(simulate(motion, without).groups[0]).velocity.mean())
-            for name, motion in motions.items()
-        }
-        for told, without in SUPPOSITIONS.items()
-    }
-
-
-def _jitter(found: Comparison) -> float:
-    """How far the second engine departs from itself if it begins elsewhere by the rounding of its numbers, m."""
-    (start,) = found.starts
-    place = start.first.position.copy()
-    place[0] *= 1.0 + 1e-15
-    moved = simulate(replace(start.first, position=place))
-    return float(np.linalg.norm(moved.position - start.second.position, axis=-1).max())
+    whole = {name: load_case(name) for name in ("fig1b", "fig4a", "fig4b")}
+    return whole | {name: shortened(case, cycles) for name, (case, cycles) in shorter.items()}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, log, pi, sqrt
 
@@ -15,10 +14,8 @@ from walkers.check import kernels
 from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, Pairs, State
 from walkers.inputs.boundary import Flat, Wall
 from walkers.inputs.case import Case
-from walkers.inputs.drive import Vector
 from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.physics.laws import law_of
-from walkers.physics.matter import Contact, Liquid
 
 TERMS = ("capillary", "lubrication", "damping", "friction", "rolling-friction", "gravity", "drive")
 """What may be left out: pull and resistances of the bridges, damping of Hertz's contact and of the spring along the
@@ -27,49 +24,19 @@ _SKIN = 0.4
 """Of the smallest radius: neighbours are listed anew when a bead has gone nearly half as far."""
 
 
-@dataclass(frozen=True)
-class Matter:
-    """Density of the beads (kg/m³), how they touch each other and the walls, and the liquid of the bridges."""
-
-    density: float
-    contact: Contact
-    liquid: Liquid
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """Walls, weight (m/s²) and drive in the frame of the walls.
-
-    ``harmonics`` are those of the inertial acceleration a sin(ωt + φ) from t = 0 on, each a direction, ω (rad/s), a
-    (m/s²) and φ (rad).
-    """
-
-    walls: Sequence[Wall]
-    gravity: Vector = (0.0, 0.0, 0.0)
-    harmonics: Sequence[tuple[float, ...]] = ()
-
-
-@dataclass(frozen=True)
-class Beads:
-    """Where N beads are: position (m), velocity (m/s), spin (rad/s), each of shape (N, 3), and their radii (m)."""
-
-    radius: FloatArray
-    position: FloatArray
-    velocity: FloatArray
-    spin: FloatArray
-
-
 class SecondEngine:
-    """Beads that move under some laws.
+    """Beads that move in the frame of the walls.
 
     Parameters
     ----------
-    beads
-        Where they are at first. What touches has a bridge; springs are unstretched.
-    matter, surroundings
-        What acts on them.
-    time_step
-        s.
+    case
+        Whose density, contacts, liquid, weight, drive, time step and, unless others are given, walls are taken.
+    radius : ndarray, shape (N,)
+        Of the beads, m.
+    start : ndarray, shape (N, 9)
+        Their position (m), velocity (m/s) and spin (rad/s). What touches has a bridge; springs are unstretched.
+    walls
+        Others than the case's.
     clock
         Step that it is; the drive begins with step 0.
     without
@@ -78,19 +45,20 @@ class SecondEngine:
 
     def __init__(
         self,
-        beads: Beads,
-        matter: Matter,
-        surroundings: Surroundings,
-        time_step: float,
+        case: Case,
+        radius: FloatArray,
+        start: FloatArray,
+        *,
+        walls: Sequence[Wall] = (),
         clock: int = 0,
         without: Collection[str] = (),
     ) -> None:
         if unknown := set(without) - set(TERMS):
             raise ValueError(f"without {unknown}: expected some of {', '.join(TERMS)}")
-        self.clock = clock
-        self.radius = np.ascontiguousarray(beads.radius, dtype=np.float64)
-        self.constants = _constants(self.radius, matter, surroundings, time_step, without)
-        self.state = _state(beads, len(self.constants.point))
+        self.clock, self.radius = clock, np.ascontiguousarray(radius, dtype=np.float64)
+        self.constants = _constants(case, self.radius, walls or case.boundary.walls, without)
+        place, velocity, spin = (np.array(start[:, one : one + 3], dtype=np.float64, order="C") for one in (0, 3, 6))
+        self.state = State(place, velocity, spin, np.zeros_like(place), np.zeros_like(place))
         self._skin = _SKIN * float(self.radius.min())
         self._reach = self.radius + (self.constants.bridges.spans[:, kernels.RUPTURE].max() + self._skin) / 2.0
         none = np.zeros(0, dtype=np.int64)
@@ -103,20 +71,7 @@ class SecondEngine:
         self._advance(self.clock, (self.clock, 1), np.empty((0, len(self.radius), 9)))
 
     def run(self, steps: int, every: int) -> FloatArray:
-        """Move on.
-
-        Parameters
-        ----------
-        steps
-            How many.
-        every
-            Steps between records.
-
-        Returns
-        -------
-        ndarray, shape (steps // every, N, 9)
-            Position, velocity and spin after each ``every`` steps.
-        """
+        """Move on for so many steps: position, velocity and spin after each ``every``, shape (steps // every, N, 9)."""
         begin, end = self.clock, self.clock + steps
         frames = np.empty((steps // every, len(self.radius), 9))
         while self.clock < end:
@@ -124,19 +79,17 @@ class SecondEngine:
             self._list()
         return frames
 
-    def follow(self, position: FloatArray, velocity: FloatArray, spin: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Put the beads where another engine had them in the next step: the forces (N) and torques (N m) on them there.
+    def follow(self, frame: FloatArray) -> FloatArray:
+        """Put the beads where another engine had them in the next step: forces (N) and torques (N m) there, (N, 6).
 
-        Parameters
-        ----------
-        position, velocity, spin
-            Of shape (N, 3); velocities are those that the forces are to be evaluated with.
+        ``frame`` is of shape (N, 9); its velocities are those that the forces are to be evaluated with.
         """
-        self.state.position[:], self.state.velocity[:], self.state.spin[:] = position, velocity, spin
+        state = self.state
+        state.position[:], state.velocity[:], state.spin[:] = frame[:, :3], frame[:, 3:6], frame[:, 6:]
         self.clock += 1
         self._list()
-        kernels.forces(self.constants, self.state, self.pairs, self.clock, True)
-        return self.state.force.copy(), self.state.torque.copy()
+        kernels.forces(self.constants, state, self.pairs, self.clock, True)
+        return np.hstack([state.force, state.torque])
 
     def _advance(self, end: int, records: tuple[int, int], frames: FloatArray) -> int:
         """Move on to a step, or until neighbours are to be listed anew: the step that it is then."""
@@ -144,7 +97,7 @@ class SecondEngine:
         return kernels.advance(self.constants, self.state, self.pairs, self._listed, self._skin, clock, frames)
 
     def bridges(self) -> list[tuple[int, int]]:
-        """Pairs of beads that a bridge holds together."""
+        """What a bridge holds together: numbers of two beads, or of a bead and, after the beads', a wall."""
         held = self.pairs.bridged
         return list(zip(self.pairs.first[held].tolist(), self.pairs.second[held].tolist(), strict=True))
 
@@ -154,10 +107,12 @@ class SecondEngine:
         near = cKDTree(self._listed).query_pairs(2.0 * float(self._reach.max()), output_type="ndarray").astype(np.int64)
         apart = np.linalg.norm(self._listed[near[:, 0]] - self._listed[near[:, 1]], axis=1)
         near = near[apart < self._reach[near].sum(axis=1)]
-        count = len(self.radius)
-        keys = np.sort(near.min(axis=1) * count + near.max(axis=1))
-        pairs = Pairs(keys // count, keys % count, np.zeros((len(keys), 3)), np.zeros(len(keys), dtype=np.bool_))
-        known = before.first * count + before.second
+        beads = len(self.radius)
+        bodies = beads + len(self.constants.point)
+        at_walls = bodies * np.arange(beads)[:, None] + np.arange(beads, bodies)
+        keys = np.sort(np.concatenate([near.min(axis=1) * bodies + near.max(axis=1), at_walls.ravel()]))
+        pairs = Pairs(keys // bodies, keys % bodies, np.zeros((len(keys), 3)), np.zeros(len(keys), dtype=np.bool_))
+        known = before.first * bodies + before.second
         _, new, old = np.intersect1d(keys, known, assume_unique=True, return_indices=True)
         pairs.spring[new], pairs.bridged[new] = before.spring[old], before.bridged[old]
         self.pairs = pairs
@@ -176,72 +131,42 @@ def _splined(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray
     return np.array([curve.formation, scale, middle, end]), np.stack(splines)
 
 
-def _bridges(radius: FloatArray, matter: Matter, without: Collection[str]) -> Bridges:
-    liquid = matter.liquid
+def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridges:
     sizes, kind = np.unique(radius, return_inverse=True)
-    others = [*sizes.tolist(), inf]
-    between = np.empty((len(sizes), len(others)), dtype=np.int64)
+    between = np.empty((len(sizes), len(sizes) + 1), dtype=np.int64)
     made: list[tuple[FloatArray, FloatArray]] = []
     for row, one in enumerate(sizes.tolist()):
-        for column, other in enumerate(others):
-            if column < row:
-                between[row, column] = between[column, row]
-                continue
+        between[row, :row] = between[:row, row]
+        for column, other in list(enumerate([*sizes.tolist(), inf]))[row:]:
             between[row, column] = len(made)
-            surfaces = Surfaces.of(one, other, liquid, matter.contact.minimum_separation_ratio)
-            made.append(_splined(law_of(liquid), surfaces))
+            surfaces = Surfaces.of(one, other, case.liquid, case.contact.minimum_separation_ratio)
+            made.append(_splined(law_of(case.liquid), surfaces))
     acts = np.array(["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64)
     spans, splines = np.stack([one for one, _ in made]), np.stack([one for _, one in made]) * acts
     return Bridges(spans, splines, kind.astype(np.int64), between)
 
 
-def _constants(
-    radius: FloatArray, matter: Matter, around: Surroundings, time_step: float, without: Collection[str]
-) -> Constants:
-    contact = matter.contact
+def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: Collection[str]) -> Constants:
+    contact = case.contact
     modulus, ratio, loss = contact.youngs_modulus, contact.poissons_ratio, log(contact.restitution)
     damping, friction, rolling, gravity, drive = (term not in without for term in TERMS[2:])
-    flat = [wall if isinstance(wall, Flat) else None for wall in around.walls]
+    waves = [(*one.direction, one.angular_frequency, one.peak_acceleration, one.phase) for one in case.drive.harmonics]
     none = (0.0, 0.0, 0.0)
+    flat = [(wall.point, wall.normal) if isinstance(wall, Flat) else (none, none) for wall in walls]
     return Constants(
-        step=time_step,
+        step=case.run.time_step,
         radius=radius,
-        mass=4.0 / 3.0 * pi * radius**3 * matter.density,
-        point=np.array([wall.point if wall else none for wall in flat]).reshape(-1, 3),
-        normal=np.array([wall.normal if wall else none for wall in flat]).reshape(-1, 3),
-        hollow=np.array([0.0 if isinstance(wall, Flat) else wall.radius for wall in around.walls]),
-        gravity=np.array(around.gravity) * gravity,
-        harmonics=np.array(around.harmonics if drive else (), dtype=np.float64).reshape(-1, 6),
+        mass=4.0 / 3.0 * pi * radius**3 * case.density,
+        point=np.array([point for point, _ in flat]).reshape(-1, 3),
+        normal=np.array([normal for _, normal in flat]).reshape(-1, 3),
+        hollow=np.array([0.0 if isinstance(wall, Flat) else wall.radius for wall in walls]),
+        gravity=np.array(case.gravity_vector) * gravity,
+        harmonics=np.array(waves if drive else (), dtype=np.float64).reshape(-1, 6),
         modulus=modulus / (2.0 * (1.0 - ratio**2)),
         shear_modulus=modulus / (4.0 * (1.0 + ratio) * (2.0 - ratio)),
         damping=-loss / sqrt(loss**2 + pi**2) * damping,
         friction_beads=contact.friction_bead_bead * friction,
         friction_walls=contact.friction_bead_wall * friction,
         rolling=contact.rolling_friction * rolling,
-        bridges=_bridges(radius, matter, without),
+        bridges=_bridges(case, radius, without),
     )
-
-
-def _state(beads: Beads, walls: int) -> State:
-    count = len(beads.radius)
-    return State(
-        position=np.array(beads.position, dtype=np.float64, order="C"),
-        velocity=np.array(beads.velocity, dtype=np.float64, order="C"),
-        spin=np.array(beads.spin, dtype=np.float64, order="C"),
-        force=np.zeros((count, 3)),
-        torque=np.zeros((count, 3)),
-        wall_spring=np.zeros((count, walls, 3)),
-        wall_bridged=np.zeros((count, walls), dtype=np.bool_),
-    )
-
-
-def engine_at(
-    case: Case, beads: Beads, clock: int = 0, walls: Sequence[Wall] = (), without: Collection[str] = ()
-) -> SecondEngine:
-    """The second engine with a case's matter, walls (or some others) and drive, and some beads, at a step."""
-    harmonics = [
-        (*one.direction, one.angular_frequency, one.peak_acceleration, one.phase) for one in case.drive.harmonics
-    ]
-    around = Surroundings(walls or case.boundary.walls, case.gravity_vector, harmonics)
-    matter = Matter(case.density, case.contact, case.liquid)
-    return SecondEngine(beads, matter, around, case.run.time_step, clock, without)

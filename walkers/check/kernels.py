@@ -33,12 +33,12 @@ Vector = tuple[float, float, float]
 CELLS = 512
 """Of each of the three pieces of a bridge's splines."""
 FORMATION, SCALE, MIDDLE, RUPTURE = range(4)
-PULL, NORMAL, SLIDING, COUPLING, ROLLING = range(5)
+NONE: Vector = (0.0, 0.0, 0.0)
 
 
 class Bridges(NamedTuple):
-    """Laws of T bridges as splines in three pieces: even in h up to the scale, in ln h up to the middle, and from there
-    to the rupture in √(rupture - h).
+    """T bridges as splines in three pieces: even in the gap h up to the scale, in ln h up to the middle, then to the
+    rupture in √(rupture - h).
 
     ``spans``, of shape (T, 4), are the gaps at which a bridge forms, where pieces end, and at which it breaks, m;
     ``splines`` (T, 3, CELLS, 4, 5) the coefficients of each cell, the highest power first, of pull (N) and resistances;
@@ -53,10 +53,10 @@ class Bridges(NamedTuple):
 
 
 class Constants(NamedTuple):
-    """What does not change: N beads, W walls, H harmonics; SI units.
+    """What does not change: N beads, W walls (``hollow``: radii of cylinders, 0 of planes), H harmonics; SI units.
 
-    ``hollow`` has the radii of cylinders, 0 of planes; ``harmonics``, of shape (H, 6), directions, ω, accelerations and
-    phases; moduli are E* and G*, ``damping`` is β; friction is that between beads and at walls, ``rolling`` both's.
+    ``harmonics``, of shape (H, 6), have directions, ω, accelerations and phases; moduli are E* and G*, ``damping`` is
+    β; friction is that between beads and at walls, ``rolling`` both's.
     """
 
     step: float
@@ -77,25 +77,24 @@ class Constants(NamedTuple):
 
 
 class State(NamedTuple):
-    """What changes with time: N beads, W walls."""
+    """Of N beads, arrays of shape (N, 3)."""
 
     position: FloatArray
     velocity: FloatArray
     spin: FloatArray
     force: FloatArray
     torque: FloatArray
-    wall_spring: FloatArray
-    """Tangential displacements, m, shape (N, W, 3)."""
-    wall_bridged: FlagArray
 
 
 class Pairs(NamedTuple):
-    """P pairs of beads near each other, sorted by the numbers of their beads."""
+    """P pairs of beads near each other, and of each bead with each wall, whose numbers come after the beads'.
+
+    They are sorted by their numbers. ``spring``, of shape (P, 3), has tangential displacements, m.
+    """
 
     first: IntArray
     second: IntArray
     spring: FloatArray
-    """Shape (P, 3)."""
     bridged: FlagArray
 
 
@@ -117,6 +116,12 @@ class Meeting(NamedTuple):
     apart: float
     slide: Vector
     turn: Vector
+
+
+@compiled
+def vector(values: FloatArray) -> Vector:
+    """A row as a tuple."""
+    return (values[0], values[1], values[2])
 
 
 @compiled
@@ -151,8 +156,8 @@ def bridge_forces(b: Bridges, bridge: int, gap: float) -> tuple[float, float, fl
     cell = min(int(place * CELLS), CELLS - 1)
     t = place * CELLS - cell
     f = b.splines[bridge, piece, cell]
-    power = ((f[0] * t + f[1]) * t + f[2]) * t + f[3]
-    return power[PULL], power[NORMAL], power[SLIDING], power[COUPLING], power[ROLLING]
+    values = ((f[0] * t + f[1]) * t + f[2]) * t + f[3]
+    return values[0], values[1], values[2], values[3], values[4]
 
 
 @compiled
@@ -164,38 +169,35 @@ def touch(c: Constants, m: Meeting, spring: FloatArray, moves: bool) -> tuple[fl
     root = sqrt(-m.radius * m.gap)
     elastic = -4.0 / 3.0 * c.modulus * root * m.gap
     damping = 2.0 * sqrt(5.0 / 6.0) * c.damping * sqrt(m.mass)
-    normal = elastic - damping * sqrt(2.0 * c.modulus * root) * m.apart
-    stretch = (spring[0], spring[1], spring[2])
+    stretch = vector(spring)
     if moves:
         stretch = plus(stretch, c.step, m.slide)
         stretch = plus(stretch, -dot(stretch, m.n), m.n)
     stiffness, limit = 8.0 * c.shear_modulus * root, m.friction * elastic
     held = stiffness * sqrt(dot(stretch, stretch))
-    scale, along = 1.0, (0.0, 0.0, 0.0)
+    scale, along = 1.0, NONE
     if held > limit:
         scale = limit / held
     else:
-        along = plus(along, -damping * sqrt(stiffness), m.slide)
+        along = plus(NONE, -damping * sqrt(stiffness), m.slide)
     tangential = plus(along, -scale * stiffness, stretch)
     size = sqrt(dot(tangential, tangential))
     if size > limit:
-        tangential = plus((0.0, 0.0, 0.0), limit / size, tangential)
+        tangential = plus(NONE, limit / size, tangential)
     if moves:
         for axis in range(3):
             spring[axis] = scale * stretch[axis]
-    turning, couple = sqrt(dot(m.turn, m.turn)), (0.0, 0.0, 0.0)
+    turning, couple = sqrt(dot(m.turn, m.turn)), NONE
     if turning > 0.0:
         rolls = plus(m.turn, -dot(m.turn, m.n), m.n)
-        couple = plus(couple, -c.rolling * elastic * m.radius / turning, rolls)
-    return normal, tangential, couple
+        couple = plus(NONE, -c.rolling * elastic * m.radius / turning, rolls)
+    return elastic - damping * sqrt(2.0 * c.modulus * root) * m.apart, tangential, couple
 
 
 @compiled
 def meet(c: Constants, m: Meeting, spring: FloatArray, bridged: bool, moves: bool) -> tuple[Vector, Vector]:
     """Force (N) and couple (N m) on the first of two surfaces that touch or have a bridge."""
-    normal, tangential, couple = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    if m.gap < 0.0:
-        normal, tangential, couple = touch(c, m, spring, moves)
+    normal, tangential, couple = touch(c, m, spring, moves) if m.gap < 0.0 else (0.0, NONE, NONE)
     if bridged:
         pull, resists, slides, couples, rolls = bridge_forces(c.bridges, m.bridge, m.gap)
         q, couples = cross(m.n, m.turn), m.order * couples
@@ -203,13 +205,6 @@ def meet(c: Constants, m: Meeting, spring: FloatArray, bridged: bool, moves: boo
         tangential = plus(plus(tangential, -slides, m.slide), -couples, q)
         couple = plus(plus(couple, couples, cross(m.n, m.slide)), rolls, cross(m.n, q))
     return plus(tangential, normal, m.n), couple
-
-
-@compiled
-def still_bridged(c: Constants, bridge: int, gap: float, was: bool) -> bool:
-    """Whether there is a bridge now."""
-    formation = c.bridges.spans[bridge, FORMATION]
-    return gap < c.bridges.spans[bridge, RUPTURE] and (was or gap <= formation)
 
 
 @compiled
@@ -223,83 +218,59 @@ def push(state: State, bead: int, sign: float, arm: float, n: Vector, acting: tu
 
 
 @compiled
-def vector(values: FloatArray) -> Vector:
-    """A row as a tuple."""
-    return (values[0], values[1], values[2])
-
-
-@compiled
-def body_forces(c: Constants, state: State, clock: int) -> None:
-    """Weight and inertial force."""
-    total = vector(c.gravity)
-    if clock >= 0:
-        for one in range(c.harmonics.shape[0]):
-            wave = c.harmonics[one]
-            total = plus(total, wave[4] * sin(wave[3] * clock * c.step + wave[5]), (wave[0], wave[1], wave[2]))
-    for bead in range(c.radius.shape[0]):
-        for axis in range(3):
-            state.force[bead, axis] = c.mass[bead] * total[axis]
-            state.torque[bead, axis] = 0.0
-
-
-@compiled
-def wall_forces(c: Constants, state: State, moves: bool) -> None:
-    """Contacts and bridges of all beads at all walls."""
-    for bead in range(c.radius.shape[0]):
-        radius, bridge = c.radius[bead], c.bridges.between[c.bridges.kind[bead], -1]
-        velocity, spin = vector(state.velocity[bead]), vector(state.spin[bead])
-        for wall in range(c.point.shape[0]):
-            n, away = vector(c.normal[wall]), plus(vector(state.position[bead]), -1.0, vector(c.point[wall]))
-            gap = dot(away, n) - radius
-            if c.hollow[wall] > 0.0:
-                out = sqrt(away[0] ** 2 + away[1] ** 2)
-                n, gap = (-away[0] / out, -away[1] / out, 0.0), c.hollow[wall] - out - radius
-            bridged = still_bridged(c, bridge, gap, state.wall_bridged[bead, wall])
-            state.wall_bridged[bead, wall] = bridged
-            if gap >= 0.0:
-                state.wall_spring[bead, wall, :] = 0.0
-                if not bridged:
-                    continue
-            arm, apart = radius + 0.5 * gap, dot(velocity, n)
-            slide = plus(plus(velocity, -apart, n), arm, cross(n, spin))
-            m = Meeting(bridge, 1.0, gap, radius, c.mass[bead], c.friction_walls, n, apart, slide, spin)
-            push(state, bead, 1.0, arm, n, meet(c, m, state.wall_spring[bead, wall], bridged, moves))
-
-
-@compiled
-def pair_forces(c: Constants, state: State, pairs: Pairs, moves: bool) -> None:
-    """Contacts and bridges between beads."""
-    for at in range(pairs.first.shape[0]):
-        i, j = pairs.first[at], pairs.second[at]
-        d = plus(vector(state.position[i]), -1.0, vector(state.position[j]))
-        distance, together = sqrt(dot(d, d)), c.radius[i] + c.radius[j]
-        gap, n = distance - together, (d[0] / distance, d[1] / distance, d[2] / distance)
-        bridge = c.bridges.between[c.bridges.kind[i], c.bridges.kind[j]]
-        pairs.bridged[at] = still_bridged(c, bridge, gap, pairs.bridged[at])
-        if gap >= 0.0:
-            pairs.spring[at, :] = 0.0
-            if not pairs.bridged[at]:
-                continue
-        arm_i, arm_j = c.radius[i] + 0.5 * gap, c.radius[j] + 0.5 * gap
-        between = plus(vector(state.velocity[i]), -1.0, vector(state.velocity[j]))
-        spin_i, spin_j = vector(state.spin[i]), vector(state.spin[j])
-        apart = dot(between, n)
-        turning = plus(plus((0.0, 0.0, 0.0), arm_i, spin_i), arm_j, spin_j)
-        slide = plus(plus(between, -apart, n), 1.0, cross(n, turning))
-        mass, radius = c.mass[i] * c.mass[j] / (c.mass[i] + c.mass[j]), c.radius[i] * c.radius[j] / together
-        order, turn = (-1.0 if c.radius[i] > c.radius[j] else 1.0), plus(spin_i, -1.0, spin_j)
-        m = Meeting(bridge, order, gap, radius, mass, c.friction_beads, n, apart, slide, turn)
-        acting = meet(c, m, pairs.spring[at], pairs.bridged[at], moves)
-        push(state, i, 1.0, arm_i, n, acting)
-        push(state, j, -1.0, arm_j, n, acting)
+def separation(c: Constants, state: State, i: int, j: int) -> tuple[Vector, float]:
+    """Normal from the second body, a bead or a wall, to the first, and the gap (m)."""
+    place, wall = vector(state.position[i]), j - c.radius.shape[0]
+    if wall < 0:
+        away = plus(place, -1.0, vector(state.position[j]))
+        distance = sqrt(dot(away, away))
+        return (away[0] / distance, away[1] / distance, away[2] / distance), distance - (c.radius[i] + c.radius[j])
+    away, n = plus(place, -1.0, vector(c.point[wall])), vector(c.normal[wall])
+    if c.hollow[wall] == 0.0:
+        return n, dot(away, n) - c.radius[i]
+    out = sqrt(away[0] ** 2 + away[1] ** 2)
+    return (-away[0] / out, -away[1] / out, 0.0), c.hollow[wall] - out - c.radius[i]
 
 
 @compiled
 def forces(c: Constants, state: State, pairs: Pairs, clock: int, moves: bool) -> None:
-    """All forces and torques at the places and velocities of the state."""
-    body_forces(c, state, clock)
-    wall_forces(c, state, moves)
-    pair_forces(c, state, pairs, moves)
+    """All forces and torques at the places and velocities of the state: weight, inertia, contacts and bridges."""
+    beads, total = c.radius.shape[0], vector(c.gravity)
+    if clock >= 0:
+        for one in range(c.harmonics.shape[0]):
+            wave = c.harmonics[one]
+            total = plus(total, wave[4] * sin(wave[3] * clock * c.step + wave[5]), (wave[0], wave[1], wave[2]))
+    for bead in range(beads):
+        for axis in range(3):
+            state.force[bead, axis] = c.mass[bead] * total[axis]
+            state.torque[bead, axis] = 0.0
+    for at in range(pairs.first.shape[0]):
+        i, j = pairs.first[at], pairs.second[at]
+        n, gap = separation(c, state, i, j)
+        bridge = c.bridges.between[c.bridges.kind[i], c.bridges.kind[j] if j < beads else -1]
+        forms, breaks = c.bridges.spans[bridge, FORMATION], c.bridges.spans[bridge, RUPTURE]
+        pairs.bridged[at] = gap < breaks and (pairs.bridged[at] or gap <= forms)
+        if gap >= 0.0:
+            pairs.spring[at, :] = 0.0
+            if not pairs.bridged[at]:
+                continue
+        arm, spin = c.radius[i] + 0.5 * gap, vector(state.spin[i])
+        between, turn, turning = vector(state.velocity[i]), spin, plus(NONE, arm, spin)
+        radius, mass, friction, order, other_arm = c.radius[i], c.mass[i], c.friction_walls, 1.0, 0.0
+        if j < beads:
+            other_arm, other_spin = c.radius[j] + 0.5 * gap, vector(state.spin[j])
+            between = plus(between, -1.0, vector(state.velocity[j]))
+            turn, turning = plus(spin, -1.0, other_spin), plus(turning, other_arm, other_spin)
+            radius = c.radius[i] * c.radius[j] / (c.radius[i] + c.radius[j])
+            mass = c.mass[i] * c.mass[j] / (c.mass[i] + c.mass[j])
+            friction, order = c.friction_beads, -1.0 if c.radius[i] > c.radius[j] else 1.0
+        apart = dot(between, n)
+        slide = plus(plus(between, -apart, n), 1.0, cross(n, turning))
+        m = Meeting(bridge, order, gap, radius, mass, friction, n, apart, slide, turn)
+        acting = meet(c, m, pairs.spring[at], pairs.bridged[at], moves)
+        push(state, i, 1.0, arm, n, acting)
+        if j < beads:
+            push(state, j, -1.0, other_arm, n, acting)
 
 
 @compiled
@@ -312,27 +283,6 @@ def kick(c: Constants, state: State) -> None:
         for axis in range(3):
             state.velocity[bead, axis] += speed * state.force[bead, axis]
             state.spin[bead, axis] += spin * state.torque[bead, axis]
-
-
-@compiled
-def drift(c: Constants, state: State, listed: FloatArray) -> float:
-    """A step of places; the square of the farthest way of a bead since neighbours were listed, m²."""
-    farthest = 0.0
-    for bead in range(c.radius.shape[0]):
-        way = 0.0
-        for axis in range(3):
-            state.position[bead, axis] += c.step * state.velocity[bead, axis]
-            way += (state.position[bead, axis] - listed[bead, axis]) ** 2
-        farthest = max(farthest, way)
-    return farthest
-
-
-@compiled
-def record(state: State, frame: FloatArray) -> None:
-    """Places, velocities and spins, into shape (N, 9)."""
-    frame[:, :3] = state.position
-    frame[:, 3:6] = state.velocity
-    frame[:, 6:] = state.spin
 
 
 @compiled
@@ -357,12 +307,20 @@ def advance(
     far = (0.4 * skin) ** 2
     while now < end:
         kick(c, state)
-        now += 1
-        moved = drift(c, state, listed)
+        now, farthest = now + 1, 0.0
+        for bead in range(c.radius.shape[0]):
+            way = 0.0
+            for axis in range(3):
+                state.position[bead, axis] += c.step * state.velocity[bead, axis]
+                way += (state.position[bead, axis] - listed[bead, axis]) ** 2
+            farthest = max(farthest, way)
         forces(c, state, pairs, now, True)
         kick(c, state)
         if (now - begin) % every == 0:
-            record(state, frames[(now - begin) // every - 1])
-        if moved > far:
+            frame = frames[(now - begin) // every - 1]
+            frame[:, :3] = state.position
+            frame[:, 3:6] = state.velocity
+            frame[:, 6:] = state.spin
+        if farthest > far:
             break
     return now

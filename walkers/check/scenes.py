@@ -1,40 +1,61 @@
-"""Beads on prescribed ways, by the engine and, put where it had them, by the second engine, whose laws are the same.
+"""Scenes of a few beads: what moves, which law, and what is compared between the engine and the second engine.
 
-Forces and torques of each step are compared, over the largest of the scene. Most scenes have `law`, whose pull and
-resistances are all there, and have nothing to do with each other; each law that comes with the program has two more.
+Most beads are moved on prescribed ways by the engine, and put where it had them by the second engine: forces and
+torques of each step are compared, over the largest of the scene. Others move freely from the same start in both, and
+their ways and spins are compared. Most scenes have `law`, whose pull and resistances are all there, and have nothing to
+do with each other; each law that comes with the program has two more.
 """
 
 from __future__ import annotations
 
+import itertools
 import shutil
-from collections.abc import Callable, Iterator
-from dataclasses import replace
-from functools import partial
-from math import cos, degrees, nan, pi, sin, sqrt
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import cos, degrees, inf, pi, sin, sqrt
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from walkers.check.bench import FLOOR, Bench, Measured, bench_case, bench_recording, bench_scene, farthest
-from walkers.check.engine import Beads, SecondEngine, engine_at
-from walkers.check.lines import Line, Verdict
-from walkers.inputs.boundary import Flat, Round
+from walkers.check.engine import SecondEngine
+from walkers.check.kernels import FloatArray
+from walkers.check.report import Line, Verdict
+from walkers.inputs import resolve_case
+from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
+from walkers.inputs.errors import Stopped
+from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
-from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
+from walkers.physics.bridge import Curve, Forces, Surfaces
 from walkers.physics.laws import LAWS, law_of
+from walkers.postprocess.dump import BinaryDump
 from walkers.postprocess.motion import prescribed_motion
+from walkers.runner.binary import Engine
+from walkers.runner.directory import write_deck
+from walkers.runner.launch import Progress, launch
 from walkers.templates.bridge_tables import tabulated
-from walkers.templates.deck import BRIDGES_NAME, Checkpoint, Plan, compose
+from walkers.templates.deck import BRIDGES_NAME, Checkpoint, Deck, Plan, Recording, compose, plan_of
+from walkers.templates.layout import BEAD_COLUMNS, FORCE_COLUMNS
 from walkers.templates.scene import Bead, Scene
 
 EQUAL = 1e-6
-"""Of the largest force or torque: how far two engines may differ, each with its own interpolation of the law."""
+"""Of the largest force, torque or way: how far two engines may differ, each with its own interpolation of the law."""
+DRY = {"law": f"{__name__}:dry"}
+"""Of a case's liquid, where there are to be no bridges."""
+FLOOR = BOTTOM
 R, S = 3e-4, 2e-4
-_DEEP = 1.7123e-6
+DEEP = 1.7123e-6
 """m; overlap of what touches."""
-_WAY, _SPIN = (0.031, -0.023, 0.053), (61.0, -83.0, 47.0)
-_STEPS = 2000
+STILL: Vector = (0.0, 0.0, 0.0)
+WAY, SPIN = (0.031, -0.023, 0.053), (61.0, -83.0, 47.0)
+
+
+def dry(surfaces: Surfaces) -> Curve:
+    """The law of no liquid."""
+    return Curve(lambda gaps: Forces(*[np.zeros_like(gaps)] * 5), rupture=surfaces.closest)
 
 
 def law(surfaces: Surfaces) -> Curve:
@@ -56,41 +77,36 @@ def law(surfaces: Surfaces) -> Curve:
     return Curve(forces, rupture=0.25 * size, formation=0.03 * size)
 
 
-def full_case(**changes: dict[str, object]) -> Case:
-    """Friction, rolling friction, damping and the law of this module, but for some changes."""
-    contact: dict[str, object] = {
+_BARE: dict[str, dict[str, Any]] = {
+    "beads": {"density": "4.0 g/cm^3"},
+    "dimers": {"radii": ["0.3 mm", "0.2 mm"]},
+    "liquid": {"surface_tension": "19.2 mN/m", "dynamic_viscosity": "0 Pa*s"},
+    "boundary": {"material": "glass"},
+    "contact": {"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": 0.0, "restitution": 1.0},
+    "drive": {"frequency": "80 Hz", "peak_acceleration": "0 g", "frame": "container"},
+    "run": {"time_step": "1 us", "samples_per_cycle": 1},
+    "environment": {"gravity": "0 m/s^2"},
+}
+_FULL: dict[str, dict[str, Any]] = {
+    "contact": {
         "friction": {"bead_bead": 0.23, "bead_wall": 0.31}, "rolling_friction": 0.04, "restitution": 0.4,
-    }  # fmt: skip
-    liquid: dict[str, object] = {"dynamic_viscosity": "4.6 mPa*s", "law": f"{__name__}:law"}
-    return bench_case(**{**changes, "contact": contact, "liquid": {**liquid, **changes.get("liquid", {})}})
+    },
+    "liquid": {"dynamic_viscosity": "4.6 mPa*s", "law": f"{__name__}:law"},
+}  # fmt: skip
 
 
-def second_engine(case: Case, scene: Scene) -> SecondEngine:
-    """The second engine with the beads of a scene."""
-    start = [[getattr(bead, name) for bead in scene.beads] for name in ("radius", "centre", "velocity", "spin")]
-    without = () if case.drive.frame == "container" else ("drive",)
-    return engine_at(case, Beads(*map(np.array, start)), walls=scene.walls, without=without)
+def bench_case(**changes: Mapping[str, Any]) -> Case:
+    """A case without friction, damping, viscosity, gravity and drive, to which a check adds what it measures."""
+    merged = {table: {**_BARE.get(table, {}), **changes.get(table, {})} for table in {**_BARE, **changes}}
+    return resolve_case(merged, source="<audit>", name="audit")
 
 
-def deviation(case: Case, scene: Scene, series: Measured) -> tuple[float, float]:
-    """How far forces and torques of a series are from the second engine's, over the largest ones."""
-    shift, _ = prescribed_motion(case.drive, series.time)
-    _, speed = prescribed_motion(case.drive, series.time - 0.5 * case.run.time_step)  # when the beads had theirs
-    engine = second_engine(case, scene)
-    ways = (series.position - shift[:, None], series.velocity - speed[:, None], series.spin)
-    found = [engine.follow(*(way[step] for way in ways)) for step in range(1, len(series.time))]
-    force, torque = (np.array([one[which] for one in found]) for which in (0, 1))
-    return farthest(series.force[1:], force), farthest(series.torque[1:], torque)
+def full_case(**changes: Mapping[str, Any]) -> Case:
+    """Friction, rolling friction, damping and the law of this module, but for some changes."""
+    return bench_case(**{table: {**_FULL.get(table, {}), **changes.get(table, {})} for table in {**_FULL, **changes}})
 
 
-def prescribed(case: Case, scene: Scene, steps: int = _STEPS, **options: object) -> Plan:
-    """Move the beads of a scene with their velocities, recording each step."""
-    return Plan(case, scene, bench_recording(steps), prescribed=True, **options)  # type: ignore[arg-type]
-
-
-def over(
-    wall: Flat, gap: float, radius: float, velocity: Vector = (0.0, 0.0, 0.0), spin: Vector = _SPIN, x: float = 0.0
-) -> Bead:
+def over(wall: Flat, gap: float, radius: float, velocity: Vector = STILL, spin: Vector = SPIN, x: float = 0.0) -> Bead:
     """A bead at a gap (m) from a wall, so far along x (m) from its point."""
     centre = [at + (radius + gap) * n for at, n in zip(wall.point, wall.normal, strict=True)]
     return Bead(0, (centre[0] + x, centre[1], centre[2]), radius, velocity, spin)
@@ -100,11 +116,11 @@ def within(wall: Round, gap: float, radius: float, turn: float, velocity: Vector
     """A bead at a gap (m) from a round wall, toward an azimuth (rad); its velocity is outward, along and upward."""
     out, (away, along, up) = wall.radius - radius - gap, velocity
     x, y = cos(turn), sin(turn)
-    return Bead(0, (out * x, out * y, 10.0 * turn * R), radius, (away * x - along * y, away * y + along * x, up), _SPIN)
+    return Bead(0, (out * x, out * y, 10.0 * turn * R), radius, (away * x - along * y, away * y + along * x, up), SPIN)
 
 
 def pair(
-    gap: float, apart: float, slide: Vector, spins: tuple[Vector, Vector] = (_SPIN, (-29.0, 53.0, 19.0))
+    gap: float, apart: float, slide: Vector, spins: tuple[Vector, Vector] = (SPIN, (-29.0, 53.0, 19.0))
 ) -> list[Bead]:
     """Two beads of unlike size in mid-air, at a gap (m), with a velocity apart (m/s) and another one besides."""
     n = np.array([0.48, 0.6, 0.64])
@@ -116,114 +132,249 @@ def pair(
     ]
 
 
+def standing(beads: Sequence[Bead], walls: Sequence[Wall] = (FLOOR,), edge: float = 0.01) -> Scene:
+    """Beads, which are numbered here, between walls in a box about the origin, ``edge`` (m) half its width."""
+    numbered = tuple(replace(bead, id=number) for number, bead in enumerate(beads, 1))
+    return Scene(numbered, tuple(walls), (-edge,) * 3, (edge,) * 3)
+
+
+def recording(steps: int, sample_every: int = 1) -> Recording:
+    """Record beads with their forces and torques; bridges at the start and the end only."""
+    return Recording(steps, sample_every, steps, steps, bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS))
+
+
+def prescribed(case: Case, scene: Scene, steps: int = 2000, **options: Any) -> Plan:
+    """Move the beads of a scene with their velocities, recording each step."""
+    return Plan(case, scene, recording(steps), prescribed=True, **options)
+
+
+def second_engine(case: Case, scene: Scene) -> SecondEngine:
+    """The second engine with the beads of a scene."""
+    start = np.array([[*bead.centre, *bead.velocity, *bead.spin] for bead in scene.beads])
+    without = () if case.drive.frame == "container" else ("drive",)
+    return SecondEngine(
+        case, np.array([bead.radius for bead in scene.beads]), start, walls=scene.walls, without=without
+    )
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Series of a deck: F frames of N beads, in SI units.
+
+    ``frames``, of shape (F, N, 9), have position, velocity and spin, ``forces`` (F, N, 6) force and torque; ``time`` is
+    of shape (F,).
+    """
+
+    time: FloatArray
+    frames: FloatArray
+    forces: FloatArray
+    directory: Path
+
+
+@dataclass
+class Bench:
+    """Runs decks of an engine in a folder of its own.
+
+    ``engine`` is the binary on trial, ``stop`` is set to end the engines that run, ``version`` is what they told.
+    """
+
+    engine: Engine
+    folder: Path
+    stop: threading.Event = field(default_factory=threading.Event)
+    version: str = "unknown"
+    _numbers: itertools.count[int] = field(default_factory=itertools.count)
+
+    def run(self, plan: Plan | Deck, carry: Path | None = None) -> Measured:
+        """Run a plan whose `recording` has forces, or its deck, with a file such as a restart file beside it."""
+        deck = compose(plan) if isinstance(plan, Plan) else plan
+        deck = replace(deck, fastest=inf)  # what a check drives may move faster than what walls drive
+        directory = self.folder / f"deck-{next(self._numbers):03d}"
+        directory.mkdir(parents=True)
+        write_deck(deck, directory)
+        if carry is not None:
+            shutil.copy(carry, directory)
+        self.version = launch(deck, directory, self.engine, on_progress=self._look).version
+        dump = BinaryDump(directory / deck.layout.bead_dump, deck.layout.bead_columns)
+        beads = dump.stack()
+        vectors = [beads[:, :, dump.column(name) :][:, :, :3] for name in ("x", "vx", "omegax", "fx", "tqx")]
+        time = dump.steps.astype(np.float64) * deck.layout.time_step
+        return Measured(time, np.concatenate(vectors[:3], -1), np.concatenate(vectors[3:], -1), directory)
+
+    def _look(self, _: Progress) -> None:
+        if self.stop.is_set():
+            raise Stopped("the audit was stopped")
+
+
+def farthest(measured: FloatArray, expected: FloatArray) -> float:
+    """The largest distance of two series of vectors, over the largest expected vector."""
+    scale = np.linalg.norm(expected, axis=-1).max()
+    return float(np.linalg.norm(measured - expected, axis=-1).max() / (scale or 1.0))
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A scene, its case by what it changes in `full_case`, and, if beads move ``freely``, for how many steps."""
+
+    beads: Sequence[Bead]
+    walls: Sequence[Wall] = (FLOOR,)
+    changes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    freely: int = 0
+
+    def lines(self, name: str, bench: Bench) -> Iterator[Line]:
+        """Run it in both engines, and compare them."""
+        case, scene = full_case(**self.changes), standing(self.beads, self.walls)
+        engine = second_engine(case, scene)
+        if self.freely:
+            every = self.freely // 100
+            series = bench.run(Plan(case, scene, recording(self.freely, every)))
+            start, frames = series.frames[0, :, :3], engine.run(self.freely, every)
+            found = {
+                "ways": farthest(series.frames[1:, :, :3] - start, frames[..., :3] - start),
+                "spins": farthest(series.frames[1:, :, 6:], frames[..., 6:]),
+            }
+        else:
+            series = bench.run(prescribed(case, scene))
+            forces = np.array([engine.follow(frame) for frame in in_walls(case, series)])
+            found = {
+                "force": farthest(series.forces[1:, :, :3], forces[..., :3]),
+                "torque": farthest(series.forces[1:, :, 3:], forces[..., 3:]),
+            }
+        for what, error in found.items():
+            yield Line(f"{name}: {what} beside the second engine's", 0.0, error, EQUAL)
+
+
+def in_walls(case: Case, series: Measured) -> FloatArray:
+    """Frames after the first as seen from the walls, with the velocities that the forces were evaluated with."""
+    frames = series.frames[1:].copy()
+    frames[..., :3] -= prescribed_motion(case.drive, series.time[1:])[0][:, None]
+    # Beads had theirs half a step ago, when walls had that of half a step ago.
+    frames[..., 3:6] -= prescribed_motion(case.drive, series.time[1:] - 0.5 * case.run.time_step)[1][:, None]
+    return frames
+
+
 _LEANING = Flat((1e-4, 2e-4, -3e-4), (0.48, -0.36, 0.8), "leaning")
 _SIDE = Flat((0.0, 6.0e-4, 1e-3), (0.0, -1.0, 0.0), "+y")
 _ROUND = Round(2.5e-3)
-_IN_CORNER = Bead(0, (1e-4, 6.0e-4 - R + _DEEP, R - _DEEP), R, (0.031, -0.043, 0.037), _SPIN)
-_CLIMBING = [
-    Bead(0, (0.0, 0.0, R - _DEEP), R, (0.01, 0.02, 0.0), (5.0, 9.0, 40.0)),
-    Bead(0, (R + S - _DEEP, 0.0, S + 1e-4), S, (0.01, 0.03, -0.04), _SPIN),
-    Bead(0, (0.0, R + R - _DEEP, R - _DEEP), R, (0.0113, 0.0447, 0.0511), (3.0, -80.0, 5.0)),
-]
+_LEAVING, _PARTING = over(FLOOR, -DEEP, R, WAY), pair(-DEEP, 0.043, (0.02, -0.011, 0.005))
 _ROLL: Vector = (0.0, 0.03 / R, 0.0)
-_STILL: Vector = (0.0, 0.0, 0.0)
-_LAB = partial(full_case, drive={"frame": "lab", "frequency": "300 Hz", "peak_acceleration": "8 g"})
-_UPRIGHT = partial(full_case, drive={"frame": "lab", "frequency": "300 Hz", "peak_acceleration": "25 g", "axis": "z"})
-_DRIVEN = partial(
-    full_case,
-    drive={"frequency": "300 Hz", "peak_acceleration": "8 g", "axis": "z"},
-    environment={"gravity": "9.81 m/s^2"},
-)
-_LEAVING = [over(FLOOR, -_DEEP, R, _WAY), over(FLOOR, 2e-5, S, _WAY, x=2e-3)]
-_SHAKEN = [over(FLOOR, -_DEEP, R), over(FLOOR, -5e-7, S, spin=_STILL, x=2e-3)]
-_LIFTED = [over(FLOOR, -_DEEP, R), over(FLOOR, 3e-6, S, spin=_ROLL, x=2e-3)]
-_PARTING = pair(-_DEEP, 0.043, (0.02, -0.011, 0.005))
-_ON_ROUND = [within(_ROUND, -_DEEP, size, turn, (-0.05, 0.03, 0.02)) for size, turn in ((R, 0.7), (S, 3.0))]
-_ALONG_ROUND = [within(_ROUND, -_DEEP, R, 0.3, (-0.02, 0.3, 0.0)), within(_ROUND, 1e-5, S, 2.0, (0.0, -0.4, 0.1))]
+CLIMBING = [
+    Bead(0, (0.0, 0.0, R - DEEP), R, (0.01, 0.02, 0.0), (5.0, 9.0, 40.0)),
+    Bead(0, (R + S - DEEP, 0.0, S + 1e-4), S, (0.01, 0.03, -0.04), SPIN),
+    Bead(0, (0.0, R + R - DEEP, R - DEEP), R, (0.0113, 0.0447, 0.0511), (3.0, -80.0, 5.0)),
+]
+_THROWN = [
+    over(FLOOR, 2e-5, R, (0.04, -0.03, -0.2), x=1e-3),
+    over(FLOOR, -1e-7, S, (0.05, 0.0, 0.0), STILL, x=-1e-3),
+    over(FLOOR, -1e-7, R, (0.03, 0.0, 0.0), _ROLL, x=3e-3),
+    *pair(1e-5, -0.1, (0.01, -0.02, 0.0)),
+]
+_WEIGHT = {"gravity": "9.81 m/s^2"}
+_FAST = {"frequency": "300 Hz", "peak_acceleration": "8 g"}
 
-SCENES: dict[str, tuple[Callable[[], Case], Scene]] = {
-    "a bead leaves the floor": (full_case, bench_scene(_LEAVING)),
-    "a bead comes to the floor": (full_case, bench_scene([over(FLOOR, 9e-5, R, (0.031, 0.023, -0.053))])),
-    "a bead slides": (full_case, bench_scene([over(FLOOR, -_DEEP, R, (0.02, 0.013, 0.0), _STILL)])),
-    "a bead rolls": (full_case, bench_scene([over(FLOOR, -_DEEP, R, (0.03, 0.0, 0.0), _ROLL)])),
-    "a bead spins where it is": (full_case, bench_scene([over(FLOOR, -_DEEP, R), over(FLOOR, 2e-6, S, x=2e-3)])),
-    "a bead leaves a leaning wall": (full_case, bench_scene([over(_LEANING, -_DEEP, R, _WAY)], [_LEANING])),
-    "beads leave a round wall": (full_case, bench_scene(_ON_ROUND, [_ROUND])),
-    "beads move along a round wall": (full_case, bench_scene(_ALONG_ROUND, [FLOOR, _ROUND])),
-    "a bead in a corner": (full_case, bench_scene([_IN_CORNER], [FLOOR, _SIDE])),
-    "two beads part": (full_case, bench_scene(_PARTING)),
-    "two beads part, the smaller first": (full_case, bench_scene(_PARTING[::-1])),
-    "two beads meet": (full_case, bench_scene(pair(4.1e-5, -0.023, (0.004, -0.003, 0.002)))),
-    "two beads roll on each other": (full_case, bench_scene(pair(-_DEEP, 0.0, _STILL))),
-    "three beads on the floor": (full_case, bench_scene(_CLIMBING)),
-    "the floor moves to and fro": (_LAB, bench_scene(_SHAKEN)),
-    "the floor moves up and down": (_UPRIGHT, bench_scene(_LIFTED)),
-    "weight and drive": (_DRIVEN, bench_scene([over(FLOOR, -_DEEP, R), Bead(0, (2e-3, 0.0, 5e-3), S)])),
+SCENES: dict[str, Setting] = {
+    "a bead leaves the floor": Setting([_LEAVING, over(FLOOR, 2e-5, S, WAY, x=2e-3)]),
+    "a bead comes to the floor": Setting([over(FLOOR, 9e-5, R, (0.031, 0.023, -0.053))]),
+    "a bead slides": Setting([over(FLOOR, -DEEP, R, (0.02, 0.013, 0.0), STILL)]),
+    "a bead rolls": Setting([over(FLOOR, -DEEP, R, (0.03, 0.0, 0.0), _ROLL)]),
+    "a bead spins where it is": Setting([over(FLOOR, -DEEP, R), over(FLOOR, 2e-6, S, x=2e-3)]),
+    "a bead leaves a leaning wall": Setting([over(_LEANING, -DEEP, R, WAY)], [_LEANING]),
+    "beads leave a round wall": Setting(
+        [within(_ROUND, -DEEP, size, turn, (-0.05, 0.03, 0.02)) for size, turn in ((R, 0.7), (S, 3.0))], [_ROUND]
+    ),
+    "beads move along a round wall": Setting(
+        [within(_ROUND, -DEEP, R, 0.3, (-0.02, 0.3, 0.0)), within(_ROUND, 1e-5, S, 2.0, (0.0, -0.4, 0.1))],
+        [FLOOR, _ROUND],
+    ),
+    "a bead in a corner": Setting(
+        [Bead(0, (1e-4, 6.0e-4 - R + DEEP, R - DEEP), R, (0.031, -0.043, 0.037), SPIN)], [FLOOR, _SIDE]
+    ),
+    "two beads part": Setting(_PARTING),
+    "two beads part, the smaller first": Setting(_PARTING[::-1]),
+    "two beads meet": Setting(pair(4.1e-5, -0.023, (0.004, -0.003, 0.002))),
+    "two beads roll on each other": Setting(pair(-DEEP, 0.0, STILL)),
+    "three beads on the floor": Setting(CLIMBING),
+    "the floor moves to and fro": Setting(
+        [over(FLOOR, -DEEP, R), over(FLOOR, -5e-7, S, spin=STILL, x=2e-3)], changes={"drive": {**_FAST, "frame": "lab"}}
+    ),
+    "the floor moves up and down": Setting(
+        [over(FLOOR, -DEEP, R), over(FLOOR, 3e-6, S, spin=_ROLL, x=2e-3)],
+        changes={"drive": {**_FAST, "frame": "lab", "peak_acceleration": "25 g", "axis": "z"}},
+    ),
+    "weight and drive": Setting(
+        [over(FLOOR, -DEEP, R), Bead(0, (2e-3, 0.0, 5e-3), S)],
+        changes={"drive": {**_FAST, "axis": "z"}, "environment": _WEIGHT},
+    ),
 }
-"""Each with its case."""
+"""Those of prescribed ways."""
 for _name in LAWS:
-    _case = partial(full_case, liquid={"law": _name, "contact_angle": "10 deg"})
-    SCENES[f"a bead leaves the floor ({_name})"] = _case, bench_scene([over(FLOOR, -_DEEP, R, _WAY)])
-    SCENES[f"two beads part ({_name})"] = _case, bench_scene(_PARTING)
+    _liquid = {"liquid": {"law": _name, "contact_angle": "10 deg"}}
+    SCENES[f"a bead leaves the floor ({_name})"] = Setting([_LEAVING], changes=_liquid)
+    SCENES[f"two beads part ({_name})"] = Setting(_PARTING, changes=_liquid)
+
+FREE: dict[str, Setting] = {
+    "thrown beads": Setting(_THROWN, (FLOOR,), {"environment": _WEIGHT, "drive": {"peak_acceleration": "4 g"}}, 6000),
+    "a bead in the air": Setting(
+        [Bead(0, (0.0, 0.0, 5e-3), R, (0.1, 0.2, 0.0), (1.0, 2.0, 3.0))],
+        changes={"environment": _WEIGHT, "drive": {"peak_acceleration": "4 g", "axis": "x"}},
+        freely=10_000,
+    ),
+}
+"""Those of beads that move freely."""
 
 
 def scene_lines(bench: Bench) -> Iterator[Line]:
     """Beads on prescribed ways beside the second engine."""
-    for name, (make, scene) in SCENES.items():
-        case = make()
-        errors = deviation(case, scene, bench.run(prescribed(case, scene)))
-        for what, error in zip(("force", "torque"), errors, strict=True):
-            yield Line(f"{name}: {what} beside the second engine's", 0.0, error, EQUAL)
+    for name, setting in SCENES.items():
+        yield from setting.lines(name, bench)
+
+
+def thrown_lines(bench: Bench) -> Iterator[Line]:
+    """Beads that move freely, in both engines from the same start."""
+    for name, setting in FREE.items():
+        yield from setting.lines(name, bench)
 
 
 def restart_lines(bench: Bench) -> Iterator[Line]:
     """Springs and open bridges, of pairs and at walls, go on from a restart file as without one."""
-    case = full_case()
-    beads = [over(FLOOR, -_DEEP, R, (0.002, 0.001, 0.0), _STILL), *pair(-_DEEP, 0.001, (0.001, -0.002, 0.001))]
-    gone = replace(over(FLOOR, -_DEEP, S, _WAY), centre=(3e-3, 0.0, S - _DEEP))
-    scene = bench_scene([*beads, gone, *(_moved(bead, 0.0, 3e-3) for bead in pair(-_DEEP, 0.04, _STILL))])
-    whole = bench.run(prescribed(case, scene, 1000))
-    first = prescribed(case, scene, 500, checkpoint=Checkpoint(write="half.restart"))
+    beads = [over(FLOOR, -DEEP, R, (0.002, 0.001, 0.0), STILL), *pair(-DEEP, 0.001, (0.001, -0.002, 0.001))]
+    gone = replace(over(FLOOR, -DEEP, S, WAY), centre=(3e-3, 0.0, S - DEEP))
+    scene = standing([*beads, gone, *(_moved(bead, 0.0, 3e-3) for bead in pair(-DEEP, 0.04, STILL))])
+    whole = bench.run(prescribed(full_case(), scene, 1000))
+    first = prescribed(full_case(), scene, 500, checkpoint=Checkpoint(write="half.restart"))
     carry = bench.run(first).directory / "half.restart"
-    recording = replace(bench_recording(1000), begin=500)
-    second = bench.run(replace(first, recording=recording, checkpoint=Checkpoint(read="half.restart")), carry)
+    second = replace(first, recording=replace(recording(1000), begin=500), checkpoint=Checkpoint(read="half.restart"))
+    forces = bench.run(second, carry).forces[1:, :, :3]
     kept = ("a spring at a wall", 0), ("a spring of a pair", 1), ("an open bridge to a wall", 3), ("one of a pair", 5)
     for what, number in kept:
-        error = farthest(second.force[1:, number], whole.force[501:, number])
+        error = farthest(forces[:, number], whole.forces[501:, number, :3])
         yield Line(f"{what} after a restart beside one without", 0.0, error, EQUAL)
 
 
 def _moved(bead: Bead, x: float, y: float, speed: float = 0.0) -> Bead:
     """A bead elsewhere (m), so much faster along x (m/s)."""
-    place, velocity = bead.centre, bead.velocity
-    return replace(
-        bead, centre=(place[0] + x, place[1] + y, place[2]), velocity=(velocity[0] + speed, velocity[1], velocity[2])
-    )
+    centre, velocity = np.add(bead.centre, (x, y, 0.0)).tolist(), np.add(bead.velocity, (speed, 0.0, 0.0)).tolist()
+    return replace(bead, centre=tuple(centre), velocity=tuple(velocity))
 
 
 def rank_lines(bench: Bench) -> Iterator[Line]:
     """A deck on two MPI ranks against the same on one."""
     if shutil.which("mpirun") is None:
-        yield Line("two MPI ranks: no mpirun on this machine", nan, nan, 0.0, unmeasured=Verdict.SKIPPED)
+        yield Line.without_number("two MPI ranks: no mpirun on this machine", Verdict.SKIPPED)
         return
     # The engine takes a pair the other way round where it has crossed from one rank to the other.
-    first, last = pair(-_DEEP, 0.01, _STILL)
-    crossing = [
-        _moved(bead, 2.6e-3, y, 0.9) for y, beads in ((0.0, (first, last)), (2e-3, (last, first))) for bead in beads
-    ]
-    case, scene = full_case(), bench_scene([*_CLIMBING, *crossing])
-    one, two = (bench.run(prescribed(case, scene, 1000, ranks=ranks)) for ranks in (1, 2))
-    yield Line("forces on two MPI ranks beside one", 0.0, farthest(two.force, one.force), 1e-9)
-    yield Line("torques on two MPI ranks beside one", 0.0, farthest(two.torque, one.torque), 1e-9)
+    first, last = pair(-DEEP, 0.01, STILL)
+    rows = (0.0, (first, last)), (2e-3, (last, first))
+    scene = standing([*CLIMBING, *(_moved(bead, 2.6e-3, y, 0.9) for y, beads in rows for bead in beads)])
+    one, two = (bench.run(prescribed(full_case(), scene, 1000, ranks=ranks)).forces for ranks in (1, 2))
+    yield Line("forces on two MPI ranks beside one", 0.0, farthest(two[..., :3], one[..., :3]), 1e-9)
+    yield Line("torques on two MPI ranks beside one", 0.0, farthest(two[..., 3:], one[..., 3:]), 1e-9)
 
 
 def stock_lines(bench: Bench) -> Iterator[Line]:
     """Two beads that part by Debian's own ``cohesion easo/capillary/viscous``, against the contact model's Soulié."""
-    bare = bench_case(
-        liquid={"dynamic_viscosity": "4.6 mPa*s", "contact_angle": "20 deg", "law": "soulie"},
-        contact={"restitution": 0.5},
-    )
-    scene = bench_scene(pair(-_DEEP, 0.05, _STILL, (_STILL, _STILL)))
+    liquid = {"dynamic_viscosity": "4.6 mPa*s", "contact_angle": "20 deg", "law": "soulie"}
+    bare = bench_case(liquid=liquid, contact={"restitution": 0.5})
+    scene = standing(pair(-DEEP, 0.05, STILL, (STILL, STILL)))
     deck = compose(prescribed(bare, scene))
     meeting = Surfaces.of(S, R, bare.liquid, bare.contact.minimum_separation_ratio)
     fine = tabulated(law_of(bare.liquid), meeting, tolerance=1e-10).text()
@@ -233,5 +384,58 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     angle = degrees(sqrt(2.0 * bare.liquid.contact_angle))
     text = rendered("walkers.check", "stock.lig.j2", case=bare, scene=scene, layout=deck.layout, angle=angle)
     theirs = bench.run(replace(deck, text=text))
-    error = farthest(ours.force, theirs.force)
+    error = farthest(ours.forces[..., :3], theirs.forces[..., :3])
     yield Line("two beads part: force beside that of Debian's model of bridges", 0.0, error, 1e-9)
+
+
+def _walker(cycles: int) -> Case:
+    """The walker of Fig. 1b, alone, for so many cycles."""
+    case = load_case("fig1b", {"dimers.replicates": 1})
+    return replace(case, run=replace(case.run, cycles=cycles, cycles_per_segment=cycles, until_steady=False))
+
+
+def company_lines(bench: Bench) -> Iterator[Line]:
+    """A walker among others of its deck, driven otherwise or not, beside the same one alone; and a rerun."""
+    alone = _walker(10)
+    alone = replace(alone, contact=replace(alone.contact, rolling_friction=0.0))  # which amplifies rounding
+    other = replace(alone, drive=alone.drive.with_peak(2.0 * alone.drive.peak_acceleration))
+    sloping = replace(alone, boundary=replace(alone.boundary, tilt=0.3))
+
+    def ran(*cases: Case) -> Measured:
+        plan = plan_of(*cases)
+        columns = (*BEAD_COLUMNS, *FORCE_COLUMNS)
+        return bench.run(replace(plan, recording=replace(plan.recording, bead_columns=columns)))
+
+    first, again, together = ran(alone), ran(alone), ran(other, alone, sloping)
+    ways = [series.frames[..., :3] - series.frames[0, :, :3] for series in (first, together)]
+    error = farthest(ways[1][:, 2:4], ways[0][:, :2])
+    yield Line("a walker's way among others beside that alone, off by", 0.0, error, 1e-9)
+    same = (first.directory / "beads.bin").read_bytes() == (again.directory / "beads.bin").read_bytes()
+    yield Line("a rerun is the same to the last bit: 0", 0.0, float(not same), 0.0)
+
+
+def step_lines(bench: Bench) -> Iterator[Line]:
+    """A walker's way in four cycles, with the step that ``auto`` takes, its half and its quarter."""
+    case, ways = _walker(4), []
+    for finer in (1, 2, 4):
+        plan = plan_of(replace(case, run=replace(case.run, time_step=case.run.time_step / finer, steps_per_cycle=0)))
+        steps = round(4.0 / case.drive.frequency / case.run.time_step) * finer
+        frames = bench.run(replace(plan, recording=recording(steps, steps))).frames
+        ways.append(frames[-1, :, :3] - frames[0, :, :3])
+    coarse, fine = farthest(ways[0], ways[2]), farthest(ways[1], ways[2])
+    yield Line("a walker's way with half a step, off that with a quarter by", 0.0, fine, 2e-3)
+    yield Line("the same with a whole step", 0.0, coarse, 5e-3)
+
+
+CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
+    "scenes": scene_lines,
+    "thrown": thrown_lines,
+    "restart": restart_lines,
+    "ranks": rank_lines,
+    "stock": stock_lines,
+    "company": company_lines,
+    "step": step_lines,
+}
+"""Each runs decks on a bench and gives lines; its docstring is its title."""
+LONG = ("step",)
+"""Those that ``--quick`` leaves out."""

@@ -2,51 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
+from walkers.check.report import Chapter, Line, Verdict
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.inputs.library import suggestion
 from walkers.inputs.text import rendered
 from walkers.postprocess.drawing import save_figure
 from walkers.runner.files import write_text
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 CHAPTERS = ("benchmarks", "bridges", "crosscheck")
 """In the order of the page; each the function ``chapter`` of a module of `walkers.check`."""
 PAGE = "validation.md"
-
-
-@dataclass(frozen=True)
-class Chapter:
-    """A chapter of docs/explanation/validation.md.
-
-    Attributes
-    ----------
-    name, title
-        For ``walkers validate``, and its heading.
-    text
-        Markdown below the heading: what was compared, with citations and DOIs, tables, what agrees, and each
-        disagreement explained or left open. A picture is referred to as ``![…](figures/validation-NAME.png)``.
-    figures
-        The pictures by the NAME of their file.
-    numbers
-        What the text states, for ``--json``.
-    failed
-        Statements that were expected to hold and do not; empty where all is as it was expected to be.
-    """
-
-    name: str
-    title: str
-    text: str
-    figures: Mapping[str, Figure] = field(default_factory=dict)
-    numbers: Mapping[str, Any] = field(default_factory=dict)
-    failed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -59,7 +29,7 @@ class Validation:
     @property
     def failed(self) -> list[str]:
         """What was expected to hold and does not, with the chapter's name before it."""
-        return [f"{chapter.name}: {statement}" for chapter in self.chapters for statement in chapter.failed]
+        return [f"{chapter.name}: {line.what}" for chapter in self.chapters for line in chapter.failures]
 
 
 def validate(
@@ -71,20 +41,16 @@ def validate(
     jobs: int = 1,
     on_done: Callable[[Chapter], None] | None = None,
 ) -> Validation:
-    """Make chapters, and write the page and its pictures.
+    """Make chapters, so many ``jobs`` at once, and write the page and its pictures.
 
     Parameters
     ----------
-    out
-        Folder of the run directories.
-    to
-        Folder of the page; pictures go into ``figures`` in it.
+    out, to
+        Folders of the run directories and of the page; pictures go into ``figures`` in it.
     only
         Names of `CHAPTERS`; if empty, all. A page of some has their names in its own.
     quick
         The part of each that takes seconds; of chapters that take no longer, all.
-    jobs
-        Chapters at once.
     on_done
         Called with each chapter as it is done.
 
@@ -114,15 +80,15 @@ def validate(
     for chapter in chapters:
         for name, figure in chapter.figures.items():
             files += save_figure(figure, to / "figures" / f"validation-{name}.png", (), title=chapter.title)
+    to.mkdir(parents=True, exist_ok=True)
     write_text(to / page, rendered("walkers.check", "validation.md.j2", chapters=chapters))
     return Validation(chapters, tuple(files))
 
 
 def _chapter(name: str, out: Path, quick: bool) -> Chapter:
     """A chapter, or what kept it from being made: the others are made all the same."""
-    module = import_module(f"walkers.check.{name}")
     try:
-        chapter: Chapter = module.chapter(out, quick=quick)
+        chapter: Chapter = import_module(f"walkers.check.{name}").chapter(out, quick=quick)
     except WalkersError as error:
-        return Chapter(name, name, "", failed=(f"could not be made: {error}",))
+        return Chapter(name, name, (Line.without_number(f"could not be made: {error}", Verdict.ERROR),))
     return chapter

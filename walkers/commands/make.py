@@ -31,6 +31,7 @@ from walkers.commands.arguments import (
 from walkers.completion import offering
 
 if TYPE_CHECKING:
+    from walkers.check.report import Chapter
     from walkers.inputs.case import Case as Resolved
 
 _MANY = 10_000
@@ -246,7 +247,7 @@ def audit(
         if engine is None:
             raise
         raise InputError("--engine", [Problem("", None, str(missing))]) from missing
-    report = run_audit(checks, engine=binary, on_done=lambda checked: tell(f"{checked.name} ({checked.seconds:.1f} s)"))
+    report = run_audit(checks, engine=binary, on_done=_tell_seconds)
     print_as(as_json, report.as_dict, report.as_text)
     if not only:
         try:
@@ -268,8 +269,9 @@ def crosscheck(
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Compare a case's run with an engine of our own, written from the published formulas; exit 1 if they differ."""
-    from walkers.check.comparison import crosscheck, describe, shortened
+    from walkers.check.crosscheck import crosscheck, shortened
     from walkers.check.engine import TERMS
+    from walkers.check.report import as_dict
     from walkers.inputs.errors import InputError, Problem
     from walkers.progress import progress_of
 
@@ -288,12 +290,11 @@ def crosscheck(
             return walkers.run(one, folder, engine=engine, progress=advance, allow_failed_audit=allow_failed_audit)
 
     found = crosscheck(loaded, out, without or (), seeds=seeds, make=make)
-    if as_json:
-        print(json.dumps(found.as_dict(), ensure_ascii=False))
-    else:
-        print(describe(found))
-        tell(*(f"{loaded.name}: differs: {one}" for one in found.disagreements))
-    return 1 if found.disagreements else 0
+    chapter = found.chapter()
+    print_as(as_json, lambda: as_dict([chapter], case=loaded.name, without=list(found.without)), chapter.as_text)
+    if not as_json:
+        tell(*(f"{loaded.name}: differs: {line.what}" for line in chapter.failures))
+    return 1 if chapter.failures else 0
 
 
 def validate(
@@ -305,15 +306,17 @@ def validate(
     as_json: Json = False,
 ) -> int:
     """Check the decks against published benchmarks, exact solutions and a second engine, and write a page of it."""
+    from walkers.check.report import as_dict
     from walkers.check.validate import validate
 
     check_folder("--out", out)
     folder, cores = to or out / "validation", on_cores(jobs).workers
     check_folder("--to", folder)
-    made = validate(
-        out, folder, only=chapters or (), quick=quick, jobs=cores, on_done=lambda one: tell(f"{one.name} done")
-    )
-    numbers = {chapter.name: dict(chapter.numbers) for chapter in made.chapters}
-    print_as(as_json, lambda: numbers, lambda: "\n".join(map(str, made.files)))
+    made = validate(out, folder, only=chapters or (), quick=quick, jobs=cores, on_done=_tell_seconds)
+    print_as(as_json, lambda: as_dict(made.chapters), lambda: "\n".join(map(str, made.files)))
     tell(*(f"not as expected: {statement}" for statement in made.failed))
     return 1 if made.failed else 0
+
+
+def _tell_seconds(chapter: Chapter) -> None:
+    tell(f"{chapter.name} ({chapter.seconds:.1f} s)")

@@ -40,18 +40,9 @@ FloatArray = npt.NDArray[np.float64]
 class Surfaces:
     """Two surfaces that a bridge joins, or may join.
 
-    Attributes
-    ----------
-    radius
-        Of the bead, m; the smaller one of two beads.
-    other_radius
-        Of the other bead, m; infinity for a plane.
-    volume
-        Liquid of the bridge, m³.
-    liquid
-        Surface tension, viscosities and contact angle.
-    minimum_separation_ratio
-        Gap over the reduced radius below which resistances stop growing (roughness).
+    ``radius`` is that of the bead, the smaller one of two, ``other_radius`` of the other one, infinity for a plane (m),
+    ``volume`` the bridge's liquid (m³), ``minimum_separation_ratio`` the gap over the reduced radius below which
+    resistances stop growing (roughness).
     """
 
     radius: float
@@ -112,10 +103,8 @@ class Curve:
     ----------
     forces
         Of gaps from 0 to ``rupture``, m.
-    rupture
-        Gap at which the bridge breaks, m.
-    formation
-        Gap below which it forms, m: 0 where the surfaces must touch.
+    rupture, formation
+        Gaps at which the bridge breaks and below which it forms, m: 0 where the surfaces must touch.
     scale
         Over which forces vary near contact, m; a kink may be there. 0 is for `Surfaces.closest`.
     pull

@@ -1,18 +1,14 @@
-"""Capillary bridges: their liquid, their rupture, and F = πγ√(R1R2) (exp(A h/R2 + B) + C).
-
-The force is that of Soulié et al. (2006), Eqs. 13 and 14, R2 the larger radius and h the gap. At a wall
-it is that between two equal spheres, taken twice.
+"""Capillary bridges, whatever their law: their liquid, their rupture, and limits.
 
 References
 ----------
-F. Soulié, F. Cherblanc, M. S. El Youssoufi, C. Saix, Int. J. Numer. Anal. Meth. Geomech. 30 (2006) 213–228.
 D. Shi, J. J. McCarthy, Powder Technology 184 (2008) 65–75 (volumes).
-G. Lian, C. Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138–147 (rupture).
+G. Lian, C. Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138–147, doi 10.1006/jcis.1993.1452 (rupture).
 """
 
 from __future__ import annotations
 
-from math import cbrt, exp, log, pi, sqrt
+from math import cbrt, pi, sqrt
 
 
 def derjaguin_radius(radius_1: float, radius_2: float) -> float:
@@ -21,16 +17,9 @@ def derjaguin_radius(radius_1: float, radius_2: float) -> float:
 
 
 def bridge_volume_between_beads(radius_1: float, radius_2: float, volume_fraction: float) -> float:
-    """Liquid in the bridge between two beads, m³ (Shi and McCarthy 2008).
+    """Liquid in the bridge between two beads, m³, of radii in m and the liquid on a bead over the bead's volume.
 
-    Each bead gives half of its liquid film that lies in the cap that the other one covers.
-
-    Parameters
-    ----------
-    radius_1, radius_2
-        Radii, m.
-    volume_fraction
-        Liquid on a bead over the bead's volume.
+    Each bead gives half of its liquid film that lies in the cap that the other one covers (Shi and McCarthy 2008).
     """
 
     def share(own: float, other: float) -> float:
@@ -43,32 +32,6 @@ def bridge_volume_between_beads(radius_1: float, radius_2: float, volume_fractio
 def bridge_volume_at_wall(radius: float, volume_fraction: float) -> float:
     """Liquid in the bridge between a bead and a wall, m³: half of the bead's liquid."""
     return 0.5 * 4.0 / 3.0 * pi * radius**3 * volume_fraction
-
-
-def capillary_force(
-    surface_tension: float, radius_1: float, radius_2: float, volume: float, contact_angle: float, gap: float = 0.0
-) -> float:
-    """Attraction by the bridge between two beads, N (Soulié et al. 2006, Eqs. 13 and 14).
-
-    Parameters
-    ----------
-    surface_tension
-        N/m.
-    radius_1, radius_2
-        Radii, m.
-    volume
-        Volume of the bridge, m³.
-    contact_angle
-        Effective contact angle, rad.
-    gap
-        Distance of the surfaces, m; overlapping surfaces (gap < 0) pull as touching ones.
-    """
-    larger = max(radius_1, radius_2)
-    scaled = volume / larger**3
-    a = -1.1 * scaled**-0.53
-    b = (-0.148 * log(scaled) - 0.96) * contact_angle**2 - 0.0082 * log(scaled) + 0.48
-    c = 0.0018 * log(scaled) + 0.078
-    return pi * surface_tension * sqrt(radius_1 * radius_2) * (exp(a * max(gap, 0.0) / larger + b) + c)
 
 
 def capillary_force_limit_at_wall(surface_tension: float, radius: float) -> float:

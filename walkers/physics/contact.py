@@ -1,13 +1,23 @@
-"""Contacts of softened beads: Hertz's repulsion 4/3 E* √R* δ^(3/2), its damping, Mindlin's tangential modulus.
+"""Contacts of softened beads: Hertz's repulsion 4/3 E* √R* δ^(3/2), and his elastic impact.
 
-E* = E/(2(1 − ν²)) and G* = E/(4(1 + ν)(2 − ν)) of two bodies of the same modulus. Hertz 1881; Mindlin 1949; K. L.
-Johnson, Contact Mechanics (1985). A wall is a sphere without end: R* is the bead's radius and m* its mass. Coulomb's
-limit is μ times the elastic repulsion, which carries the load of the bridge.
+E* = E/(2(1 − ν²)) and G* = E/(4(1 + ν)(2 − ν)) (Mindlin 1949) of two bodies of the same modulus. A wall is a sphere
+without end: R* is the bead's radius and m* its mass. In an impact at a normal speed v_n
+
+    δ_max = (15 m* v_n²/(16 E* √R*))^(2/5),    F_max = 4/3 E* √R* δ_max^(3/2),    and the contact lasts 2.943 δ_max/v_n.
+
+References
+----------
+H. Hertz, J. reine angew. Math. 92 (1882) 156, doi 10.1515/crll.1882.92.156; R. D. Mindlin, J. Appl. Mech. 16 (1949)
+259; K. L. Johnson, Contact Mechanics (1985), doi 10.1017/CBO9781139171731 (the duration: ch. 11.4).
 """
 
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
+
+_DURATION = 2.9432750
+"""Of Hertz's impact, over δ_max/v_n."""
 
 
 def reduced_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
@@ -16,13 +26,25 @@ def reduced_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
 
 
 def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -> float:
-    """Overlap at which the repulsion of two beads carries a load, m.
-
-    Parameters
-    ----------
-    force
-        Load, N; one that pulls apart presses nothing.
-    reduced_radius, reduced_modulus
-        R* in m, E* in Pa.
-    """
+    """Overlap (m) at which the repulsion carries a load (N), of R* in m and E* in Pa; a pull presses nothing."""
     return float((3.0 * max(force, 0.0) / (4.0 * reduced_modulus * sqrt(reduced_radius))) ** (2.0 / 3.0))
+
+
+class Impact(NamedTuple):
+    """What meets: reduced mass (kg), radius (m) and modulus (Pa); speeds are normal ones, m/s."""
+
+    mass: float
+    radius: float
+    modulus: float
+
+    def depth(self, speed: float) -> float:
+        """Largest overlap, m."""
+        return float((15.0 * self.mass * speed**2 / (16.0 * self.modulus * sqrt(self.radius))) ** 0.4)
+
+    def peak_force(self, speed: float) -> float:
+        """Largest force, N."""
+        return float(4.0 / 3.0 * self.modulus * sqrt(self.radius) * self.depth(speed) ** 1.5)
+
+    def duration(self, speed: float) -> float:
+        """How long it lasts, s."""
+        return _DURATION * self.depth(speed) / speed

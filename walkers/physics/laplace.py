@@ -36,8 +36,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import cbrt, cos, inf, pi, sin, sqrt
-from typing import Any
+from math import cbrt, inf, pi, sin, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -48,8 +48,6 @@ FloatArray = npt.NDArray[np.float64]
 Array = npt.NDArray[Any]
 """Real, or complex to be differentiated by complex steps."""
 
-POINTS = 60
-"""Gaps of a table."""
 _NODES, _WEIGHTS = (
     0.5 * (part + shift) for part, shift in zip(np.polynomial.legendre.leggauss(48), (1.0, 0.0), strict=True)
 )
@@ -67,38 +65,20 @@ class NoBridgeError(ValueError):
     """There is no bridge as asked for, or none was found."""
 
 
-@dataclass(frozen=True)
-class ForceCurve:
-    """The stable bridges of one volume, from contact to rupture.
+class ForceCurve(NamedTuple):
+    """Stable bridges of one volume at n gaps.
 
     Attributes
     ----------
-    gaps, forces : ndarray, shape (n,)
-        Rising gaps from 0 to `rupture`, and F/γ there, in the unit of length that was given.
-    energies : ndarray, shape (n,)
-        Surface energies over the surface tension, of the free surface less cos θ times each wetted one: their slope is
-        the force.
-    arcs : ndarray, shape (n, 2)
-        From the apex of either solid to its wetting line, along the solid; at a sphere the filling angle times its
-        radius.
-    pressures, lengths : ndarray, shape (n,)
-        Excess pressures over the surface tension, 1/length, and lengths of the profile.
-    rupture
-        The largest gap.
+    forces : ndarray, shape (n,)
+        F/γ, in the unit of length that was given.
+    bridges : ndarray, shape (n, 4)
+        Arcs from the apex of either solid to its wetting line (at a sphere the filling angle times its radius), excess
+        pressure over the surface tension (1/length), and length of the profile.
     """
 
-    gaps: FloatArray
     forces: FloatArray
-    energies: FloatArray
-    arcs: FloatArray
-    pressures: FloatArray
-    lengths: FloatArray
-    rupture: float
-
-    @property
-    def work(self) -> float:
-        """Work from contact to rupture over the surface tension, length²."""
-        return float(self.energies[-1] - self.energies[0])
+    bridges: FloatArray
 
 
 @dataclass(frozen=True)
@@ -122,9 +102,6 @@ class _Solid:
     def cap_volume(self, arc: Array) -> Array:
         rise = self.rise(arc)
         return np.asarray(pi / 6.0 * rise * (3.0 * self.radius(arc) ** 2 + rise**2))
-
-    def wetted_area(self, arc: Array) -> Array:
-        return np.asarray(pi * (self.radius(arc) ** 2 + self.rise(arc) ** 2))
 
 
 def _sinc(x: Array) -> Array:
@@ -190,14 +167,6 @@ class _Family:
         upright = self.start(x[0])[0]
         return float(pi * (2.0 * upright - x[2] * self.first.radius(x[0]) ** 2))
 
-    def energy(self, x: FloatArray) -> float:
-        free = 2.0 * pi * x[3] * np.sum(_WEIGHTS * self.profile(x, _NODES)[0])
-        wetted = [
-            cos(solid.contact_angle) * solid.wetted_area(arc)
-            for solid, arc in ((self.first, x[0]), (self.second, x[1]))
-        ]
-        return float(free - sum(wetted))
-
     def solve(self, x: FloatArray, row: FloatArray, value: float) -> FloatArray | None:
         """Newton's method from x for a bridge with row · x = value; None where it fails."""
         for _ in range(_NEWTON_STEPS):
@@ -239,14 +208,15 @@ def _toroid(family: _Family, gap: float) -> FloatArray:
     return np.array([*arc, 1.0 / arc[0] - 2.0 * sin(turn) / height, length, gap])
 
 
-def _family_of(radii: tuple[float, float], volume: float, contact_angles: tuple[float, float]) -> _Family:
+def _family_of(radii: tuple[float, float], volume: float, contact_angle: float | tuple[float, float]) -> _Family:
     """The family of bridges, lengths in units of the volume's cube root."""
     if volume <= 0.0 or min(radii) <= 0.0 or not volume < inf or min(radii) == inf:
         raise ValueError(f"radii {radii}, volume {volume}: expected positive numbers, and a plane at one side at most")
-    if not all(0.0 <= angle < pi for angle in contact_angles):
-        raise ValueError(f"contact angles {contact_angles}: expected 0 to π")
+    angles = contact_angle if isinstance(contact_angle, tuple) else (contact_angle, contact_angle)
+    if not all(0.0 <= angle < pi for angle in angles):
+        raise ValueError(f"contact angles {angles}: expected 0 to π")
     unit = cbrt(volume)
-    first, second = (_Solid(unit / radius, angle) for radius, angle in zip(radii, contact_angles, strict=True))
+    first, second = (_Solid(unit / radius, angle) for radius, angle in zip(radii, angles, strict=True))
     return _Family(first, second)
 
 
@@ -343,9 +313,9 @@ def force_curve(
     radius_2: float,
     volume: float,
     contact_angle: float | tuple[float, float],
-    gaps: npt.ArrayLike | None = None,
+    gaps: npt.ArrayLike,
 ) -> ForceCurve:
-    """Pull of a bridge of constant volume against the gap.
+    """Pull of a bridge of constant volume at gaps.
 
     Parameters
     ----------
@@ -356,12 +326,7 @@ def force_curve(
     contact_angle
         rad; one, or one on each solid.
     gaps
-        Rising, from 0 to rupture at most, shape (n,); left out, `POINTS` of them over that range, closer at
-        both ends.
-
-    Returns
-    -------
-    ForceCurve
+        From 0 to rupture at most, shape (n,).
 
     Raises
     ------
@@ -370,25 +335,15 @@ def force_curve(
     NoBridgeError
         If no bridge was found (a contact angle so large that the liquid is not held between them).
     """
-    family = _family_of((radius_1, radius_2), volume, _pair(contact_angle))
+    family = _family_of((radius_1, radius_2), volume, contact_angle)
     unit, branch = cbrt(volume), _branch(family)
     largest = float(branch.bridges[-1, 4])
-    if gaps is None:
-        wanted = 0.5 * largest * (1.0 - np.cos(np.linspace(0.0, pi, POINTS)))
-    else:
-        wanted = np.atleast_1d(np.asarray(gaps, np.float64)) / unit
+    wanted = np.asarray(gaps, np.float64) / unit
     if wanted.min() < 0.0 or wanted.max() > largest * (1.0 + 1e-12):
         raise ValueError(f"gaps: expected 0 to {largest * unit:.6g}, where the bridge ruptures")
     bridges = [_stable(family, branch, min(float(gap), largest)) for gap in wanted]
-    return ForceCurve(
-        gaps=unit * np.minimum(wanted, largest),
-        forces=unit * np.array([family.force(x) for x in bridges]),
-        energies=unit**2 * np.array([family.energy(x) for x in bridges]),
-        arcs=unit * np.array([x[:2] for x in bridges]),
-        pressures=np.array([x[2] for x in bridges]) / unit,
-        lengths=unit * np.array([x[3] for x in bridges]),
-        rupture=unit * largest,
-    )
+    forces = unit * np.array([family.force(x) for x in bridges])
+    return ForceCurve(forces, np.array(bridges)[:, :4] * [unit, unit, 1.0 / unit, unit])
 
 
 def _stable(family: _Family, branch: _Branch, gap: float) -> FloatArray:
@@ -419,13 +374,9 @@ def _stable(family: _Family, branch: _Branch, gap: float) -> FloatArray:
     return found
 
 
-def _pair(contact_angle: float | tuple[float, float]) -> tuple[float, float]:
-    return contact_angle if isinstance(contact_angle, tuple) else (contact_angle, contact_angle)
-
-
 def rupture_distance(
     radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float]
 ) -> float:
     """Largest gap at which a bridge of this volume exists; parameters and errors as for `force_curve`."""
-    family = _family_of((radius_1, radius_2), volume, _pair(contact_angle))
+    family = _family_of((radius_1, radius_2), volume, contact_angle)
     return cbrt(volume) * float(_branch(family).bridges[-1, 4])

@@ -31,12 +31,7 @@ LAWS = {
 
 
 def by_name(name: str) -> BridgeLaw:
-    """The law of a name.
-
-    Parameters
-    ----------
-    name
-        One of `LAWS`, ``package.module:function`` or ``file.py:function``; a file is sought from the working directory.
+    """The law of a name: of `LAWS`, ``package.module:function`` or, from the working directory, ``file.py:function``.
 
     Raises
     ------
@@ -55,13 +50,7 @@ def by_name(name: str) -> BridgeLaw:
 
 
 def source_sha256(name: str) -> str | None:
-    """SHA-256 of the file that a user's own law is in; None of a law that comes with the program.
-
-    Raises
-    ------
-    ValueError
-        As for `by_name`.
-    """
+    """SHA-256 of the file that a user's own law is in, None of a law that comes with the program; errors: `by_name`."""
     if name in LAWS:
         return None
     file = getsourcefile(by_name(name))
@@ -74,22 +63,19 @@ def law_of(liquid: Liquid) -> BridgeLaw:
 
 
 def _module(name: str, place: str) -> ModuleType:
+    """A module, or a file as one, which is among the imported ones while it runs: its dataclasses look for it there."""
+    key = f"walkers_law_{Path(place).resolve()}"
     try:
-        return _from_file(Path(place)) if place.endswith(".py") else import_module(place)
-    except Exception as error:
-        raise ValueError(f"bridge law {name!r}: {place} cannot be imported: {error}") from error
-
-
-def _from_file(path: Path) -> ModuleType:
-    """A file as a module, among the imported ones while it runs: its dataclasses look for it there."""
-    key = f"walkers_law_{path.resolve()}"
-    specification = spec_from_file_location(key, path)
-    assert specification is not None
-    assert specification.loader is not None
-    module = sys.modules[key] = module_from_spec(specification)
-    try:
+        if not place.endswith(".py"):
+            return import_module(place)
+        specification = spec_from_file_location(key, place)
+        assert specification is not None
+        assert specification.loader is not None
+        module = sys.modules[key] = module_from_spec(specification)
         specification.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[key]
+    except BaseException as error:
+        sys.modules.pop(key, None)
+        if isinstance(error, Exception):
+            raise ValueError(f"bridge law {name!r}: {place} cannot be imported: {error}") from error
         raise
     return module

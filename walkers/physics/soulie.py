@@ -1,24 +1,31 @@
 """The law of the stock engine, mended at walls: Soulié's pull, and lubrication between immersed spheres at all gaps.
 
-The pull is that of `walkers.physics.capillary`, the bridge breaks at (1 + θ/2) V^(1/3), and the resistances are those
-of `walkers.physics.lubrication`, which take the solids for immersed: no torque but by the sliding force. At a wall the
-pull is twice that of two equal spheres; the resistances are a plane's, of R* = R. Such a deck's doubled wall has less
-of the tangential one at gaps above εR/2, by about a fifth: there this law differs from it.
+    F = πγ √(R1 R2) (exp(A h/R2 + B) + C),        R2 the larger radius, h the gap
+    N = 6πηR*/x,        S = 6πηR* (8/15 ln(1/x) + 0.9588),        x = max(ε, h/R*)
+
+At a wall the pull is twice that of two equal spheres; the resistances are a plane's, of R* = R, ε the gap over R* below
+which they stop growing (roughness), without torque but by the sliding force. Such a deck's doubled wall has less of the
+tangential one at gaps above εR/2, by about a fifth: there this law differs from it. The bridge breaks at
+(1 + θ/2) V^(1/3).
+
+References
+----------
+F. Soulié, F. Cherblanc, M. S. El Youssoufi, C. Saix, Int. J. Numer. Anal. Meth. Geomech. 30 (2006) 213, Eqs. 13, 14.
+Nase et al. as in D. Shi, J. J. McCarthy, Powder Technology 184 (2008) 65–75, Eqs. 40, 41.
 """
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, log, pi, sqrt
 
 import numpy as np
 
-from walkers.physics import capillary
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
-from walkers.physics.lubrication import normal_drag, tangential_drag
+from walkers.physics.capillary import rupture_distance
 
 
 def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
-    """Pull over the surface tension, F/γ (Soulié et al. 2006, Eqs. 13 and 14), at a plane that of spheres, twice.
+    """Pull over the surface tension, F/γ.
 
     Parameters
     ----------
@@ -27,29 +34,29 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
     volume, contact_angle
         m³ and rad.
     gaps
-        m, shape (n,).
+        m, shape (n,); overlapping surfaces pull as touching ones.
 
     Returns
     -------
     ndarray, shape (n,), m.
     """
-    pair, times = ((radius_1, radius_1), 2.0) if radius_2 == inf else ((radius_1, radius_2), 1.0)
-    return np.array([times * capillary.capillary_force(1.0, *pair, volume, contact_angle, float(gap)) for gap in gaps])
+    (one, other), times = ((radius_1, radius_1), 2.0) if radius_2 == inf else ((radius_1, radius_2), 1.0)
+    larger = max(one, other)
+    scaled = log(volume / larger**3)
+    a = -1.1 * (volume / larger**3) ** -0.53
+    b = (-0.148 * scaled - 0.96) * contact_angle**2 - 0.0082 * scaled + 0.48
+    c = 0.0018 * scaled + 0.078
+    return np.asarray(times * pi * sqrt(one * other) * (np.exp(a * np.maximum(gaps, 0.0) / larger + b) + c))
 
 
 def law(surfaces: Surfaces) -> Curve:
     """Pull and resistances as decks for the stock engine have them."""
-    liquid, radius = surfaces.liquid, surfaces.radius
-    lubricated = (liquid.dynamic_viscosity, surfaces.reduced_radius, surfaces.minimum_separation_ratio)
+    liquid, reduced, shape = surfaces.liquid, surfaces.reduced_radius, (surfaces.radius, surfaces.other_radius)
+    stokes = 6.0 * pi * liquid.dynamic_viscosity * reduced
 
     def forces(gaps: FloatArray) -> Forces:
-        pair, none = (radius, surfaces.other_radius), np.zeros_like(gaps)
-        return Forces(
-            pull=liquid.surface_tension * pull(*pair, surfaces.volume, liquid.contact_angle, gaps),
-            normal=np.array([normal_drag(*lubricated, float(gap)) for gap in gaps]),
-            sliding=np.array([tangential_drag(*lubricated, float(gap)) for gap in gaps]),
-            coupling=none,
-            rolling=none,
-        )
+        near, none = np.maximum(surfaces.minimum_separation_ratio, gaps / reduced), np.zeros_like(gaps)
+        pulled = liquid.surface_tension * pull(*shape, surfaces.volume, liquid.contact_angle, gaps)
+        return Forces(pulled, stokes / near, stokes * (8.0 / 15.0 * np.log(1.0 / near) + 0.9588), none, none)
 
-    return Curve(forces, capillary.rupture_distance(surfaces.volume, liquid.contact_angle))
+    return Curve(forces, rupture_distance(surfaces.volume, liquid.contact_angle))

@@ -14,11 +14,10 @@ Speeds of the AK5 walker agree within 0.5 % from 1 to 10 µs, the latter being i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import ceil, inf, pi, sqrt
 
 from walkers.physics.contact import reduced_modulus
-from walkers.physics.lubrication import normal_drag
 from walkers.physics.matter import Contact, Liquid
 
 AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
@@ -29,6 +28,8 @@ WALKER_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.4, "hertz": 0.2, "viscous
 0.25 % of those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of it they go wrong."""
 LONGEST_WALKER_STEP = 4e-6
 """s; longest step of walkers, however soft they are."""
+Bridged = Sequence[tuple[float, Sequence[float]]]
+"""Radius of each bead and the radii of those that bridges join to it, beside a wall, m."""
 
 
 def auto_fractions(*, loose: bool) -> Mapping[str, float]:
@@ -46,7 +47,7 @@ class TimeStepLimits:
 
     def as_dict(self) -> dict[str, float]:
         """Name to limit in s."""
-        return {"rayleigh": self.rayleigh, "hertz": self.hertz, "viscous": self.viscous}
+        return asdict(self)
 
     def recommended(self, *, loose: bool) -> float:
         """Largest step, in s, that respects every limit with margin, of beads that are loose or of walkers."""
@@ -58,19 +59,30 @@ class TimeStepLimits:
         return [name for name, limit in self.as_dict().items() if time_step > limit]
 
 
-Bridged = Sequence[tuple[float, Sequence[float]]]
-"""Radius of each bead and the radii of those that bridges join to it, beside a wall, m."""
-
-
 def time_step_limits(
     bridged: Bridged, density: float, contact: Contact, liquid: Liquid, peak_velocity: float
 ) -> TimeStepLimits:
     """Limits of the time step for beads on a substrate of this peak velocity (m/s); see the module."""
-    radii = [radius for radius, _ in bridged]
+    modulus = reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
+    impacts, rates = [], []
+    for radius, neighbours in bridged:
+        mass = _mass(radius, density)
+        impacts.append((mass, radius))
+        rates.append(_drag(radius, liquid, contact) / mass)
+        between = 0.0
+        for other in neighbours:
+            other_mass, reduced = _mass(other, density), radius * other / (radius + other)
+            impacts.append((mass * other_mass / (mass + other_mass), reduced))
+            between += _drag(reduced, liquid, contact) * (1.0 / mass + 1.0 / other_mass)
+        rates[-1] += between
+    shear_modulus = contact.youngs_modulus / (2.0 * (1.0 + contact.poissons_ratio))
+    slowest = pi * min(radius for radius, _ in bridged) * sqrt(density / shear_modulus)
     return TimeStepLimits(
-        rayleigh=_rayleigh_time(min(radii), density, contact),
-        hertz=_hertz_time(bridged, density, contact, peak_velocity),
-        viscous=_viscous_limit(bridged, density, contact, liquid),
+        rayleigh=slowest / (0.1631 * contact.poissons_ratio + 0.8766),
+        hertz=min(2.87 * float((mass**2 / (radius * modulus**2 * peak_velocity)) ** 0.2) for mass, radius in impacts)
+        if peak_velocity
+        else inf,
+        viscous=2.0 / max(rates) if max(rates) > 0.0 else inf,
     )
 
 
@@ -78,60 +90,16 @@ def _mass(radius: float, density: float) -> float:
     return 4.0 / 3.0 * pi * radius**3 * density
 
 
-def _rayleigh_time(radius: float, density: float, contact: Contact) -> float:
-    shear_modulus = contact.youngs_modulus / (2.0 * (1.0 + contact.poissons_ratio))
-    speed_factor = 0.1631 * contact.poissons_ratio + 0.8766
-    return pi * radius * sqrt(density / shear_modulus) / speed_factor
-
-
-def _hertz_time(bridged: Bridged, density: float, contact: Contact, velocity: float) -> float:
-    if velocity == 0.0:
-        return inf
-    modulus = reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
-    colliding = []
-    for radius, neighbours in bridged:
-        mass = _mass(radius, density)
-        colliding.append((mass, radius))
-        for other in neighbours:
-            other_mass = _mass(other, density)
-            colliding.append((mass * other_mass / (mass + other_mass), radius * other / (radius + other)))
-    return min(2.87 * float((mass**2 / (radius * modulus**2 * velocity)) ** 0.2) for mass, radius in colliding)
-
-
-def _viscous_limit(bridged: Bridged, density: float, contact: Contact, liquid: Liquid) -> float:
-    viscosity, nearest = liquid.dynamic_viscosity, contact.minimum_separation_ratio
-    rates = []
-    for radius, neighbours in bridged:
-        mass = _mass(radius, density)
-        between = sum(
-            normal_drag(viscosity, radius * other / (radius + other), nearest)
-            * (1.0 / mass + 1.0 / _mass(other, density))
-            for other in neighbours
-        )
-        rates.append(normal_drag(viscosity, radius, nearest) / mass + between)
-    return 2.0 / max(rates) if max(rates) > 0.0 else inf
+def _drag(reduced_radius: float, liquid: Liquid, contact: Contact) -> float:
+    """The largest of a bridge's normal drags by lubrication, N s/m."""
+    return 6.0 * pi * liquid.dynamic_viscosity * reduced_radius / contact.minimum_separation_ratio
 
 
 def fit_into_cycle(largest_time_step: float, frequency: float, samples_per_cycle: int) -> tuple[float, int]:
-    """Largest step not above the given one of which a cycle and each sampling interval hold a whole number.
+    """Largest step (s) not above the given one of which a cycle and each sampling interval hold a whole number.
 
-    A cycle of 6250 steps sampled every 312 drifts through the phase and puts 3 % on a mean velocity.
-
-    Parameters
-    ----------
-    largest_time_step
-        s.
-    frequency
-        Hz.
-    samples_per_cycle
-        Samples in a cycle.
-
-    Returns
-    -------
-    time_step : float
-        s.
-    steps_per_cycle : int
-        A multiple of ``samples_per_cycle``.
+    A cycle of 6250 steps sampled every 312 drifts through the phase and puts 3 % on a mean velocity. Returns the step
+    and how many are a cycle, of a drive of this frequency (Hz).
     """
     # A step given as 2 us must give 6250 steps in 12.5 ms, not one interval more for the last bit of the quotient.
     intervals = ceil(1.0 / (frequency * largest_time_step * samples_per_cycle) * (1.0 - 1e-12))

@@ -12,6 +12,7 @@ The resistances are those of `walkers.physics.reynolds`.
 from __future__ import annotations
 
 import tempfile
+from contextlib import suppress
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -51,47 +52,33 @@ def law(surfaces: Surfaces) -> Curve:
 
 @lru_cache(maxsize=4096)
 def _solved(other_radius: float, volume: float, contact_angle: float) -> tuple[float, Chebyshev]:
-    """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's radius.
-
-    Bridges of one shape are solved once: beads of all sizes have the same at a wall.
-    """
+    """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's radius."""
     shape = (other_radius, volume, contact_angle)
-    place = user_cache_path("granular-walkers") / "young-laplace" / f"{_fingerprint(shape)}.npy"
+    source = Path(__file__).with_name("laplace.py").read_bytes()  # what is kept is of this solver
+    name = sha256(source + repr((NODES, _SMALL, shape)).encode()).hexdigest()[:24]
+    place = user_cache_path("granular-walkers") / "young-laplace" / f"{name}.npy"
     try:
         numbers = np.load(place)
     except (OSError, ValueError, EOFError):
         numbers = _solve(shape)
-        _keep(place, numbers)
+        with suppress(OSError):  # written beside and renamed, if it can be: others may be at it
+            place.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(dir=place.parent, suffix=".part", delete=False) as file:
+                np.save(file, numbers)
+            Path(file.name).replace(place)
     return float(numbers[0]), Chebyshev(numbers[1:], domain=[0.0, 1.0])
-
-
-def _fingerprint(shape: tuple[float, float, float]) -> str:
-    """Of a bridge's shape and of what solves the equation."""
-    source = Path(__file__).with_name("laplace.py").read_bytes()
-    return sha256(source + repr((NODES, _SMALL, shape)).encode()).hexdigest()[:24]
 
 
 def _solve(shape: tuple[float, float, float]) -> FloatArray:
     """The rupture distance, then the coefficients of the polynomial."""
-    from walkers.physics import laplace
+    from walkers.physics.laplace import force_curve, rupture_distance
 
     bridge = (1.0, *shape)
-    rupture = laplace.rupture_distance(*bridge)
+    rupture = rupture_distance(*bridge)
     for nodes in NODES:
         smooth = Chebyshev.interpolate(
-            lambda part: laplace.force_curve(*bridge, rupture * (1.0 - part**2)).forces, nodes - 1, domain=[0.0, 1.0]
+            lambda part: force_curve(*bridge, rupture * (1.0 - part**2)).forces, nodes - 1, domain=[0.0, 1.0]
         )
         if np.abs(smooth.coef[-4:]).max() < _SMALL * abs(smooth(1.0)):
             break
     return np.array([rupture, *smooth.coef])
-
-
-def _keep(place: Path, numbers: FloatArray) -> None:
-    """Write to the cache, if it can be written to, beside and renamed: others may be at it."""
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=place.parent, suffix=".part", delete=False) as file:
-            np.save(file, numbers)
-        Path(file.name).replace(place)
-    except OSError:
-        return
