@@ -96,25 +96,21 @@ def sweep_figure(
     InputError
         If it is no sweep's directory, no point is finished, or there is no such column.
     """
-    from walkers.sweeps.figure import draw
-    from walkers.sweeps.figure_layout import drawn_column, layout_of
-    from walkers.sweeps.record import read_record
+    from walkers.sweeps.figure import draw, drawn_column, layout_of
     from walkers.sweeps.table import load
 
-    record, table = read_record(directory), load(directory)
+    table = load(directory)
     column = _column(table, y)
     done = _finished(str(directory), table, column)
-    layout = layout_of(record, done, x=x, hue=hue, panels=panels)
+    layout = layout_of(table, done, x=x, hue=hue, panels=panels)
     if layout.untold:
         _tell(f"not told apart: {'; '.join(layout.untold)}")
     predicted = _predicted(done, column) if theory else {}
-    title = record.title or record.name
-    return draw(layout, drawn_column(done, column, predicted), title=title, log=log)
+    return draw(layout, drawn_column(done, column, predicted), title=table.attrs["title"], log=log)
 
 
 def _column(table: pd.DataFrame, wanted: str | None) -> str:
-    from walkers.sweeps.factors import find_name
-    from walkers.sweeps.figure_layout import default_column
+    from walkers.sweeps.table import default_column, find_name
 
     return find_name("--y", wanted, table.columns) if wanted else default_column(table)
 

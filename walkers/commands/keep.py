@@ -81,12 +81,11 @@ def list_(
     as_json: Json = False,
 ) -> None:
     """List runs and sweeps: by what they differ, velocity or climbs, status, age, size."""
-    from walkers.sweeps import listing
-    from walkers.sweeps.inventory import inventory, select
+    from walkers.sweeps import folder
 
-    found = select(inventory(out), case=case, status=status, older_than=older_than, where=where or ())
-    found = listing.ordered(found, sort, reverse=reverse)
-    print_as(as_json, lambda: listing.as_json(found), lambda: listing.as_text(found))
+    found = folder.select(folder.inventory(out), case=case, status=status, older_than=older_than, where=where or ())
+    found = folder.ordered(found, sort, reverse=reverse)
+    print_as(as_json, lambda: folder.as_json(found), lambda: folder.as_text(found))
 
 
 def clean(
@@ -99,7 +98,7 @@ def clean(
     yes: Yes = False,
 ) -> int:
     """Remove interrupted and failed runs, or given runs and sweeps, after asking; never what is being made."""
-    from walkers.sweeps.cleaning import clean, plan_cleaning
+    from walkers.sweeps.folder import clean, plan_cleaning
 
     check_folder("--out", out)
     refuse("--finished", finished and bool(runs), "has no meaning with given runs")

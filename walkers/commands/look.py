@@ -278,7 +278,7 @@ def theory(case: Case, settings: Set = None, out: Out = DEFAULT_OUT, as_json: Js
 def status(directory: SweepOrFolder, out: Out = DEFAULT_OUT) -> None:
     """Say how many points of a sweep are finished, failed, running and missing, and why they failed."""
     from walkers.pipeline import find_sweep
-    from walkers.sweeps.summary import describe_status, sweeps_in
+    from walkers.sweeps.table import describe_status, sweeps_in
 
     print_lines(describe_status(one) for one in sweeps_in(find_sweep(directory, out) or Path(directory)))
 
@@ -345,10 +345,9 @@ def compare(
 ) -> None:
     """Print by what two runs or cases differ, in parameters and results; or two sweeps, point by point."""
     from walkers.pipeline import find_side, find_sweep
-    from walkers.sweeps.comparison import Comparison, SweepComparison, compare_runs, compare_sweeps
+    from walkers.sweeps.comparison import compare_runs, compare_sweeps
 
     sweeps = [find_sweep(one, out) for one in (first, second)]
-    found: Comparison | SweepComparison
     if sweeps[0] is not None and sweeps[1] is not None:
         found = compare_sweeps(sweeps[0], sweeps[1], y)
     else:
@@ -356,4 +355,4 @@ def compare(
             refuse(one, sweep is not None, "is a sweep, to be compared with another sweep")
         refuse("--y", y is not None, "is for sweeps")
         found = compare_runs(find_side(first, out), find_side(second, out))
-    print_as(as_json, found.as_dict, found.as_text)
+    print_as(as_json, lambda: found.contents, lambda: found.text)
