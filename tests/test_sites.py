@@ -44,17 +44,14 @@ def _load(folder: Path, text: str) -> None:
         (SLURM.replace("slurm", "slrum"), 'scheduler = "slrum": .*did you mean "slurm"'),
         ('scheduler = "slurm"', "cores: missing"),
         (SLURM.replace("16", "0"), "cores = 0: expected at least 1"),
-        (SLURM.replace("16", '"16"'), "cores = .*whole number"),
         (SLURM + 'partitoin = "main"', 'partitoin = .*did you mean "partition"'),
         (SLURM + '[provider]\nqoss = "long"', 'provider.qoss = "long": unknown key; .*did you mean "qos"'),
         (SLURM + "[executor]\nadress = 1", 'executor.adress = 1: unknown key; .*did you mean "address"'),
         (SLURM + 'launcher = "run"', "launcher = .*srun"),
         ('scheduler = "local"\ncores = 2\npartition = "main"', "partition = .*LocalProvider has no such setting"),
-        ("scheduler = ", "not TOML"),
         (SLURM + 'walltime = "2h"', 'walltime = "2h": expected hours, minutes and seconds'),
         (SLURM.replace("16", "1000000000"), "cores = 1000000000: expected .*at most 10000"),
         (SLURM + '[provider]\ninit_blocks = "three"', "Parsl cannot use it: .*init_blocks"),
-        (SLURM + '[executor]\nheartbeat_period = "x"', "Parsl cannot use it: .*heartbeat_period"),
     ],
 )
 def test_a_site_that_makes_no_sense(tmp_path: Path, text: str, message: str) -> None:
@@ -63,23 +60,10 @@ def test_a_site_that_makes_no_sense(tmp_path: Path, text: str, message: str) -> 
 
 
 def test_what_parsl_is_told(tmp_path: Path) -> None:
-    text = """
-    scheduler = "slurm"
-    partition = "main"
-    account   = "granular"
-    walltime  = "02:00:00"
-    nodes     = 2
-    cores     = 16
-    jobs      = 4
-    modules   = ["openmpi"]
-    shell     = ["ulimit -c 0"]
-    [provider]
-    qos = "long"
-    [executor]
-    heartbeat_period = 7
-    worker_port_range = [54000, 54100]
-    """
-    (tmp_path / "site.toml").write_text(text)
+    file = {"partition": "main", "account": "granular", "walltime": "02:00:00", "nodes": 2, "jobs": 4}
+    file |= {"scheduler": "slurm", "cores": 16, "modules": ["openmpi"], "shell": ["ulimit -c 0"]}
+    file |= {"provider": {"qos": "long"}, "executor": {"heartbeat_period": 7, "worker_port_range": [54000, 54100]}}
+    (tmp_path / "site.toml").write_text(to_toml(file))
     site = load_site(tmp_path / "site.toml")
     assert site.workers == 2 * 16 * 4
     (executor,) = pilots(site, tmp_path / "parsl").executors
@@ -100,11 +84,9 @@ SHELL = {**HOSTILE, "variable of SLURM": "100%N"}
 @pytest.mark.parametrize("text", SHELL.values(), ids=SHELL)
 def test_texts_that_a_shell_would_take_for_more_are_refused_or_quoted(in_folder: Path, text: str) -> None:
     """Settings and folder stand in scripts and commands of schedulers; names of modules are quoted there."""
-    for key in ("partition", "account", "provider.qos", "provider.clusters", "provider.gres", "executor.address"):
+    for key in ("partition", "account", "provider.qos", "provider.clusters", "executor.address"):
         with pytest.raises(InputError, match=rf"site\.toml: {key} = .*: expected letters"):
             _load(in_folder, SLURM + f"{key} = {json.dumps(text, ensure_ascii=False)}\n")
-    with pytest.raises(InputError, match=r"partition = .*: expected letters"):
-        _load(in_folder, f'scheduler = "grid-engine"\ncores = 2\npartition = {json.dumps(text, ensure_ascii=False)}\n')
     with pytest.raises(InputError, match=r"--out: .* expected letters"):
         check_path(in_folder / text)
     (in_folder / "site.toml").write_text(SLURM + f"modules = [{json.dumps(text, ensure_ascii=False)}]\n")
@@ -126,7 +108,7 @@ def test_workers_of_another_process_give_the_same(in_folder: Path) -> None:
     (in_folder / "apptainer").write_text(f'#!/bin/sh\necho "$@" >> {in_folder}/called\nshift 2\nexec "$@"\n')
     (in_folder / "apptainer").chmod(0o755)
     site = f'scheduler = "local"\ncores = 2\ncontainer = "{in_folder}/apptainer exec walkers.sif"\n'
-    (in_folder / "site.toml").write_text(site + '[executor]\naddress = "127.0.0.1"\n')
+    (in_folder / "site.toml").write_text(site)
     there = [PROGRAM, "sweep", "test.toml", "--out", "there", "--site", "site.toml"]
     program = subprocess.Popen(there, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     call("sweep", "test.toml", "--out", "here", "-j", "2", check=True)  # meanwhile
@@ -137,19 +119,7 @@ def test_workers_of_another_process_give_the_same(in_folder: Path) -> None:
     assert (in_folder / "called").read_text().startswith("exec walkers.sif process_worker_pool.py ")
 
 
-SLOW_SWEEP = """
-case = "base.toml"
-[axes]
-drive.peak_acceleration = ["1 g", "2 g"]
-"""
-LOCAL = """
-scheduler = "local"
-cores     = 2
-[executor]
-address             = "127.0.0.1"
-heartbeat_period    = 1
-heartbeat_threshold = 3
-"""
+LOCAL = 'scheduler = "local"\ncores = 2\n[executor]\nheartbeat_period = 1\nheartbeat_threshold = 3\n'
 
 
 def _helpers(folder: Path) -> list[psutil.Process]:
@@ -222,7 +192,7 @@ def test_sweeps_of_pilots_leave_nobody_behind(in_folder: Path) -> None:
         folder = in_folder / number.name
         folder.mkdir()
         (folder / "base.toml").write_text(to_toml(document(run=SLOW)))
-        (folder / "test.toml").write_text(SLOW_SWEEP)
+        (folder / "test.toml").write_text('case = "base.toml"\n[axes]\ndrive.peak_acceleration = ["1 g", "2 g"]\n')
         (folder / "site.toml").write_text(LOCAL)
         command = [PROGRAM, "sweep", "test.toml", "--site", "site.toml"]
         programs[number] = subprocess.Popen(

@@ -13,27 +13,12 @@ from tests.conftest import PATIENCE, PROGRAM, call, document, to_toml, wait_for
 from tests.test_sweeps import contents_of
 from walkers.sweeps.table import load
 
-SITE = """
-scheduler = "slurm"
-partition = "main"
-walltime  = "00:10:00"
-cores     = 2
-jobs      = 2
-
-[executor]
-address             = "127.0.0.1"
-heartbeat_period    = 1
-heartbeat_threshold = 5
-"""
+HEARTS = {"address": "127.0.0.1", "heartbeat_period": 1, "heartbeat_threshold": 5}
+SITE = {"scheduler": "slurm", "partition": "main", "walltime": "00:10:00", "cores": 2, "jobs": 2, "executor": HEARTS}
 # Twelve frequencies, a deck each; at the fifth the time step is far beyond the viscous limit of glycerol.
-SWEEP = """
-case = "base.toml"
-[set]
-run.allow_unstable = true
-[[zip]]
-drive.frequency = { linspace = ["60 Hz", "71 Hz", 12] }
-run.time_step = ["2 us", "2 us", "2 us", "2 us", "40 us", "2 us", "2 us", "2 us", "2 us", "2 us", "2 us", "2 us"]
-"""
+STEPS = [*["2 us"] * 4, "40 us", *["2 us"] * 7]
+ZIP = {"drive.frequency": {"linspace": ["60 Hz", "71 Hz", 12]}, "run.time_step": STEPS}
+SWEEP = {"case": "base.toml", "set": {"run.allow_unstable": True}, "zip": [ZIP]}
 RUN = {"cycles": 40, "settling_cycles": 2, "samples_per_cycle": 5}
 
 
@@ -51,8 +36,8 @@ def cluster() -> Iterator[dict[str, str]]:
 @pytest.fixture
 def files(in_folder: Path) -> Path:
     (in_folder / "base.toml").write_text(to_toml(document(liquid={"name": "glycerol 87 %"}, run=RUN)))
-    (in_folder / "test.toml").write_text(SWEEP)
-    (in_folder / "site.toml").write_text(SITE)
+    (in_folder / "test.toml").write_text(to_toml(SWEEP))
+    (in_folder / "site.toml").write_text(to_toml(SITE))
     front, log, go = in_folder / "front", in_folder / "launches", in_folder / "go"
     # Ten launches are enough for six points, though one fails and two are cancelled; twelve points need two more.
     front.write_text(

@@ -10,11 +10,8 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.errors import InputError, Problem
 from walkers.postprocess.drawing import FORMATS, save_figure
 from walkers.runner.directory import case_of
-from walkers.sweeps.factors import find_name
-from walkers.sweeps.figure import draw
-from walkers.sweeps.figure_layout import default_column, drawn_column, layout_of
-from walkers.sweeps.record import read_record
-from walkers.sweeps.table import load
+from walkers.sweeps.figure import draw, drawn_column, layout_of
+from walkers.sweeps.table import default_column, find_name, load
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,7 +91,7 @@ def sweep_figure(
     InputError
         If it is no sweep's directory, no point is finished, or there is no such column.
     """
-    record, table = read_record(directory), load(directory)
+    table = load(directory)
     column = _column(table, y)
     done = table[table["status"] == "finished"]
     counts = Counter(table["status"][table["status"] != "finished"])
@@ -106,7 +103,7 @@ def sweep_figure(
         _tell(f"{sum(counts.values())} of {len(table)} points left out: {others}")
     if empty := int(done[column].isna().sum()):
         _tell(f"{empty} of {len(done)} finished points have no {column}")
-    layout = layout_of(record, done, x=x, hue=hue, panels=panels)
+    layout = layout_of(table, done, x=x, hue=hue, panels=panels)
     if layout.untold:
         _tell(f"not told apart: {'; '.join(layout.untold)}")
     predicted: dict[str, FloatArray] = {}
@@ -116,7 +113,7 @@ def sweep_figure(
         predicted, reasons = predicted_column([case_of(Path(run)) for run in done["run"]], column)
         for reason, number in reasons.items():
             _tell(f"not drawn at {number} of {len(done)} points: {reason}")
-    return draw(layout, drawn_column(done, column, predicted), title=record.title or record.name, log=log)
+    return draw(layout, drawn_column(done, column, predicted), title=table.attrs["title"], log=log)
 
 
 def _column(table: pd.DataFrame, wanted: str | None) -> str:

@@ -24,7 +24,7 @@ from walkers.inputs.units import Kind
 from walkers.main import _program
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.tables import FAMILIES, TABLES
-from walkers.sweeps.columns import derived_columns, result_columns
+from walkers.sweeps.record import derived_columns, result_columns
 from walkers.sweeps.table import STATE
 
 INPUTS = Path(walkers.inputs.__file__).parent

@@ -218,7 +218,7 @@ def status(
 ) -> None:
     """Say how many points of a sweep are finished, failed, running and missing, and why they failed."""
     from walkers.pipeline import find_sweep
-    from walkers.sweeps.summary import describe_status, sweeps_in
+    from walkers.sweeps.table import describe_status, sweeps_in
 
     print_lines(describe_status(one) for one in sweeps_in(find_sweep(directory, out)))
 
@@ -284,11 +284,10 @@ def compare(
 ) -> None:
     """Print by what two runs or cases differ, in parameters and results; or two sweeps, point by point."""
     from walkers.pipeline import find_side, placed
-    from walkers.sweeps.comparison import Comparison, SweepComparison, compare_runs, compare_sweeps
+    from walkers.sweeps.comparison import compare_runs, compare_sweeps
 
     there = {one: placed(one, out) for one in (first, second)}
     sweeps = {one: place.path for one, place in there.items() if place and place.kind == "sweep"}
-    found: Comparison | SweepComparison
     if sweeps.keys() == there.keys():
         found = compare_sweeps(sweeps[first], sweeps[second], y)
     else:
@@ -296,7 +295,7 @@ def compare(
             refuse(one, True, "is a sweep, to be compared with another sweep")
         refuse("--y", y is not None, "is for sweeps")
         found = compare_runs(find_side(first, out), find_side(second, out))
-    print_as(as_json, found.as_dict, found.as_text)
+    print_as(as_json, lambda: found.contents, lambda: found.text)
 
 
 def list_(
@@ -316,12 +315,11 @@ def list_(
     as_json: Json = False,
 ) -> None:
     """List runs and sweeps: by what they differ, velocity or climbs, status, age, size."""
-    from walkers.sweeps import listing
-    from walkers.sweeps.inventory import inventory, select
+    from walkers.sweeps import folder
 
-    found = select(inventory(out), case=case, status=status, older_than=older_than, where=where or ())
-    found = listing.ordered(found, sort, reverse=reverse)
-    print_as(as_json, lambda: listing.as_json(found), lambda: listing.as_text(found))
+    found = folder.select(folder.inventory(out), case=case, status=status, older_than=older_than, where=where or ())
+    found = folder.ordered(found, sort, reverse=reverse)
+    print_as(as_json, lambda: folder.as_json(found), lambda: folder.as_text(found))
 
 
 def clean(
@@ -334,7 +332,7 @@ def clean(
     yes: bool = Option(False, "--yes", "-y", help="Do not ask."),
 ) -> int:
     """Remove interrupted and failed runs, or given runs and sweeps, after asking; never what is being made."""
-    from walkers.sweeps.cleaning import clean, plan_cleaning
+    from walkers.sweeps.folder import clean, plan_cleaning
 
     check_folder("--out", out)
     refuse("--finished", finished and bool(runs), "has no meaning with given runs")

@@ -141,7 +141,7 @@ def sweep(
     from walkers.progress import progress_of_sweep
     from walkers.sweeps.run import plan_sweep, run_sweep
     from walkers.sweeps.site import load_site
-    from walkers.sweeps.summary import describe_status
+    from walkers.sweeps.table import describe_status
 
     loaded = load_sweep(sweep, settings_of(settings or ()))
     check_folder("--out", out)

@@ -24,29 +24,21 @@ from walkers.postprocess.clusters import ClimbCriteria
 from walkers.postprocess.piles import Pile, analyse, classified
 from walkers.runner.directory import CASE_NAME, FinishedRun, finished_places, finished_run
 from walkers.sweeps.record import RECORD_NAME, read_record, result_in, states
+from walkers.sweeps.table import value_text
 
 FloatArray = npt.NDArray[np.float64]
 
 _CONFIDENCE = 0.95
 _NO_CONDITION = ("name", "title", "seed", "run.cycles", "run.cycles_per_segment")
 """Keys of a case that are none of a condition under which a pile is shaken: how long it was, is none."""
-_ALIKE = 1e-6
-"""Lengths of runs that differ by less, relatively, are the same."""
+_ALIKE = 1e-6  # lengths of runs that differ by less, relatively, are the same
 
 
 def piles_in(directory: Path) -> dict[str, list[Path]]:
-    """The finished runs of piles of a sweep, or in a folder, or the run itself, by what they have in common.
+    """The finished runs of piles of a sweep, or in a folder, or the run itself, by what distinguishes them.
 
-    Returns
-    -------
-    dict
-        From what distinguishes them, seeds and lengths aside, to the runs; each run once, whatever names it has, and
-        of those that begin alike and were shaken for different times the longest alone: it shows what the others show.
-
-    Raises
-    ------
-    InputError
-        If there is none, or one cannot be read.
+    Seeds and lengths do not. Each run is there once, whatever names it has, and of those that begin alike and were
+    shaken for different times the longest alone: it shows what the others show. `InputError` if there is none.
     """
     if (directory / RECORD_NAME).exists():
         found = [state.directory for state in states(read_record(directory)) if state.directory is not None]
@@ -65,11 +57,9 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
     keys = dict.fromkeys(key for case in cases.values() for key in case if key not in _NO_CONDITION)
     differ = [key for key in keys if len({str(case.get(key)) for case in cases.values()}) > 1]
     groups: dict[str, dict[Any, Path]] = {}
-    for path, case in cases.items():
-        starts = groups.setdefault(", ".join(f"{key} = {_short(case.get(key))}" for key in differ), {})
-        before = starts.setdefault(case.get("seed"), path)
-        if case.get("run.cycles", 0) > cases[before].get("run.cycles", 0):
-            starts[case.get("seed")] = path
+    for path, case in sorted(cases.items(), key=lambda one: -one[1].get("run.cycles", 0)):
+        label = ", ".join(f"{key} = {value_text(case.get(key))}" for key in differ)
+        groups.setdefault(label, {}).setdefault(case.get("seed"), path)
     return {label: list(starts.values()) for label, starts in groups.items()}
 
 
@@ -78,10 +68,6 @@ def _determinants(run: FinishedRun) -> dict[str, Any]:
     manifest = run.manifest
     made_by = {"deck version": manifest.get("deck_version"), "engine": manifest["engine"]["sha256"][:8]}
     return dict(dotted(run.case.determinants())) | made_by
-
-
-def _short(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
@@ -119,14 +105,13 @@ def _summary(driven: FloatArray, told: Sequence[Sequence[dict[str, Any]]], withi
     """`summarise_climbs` of runs of such lengths (s) and their climbs."""
     first = np.array([min((climb["qualified"] for climb in climbs), default=np.inf) for climbs in told])
     at, cut = (float(driven.min()), np.inf) if within is None else (within, within)
-    chances = survival(first, np.minimum(driven, cut), at)
     counted = [[climb for climb in climbs if climb["qualified"] <= at] for climbs in told]
     firsts = [min(climbs, key=lambda climb: climb["qualified"]) for climbs in counted if climbs]
     every = [climb for climbs in counted for climb in climbs]
     return {
         "within": at,
         "runs": len(told),
-        **chances,
+        **survival(first, np.minimum(driven, cut), at),
         "climbs": len(every),
         "times": [climb["qualified"] for climb in firsts],
         "onsets": [climb["onset"] for climb in firsts],
@@ -156,35 +141,31 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
         interval is that of Greenwood's variance of log(-log) of the survival, where it exists; where none or all have
         climbed, the binomial one (Clopper and Pearson 1934) of the records that are so long.
     """
-    from scipy.stats import CensoredData, ecdf
+    from scipy.stats import CensoredData, binomtest, ecdf
 
     censored = first > watched
     longest = watched >= at * (1.0 - _ALIKE)
     share = ecdf(CensoredData.right_censored(np.minimum(first, watched), censored)).cdf
     half = np.flatnonzero(share.probabilities >= 0.5)
     probability = float(share.evaluate(at)) if longest.any() else None
+    interval = None
+    if probability is not None and 0.0 < probability < 1.0:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
+            ends = share.confidence_interval(_CONFIDENCE, method="log-log")
+        interval = [float(ends.low.evaluate(at)), float(ends.high.evaluate(at))]
+    elif probability is not None:
+        followed = int(longest.sum())
+        exact = binomtest(round(probability) * followed, followed).proportion_ci(_CONFIDENCE)
+        interval = [float(exact.low), float(exact.high)]
     return {
         "climbed": int((~censored & (first <= at)).sum()),
         "ended": int((censored & ~longest).sum()),
         "censored": int(censored.sum()),
         "probability": probability,
-        "interval": None if probability is None else _interval(share, at, int(longest.sum())),
+        "interval": interval,
         "median": float(share.quantiles[half[0]]) if len(half) else None,
     }
-
-
-def _interval(share: Any, at: float, followed: int) -> list[float]:
-    """That of a share of scipy's ``ecdf`` at a time that so many records reach."""
-    from scipy.stats import binomtest
-
-    probability = float(share.evaluate(at))
-    if 0.0 < probability < 1.0:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
-            ends = share.confidence_interval(_CONFIDENCE, method="log-log")
-        return [float(ends.low.evaluate(at)), float(ends.high.evaluate(at))]
-    exact = binomtest(round(probability) * followed, followed).proportion_ci(_CONFIDENCE)
-    return [float(exact.low), float(exact.high)]
 
 
 VARIATIONS = {
@@ -198,11 +179,6 @@ VARIATIONS = {
 def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
     """How the outcome depends on the thresholds of what counts as a climb.
 
-    Parameters
-    ----------
-    runs
-        Run directories of piles.
-
     Returns
     -------
     list of dict
@@ -210,27 +186,22 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
         ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s).
     """
     usual = ClimbCriteria()
-    tried: dict[tuple[str, float | None], ClimbCriteria] = {("", None): usual}
-    for name, values in VARIATIONS.items():
-        tried |= {(name, one): replace(usual, **{name: one}) for one in values if one != getattr(usual, name)}
-    climbs: dict[tuple[str, float | None], list[list[tuple[float, bool]]]] = {key: [] for key in tried}
-    for run in runs:
-        found = analyse(run)
-        for key, definition in tried.items():
-            climbed = [climb for climb in classified(found, definition).climbs if climb.climbed]
-            climbs[key].append([(climb.speed, bool(found.motion.large[climb.leader])) for climb in climbed])
-    return [
-        {
-            "threshold": name,
-            "value": value,
-            "runs": len(runs),
-            "climbed": sum(map(bool, of_runs)),
-            "climbs": sum(map(len, of_runs)),
-            "led_by_large": sum(large for of_run in of_runs for _, large in of_run),
-            "median_speed": median([speed for of_run in of_runs for speed, _ in of_run]) if any(of_runs) else None,
-        }
-        for (name, value), of_runs in climbs.items()
+    tried: list[tuple[str, float | None]] = [("", None)]
+    tried += [(name, one) for name, ones in VARIATIONS.items() for one in ones if one != getattr(usual, name)]
+    counts = dict.fromkeys(("climbed", "climbs", "led_by_large"), 0)
+    rows: list[dict[str, Any]] = [
+        {"threshold": name, "value": value, "runs": len(runs), **counts, "median_speed": []} for name, value in tried
     ]
+    for run in runs:
+        pile = analyse(run)
+        for row in rows:
+            definition = replace(usual, **{row["threshold"]: row["value"]}) if row["threshold"] else usual
+            climbs = [climb for climb in classified(pile, definition).climbs if climb.climbed]
+            row["climbed"] += bool(climbs)
+            row["climbs"] += len(climbs)
+            row["led_by_large"] += sum(bool(pile.motion.large[climb.leader]) for climb in climbs)
+            row["median_speed"] += [climb.speed for climb in climbs]
+    return [{**row, "median_speed": median(row["median_speed"]) if row["climbs"] else None} for row in rows]
 
 
 def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:

@@ -11,20 +11,17 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.readable import differing, flattened, readable, readable_unit
 from walkers.runner.directory import case_of
-from walkers.sweeps.columns import result_columns, row_of
-from walkers.sweeps.factors import find_name, value_text, with_unit
-from walkers.sweeps.figure_layout import ERRORS, default_column
-from walkers.sweeps.listing import aligned, with_error
-from walkers.sweeps.record import read_record, result_in
-from walkers.sweeps.table import load, varied_columns
+from walkers.sweeps.folder import aligned, with_error
+from walkers.sweeps.record import read_record, result_columns, result_in, row_of
+from walkers.sweeps.table import ERRORS, default_column, find_name, load, value_text, varied_columns, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from walkers.inputs.case import Case
 
-_SPREADS = ("smallest", "largest", "standard_error")
-"""Columns of a sweep's table that are errors rather than results."""
+_SIDES = ("first", "second")
+_SPREADS = ("smallest", "largest", "standard_error")  # columns of a sweep's table that are errors rather than results
 _FIRST_MAKE = ("rotation", "sliding", "open")
 _OF_ALL = ("orientation_end", "separated_fraction")
 """Columns that are means over walkers: of the first make, or of all. (Axial velocities are of two headings.)"""
@@ -40,145 +37,80 @@ class Side:
 
 
 @dataclass(frozen=True)
-class Pair:
-    """A quantity of both sides.
-
-    Attributes
-    ----------
-    quantity, unit
-        What it is, and its SI unit.
-    values, errors
-        Of the first and the second, and their standard errors; NaN where there is none.
-    """
-
-    quantity: str
-    unit: str
-    values: tuple[float, float]
-    errors: tuple[float, float]
-
-    @property
-    def difference(self) -> float:
-        """Second minus first."""
-        return self.values[1] - self.values[0]
-
-    @property
-    def standard_errors(self) -> float:
-        """The difference in units of its standard error; NaN where one of them is not known."""
-        error = hypot(*self.errors)
-        return self.difference / error if error > 0.0 else nan
-
-    def as_dict(self) -> dict[str, Any]:
-        """As JSON; None for what is not known."""
-        names = ("first", "second", "first_standard_error", "second_standard_error", "difference", "in_standard_errors")
-        numbers = (*self.values, *self.errors, self.difference, self.standard_errors)
-        known = [value if isfinite(value) else None for value in numbers]
-        return {"quantity": self.quantity, "unit": self.unit, **dict(zip(names, known, strict=True))}
-
-    def cells(self) -> list[str]:
-        """As text, in the usual unit."""
-        unit, size = readable_unit(self.unit)
-        told = [with_error(value / size, error / size) for value, error in zip(self.values, self.errors, strict=True)]
-        apart = f"{self.difference / size:+.3g}" if isfinite(self.difference) else "-"
-        share = f"{self.standard_errors:+.3g}" if isfinite(self.standard_errors) else "-"
-        return [with_unit(self.quantity, unit), *told, apart, share]
-
-
-def parameters_text(names: Sequence[str], parameters: Mapping[str, tuple[Any, Any]]) -> str:
-    """Keys and their values on both sides, in the usual units; empty if there are none."""
-    rows = [[key, *(readable(key, value) for value in values)] for key, values in parameters.items()]
-    return aligned([["parameter", *names], *rows]) if rows else ""
-
-
-@dataclass(frozen=True)
 class Comparison:
-    """Two runs or cases.
+    """What differs between two: as JSON, SI units (keys of sweeps in those of their files); as text in usual units."""
 
-    Attributes
-    ----------
-    names
-        What they are called.
-    parameters
-        For each key by which the cases differ its values, SI units; what merely follows from other keys is left out.
-    results
-        What came out of both; empty if one of them was not run.
-    not_run
-        Names of those without a finished run.
-    """
+    contents: Mapping[str, Any]
+    text: str
 
-    names: tuple[str, str]
-    parameters: Mapping[str, tuple[Any, Any]]
-    results: Sequence[Pair]
-    not_run: Sequence[str]
 
-    def as_dict(self) -> dict[str, Any]:
-        """As JSON, SI units."""
-        return {
-            "first": self.names[0],
-            "second": self.names[1],
-            "parameters": {key: list(values) for key, values in self.parameters.items()},
-            "results": [pair.as_dict() for pair in self.results],
-            "not_run": list(self.not_run),
-        }
-
-    def as_text(self) -> str:
-        """As text, in the usual units."""
-        text = [parameters_text(self.names, self.parameters) or "the cases are the same"]
-        apart = [pair for pair in self.results if pair.values[0] != pair.values[1]]
-        if apart:
-            head = ["result", *self.names, "difference", "in standard errors"]
-            text.append(aligned([head, *(pair.cells() for pair in apart)]))
-        if same := [pair.quantity for pair in self.results if pair not in apart]:
-            text.append(f"the same in both: {', '.join(same)}")
-        text += [f"{name}: no finished run; the parameters alone are compared" for name in self.not_run]
-        return "\n\n".join(text)
+def _pair(
+    quantity: str, unit: str, values: Sequence[float], errors: Sequence[float]
+) -> tuple[dict[str, Any], list[str]]:
+    """A quantity of both sides, with standard errors: as JSON, SI units, and as cells of a text, in usual units."""
+    difference, error = values[1] - values[0], hypot(*errors)
+    share = difference / error if error > 0.0 else nan
+    names = ("first", "second", "first_standard_error", "second_standard_error", "difference", "in_standard_errors")
+    numbers = zip(names, (*values, *errors, difference, share), strict=True)
+    contents = {"quantity": quantity, "unit": unit, **{name: one if isfinite(one) else None for name, one in numbers}}
+    usual, size = readable_unit(unit)
+    told = [with_error(value / size, one / size) for value, one in zip(values, errors, strict=True)]
+    told += [f"{one:+.3g}" if isfinite(one) else "-" for one in (difference / size, share)]
+    return contents, [with_unit(quantity, usual), *told]
 
 
 def compare_runs(first: Side, second: Side) -> Comparison:
-    """Compare two runs, or cases that may not have been run.
+    """Compare two runs, or cases that may not have been run; `DamagedRunError` if a run's result is lost."""
+    sides = (first, second)
+    names = [side.name for side in sides]
+    parameters, told = _different([side.case for side in sides], names)
+    not_run = [side.name for side in sides if side.directory is None]
+    pairs = [] if not_run else _pairs([side.directory for side in sides if side.directory])
+    text = [told or "the cases are the same"]
+    if apart := [cells for one, cells in pairs if one["first"] != one["second"]]:
+        text.append(aligned([["result", *names, "difference", "in standard errors"], *apart]))
+    if same := [one["quantity"] for one, _ in pairs if one["first"] == one["second"]]:
+        text.append(f"the same in both: {', '.join(same)}")
+    text += [f"{name}: no finished run; the parameters alone are compared" for name in not_run]
+    contents: dict[str, Any] = {**dict(zip(_SIDES, names, strict=True)), "parameters": parameters}
+    contents |= {"results": [one for one, _ in pairs], "not_run": not_run}
+    return Comparison(contents, "\n\n".join(text))
 
-    Raises
-    ------
-    sweeps.record.DamagedRunError
-        If a run can neither be read nor be tabulated anew.
-    """
-    pairs = _pairs(first.directory, second.directory) if first.directory and second.directory else []
-    not_run = [side.name for side in (first, second) if side.directory is None]
-    return Comparison((first.name, second.name), different_parameters(first.case, second.case), pairs, not_run)
+
+def _different(cases: Sequence[Case], names: Sequence[str]) -> tuple[dict[str, list[Any]], str]:
+    """The values of both cases by which they differ, SI units, without what merely follows from others; and as text."""
+    flat = [flattened(one.as_dict()) for one in cases]
+    parameters = {key: [one.get(key) for one in flat] for key in differing(flat)}
+    rows = [[key, *(readable(key, value) for value in values)] for key, values in parameters.items()]
+    return parameters, aligned([["parameter", *names], *rows]) if rows else ""
 
 
-def different_parameters(first: Case, second: Case) -> dict[str, tuple[Any, Any]]:
-    """The values of both cases by which they differ, SI units, without what merely follows from others."""
-    cases = [flattened(one.as_dict()) for one in (first, second)]
-    return {key: (cases[0].get(key), cases[1].get(key)) for key in differing(cases)}
+def _number_of(value: Any) -> float:
+    return nan if value is None or isinstance(value, str) else float(value)
 
 
-def _pairs(first: Path, second: Path) -> list[Pair]:
+def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     """All numbers that the analyses give of two runs."""
-    results = [result_in(run) for run in (first, second)]
+    results = [result_in(run) for run in runs]
     rows = [row_of(result) for result in results]
-    errors = [_errors(run, result) for run, result in zip((first, second), results, strict=True)]
-    units = result_columns(list(dict.fromkeys(name for result in results for name in result["analyses"])))
+    errors = [_errors(run, result) for run, result in zip(runs, results, strict=True)]
+    units = result_columns([name for result in results for name in result["analyses"]])
     pairs = []
     for name, (unit, _) in units.items():
-        values = (number_of(rows[0].get(name)), number_of(rows[1].get(name)))
+        values = [_number_of(row.get(name)) for row in rows]
         if name not in _SPREADS and any(map(isfinite, values)):
-            pairs.append(Pair(name, unit, values, (errors[0].get(name, nan), errors[1].get(name, nan))))
+            pairs.append(_pair(name, unit, values, [known.get(name, nan) for known in errors]))
     return pairs
-
-
-def number_of(value: Any) -> float:
-    """A value of a table or a result as a number; NaN where it is none."""
-    return nan if value is None or isinstance(value, str) else float(value)
 
 
 def _errors(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
     """Standard errors of columns: as the result has them, and of means over walkers from the table of the walkers."""
     if "velocity" not in result:
         return {}
-    known = {"velocity": result["velocity"], **{name: result[name] for name in ("right_facing", "left_facing")}}
-    errors = {name: number_of(spread["standard_error"]) for name, spread in known.items()}
     from walkers.postprocess.tables import read_table
 
+    known = ("velocity", "right_facing", "left_facing")
+    errors = {name: _number_of(result[name]["standard_error"]) for name in known}
     walkers = read_table(run, "walkers")
     for name in walkers.columns:
         of_first = name.rpartition("_")[0] in _FIRST_MAKE
@@ -188,76 +120,16 @@ def _errors(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
     return errors
 
 
-_SIDES = ("first", "second")
+def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comparison:
+    """Compare a column of two sweeps, ``velocity`` or ``climbs`` if none is named, at the points finished in both.
 
-
-@dataclass(frozen=True)
-class SweepComparison:
-    """A column of two sweeps, point by point.
-
-    Attributes
-    ----------
-    names, keys
-        Of the sweeps; what varies in both, with its unit.
-    points
-        The values of the keys, and the column of both sweeps.
-    unmatched
-        How many points of each sweep the other has not, or that are not finished in both.
-    parameters
-        By what else the cases of the points differ, as the first of them shows.
-    """
-
-    names: tuple[str, str]
-    keys: Mapping[str, str | None]
-    points: Sequence[tuple[tuple[Any, ...], Pair]]
-    unmatched: tuple[int, int]
-    parameters: Mapping[str, tuple[Any, Any]]
-
-    def as_dict(self) -> dict[str, Any]:
-        """As JSON, SI units but for the keys, which have those of the sweeps' files."""
-        return {
-            "first": self.names[0],
-            "second": self.names[1],
-            "keys": dict(self.keys),
-            "parameters": {key: list(values) for key, values in self.parameters.items()},
-            "points": [{"point": dict(zip(self.keys, at, strict=True)), **pair.as_dict()} for at, pair in self.points],
-            "unmatched": list(self.unmatched),
-        }
-
-    def as_text(self) -> str:
-        """As text, in the usual units."""
-        quantity = self.points[0][1].cells()[0]
-        sides = [f"{name}: {quantity}" for name in self.names]
-        head = [*_with_units(self.keys), *sides, "difference", "in standard errors"]
-        told = [[*map(value_text, at), *pair.cells()[1:]] for at, pair in self.points]
-        largest = max((pair for _, pair in self.points), key=lambda pair: abs(pair.difference))
-        unit, size = readable_unit(largest.unit)
-        line = f"{len(self.points)} points in both; largest difference {largest.difference / size:+.3g} {unit}".rstrip()
-        if any(self.unmatched):
-            line += f"; left out: {self.unmatched[0]} of {self.names[0]}, {self.unmatched[1]} of {self.names[1]}"
-        return "\n\n".join(filter(None, [parameters_text(self.names, self.parameters), aligned([head, *told]), line]))
-
-
-def compare_sweeps(first: Path, second: Path, column: str | None = None) -> SweepComparison:
-    """Compare a column of two sweeps that vary the same keys, at the points that are finished in both.
-
-    Parameters
-    ----------
-    first, second
-        Directories of sweeps.
-    column
-        Of their tables; ``velocity``, of piles ``climbs`` if left out.
-
-    Raises
-    ------
-    InputError
-        If they vary other keys, have no finished point in common, or not that column.
+    `InputError` if they vary other keys, have no finished point in common, or not that column.
     """
     records, source = (read_record(first), read_record(second)), f"{first}, {second}"
-    units = dict(records[0].units)
-    if units != dict(records[1].units):
-        varied = " and ".join(", ".join(_with_units(record.units)) or "nothing" for record in records)
-        told = f"expected sweeps that vary the same keys in the same units: {varied}"
+    keys = [[with_unit(key, unit) for key, unit in one.units.items()] for one in records]
+    if dict(records[0].units) != dict(records[1].units):
+        told = " and ".join(", ".join(one) or "nothing" for one in keys)
+        told = f"expected sweeps that vary the same keys in the same units: {told}"
         raise InputError(source, [Problem("", None, told)])
     tables = [load(directory) for directory in (first, second)]
     numbers = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
@@ -265,31 +137,30 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Swee
     both = _matched([table[table["status"] == "finished"] for table in tables], varied_columns(tables[0]))
     if both.empty:
         raise InputError(source, [Problem("", None, "have no finished point in common")])
-    unit = tables[0].attrs["units"][column]
-    rows = [{str(name): value for name, value in row.items()} for row in both.to_dict("records")]
-    names = records[0].name, records[1].name
-    return SweepComparison(
-        names=(str(first), str(second)) if names[0] == names[1] else names,
-        keys=units,
-        points=[(tuple(records[0].values[row["point_first"]]), _pair(column, unit, row)) for row in rows],
-        unmatched=(len(tables[0]) - len(both), len(tables[1]) - len(both)),
-        parameters=different_parameters(*(case_of(Path(rows[0][f"run_{side}"])) for side in _SIDES)),
-    )
-
-
-def _with_units(units: Mapping[str, str | None]) -> list[str]:
-    return [with_unit(key, unit or "") for key, unit in units.items()]
+    names = [record.name for record in records]
+    names = [str(first), str(second)] if names[0] == names[1] else names
+    parameters, told = _different([case_of(Path(both[f"run_{side}"].iloc[0])) for side in _SIDES], names)
+    points, lines = [], []
+    for row in both.to_dict("records"):
+        of_sides = [[_number_of(row.get(f"{name}_{side}")) for side in _SIDES] for name in (column, ERRORS.get(column))]
+        one, (quantity, *cells) = _pair(column, tables[0].attrs["units"][column], *of_sides)
+        at = dict(zip(records[0].units, records[0].values[row["point_first"]], strict=True))
+        points.append({"point": at, **one})
+        lines.append([*map(value_text, at.values()), *cells])
+    unmatched = [len(table) - len(both) for table in tables]
+    heads = [*keys[0], *(f"{name}: {quantity}" for name in names), "difference", "in standard errors"]
+    unit, size = readable_unit(tables[0].attrs["units"][column])
+    largest = max((one["difference"] or 0.0 for one in points), key=abs)
+    line = f"{len(both)} points in both; largest difference {largest / size:+.3g} {unit}".rstrip()
+    if any(unmatched):
+        line += f"; left out: {unmatched[0]} of {names[0]}, {unmatched[1]} of {names[1]}"
+    contents: dict[str, Any] = {**dict(zip(_SIDES, names, strict=True)), "keys": dict(records[0].units)}
+    contents |= {"parameters": parameters, "points": points, "unmatched": unmatched}
+    return Comparison(contents, "\n\n".join(filter(None, [told, aligned([heads, *lines]), line])))
 
 
 def _matched(tables: Sequence[pd.DataFrame], keys: list[str]) -> pd.DataFrame:
     """The rows of two tables whose keys have the same values, the columns of both beside each other."""
     first, second = (table.astype(dict.fromkeys(keys, object)) for table in tables)
-    how = {"on": keys} if keys else {"how": "cross"}
-    return first.merge(second, suffixes=[f"_{side}" for side in _SIDES], **how)
-
-
-def _pair(column: str, unit: str, row: Mapping[str, Any]) -> Pair:
-    values, errors = (
-        tuple(number_of(row.get(f"{name}_{side}")) for side in _SIDES) for name in (column, ERRORS.get(column, ""))
-    )
-    return Pair(column, unit, (values[0], values[1]), (errors[0], errors[1]))
+    how: dict[str, Any] = {"on": keys} if keys else {"how": "cross"}
+    return first.merge(second, suffixes=(f"_{_SIDES[0]}", f"_{_SIDES[1]}"), **how)

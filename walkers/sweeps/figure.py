@@ -1,8 +1,10 @@
-"""The figure of a sweep, drawn: symbols with their errors, colours, panels, and a theory's lines."""
+"""The figure of a sweep: one column of its table against what was varied, in colours and panels."""
 
 from __future__ import annotations
 
-from math import ceil
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import ceil, prod
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -10,54 +12,270 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.readable import readable_unit
 from walkers.postprocess.drawing import letter_panels, new_figure, plain_text, styled
-from walkers.sweeps.factors import SEEDS, Factor
-from walkers.sweeps.figure_layout import Drawn, Layout
+from walkers.sweeps.table import ERRORS, find_name, value_text, varied_columns, with_unit
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
+FloatArray = npt.NDArray[np.float64]
+_NONE = "none"
+"""Instead of a column: do not tell points apart so."""
+_SEEDS = ("run.seed", "seed")
+_SYMBOLS = {"gamma0": "Γ0", "sin_delta": "sin δ", "mass_asymmetry": "μ"}
+_LEAST_ASYMMETRIES = 3  # different radii are shown by sin δ from so many on
+_MOST_PANELS = 12  # more combinations of what is left are not told apart by panels
 _MARKERS = "osD^vXP<>*"
-_MODELS = (("--", "_"), (":", "+"))
-"""Of each model the line, and the symbol where points are not joined."""
-_FEW_COLOURS = 6
-"""More come from a map of colours rather than from the style."""
-_MOST_COLOURS = 12
-"""Numbers with more values have a scale of colours rather than a legend."""
-_ASIDE = 0.12
-"""How far symbols of different colours stand aside of their category."""
-_FEW_TICKS = 6
-_LEAST_APART = 0.08
-"""Ticks are at the values of x if these are few, and this share of the axis apart."""
-_MARGIN = 0.06
-"""Of the range along y, above and below."""
-_LONG_NAMES = 40
-"""Letters of all categories from which on they are written aslant."""
+_MODELS = (("--", "_"), (":", "+"))  # of each model the line, and the symbol where points are not joined
+_FEW_COLOURS = 6  # more come from a map of colours rather than from the style
+_MOST_COLOURS = 12  # numbers with more values have a scale of colours rather than a legend
+_FEW_TICKS = 6  # ticks are at the values of x if these are so few, and not too near
 
 
-@styled
-def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Figure:
-    """Draw a column of a sweep's table.
+@dataclass(frozen=True)
+class Factor:
+    """Something by which points differ: its keys, its label, a number (in its unit) or a text for each point.
+
+    Of a sample each key is a factor, whose numbers are not levels that others share.
+    """
+
+    keys: tuple[str, ...]
+    label: str
+    values: Sequence[Any]
+    is_number: bool
+    is_sample: bool = False
+    unit: str = ""
+
+    @property
+    def levels(self) -> list[Any]:
+        """The different values: numbers in ascending order, texts in that of the sweep."""
+        different = dict.fromkeys(self.values)
+        return sorted(different) if self.is_number else list(different)
+
+    @property
+    def name(self) -> str:
+        """The label without the unit and without what else varies with it."""
+        first = self.label.partition("\n")[0]
+        return first.removesuffix(f" ({self.unit})") if self.unit else first
+
+    def where(self, level: Any) -> npt.NDArray[np.bool_]:
+        """Which of the points have a level."""
+        return np.array([value == level for value in self.values], dtype=bool)
+
+    def told(self, level: Any, *, by_name: bool = False) -> str:
+        """A level as text, with its unit; if so wanted a number with the factor's name."""
+        text = f"{level:.6g} {self.unit}".strip() if self.is_number else str(level)
+        return f"{self.name} = {text}" if by_name and self.is_number else text
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What is drawn along x (samples have a panel for each), in colours, in panels; names of what is not told apart."""
+
+    x: Sequence[Factor]
+    hue: Factor | None
+    panels: Factor | None
+    untold: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A column of a table in readable units, its errors, and what models predict, row by row; the axis's label."""
+
+    label: str
+    values: FloatArray
+    errors: FloatArray
+    theory: Mapping[str, FloatArray] = field(default_factory=dict)
+
+
+def factors_of(table: pd.DataFrame) -> list[Factor]:
+    """What a sweep's points differ by, in the order of its keys; what has one value is left out.
+
+    Keys of one axis whose numbers rise or fall together, or that have texts or lists, are one factor. Numbers that go
+    together otherwise, as those of a sample, are one factor each.
+    """
+    factors = []
+    for keys in table.attrs["axes"]:
+        units, columns = {}, {}
+        for key in keys:
+            names = [name for name in varied_columns(table) if name == key or name.startswith(f"{key}[")]
+            rows = table[names].astype(object)
+            columns[key] = (
+                rows[key].tolist() if names == [key] else [row.dropna().tolist() for _, row in rows.iterrows()]
+            )
+            units[key] = table.attrs["units"][names[0]]
+        varied = {key: column for key, column in columns.items() if _count(column) > 1}
+        if varied:
+            factors += _of_axis(varied, units)
+    return factors
+
+
+def _of_axis(columns: Mapping[str, list[Any]], units: Mapping[str, str]) -> list[Factor]:
+    """The factors of keys that go together."""
+    if {type(one) for column in columns.values() for one in column} <= {int, float}:
+        rows = np.unique(np.array(list(columns.values()), dtype=float).T, axis=0)
+        steps = np.diff(rows, axis=0)
+        together = (steps[:, 0] > 0.0).all() and ((steps > 0.0).all(axis=0) | (steps < 0.0).all(axis=0)).all()
+        factors = []
+        for key, *rest in [list(columns)] if together else [[key] for key in columns]:
+            label = with_unit(readable_key(key), units[key]) + _with(rest)
+            values = list(map(float, columns[key]))
+            factors.append(Factor((key, *rest), label, values, True, not together, units[key]))
+        return factors
+    # Texts: of the key that tells the levels apart, or of all together.
+    whole = _count(zip(*columns.values(), strict=True))
+    shown = next(([key] for key, values in columns.items() if _count(values) == whole), list(columns))
+    rest = [key for key in columns if key not in shown]
+    told = [[f"{value_text(value)} {units[key]}".strip() for value in columns[key]] for key in shown]
+    label = ", ".join(map(readable_key, shown)) + _with(rest)
+    return [Factor((*shown, *rest), label, [", ".join(row) for row in zip(*told, strict=True)], False)]
+
+
+def _count(values: Iterable[Any]) -> int:
+    return len(set(map(repr, values)))
+
+
+def _with(keys: Sequence[str]) -> str:
+    if len(keys) > 2:
+        return f"\n(and {len(keys)} further keys with it)"
+    return f"\n(and with it {', '.join(map(readable_key, keys))})" if keys else ""
+
+
+def readable_key(key: str) -> str:
+    """A dotted key or a column as words: ``peak acceleration``, ``friction bead wall``, ``liquid``, ``Γ0``."""
+    table, _, name = key.partition(".")
+    if (name or table) in _SYMBOLS:
+        return _SYMBOLS[name or table]
+    words = table.partition("[")[0] if name in ("name", "material") else (name or table)
+    return words.replace(".", " ").replace("_", " ")
+
+
+def drawn_column(rows: pd.DataFrame, name: str, theory: Mapping[str, FloatArray] | None = None) -> Drawn:
+    """A column of numbers of a sweep's table with what models predict (SI units), in readable units."""
+    column = _numbers(rows, name, "--y")
+    size = readable_unit(rows.attrs["units"].get(name, ""))[1]
+    errors = np.full(len(rows), np.nan)
+    if name in ERRORS:
+        errors = rows[ERRORS[name]].to_numpy(dtype=float, na_value=np.nan) / size
+    predicted = {model: numbers / size for model, numbers in (theory or {}).items()}
+    return Drawn(column.label, np.array(column.values), errors, predicted)
+
+
+def _numbers(rows: pd.DataFrame, name: str, option: str) -> Factor:
+    """A column of numbers in its readable unit."""
+    import pandas as pd
+
+    unit, size = readable_unit(rows.attrs["units"].get(name, ""))
+    values = pd.to_numeric(rows[name], errors="coerce").to_numpy(dtype=float, na_value=np.nan)
+    if len(rows) and np.isnan(values).all():
+        raise InputError(option, [Problem("", None, f'"{name}" has no number that could be drawn')])
+    return Factor((name,), with_unit(readable_key(name), unit), (values / size).tolist(), True, unit=unit)
+
+
+def layout_of(
+    table: pd.DataFrame,
+    rows: pd.DataFrame,
+    *,
+    x: str | None = None,
+    hue: str | None = None,
+    panels: str | None = None,
+) -> Layout:
+    """What of a sweep goes where, as asked for or guessed.
+
+    Guessed is: along x the numbers with the most values, in colours what has the most values of the rest, in panels
+    all else. Samples have a panel for each key.
 
     Parameters
     ----------
-    layout, drawn
-        From `walkers.sweeps.figure_layout.layout_of` and `drawn_column` there, of the same rows.
-    title
-        Of the figure.
-    log
-        Which axes are logarithmic: ``x``, ``y`` or ``xy``; what is not positive is left out there.
+    table, rows
+        The sweep's table (`walkers.sweeps.table.load`), and those of its rows that are drawn.
+    x, hue, panels
+        Keys that vary or columns of the table; ``none`` for neither colours nor panels.
 
     Raises
     ------
     InputError
-        If x is to be logarithmic and has categories.
+        If there is no such key or column.
+    """
+    places = table.index.get_indexer(rows.index).tolist()
+    left = factors = [replace(one, values=[one.values[place] for place in places]) for one in factors_of(table)]
+    asked = {}
+    for option, name in (("x", x), ("hue", hue), ("panels", panels)):
+        if name is not None and not (name == _NONE and option != "x"):
+            keys = [key for factor in factors for key in factor.keys]
+            found = find_name(f"--{option}", name, [*keys, *table.columns])
+            given = next((one for one in factors if found in one.keys), None)
+            if given is None and rows[found].map(lambda value: isinstance(value, str)).all():
+                given = Factor((found,), readable_key(found), rows[found].tolist(), False)
+            asked[option] = given or _numbers(rows, found, f"--{option}")
+            left = [one for one in left if not _same(one, asked[option])]
+    samples = [factor for factor in left if factor.is_sample]
+    left = [factor for factor in left if not factor.is_sample]
+    untold = [one.name for one in samples] if "x" in asked else []
+    along = [asked["x"]] if "x" in asked else samples
+    if not along:
+        along = [_along(left, rows) or _numbers(rows, "point", "--x")]
+        left = [factor for factor in left if factor.keys != along[0].keys]
+    left = sorted((one for one in left if one.keys[0] not in _SEEDS), key=lambda one: -len(one.levels))
+    colours = asked.get("hue") or (left.pop(0) if left and hue is None else None)
+    apart = asked.get("panels")
+    if len(along) > 1 and apart is not None:
+        raise InputError("--panels", [Problem("", None, "expected --x too: the samples have a panel for each key")])
+    if apart is None and panels is None and left and len(along) == 1:
+        while prod(len(one.levels) for one in left) > _MOST_PANELS:
+            untold.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
+        apart, left = _joined(left), []
+    return Layout(along, colours, apart, [*untold, *(one.name for one in left)])
+
+
+def _same(one: Factor, other: Factor) -> bool:
+    """Whether two factors tell the same points apart, such as Γ0 and the acceleration that it follows from."""
+    pairs = len(set(zip(one.values, other.values, strict=True)))
+    return one.keys == other.keys or pairs == len(one.levels) == len(other.levels)
+
+
+def _along(factors: Sequence[Factor], rows: pd.DataFrame) -> Factor | None:
+    """What is best along x: most values, of equally many the last; categories and seeds if there is nothing else.
+
+    Three or more pairs of radii are numbers: their sin δ, if no two of them have the same.
+    """
+    shown = list(factors)
+    known = "sin_delta" in rows and rows["sin_delta"].notna().all()  # none of clusters
+    sines = rows["sin_delta"].astype(float).round(12).tolist() if known else []
+    for place, one in enumerate(factors):
+        if not one.is_number and any(key.endswith("radii") for key in one.keys):
+            pairs = len(set(zip(one.values, sines, strict=bool(sines))))
+            if pairs == len(set(sines)) == len(one.levels) >= _LEAST_ASYMMETRIES:
+                shown[place] = Factor(one.keys, "asymmetry sin δ", rows["sin_delta"].tolist(), True)
+    ranks = [(one.keys[0] not in _SEEDS, one.is_number, len(one.levels), place) for place, one in enumerate(shown)]
+    return shown[max(ranks)[-1]] if ranks else None
+
+
+def _joined(factors: Sequence[Factor]) -> Factor | None:
+    """Several factors as one."""
+    if len(factors) < 2:
+        return next(iter(factors), None)
+    columns = [[one.told(level, by_name=not one.unit) for level in one.values] for one in factors]
+    keys = tuple(key for factor in factors for key in factor.keys)
+    texts = [", ".join(row) for row in zip(*columns, strict=True)]
+    return Factor(keys, ", ".join(factor.name for factor in factors), texts, False)
+
+
+@styled
+def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Figure:
+    """Draw what `layout_of` and `drawn_column` gave of the same rows.
+
+    What is not positive is left out along axes that are logarithmic, as ``log`` says: ``x``, ``y`` or ``xy``.
     """
     if "x" in log and not all(one.is_number for one in layout.x):
         raise InputError("--logx", [Problem("", None, f"{layout.x[0].label} has no numbers")])
-    parts, colours = _parts(layout), _Colours(layout.hue, hollow=bool(drawn.theory))
+    parts = [(x, np.ones(len(drawn.values), dtype=bool), "") for x in layout.x]
+    if (told := layout.panels) is not None:
+        parts = [(layout.x[0], told.where(level), told.told(level, by_name=True)) for level in told.levels]
+    colours = _Colours(layout.hue, hollow=bool(drawn.theory))
     columns = min(len(parts), 2 if len(parts) in (2, 4) else 3)
     rows = ceil(len(parts) / columns)
     width, height = (5.6, 3.8) if len(parts) == 1 else (7.0, 6.0 / columns * rows + 0.9)
@@ -71,10 +289,10 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
             axes.tick_params(labelbottom=True)
         if number % columns == 0:
             axes.set_ylabel(plain_text(drawn.label))
-        _scale(axes, x, log)
+        _scale_x(axes, x, log)
     if len(parts) > 1:
         letter_panels(grid.flat[: len(parts)])
-    _limits(grid[0, 0], drawn, log)
+    _scale_y(grid[0, 0], drawn, log)
     for axes in grid.flat[len(parts) :]:
         axes.set_axis_off()
     _legend(figure, grid, colours, drawn)
@@ -83,63 +301,46 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
     return figure
 
 
-def _parts(layout: Layout) -> list[tuple[Factor, npt.NDArray[np.bool_], str]]:
-    """What each panel has along x, which rows it shows, and its name."""
-    panels = layout.panels
-    if panels is None:
-        return [(x, np.ones(len(x.values), dtype=bool), "") for x in layout.x]
-    names = [f"{panels.name} = {panels.told(one)}" if panels.is_number else panels.told(one) for one in panels.levels]
-    return [(layout.x[0], panels.where(level), name) for level, name in zip(panels.levels, names, strict=True)]
-
-
 class _Colours:
-    """Colour and marker of each level of a factor; of many numbers one series with a scale of colours."""
+    """How the levels of a factor look: of many numbers by a scale of colours."""
 
     def __init__(self, factor: Factor | None, *, hollow: bool) -> None:
         from matplotlib import colormaps
         from matplotlib.colors import Normalize
 
-        levels: list[Any] = factor.levels if factor else [None]
-        is_number = factor is not None and factor.is_number
-        self.factor, self.hollow, self.map = factor, hollow, colormaps["viridis"]
-        self.norm = Normalize(min(levels), max(levels)) if is_number and len(levels) > _MOST_COLOURS else None
-        self.levels = [None] if self.norm else levels
-        shades = colormaps["viridis" if is_number else "turbo"](np.linspace(0.0, 0.92, len(levels)))
-        self.colours = [f"C{place}" if len(levels) <= _FEW_COLOURS else shade for place, shade in enumerate(shades)]
-
-    def look(self, place: int) -> dict[str, Any]:
-        """Options of the symbols of a level."""
-        colour = self.colours[place]
-        face = "none" if self.hollow else colour
-        return {"marker": _MARKERS[place % len(_MARKERS)], "color": colour, "mfc": face, "ms": 4.5}
+        self.factor = factor
+        self.levels: list[Any] = factor.levels if factor else [None]
+        count, is_number = len(self.levels), factor is not None and factor.is_number
+        self.scale = Normalize(self.levels[0], self.levels[-1]) if is_number and count > _MOST_COLOURS else None
+        shares = self.scale(self.levels) if self.scale else np.linspace(0.0, 0.92, count)
+        shades = colormaps["viridis" if is_number else "turbo"](shares)
+        self.looks: list[dict[str, Any]] = []
+        for place in range(count):
+            colour = f"C{place}" if count <= _FEW_COLOURS else shades[place]
+            marker = _MARKERS[0 if self.scale else place % len(_MARKERS)]
+            face = "none" if hollow else colour
+            self.looks.append({"marker": marker, "color": colour, "mfc": face, "ms": 4.5})
 
 
 def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, colours: _Colours) -> None:
     """Means with their errors, joined by lines unless a theory's are there, and the theory's values."""
     places = np.array(x.values if x.is_number else [x.levels.index(one) for one in x.values], float)
     count = len(colours.levels)
-    for place, level in enumerate(colours.levels):
-        rows = np.flatnonzero(here & (True if colours.factor is None or colours.norm else colours.factor.where(level)))
+    for number, (level, look) in enumerate(zip(colours.levels, colours.looks, strict=True)):
+        rows = np.flatnonzero(here & (colours.factor.where(level) if colours.factor else True))
         rows = rows[np.argsort(places[rows], kind="stable")]
-        along = places[rows] + (0.0 if x.is_number else (place - (count - 1) / 2.0) * min(_ASIDE, 0.6 / count))
-        is_course = x.is_number and not x.is_sample and x.keys[0] not in SEEDS
+        # Symbols of different colours stand aside of their category.
+        aside = 0.0 if x.is_number else (number - (count - 1) / 2.0) * min(0.12, 0.6 / count)
+        is_course = x.is_number and not x.is_sample and x.keys[0] not in _SEEDS
         joined = is_course and len(set(places[rows])) == len(rows) > 1
         y, errors = drawn.values[rows], drawn.errors[rows]
         bars: Any = errors if np.isfinite(errors).any() else None
-        if colours.norm is not None and colours.factor is not None:
-            axes.errorbar(along, y, yerr=bars, fmt="none", ecolor="0.6", lw=0.8, zorder=1)
-            tints = np.array(colours.factor.values, dtype=float)[rows]
-            axes.scatter(along, y, c=tints, cmap=colours.map, norm=colours.norm, s=18, zorder=2)
-        else:
-            line = "-" if joined and not drawn.theory else "none"
-            axes.errorbar(along, y, yerr=bars, capsize=2, lw=0.9, ls=line, **colours.look(place))
-        for number, values in enumerate(drawn.theory.values()):
-            tint = "0.3" if colours.norm else colours.colours[place]
-            axes.plot(along, values[rows], zorder=1, **_model_look(number, joined, tint))
+        line = "-" if joined and not drawn.theory else "none"
+        axes.errorbar(places[rows] + aside, y, yerr=bars, capsize=2, lw=0.9, ls=line, **look)
+        for model, values in enumerate(drawn.theory.values()):
+            axes.plot(places[rows] + aside, values[rows], zorder=1, **_model_look(model, joined, look["color"]))
     if np.nanmin(drawn.values) <= 0.0 <= np.nanmax(drawn.values):
         axes.axhline(0.0, color="0.4", lw=0.6, zorder=0)
-    if not x.is_number:
-        _name_categories(axes, x)
 
 
 def _model_look(number: int, joined: bool, colour: Any) -> dict[str, Any]:
@@ -147,22 +348,19 @@ def _model_look(number: int, joined: bool, colour: Any) -> dict[str, Any]:
     return {"color": colour, "lw": 0.9, **({"ls": line} if joined else {"ls": "none", "marker": marker, "ms": 9})}
 
 
-def _name_categories(axes: Axes, x: Factor) -> None:
-    aslant = sum(map(len, x.levels)) > _LONG_NAMES
-    look: dict[str, Any] = {"rotation": 35, "ha": "right", "rotation_mode": "anchor"} if aslant else {}
-    axes.set_xticks(range(len(x.levels)), [plain_text(level) for level in x.levels], **look)
-    axes.set_xlim(-0.6, len(x.levels) - 0.4)
-
-
-def _scale(axes: Axes, x: Factor, log: str) -> None:
-    """Logarithms, and ticks at the values of x where they are few."""
+def _scale_x(axes: Axes, x: Factor, log: str) -> None:
+    """Logarithms, names of categories (aslant if they are long), ticks at the values of x where they are few."""
     from matplotlib.ticker import MaxNLocator
 
+    if not x.is_number:
+        look: dict[str, Any] = {"rotation": 35, "ha": "right", "rotation_mode": "anchor"}
+        names = [plain_text(level) for level in x.levels]
+        axes.set_xticks(range(len(names)), names, **(look if sum(map(len, x.levels)) > 40 else {}))
+        axes.set_xlim(-0.6, len(names) - 0.4)
+        return
     if "x" in log:
         axes.set_xscale("log")
-    if not x.is_number:
-        return
-    apart = np.diff(x.levels) > _LEAST_APART * (x.levels[-1] - x.levels[0])
+    apart = np.diff(x.levels) > 0.08 * (x.levels[-1] - x.levels[0])
     if len(x.levels) <= _FEW_TICKS and apart.all():
         axes.set_xticks(x.levels, [f"{level:.4g}" for level in x.levels])
         axes.set_xticks([], minor=True)
@@ -170,8 +368,8 @@ def _scale(axes: Axes, x: Factor, log: str) -> None:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def _limits(axes: Axes, drawn: Drawn, log: str) -> None:
-    """Along y what the runs and the first model gave: another model may leave the axes."""
+def _scale_y(axes: Axes, drawn: Drawn, log: str) -> None:
+    """Along y what the runs and the first model gave, with margins: another model may leave the axes."""
     from matplotlib.ticker import MaxNLocator
 
     if "y" in log:
@@ -184,7 +382,7 @@ def _limits(axes: Axes, drawn: Drawn, log: str) -> None:
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         low, high = low - 0.5, high + 0.5
     if high > low:
-        axes.set_ylim(low - _MARGIN * (high - low), high + _MARGIN * (high - low))
+        axes.set_ylim(low - 0.06 * (high - low), high + 0.06 * (high - low))
 
 
 def _legend(figure: Figure, grid: npt.NDArray[Any], colours: _Colours, drawn: Drawn) -> None:
@@ -194,16 +392,15 @@ def _legend(figure: Figure, grid: npt.NDArray[Any], colours: _Colours, drawn: Dr
 
     factor, title = colours.factor, None
     handles: list[Line2D] = []
-    if colours.norm is not None and factor is not None:
-        figure.colorbar(ScalarMappable(colours.norm, colours.map), ax=grid, label=plain_text(factor.label))
+    if factor is not None and colours.scale is not None:
+        figure.colorbar(ScalarMappable(colours.scale, "viridis"), ax=grid, label=plain_text(factor.label))
     elif factor is not None:
         title = plain_text(factor.name)
-        names = [plain_text(factor.told(level)) for level in colours.levels]
-        handles = [Line2D([], [], ls="none", label=name, **colours.look(at)) for at, name in enumerate(names)]
+        looks = zip(colours.levels, colours.looks, strict=True)
+        handles = [Line2D([], [], ls="none", label=plain_text(factor.told(level)), **look) for level, look in looks]
     lines = {line.get_linestyle() for axes in grid.flat for line in axes.lines}
     for number, model in enumerate(drawn.theory):
-        look = _model_look(number, _MODELS[number][0] in lines, "0.3")
-        handles.append(Line2D([], [], label=model, **look))
+        handles.append(Line2D([], [], label=model, **_model_look(number, _MODELS[number][0] in lines, "0.3")))
     if handles:
         longest = max(len(str(handle.get_label())) for handle in handles)
         columns = max(1, min(len(handles), int(13.0 * figure.get_figwidth() / (longest + 6))))

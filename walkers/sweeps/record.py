@@ -1,28 +1,29 @@
 """What a sweep's directory holds: ``sweep.json``, the list of its points, each with the name of its run.
 
 The runs themselves are beside the sweep's directory, shared by all sweeps of that folder: what is finished, failed or
-being made is read from them and from nowhere else.
+being made is read from them and from nowhere else. What a point shows in the table (`walkers.sweeps.table`) is what
+varied, what follows from its case, and what its run gave.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.axes import plain
+from walkers.inputs.axes import is_axis, plain
 from walkers.inputs.case import Case
+from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem, WalkersError
-from walkers.postprocess.analysis import RESULT_NAME, current_result
+from walkers.postprocess.analysis import RESULT_NAME, Described, analyses, analyses_in, analyses_of, current_result
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, finished_run, run_place, unfinished
 from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import is_locked
 from walkers.runner.manifest import check_unchanged
-from walkers.sweeps.columns import analyses_of_all, derived_columns, derived_of, result_columns, velocity_in
 
 if TYPE_CHECKING:
     from walkers.inputs.sweep import Descent, Sweep
@@ -31,32 +32,22 @@ RECORD_NAME = "sweep.json"
 PARSL = "parsl"
 """Folder of Parsl's scripts and logs in a sweep's directory."""
 _FORMAT = 2
+_DRIVE = {
+    "frequency": ("Hz", "of the drive"),
+    "peak_acceleration": ("m/s^2", "of the boundary"),
+    "peak_velocity": ("m/s", "of the boundary"),
+    "amplitude": ("m", "of the boundary's displacement"),
+}
+"""Columns that every case has."""
 
 
 @dataclass(frozen=True)
 class SweepRecord:
     """A sweep as its directory describes it.
 
-    Attributes
-    ----------
-    directory
-        Of the sweep; the folder of the runs is its parent.
-    name, title
-        Of the sweep.
-    units
-        From the keys that vary to their units, None where one has none.
-    values
-        Of each point, one a key.
-    derived
-        Of each point, one a column of `walkers.sweeps.columns.derived_columns`.
-    runs
-        Name of each point's run.
-    descent
-        How the points depend on each other, if they do.
-    analyses
-        Names of the analyses that mean something for its cases.
-    file
-        Tables of the sweep file; empty for one that was recorded before they were.
+    ``units`` has the keys that vary; of each point ``values`` has one a key, ``derived`` one a column of
+    `derived_columns`, ``runs`` the name of its run. ``analyses`` are those that mean something for its cases; ``file``
+    has the tables of the sweep file, if they were recorded.
     """
 
     directory: Path
@@ -75,25 +66,59 @@ class SweepRecord:
         """Folder of the run directories."""
         return self.directory.parent
 
+    @property
+    def axes(self) -> list[tuple[str, ...]]:
+        """The keys that vary, those together that its file has in one ``[[zip]]`` or ``[[sample]]``."""
+        together = [flatten(table, is_axis) for table in self.file.get("zip", ())]
+        together += [flatten(table["ranges"], is_axis) for table in self.file.get("sample", ())]
+        axis_of = {key: tuple(keys) for keys in together for key in keys}
+        return list(dict.fromkeys(axis_of.get(key, (key,)) for key in self.units))
+
+    @property
+    def chains(self) -> list[list[int]]:
+        """The descents: numbers of their points, from the top. All points where there is no descent."""
+        steps = self.descent.steps if self.descent else len(self.runs)
+        return [list(range(start, start + steps)) for start in range(0, len(self.runs), steps or 1)]
+
+
+def derived_columns(names: Sequence[str]) -> Described:
+    """Columns that follow from a case, of the analyses of these names: unit and meaning."""
+    return {**{key: told for one in analyses() if one.name in names for key, told in one.derived.items()}, **_DRIVE}
+
+
+def result_columns(names: Sequence[str]) -> Described:
+    """Columns that a run gives, of the analyses of these names: unit and meaning."""
+    return {key: told for one in analyses() if one.name in names for key, told in one.columns.items()}
+
+
+def analyses_of_all(cases: Iterable[Case]) -> list[str]:
+    """Names of the analyses that mean something for any of several cases."""
+    found = {one.name for case in cases for one in analyses_of(case)}
+    return [one.name for one in analyses() if one.name in found]
+
+
+def row_of(result: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns `result_columns` of a result."""
+    return {key: value for one in analyses_in(result) for key, value in one.row(result).items()}
+
 
 def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Path) -> SweepRecord:
-    """The record of a sweep whose points have been resolved.
-
-    Raises
-    ------
-    InputError
-        If piles are to descend.
-    """
+    """The record of a sweep whose points have been resolved; `InputError` if piles are to descend."""
     names = analyses_of_all(cases)
     if sweep.descent is not None and "velocity" not in result_columns(names):
         raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
+    derived = []
+    for case in cases:
+        known = {key: value for one in analyses_of(case) for key, value in one.derived_of(case).items()}
+        known |= {key: getattr(case.drive, key) for key in _DRIVE}
+        derived.append([known.get(key, nan) for key in derived_columns(names)])
     return SweepRecord(
         directory=out / sweep.name,
         name=sweep.name,
         title=sweep.title,
         units=dict(zip(sweep.keys, sweep.units, strict=True)),
-        values=[[_plain(value) for value in row] for row in sweep.rows],
-        derived=[derived_of(case, names) for case in cases],
+        values=[[list(map(plain, one)) if isinstance(one, list) else plain(one) for one in row] for row in sweep.rows],
+        derived=derived,
         runs=[run_place(case, engine, out).name for case in cases],
         descent=sweep.descent,
         analyses=names,
@@ -101,41 +126,26 @@ def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Pat
     )
 
 
-def _plain(value: Any) -> Any:
-    return [plain(part) for part in value] if isinstance(value, list) else plain(value)
-
-
 def write_record(record: SweepRecord) -> None:
     """Make the sweep's directory, if need be, and write its ``sweep.json``."""
     record.directory.mkdir(parents=True, exist_ok=True)
-    descent = record.descent
-    write_json(
-        record.directory / RECORD_NAME,
-        {
-            "format": _FORMAT,
-            "name": record.name,
-            "title": record.title,
-            "file": dict(record.file),
-            "units": dict(record.units),
-            "descent": vars(descent) if descent else None,
-            "analyses": list(record.analyses),
-            "derived": list(derived_columns(record.analyses)),
-            "points": [
-                {"values": list(values), "derived": list(derived), "run": run}
-                for values, derived, run in zip(record.values, record.derived, record.runs, strict=True)
-            ],
-        },
-    )
+    points = zip(record.values, record.derived, record.runs, strict=True)
+    contents = {
+        "format": _FORMAT,
+        "name": record.name,
+        "title": record.title,
+        "file": dict(record.file),
+        "units": dict(record.units),
+        "descent": vars(record.descent) if record.descent else None,
+        "analyses": list(record.analyses),
+        "derived": list(derived_columns(record.analyses)),
+        "points": [{"values": list(values), "derived": list(derived), "run": run} for values, derived, run in points],
+    }
+    write_json(record.directory / RECORD_NAME, contents)
 
 
 def read_record(directory: str | Path) -> SweepRecord:
-    """Read a sweep's directory.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
+    """Read a sweep's directory; `InputError` if it is none."""
     from walkers.inputs.sweep import Descent
 
     given, directory = directory, Path(directory).resolve()
@@ -144,14 +154,11 @@ def read_record(directory: str | Path) -> SweepRecord:
         points = contents["points"]
         return SweepRecord(
             directory=directory,
-            name=contents["name"],
-            title=contents["title"],
-            units=contents["units"],
+            **{key: contents[key] for key in ("name", "title", "units", "analyses")},
             values=[point["values"] for point in points],
             derived=[point["derived"] for point in points],
             runs=[point["run"] for point in points],
             descent=Descent(**contents["descent"]) if contents["descent"] else None,
-            analyses=contents["analyses"],
             file=contents.get("file", {}),
         )
     except (FileNotFoundError, NotADirectoryError) as error:
@@ -163,16 +170,9 @@ def read_record(directory: str | Path) -> SweepRecord:
 
 @dataclass(frozen=True)
 class PointState:
-    """What has become of a point.
+    """What has become of a point: finished, failed, running, missing, or not needed, below where a descent ended.
 
-    Attributes
-    ----------
-    status
-        ``finished``, ``failed``, ``running``, ``missing``, or ``not needed``: below where a descent ended.
-    directory
-        Of the finished run, or of what is left of the failed one; None if there is none.
-    reason, message, lost
-        Of a failure; the number of beads lost.
+    The directory is that of the finished run, or of what is left of the failed one; the rest is of a failure.
     """
 
     status: str
@@ -184,64 +184,61 @@ class PointState:
 
 def states(record: SweepRecord) -> list[PointState]:
     """What has become of each point, as the run directories say."""
-    found = [_state(record.out / run) for run in record.runs]
+    places = [record.out / run for run in record.runs]
+    found = [
+        PointState("finished", place) if finished_run(place) else unfinished_state(place, unfinished(place))
+        for place in places
+    ]
     if record.descent is None:
         return found
-    for chain in chains(record):
+    for chain in record.chains:
         stopped = False
         for number in chain:
             if stopped:
                 found[number] = PointState("not needed")
-            directory = found[number].directory
-            if found[number].status == "finished" and directory is not None:
-                stopped = record.descent.at_rest(velocity_of(directory))
+            elif found[number].status == "finished":
+                stopped = record.descent.at_rest(velocity_of(places[number]))
     return found
 
 
-def _state(place: Path) -> PointState:
-    if finished_run(place) is not None:
-        return PointState("finished", place)
+def unfinished_state(place: Path, directory: Path) -> PointState:
+    """What has become of a run that is not finished, or is made anew, in a directory."""
     if is_locked(place):
         return PointState("running")
-    incomplete = unfinished(place)
     try:
-        failure = read_json(incomplete / FAILURE_NAME)
-        return PointState(
-            "failed", incomplete, str(failure["reason"]), str(failure["message"]), int(failure.get("lost", 0))
-        )
+        failure = read_json(directory / FAILURE_NAME)
+        reason, message = str(failure["reason"]), str(failure["message"])
+        return PointState("failed", directory, reason, message, int(failure.get("lost", 0)))
     except (OSError, ValueError, KeyError, TypeError):
         return PointState("missing")
 
 
-def chains(record: SweepRecord) -> list[list[int]]:
-    """The descents of a sweep: numbers of their points, from the top."""
-    steps = record.descent.steps if record.descent else len(record.runs)
-    return [list(range(start, start + steps)) for start in range(0, len(record.runs), steps or 1)]
+def velocity_in(result: Mapping[str, Any]) -> float:
+    """Mean velocity of walkers, m/s; NaN where there are none."""
+    return float(result["velocity"]["mean"]) if "velocity" in result else nan
 
 
 def velocity_of(directory: Path) -> float:
     """Mean velocity of a finished run, m/s, as its result says, of whatever version; NaN if its files are damaged."""
-    try:
-        check_unchanged(directory, [RESULT_NAME])
-        return velocity_in(read_json(directory / RESULT_NAME))
-    except (OSError, ValueError, KeyError, TypeError):
-        with suppress(DamagedRunError):
-            return velocity_in(result_in(directory))
-        return nan
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        return velocity_in(recorded_result(directory))
+    with suppress(DamagedRunError):
+        return velocity_in(result_in(directory))
+    return nan
+
+
+def recorded_result(directory: Path) -> dict[str, Any]:
+    """The result that a finished run has, of whatever version; `OSError`, `ValueError` if it is not what it was."""
+    check_unchanged(directory, [RESULT_NAME])
+    return read_json(directory / RESULT_NAME)
 
 
 class DamagedRunError(WalkersError):
-    """A finished run whose files were changed or cut since."""
+    """A finished run whose files were changed or cut since, and whose result cannot be made anew from its dumps."""
 
 
 def result_in(directory: Path) -> dict[str, Any]:
-    """The result of a finished run.
-
-    Raises
-    ------
-    DamagedRunError
-        If it can neither be read nor be made anew from the dumps.
-    """
+    """The result of a finished run; `DamagedRunError` if there is none."""
     try:
         return current_result(directory)
     except (OSError, ValueError, KeyError, TypeError, IndexError, WalkersError) as error:

@@ -1,36 +1,54 @@
-"""Schedule a sweep: decks handed to Parsl's workers, what they report taken in, until every point is settled."""
+"""Schedule a sweep: points packed into decks, these handed to Parsl's workers, until every point is settled.
+
+A deck costs a start-up and a share a step whoever is in it, so that fewer decks are cheaper; more of them fill the
+cores more evenly and give results sooner. They are packed by predicted cost, so that all cores finish together: the
+whole sweep for a number of workers, whatever is finished, so that an interrupted sweep goes on with the decks that it
+would have had.
+
+Parsl runs the workers, here or on a cluster, and gives out again a deck whose worker was lost. What the failure of a
+deck means for its points is decided here: it is tried again in halves.
+"""
 
 from __future__ import annotations
 
+import heapq
 import resource
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from math import ceil
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from uuid import uuid4
 
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError, Problem, WalkersError
 from walkers.runner.binary import Engine
-from walkers.runner.cost import pairs_of_beads
+from walkers.runner.cost import pairs_of_beads, predicted_seconds
 from walkers.runner.locks import is_locked
-from walkers.sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, PlannedDeck, halves, pack, unfinished_parts
-from walkers.sweeps.record import PARSL, PointState, SweepRecord, chains, states, velocity_of
+from walkers.sweeps.record import PARSL, SweepRecord, velocity_of
+from walkers.sweeps.shared_deck import STOPS, Report, work
 from walkers.sweeps.site import Site, pilots, threads
-from walkers.sweeps.worker import STOPS, Report, SweepStopped, Task, work
+from walkers.sweeps.table import with_unit
 from walkers.templates.scene import sharing_key
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
+MOST_WALKERS = 96
+"""In a deck; with 96 the share of the deck's own cost is down to 4 %."""
+MOST_POINTS = 64
+LONGEST_SECONDS = 60.0
+"""Predicted time of a deck of several points: results are to keep coming."""
+_TRIALS = 24
+_AS_GOOD = 1.02
 _LOOK_SECONDS = 0.25
-_BUSY_SECONDS = 2.0
-_MOST_LOSSES = 5
-"""How often a deck is given out again after its worker was lost (a cancelled job, a node gone down)."""
 
 
 class ClusterFailed(WalkersError):
@@ -39,21 +57,10 @@ class ClusterFailed(WalkersError):
 
 @dataclass(frozen=True)
 class Options:
-    """How a sweep is run.
+    """How a sweep is run: by so many decks at once on this machine, or on a cluster (whose own number counts).
 
-    Attributes
-    ----------
-    workers
-        How many decks run at once on this machine; on a site its own number counts.
-    site
-        The cluster, or None for this machine.
-    retries
-        How often a point that failed is tried again.
-    time_limit
-        Wall time in s that an engine may take, or None.
-    final
-        Names of failures after which a point is not run again, not by a later call either: the engine would meet them
-        again. They are told as failures each time.
+    A point that failed is tried again ``retries`` times, but not after failures of the names ``final``, not by a later
+    call either: the engine would meet them again. ``time_limit`` is the wall time in s that an engine may take.
     """
 
     workers: int
@@ -119,46 +126,158 @@ def _severity(failure: Failure) -> int:
     return _WORST_FIRST.index(failure.reason if failure.reason in _WORST_FIRST else "")
 
 
-@dataclass(frozen=True, eq=False)
-class _Job:
-    """A deck on its way, of which group of points: how often it failed and how often its worker was lost."""
+@dataclass(frozen=True)
+class PlannedDeck:
+    """Numbers of the points of a deck, in order, and its predicted time in s on one core."""
 
-    deck: PlannedDeck
-    group: int
-    failures: int = 0
-    losses: int = 0
+    points: tuple[int, ...]
+    seconds: float
+
+    def part(self, points: Sequence[int]) -> PlannedDeck:
+        """A deck of some of its points."""
+        return PlannedDeck(tuple(points), self.seconds * len(points) / len(self.points))
 
 
-def schedule(
-    record: SweepRecord,
-    cases: Sequence[Case],
-    engine: Engine,
-    options: Options,
-    on_progress: Callable[[SweepProgress], None] | None = None,
-) -> list[Failure]:
-    """Make all runs of a sweep that are missing, as `walkers.sweeps.run.run_sweep` says.
+def pack(cases: Mapping[int, Case], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
+    """Pack points, by their numbers, into decks for so many workers; the longest first, as they are to be started.
 
-    Returns
-    -------
-    list of Failure
-        The points that failed; all others are finished or, below the end of a descent, not needed.
+    No deck of several points may exceed a predicted time.
+    """
+    by_key: dict[Hashable, list[int]] = {}
+    for number, case in cases.items():
+        by_key.setdefault(sharing_key(case), []).append(number)
+    groups = list(by_key.values())
+    longest = max((_deck([number], cases).seconds for number in cases), default=0.0)
+    lengths = [longest]
+    if len(groups) < len(cases):
+        whole = sum(_deck(group, cases).seconds for group in groups)
+        lengths = [2.0 * max(whole / workers, longest) * 2.0 ** (-number / 4) for number in range(_TRIALS)]
+    plans = [
+        [deck for group in groups for deck in _parted(group, cases, min(length, longest_seconds))] for length in lengths
+    ]
+    spans = [makespan((deck.seconds for deck in plan), workers) for plan in plans]
+    # Of plans that take as long, the one with the smallest decks.
+    good = max(number for number, span in enumerate(spans) if span <= _AS_GOOD * min(spans))
+    return sorted(plans[good], key=lambda deck: -deck.seconds)
 
-    Raises
-    ------
-    ClusterFailed
-        If the cluster's jobs end without having worked.
+
+def _parted(group: Sequence[int], cases: Mapping[int, Case], longest: float) -> list[PlannedDeck]:
+    """A group in the fewest decks that keep to the bounds; a point by itself may exceed them."""
+    most_walkers = max(pairs_of_beads(cases[number]) for number in group)
+    for parts in range(1, len(group)):
+        points = ceil(len(group) / parts)
+        walkers = points * most_walkers
+        seconds = predicted_seconds(cases[group[0]], walkers)  # a group shares the number of steps
+        if points <= MOST_POINTS and walkers <= MOST_WALKERS and seconds <= longest:
+            break
+    else:
+        parts = len(group)
+    return [_deck(part, cases) for part in _parts(group, parts)]
+
+
+def _parts(group: Sequence[int], count: int) -> list[Sequence[int]]:
+    """A sequence in so many consecutive parts, of equal lengths as far as that goes."""
+    edges = [len(group) * number // count for number in range(count + 1)]
+    return [group[start:end] for start, end in pairwise(edges)]
+
+
+def _deck(points: Sequence[int], cases: Mapping[int, Case]) -> PlannedDeck:
+    walkers = sum(pairs_of_beads(cases[number]) for number in points)
+    return PlannedDeck(tuple(points), predicted_seconds(cases[points[0]], walkers))
+
+
+def makespan(seconds: Iterable[float], workers: int) -> float:
+    """Time until all is done when each free worker takes the longest that is left, s."""
+    durations = sorted(seconds, reverse=True)
+    ends = [0.0] * max(1, min(workers, len(durations)))
+    for duration in durations:
+        heapq.heapreplace(ends, ends[0] + duration)
+    return max(ends)
+
+
+def halves(points: Sequence[int]) -> list[Sequence[int]]:
+    """The two halves of a deck of several points."""
+    return _parts(points, 2)
+
+
+def unfinished_parts(
+    points: Sequence[int], cases: Mapping[int, Case], is_finished: Callable[[int], bool]
+) -> list[PlannedDeck]:
+    """What is left of a deck: itself, or those of its halves, halves of halves …, of which nothing is finished.
+
+    A deck that fails is tried again in halves; so what is left of it consists of the same decks, whenever the sweep was
+    interrupted.
+    """
+    finished = [is_finished(number) for number in points]
+    if all(finished):
+        return []
+    if not any(finished):
+        return [_deck(points, cases)]
+    return [part for half in halves(points) for part in unfinished_parts(half, cases, is_finished)]
+
+
+def missing_decks(
+    cases: Sequence[Case], points: Sequence[int], options: Options, is_settled: Callable[[int], bool]
+) -> list[PlannedDeck]:
+    """The decks of some points of which anything is missing, as they are whatever is finished."""
+    numbered = {point: cases[point] for point in points}
+    packed = pack(numbered, options.decks_at_once, options.longest_seconds) if numbered else []
+    return [part for deck in packed for part in unfinished_parts(deck.points, numbered, is_settled)]
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """What a sweep would do: its points with their statuses, the decks that are missing, what is not run again.
+
+    Of a sweep with a descent these are all decks down to its bottom: it may end earlier.
+    """
+
+    record: SweepRecord
+    cases: Sequence[Case]
+    engine: Engine
+    decks: Sequence[PlannedDeck]
+    statuses: Sequence[str]
+    options: Options
+    final: list[Failure]
+
+    def as_text(self) -> str:
+        """The plan in a few lines, with the predicted time of the engines, over all of their MPI processes."""
+        record, at_once = self.record, self.options.decks_at_once
+        missing = {point for deck in self.decks for point in deck.points}
+        seconds = sum(deck.seconds * max(self.cases[point].run.ranks for point in deck.points) for deck in self.decks)
+        apart = sum(predicted_seconds(self.cases[point]) * self.cases[point].run.ranks for point in missing)
+        until = makespan((deck.seconds for deck in self.decks), at_once)
+        told = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
+        keys = ", ".join(with_unit(key, unit) for key, unit in record.units.items())
+        at_most = "at most " if record.descent else ""
+        lines = [
+            f"{record.name}: {record.title}".rstrip(": "),
+            f"  varied     {keys or 'nothing'}",
+            f"  points     {len(record.runs)}: {told}",
+            f"  to do      {at_most}{len(missing)} points in {len(self.decks)} decks",
+            f"  predicted  {at_most}{seconds:.0f} core-seconds ({apart:.0f} with a deck a point), "
+            f"{until:.0f} s with {at_once} at once",
+            f"  directory  {record.directory}",
+        ]
+        return "\n".join(lines)
+
+
+def schedule(plan: SweepPlan, on_progress: Callable[[SweepProgress], None] | None = None) -> list[Failure]:
+    """Make all runs of a sweep that are missing; the points that failed.
+
+    All others are finished then or, below the end of a descent, not needed.
     """
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with suppress(ValueError, OSError):  # each point of a running deck keeps a lock open
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    record.out.mkdir(parents=True, exist_ok=True)
-    with _workers(options, record) as (sweep, submit):
-        return _Scheduler(record, cases, engine, options, sweep, submit, on_progress or (lambda _: None)).run()
+    plan.record.out.mkdir(parents=True, exist_ok=True)
+    with _workers(plan.options, plan.record) as submit:
+        return _Scheduler(plan, submit).run(on_progress or (lambda _: None))
 
 
 @contextmanager
-def _workers(options: Options, record: SweepRecord) -> Iterator[tuple[str, Callable[[Task], Future[Report]]]]:
-    """Start Parsl; yield what the sweep is called there, and what takes tasks.
+def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Future[Report]]]:
+    """Start Parsl; yield what takes `walkers.sweeps.shared_deck.work` with its arguments but the sweep's name there.
 
     At the end the workers and their engines have ended, however the block is left.
     """
@@ -177,7 +296,7 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[tuple[str, Calla
             f"Parsl cannot start ({told}); see {folder}, and [executor] address in the site file"
         ) from error
     try:
-        yield sweep, parsl.python_app(work, data_flow_kernel=kernel)
+        yield partial(parsl.python_app(work, data_flow_kernel=kernel), sweep)
     finally:
         stop.set()
         kernel.cleanup()
@@ -188,195 +307,131 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[tuple[str, Calla
                 folder.rmdir()
 
 
-def _groups(record: SweepRecord, cases: Sequence[Case]) -> list[list[list[int]]]:
-    """The points in groups that are made side by side: all points, or descents that may share decks."""
-    together: dict[Any, list[list[int]]] = {}
-    for chain in chains(record):
-        together.setdefault(sharing_key(cases[chain[0]]) if record.descent else None, []).append(chain)
-    return list(together.values())
-
-
-def final_failures(record: SweepRecord, found: Sequence[PointState], options: Options) -> list[Failure]:
-    """The points that failed before for one of the reasons that are final."""
-    return [
-        Failure(point, run, state.reason or "", state.message or "", str(state.directory))
-        for point, (run, state) in enumerate(zip(record.runs, found, strict=True))
-        if state.status == "failed" and state.reason in options.final
-    ]
-
-
 class _Scheduler:
     """Hands out decks and takes in reports."""
 
-    def __init__(
-        self,
-        record: SweepRecord,
-        cases: Sequence[Case],
-        engine: Engine,
-        options: Options,
-        sweep: str,
-        submit: Callable[[Task], Future[Report]],
-        on_progress: Callable[[SweepProgress], None],
-    ) -> None:
-        self.record, self.cases, self.engine, self.options = record, cases, engine, options
-        self.sweep, self.submit, self.on_progress = sweep, submit, on_progress
-        self.groups = _groups(record, cases)
-        found = states(record)
-        self.finished = {run for run, state in zip(record.runs, found, strict=True) if state.status == "finished"}
+    def __init__(self, plan: SweepPlan, submit: Callable[..., Future[Report]]) -> None:
+        self.plan, self.record, self.cases, self.submit = plan, plan.record, plan.cases, submit
+        self.failures = list(plan.final)
+        finished = [run for run, status in zip(plan.record.runs, plan.statuses, strict=True) if status == "finished"]
+        self.settled = {*finished, *(failure.run for failure in plan.final)}
+        """Names of the runs that are finished or given up."""
         self.velocities: dict[str, float] = {}
-        self.failures = final_failures(record, found, options)
-        self.given_up = {failure.run for failure in self.failures}
-        self.ended: SimpleQueue[tuple[_Job, Future[Report]]] = SimpleQueue()
-        self.out_there: dict[_Job, None] = {}
-        self.later: list[tuple[float, _Job]] = []
-        self.begin = time.perf_counter()
-        self.seconds_done = 0.0
-        self.found = sum(state.status == "finished" for state in found)
-        self.done = 0
-        self.told = 0.0
+        self.ended: SimpleQueue[tuple[PlannedDeck, Future[Report]]] = SimpleQueue()
+        self.groups_of: dict[PlannedDeck, int] = {}
+        """The decks on their way, of which group of points."""
+        groups: dict[Hashable, list[list[int]]] = {}
+        for chain in self.record.chains:  # all points are one group, as are descents that may share decks
+            groups.setdefault(sharing_key(self.cases[chain[0]]) if self.record.descent else None, []).append(chain)
+        self.batches = [self._batches(chains) for chains in groups.values()]
+        self.begin, self.seconds_done = time.perf_counter(), 0.0
+        self.found = self.done = len(finished)
 
-    def run(self) -> list[Failure]:
-        self._advance(range(len(self.groups)))
-        while self.out_there or self.later:
-            now = time.perf_counter()
-            for due, job in [entry for entry in self.later if entry[0] <= now]:
-                self.later.remove((due, job))
-                self._hand_out(job)
+    def run(self, on_progress: Callable[[SweepProgress], None]) -> list[Failure]:
+        """Until every point is settled."""
+        told = 0.0
+        for group in range(len(self.batches)):
+            self._advance(group)
+        while self.groups_of:
             with suppress(Empty):
-                job, future = self.ended.get(timeout=_LOOK_SECONDS)
-                self._take_in(job, future)
-                self._advance([job.group])
-            if now - self.told > _LOOK_SECONDS:
-                self.told = now
-                self.on_progress(self._progress())
-        self.on_progress(self._progress())
+                deck, future = self.ended.get(timeout=_LOOK_SECONDS)
+                group = self.groups_of.pop(deck)
+                self._take_in(deck, group, future)
+                self._advance(group)
+            if time.perf_counter() - told > _LOOK_SECONDS:
+                told = time.perf_counter()
+                on_progress(self._progress())
+        on_progress(self._progress())
         return sorted(self.failures, key=lambda failure: failure.point)
 
     def _is_settled(self, point: int) -> bool:
-        run = self.record.runs[point]
-        return run in self.finished or run in self.given_up
+        return self.record.runs[point] in self.settled
 
-    def _advance(self, groups: Iterable[int]) -> None:
-        """Hand out what may be made next of the groups of which nothing is on its way."""
-        busy = {job.group for job in (*self.out_there, *(job for _, job in self.later))}
-        for group in groups:
-            numbered = {} if group in busy else {point: self.cases[point] for point in self._batch(self.groups[group])}
-            for deck in pack(numbered, self.options.decks_at_once, self.options.longest_seconds) if numbered else ():
-                for part in unfinished_parts(deck.points, numbered, self._is_settled):
-                    self._hand_out(_Job(part, group))
-
-    def _batch(self, descents: Sequence[list[int]]) -> list[int]:
-        """The first points of a group of which some are not settled; none if all that are needed are.
+    def _batches(self, chains: list[list[int]]) -> Iterator[list[int]]:
+        """What of a group is made at once, each batch when the one before is settled: all points without descents.
 
         Descents go down side by side, so many steps at once as fill a deck: those below where a descent ends are made
         in vain, but cost less than decks that are nearly empty.
         """
-        step = 0
-        while descents and step < len(descents[0]):
-            after = step + self._steps_at_once([chain[step:] for chain in descents])
-            batch = [point for chain in descents for point in chain[step:after]]
-            if not all(map(self._is_settled, batch)):
-                return batch
-            descents = [chain for chain in descents if not any(map(self._stopped, chain[step:after]))]
-            step = after
-        return []
+        step, descent = 0, self.record.descent
+        while chains and step < len(chains[0]):
+            steps = len(chains[0])
+            if descent is not None:
+                keys = {sharing_key(self.cases[point]) for chain in chains for point in chain[step:]}
+                walkers = sum(pairs_of_beads(self.cases[chain[0]]) for chain in chains)
+                steps = max(1, MOST_WALKERS // walkers) if len(keys) == 1 else 1
+            now = slice(step, step + steps)
+            yield [point for chain in chains for point in chain[now]]
+            if descent is not None:
+                chains = [
+                    one for one in chains if not any(descent.at_rest(self._velocity(point)) for point in one[now])
+                ]
+            step += steps
 
-    def _steps_at_once(self, descents: Sequence[Sequence[int]]) -> int:
-        """How many steps of descents can share a deck; all points of a sweep without descents go at once."""
-        if self.record.descent is None:
-            return len(descents[0])
-        if len({sharing_key(self.cases[point]) for chain in descents for point in chain}) > 1:
-            return 1
-        return max(1, MOST_WALKERS // sum(pairs_of_beads(self.cases[chain[0]]) for chain in descents))
-
-    def _stopped(self, point: int) -> bool:
-        """Whether the walkers of a settled point were at rest."""
-        run, descent = self.record.runs[point], self.record.descent
-        if descent is None or run not in self.finished:
-            return False
+    def _velocity(self, point: int) -> float:
+        """That of a settled point, m/s; NaN if it failed."""
+        run = self.record.runs[point]
         if run not in self.velocities:
             self.velocities[run] = velocity_of(self.record.out / run)
-        return descent.at_rest(self.velocities[run])
+        return self.velocities[run]
 
-    def _hand_out(self, job: _Job) -> None:
-        task = Task(
-            sweep=self.sweep,
-            runs=tuple(self.record.runs[point] for point in job.deck.points),
-            cases=tuple(self.cases[point] for point in job.deck.points),
+    def _advance(self, group: int) -> None:
+        """Hand out what may be made next of a group of which nothing is on its way."""
+        while group not in self.groups_of.values():
+            batch = next(self.batches[group], None)
+            if batch is None:
+                return
+            for deck in missing_decks(self.cases, batch, self.plan.options, self._is_settled):
+                self._hand_out(deck, group)
+
+    def _hand_out(self, deck: PlannedDeck, group: int) -> None:
+        self.groups_of[deck] = group
+        future = self.submit(
+            runs=[self.record.runs[point] for point in deck.points],
+            cases=[self.cases[point] for point in deck.points],
             out=self.record.out,
-            engine=str(self.engine.path),
-            sha256=self.engine.sha256,
-            time_limit=self.options.time_limit,
+            engine=self.plan.engine,
+            time_limit=self.plan.options.time_limit,
+            retries=self.plan.options.retries if len(deck.points) == 1 else 0,
         )
-        self.out_there[job] = None
-        self.submit(task).add_done_callback(lambda future: self.ended.put((job, future)))
+        future.add_done_callback(lambda future: self.ended.put((deck, future)))
 
-    def _take_in(self, job: _Job, future: Future[Report]) -> None:
-        del self.out_there[job]
-        error = future.exception()
-        report = self._lost(job, error) if error else future.result()
-        if report is None:
-            return
-        self.finished |= set(report.finished)
-        self.velocities |= report.finished
-        left = [point for point in job.deck.points if not self._is_settled(point)]
-        settled = len(job.deck.points) - len(left)
-        self.seconds_done += job.deck.seconds * settled / len(job.deck.points)
-        self.done += settled
-        if left and report.failure:
-            self._failed(job, report, left)
-        elif left:
-            self.later.append((time.perf_counter() + _BUSY_SECONDS, _part(job, left)))
-
-    def _failed(self, job: _Job, report: Report, left: Sequence[int]) -> None:
-        """Try the points of a deck apart, a point by itself as often as told."""
-        if report.failure == SweepStopped.__name__ and STOPS[self.sweep].is_set():
-            return
-        if len(left) > 1:
-            for half in halves(left):
-                self._hand_out(_part(job, half))
-        elif job.failures < self.options.retries:
-            self._hand_out(replace(job, failures=job.failures + 1))
-        else:
-            (point,) = left
-            run = self.record.runs[point]
-            self.failures.append(Failure(point, run, report.failure or "", report.message, report.directory))
-            self.given_up.add(run)
-            self.seconds_done += job.deck.seconds
-
-    def _lost(self, job: _Job, error: BaseException) -> Report | None:
-        """An exception out of a worker: lost with its job or node, or something that nobody foresaw."""
+    def _take_in(self, deck: PlannedDeck, group: int, future: Future[Report]) -> None:
+        """Count what is finished; hand the rest out again: what others were making as it is, what failed in halves."""
         from parsl.executors.errors import BadStateException
-        from parsl.executors.high_throughput.errors import ManagerLost, WorkerLost
 
+        error = future.exception()
         if isinstance(error, BadStateException):
             first = " ".join(str(error).partition("Error 2:")[0].split())  # the others say the same
             raise ClusterFailed(f"the cluster's jobs fail: {first}") from error
-        if isinstance(error, (ManagerLost, WorkerLost)) and job.losses < _MOST_LOSSES:
-            self._hand_out(replace(job, losses=job.losses + 1))
-            return None
-        return Report(failure=type(error).__name__, message=str(error) or repr(error))
+        report = Report(failure=type(error).__name__, message=str(error) or repr(error)) if error else future.result()
+        self.settled |= set(report.finished)
+        self.velocities |= report.finished
+        left = [point for point in deck.points if not self._is_settled(point)]
+        settled = len(deck.points) - len(left)
+        self.seconds_done += deck.seconds * settled / len(deck.points)
+        self.done += settled
+        if len(left) == 1 and report.failure is not None:
+            run = self.record.runs[left[0]]
+            self.failures.append(Failure(left[0], run, report.failure, report.message, report.directory))
+            self.settled.add(run)
+            self.seconds_done += deck.seconds
+        elif left:
+            for part in halves(left) if report.failure else [left]:
+                self._hand_out(deck.part(part), group)
 
     def _progress(self) -> SweepProgress:
-        running = sum(
-            len(job.deck.points)
-            for job in list(self.out_there)[: 4 * self.options.decks_at_once]
-            if is_locked(self.record.out / self.record.runs[job.deck.points[0]])
-        )
-        waiting = sum(job.deck.seconds for job in [*self.out_there, *(job for _, job in self.later)])
+        first = list(self.groups_of)[: 4 * self.plan.options.decks_at_once]  # the others wait
+        made = [deck for deck in first if is_locked(self.record.out / self.record.runs[deck.points[0]])]
+        waiting = sum(deck.seconds for deck in self.groups_of)
         elapsed = time.perf_counter() - self.begin
         return SweepProgress(
             points=len(self.record.runs),
             found=self.found,
-            done=self.found + self.done,
+            done=self.done,
             failed=len(self.failures),
-            running=running,
+            running=sum(len(deck.points) for deck in made),
             elapsed=elapsed,
             left=waiting / self.seconds_done * elapsed if self.seconds_done else None,
             worst_failure=min(self.failures, key=_severity, default=None),
         )
-
-
-def _part(job: _Job, points: Sequence[int]) -> _Job:
-    """Some of a deck's points as a job of their own."""
-    return replace(job, deck=PlannedDeck(tuple(points), job.deck.seconds * len(points) / len(job.deck.points)))

@@ -19,6 +19,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
@@ -43,9 +44,6 @@ _OURS = {
     "cores": ("cores_per_node", "cpus_per_node"),
     "jobs": ("max_blocks",),
 }
-_GUARDED = ("setsid", "setpriv", "--pdeathsig", "TERM")
-"""How Parsl's interchange is started: out of Ctrl-C's reach, for Parsl waits for its word at the end; and mortal, so
-that the pilots of a sweep that was killed miss it and end too."""
 _SCHEDULERS = {
     "slurm": "SlurmProvider",
     "pbs": "PBSProProvider",
@@ -56,15 +54,16 @@ _SCHEDULERS = {
     "local": "LocalProvider",
 }
 """Names of our own; the class names of Parsl's other providers are taken as they are."""
-
-
+_GUARDED = ("setsid", "setpriv", "--pdeathsig", "TERM")
+"""How Parsl's interchange is started: out of Ctrl-C's reach, for Parsl waits for its word at the end; and mortal, so
+that the pilots of a sweep that was killed miss it and end too."""
+_MOST_LOSSES = 5  # how often a deck is given out again after its worker was lost (a cancelled job, a node gone down)
 _SHELL_TEXTS = ("scheduler_options", "worker_init", "launch_cmd", "interchange_launch_cmd", "regex_job_id")
 """Settings of Parsl's that are lines or commands by what they are, and one that no shell sees."""
 # SLURM fills in what stands behind a per cent sign, and its jobs end at once where their output cannot go.
 _ODD = re.compile(r"[^\w./+@=,:-]")
 _TAKEN = "expected letters, digits and . _ / + @ = , : -"
-MOST = 10_000
-"""Of anything that a site file counts."""
+_Count = Annotated[Whole, Field(ge=1, le=10_000)]
 
 
 class SiteFile(BaseModel):
@@ -76,9 +75,9 @@ class SiteFile(BaseModel):
     partition: str | None = None
     account: str | None = None
     walltime: Annotated[str, Field(pattern=r"^\d+:\d\d:\d\d$")] | None = None
-    nodes: Annotated[Whole, Field(ge=1, le=MOST)] = 1
-    cores: Annotated[Whole, Field(ge=1, le=MOST)]
-    jobs: Annotated[Whole, Field(ge=1, le=MOST)] = 1
+    nodes: _Count = 1
+    cores: _Count
+    jobs: _Count = 1
     modules: list[str] = []
     shell: list[str] = []
     launcher: str | None = None
@@ -111,19 +110,12 @@ def cores_here() -> int:
 
 
 def load_site(path: str | Path) -> Site:
-    """Read a site file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be used: unknown keys are told with those that Parsl's class takes.
-    """
+    """Read a site file; `InputError` tells unknown keys with those that Parsl's class takes."""
     document = read_toml(Path(path))
-    file = validated(SiteFile, document, str(path), "a site")
-    problems = _problems(file, document)
+    site = Site(validated(SiteFile, document, str(path), "a site"))
+    problems = _problems(site.file, document)
     if problems:
         raise InputError(str(path), problems)
-    site = Site(file)
     try:
         pilots(site, Path("parsl"))
     except Exception as error:  # whatever Parsl's classes raise about what they are given
@@ -133,42 +125,38 @@ def load_site(path: str | Path) -> Site:
 
 
 def _problems(file: SiteFile, document: Mapping[str, Any]) -> list[Problem]:
-    """What pydantic cannot see: whether Parsl has such a scheduler, and whether that takes such keys."""
+    """What pydantic cannot see: what Parsl does not know, and what a shell or a script would take for more than a name.
+
+    Parsl writes texts there as they are.
+    """
+    found: list[Problem] = []
+
+    def refuse(place: list[str], expected: str) -> None:
+        found.append(Problem(".".join(place), quoted(document, place), expected))
+
     provider = _provider(file.scheduler)
     if provider is None:
         expected = f"expected one of {', '.join(_SCHEDULERS)}{suggestion(file.scheduler, _SCHEDULERS)}"
-        return [Problem("scheduler", quoted(document, ["scheduler"]), f"{expected}, or a provider of Parsl's")]
-    found = []
+        refuse(["scheduler"], f"{expected}, or a provider of Parsl's")
+        return found
     taken = _parameters("parsl.providers", provider)
     for key, names in _OURS.items():
         if key in document and not taken.intersection(names) and key != "cores":
-            found.append(Problem(key, quoted(document, [key]), f"{provider} has no such setting"))
-    for table, known in (("provider", taken), ("executor", _parameters("parsl.executors", "HighThroughputExecutor"))):
-        for key in document.get(table, {}):
-            if key not in known:
-                expected = f"unknown key; Parsl takes {', '.join(sorted(known))}{suggestion(key, known)}"
-                found.append(Problem(f"{table}.{key}", quoted(document, [table, key]), expected))
-    found += _odd_texts(document)
-    if file.launcher is not None and file.launcher not in _launchers():
-        expected = f"expected one of {', '.join(sorted(_launchers()))}"
-        found.append(Problem("launcher", quoted(document, ["launcher"]), expected))
-    return found
-
-
-def _odd_texts(document: Mapping[str, Any]) -> list[Problem]:
-    """What a shell, or the scheduler's script, would take for more than a name: Parsl writes it there as it is."""
-    places = [["partition"], ["account"]]
-    places += [[table, key] for table in ("provider", "executor") for key in document.get(table, {})]
-    found = []
-    for place in places:
-        value: Any = document
-        for part in place:
-            value = value.get(part)
+            refuse([key], f"{provider} has no such setting")
+    tables = {"provider": taken, "executor": _parameters("parsl.executors", "HighThroughputExecutor")}
+    settings = [([table, key], known) for table, known in tables.items() for key in document.get(table, {})]
+    for place, known in settings:
+        if place[1] not in known:
+            refuse(place, f"unknown key; Parsl takes {', '.join(sorted(known))}{suggestion(place[1], known)}")
+    for place in (["partition"], ["account"], *(place for place, _ in settings)):
+        value = document.get(place[0]) if len(place) == 1 else document[place[0]][place[1]]
         texts = [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, str)]
-        odd = next((odd for odd in map(_ODD.search, texts) if odd), None)
+        odd = next(filter(None, map(_ODD.search, texts)), None)
         if odd and place[-1] not in _SHELL_TEXTS:
             expected = f"{_TAKEN}, found {odd[0]!r}; [provider] scheduler_options takes whole lines of a script"
-            found.append(Problem(".".join(place), quoted(document, place), expected))
+            refuse(place, expected)
+    if file.launcher is not None and file.launcher not in _launchers():
+        refuse(["launcher"], f"expected one of {', '.join(sorted(_launchers()))}")
     return found
 
 
@@ -181,9 +169,7 @@ def _provider(scheduler: str) -> str | None:
 
 @cache
 def _parameters(module: str, name: str) -> frozenset[str]:
-    import importlib
-
-    parameters = inspect.signature(getattr(importlib.import_module(module), name)).parameters
+    parameters = inspect.signature(getattr(import_module(module), name)).parameters
     return frozenset(parameters) - {"label", "provider", "launcher"}
 
 
@@ -196,13 +182,7 @@ def _launchers() -> Mapping[str, str]:
 
 
 def check_path(folder: Path) -> None:
-    """Refuse a folder that Parsl's shell scripts would take for something else: it writes paths into them as they are.
-
-    Raises
-    ------
-    InputError
-        If there is a space, a quote, a dollar or the like in the whole path.
-    """
+    """Refuse a folder with a space, a quote or the like in its path: Parsl writes it into shell scripts as it is."""
     whole = str(folder.resolve())
     if odd := _ODD.search(whole):
         told = f"with a site file {_TAKEN} in the path, found {odd[0]!r} in {whole!r}"
@@ -214,13 +194,8 @@ def threads(workers: int, run_dir: Path) -> Config:
     from parsl.config import Config
     from parsl.executors import ThreadPoolExecutor
 
-    return Config(
-        executors=[ThreadPoolExecutor(label="threads", max_threads=workers)],
-        run_dir=str(run_dir),
-        strategy="none",
-        initialize_logging=False,
-        usage_tracking=0,
-    )
+    executor = ThreadPoolExecutor(label="threads", max_threads=workers)
+    return Config(executors=[executor], run_dir=str(run_dir), strategy="none", initialize_logging=False)
 
 
 def pilots(site: Site, run_dir: Path) -> Config:
@@ -234,23 +209,16 @@ def pilots(site: Site, run_dir: Path) -> Config:
 
     file = site.file
     name = _provider(file.scheduler) or file.scheduler
-    taken = _parameters("parsl.providers", name)
-    settings: dict[str, Any] = {"worker_init": _worker_init(file)}
-    for key, names in _OURS.items():
-        value = getattr(file, key)
-        if value is not None:
-            settings |= {theirs: value for theirs in names if theirs in taken}
     # A node is shared with others unless the provider table says otherwise; jobs come and go with the work.
-    settings |= {key: value for key, value in (("exclusive", False), ("min_blocks", 0)) if key in taken}
+    given = {"worker_init": _worker_init(file), "exclusive": False, "min_blocks": 0}
+    given |= {theirs: getattr(file, key) for key, names in _OURS.items() for theirs in names}
+    taken = _parameters("parsl.providers", name)
+    settings = {key: value for key, value in given.items() if key in taken and value is not None}
     # On several nodes each needs a step of its own to start its workers.
     launcher = file.launcher or ("srun" if name == "SlurmProvider" and file.nodes > 1 else None)
     if launcher is not None:
         settings["launcher"] = getattr(parsl.launchers, _launchers()[launcher])()
-    provider = getattr(parsl.providers, name)(**(settings | _as_tuples(file.provider)))
     options: dict[str, Any] = {
-        **({"launch_cmd": f"{file.container} {DEFAULT_LAUNCH_CMD}"} if file.container else {}),
-        # Whose pilots are on this machine has nobody to listen to elsewhere; Parsl listens to all who come.
-        **({"address": "127.0.0.1"} if name == "LocalProvider" else {}),
         "max_workers_per_node": site.workers_per_node,
         "heartbeat_period": 10,
         "heartbeat_threshold": 60,
@@ -258,13 +226,32 @@ def pilots(site: Site, run_dir: Path) -> Config:
         "worker_logdir_root": str(run_dir),
         "interchange_launch_cmd": [*_GUARDED, str(Path(sys.executable).with_name("interchange.py"))],
     }
-    executor = HighThroughputExecutor(label="pilots", provider=provider, **(options | _as_tuples(file.executor)))
-    return Config(executors=[executor], run_dir=str(run_dir), strategy="simple", strategy_period=2, usage_tracking=0)
+    if file.container:
+        options["launch_cmd"] = f"{file.container} {DEFAULT_LAUNCH_CMD}"
+    if name == "LocalProvider":  # pilots on this machine: nobody else is to be listened to, and Parsl listens to all
+        options["address"] = "127.0.0.1"
+    # TOML has lists only, while Parsl's ranges are tuples.
+    own, others = (
+        {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+        for table in (file.provider, file.executor)
+    )
+    provider = getattr(parsl.providers, name)(**(settings | own))
+    executor = HighThroughputExecutor(label="pilots", provider=provider, **(options | others))
+    return Config(
+        executors=[executor],
+        run_dir=str(run_dir),
+        strategy="simple",
+        strategy_period=2,
+        retries=_MOST_LOSSES,
+        retry_handler=_cost_of_failure,
+    )
 
 
-def _as_tuples(table: Mapping[str, Any]) -> dict[str, Any]:
-    """TOML has lists only, while Parsl's ranges are tuples."""
-    return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+def _cost_of_failure(error: Exception, _: object) -> float:
+    """What Parsl counts a task's failure for: it may be lost with its worker, and not fail otherwise."""
+    from parsl.executors.high_throughput.errors import ManagerLost, WorkerLost
+
+    return 1.0 if isinstance(error, (ManagerLost, WorkerLost)) else _MOST_LOSSES + 1.0
 
 
 def _worker_init(file: SiteFile) -> str:

@@ -1,0 +1,441 @@
+"""What is in a folder of runs: runs, finished or not, and sweeps, as their files say; listed, and removed.
+
+Nothing is tabulated, no dump is opened and no table: a folder of ten thousand runs takes seconds.
+
+Never removed is what a process is making: who removes a run holds its lock meanwhile, as who makes it does. A finished
+run loses its manifest first: should the removal be interrupted, what is left is no run, and goes the next time.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from math import inf, isfinite, nan
+from pathlib import Path
+from stat import S_ISDIR
+from typing import Any, Literal
+
+from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.readable import agrees, differing, flattened, has_key, readable
+from walkers.inputs.units import Kind, parse_quantity
+from walkers.runner.directory import CASE_NAME, REPLACED, UNFINISHED, holds_unfinished, is_run_name, recover
+from walkers.runner.files import read_json
+from walkers.runner.locks import is_locked, locked
+from walkers.runner.manifest import MANIFEST_NAME
+from walkers.sweeps.record import (
+    PARSL,
+    RECORD_NAME,
+    derived_columns,
+    read_record,
+    recorded_result,
+    result_columns,
+    states,
+    unfinished_state,
+)
+
+Order = Literal["name", "status", "velocity", "age", "size"]
+AGE = Kind("age", "s", "7 d", 1e12)
+_AGES = {"d": 86400.0, "h": 3600.0, "min": 60.0}
+_SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
+_LOCK = ".lock"
+_MOST_LINES = 40
+_MARK = b"granular-walkers"
+"""In every report and figure that the project writes."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A run (``case-hash``) or a sweep in a folder.
+
+    It is finished, running, failed, or interrupted: a run would go on where it was, of a sweep points are missing. Its
+    age (s) counts from when it was finished or last written to; its size (bytes) is that of its files, of a sweep those
+    of its runs. Its parameters are those of `walkers.inputs.readable.flattened`, of a sweep the numbers of values of
+    what varies. A run gave a velocity (mean over its walkers, m/s) or climbs; a sweep has points of some statuses.
+    """
+
+    name: str
+    case: str
+    status: str
+    directory: Path
+    age: float = 0.0
+    size: int = 0
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    reason: str | None = None
+    message: str | None = None
+    velocity: float | None = None
+    standard_error: float | None = None
+    climbs: int | None = None
+    points: Mapping[str, int] | None = None
+    runs: Sequence[str] = ()
+
+    @property
+    def is_sweep(self) -> bool:
+        """Whether it is a sweep."""
+        return self.points is not None
+
+    @property
+    def place(self) -> Path:
+        """Where a run belongs; beside it is its lock."""
+        return self.directory.with_name(_run_name(self.directory))
+
+
+def _run_name(directory: Path) -> str:
+    return directory.name.removesuffix(UNFINISHED).removesuffix(REPLACED)
+
+
+def inventory(out: Path) -> list[Entry]:
+    """All runs and sweeps in a folder, sweeps first, each kind by name; none where there is no folder."""
+    if out.exists() and not out.is_dir():
+        raise InputError(str(out), [Problem("", None, "expected a folder of runs, this is a file")])
+    try:
+        with os.scandir(out) as entries:
+            folders = sorted(Path(entry) for entry in entries if entry.is_dir())
+    except OSError:
+        folders = []
+    now = time.time()
+    runs = [run for path in folders if (run := _run(path, now)) is not None]
+    made = {run.place for run in runs}
+    for lock in out.glob(f"*{_LOCK}"):  # a run whose directory is about to be made, or that is made with others
+        place = lock.with_name(lock.name.removesuffix(_LOCK))
+        if place not in made and is_locked(place):
+            runs.append(Entry(place.name, place.name.rpartition("-")[0], "running", place))
+    sweeps = [sweep for path in folders if (sweep := _sweep(path, runs, now)) is not None]
+    return [*sweeps, *sorted(runs, key=lambda run: (run.name, run.status != "finished"))]
+
+
+def _run(path: Path, now: float) -> Entry | None:
+    """The run in a directory; None if there is none."""
+    name = _run_name(path)
+    finished = name == path.name and (path / MANIFEST_NAME).is_file()
+    if not (finished or is_run_name(name)):  # a folder of somebody's, whatever is in it
+        return None
+    parameters: Mapping[str, Any] = {}
+    case_name = name.rpartition("-")[0]
+    try:
+        case = read_json(path / CASE_NAME)
+        parameters, case_name = flattened(case), str(case["name"])
+    except (OSError, ValueError, KeyError, TypeError):
+        if not is_run_name(name) or not (finished or (name != path.name and holds_unfinished(path))):
+            return None
+    size, newest = weigh(path)
+    if not finished:
+        state = unfinished_state(path.with_name(name), path)
+        status = "interrupted" if state.status == "missing" else state.status
+        age = max(now - newest, 0.0)
+        return Entry(name, case_name, status, path, age, size, parameters, state.reason, state.message)
+    given: dict[str, Any] = {}
+    with suppress(OSError, ValueError, AttributeError, TypeError):
+        result = recorded_result(path)
+        velocity, climbs = result.get("velocity") or {}, result.get("climbs")
+        given = {"velocity": velocity.get("mean"), "standard_error": velocity.get("standard_error")}
+        given["climbs"] = None if climbs is None else len(climbs)
+    return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
+
+
+def _age(path: Path, now: float) -> float:
+    return max(now - path.stat().st_mtime, 0.0)
+
+
+def weigh(path: Path) -> tuple[int, float]:
+    """Bytes of a file or of all in a directory, and when one was last written (s since the epoch; 0 if none was)."""
+    size, newest = 0, 0.0
+    for file in [path, *path.rglob("*")]:
+        with suppress(OSError):  # just being removed
+            about = file.lstat()
+            if not S_ISDIR(about.st_mode):
+                size, newest = size + about.st_size, max(newest, about.st_mtime)
+    return size, newest
+
+
+def _sweep(path: Path, runs: Sequence[Entry], now: float) -> Entry | None:
+    try:
+        record = read_record(path)
+    except InputError:
+        return None
+    points = dict(Counter(state.status for state in states(record)))
+    worst = {"running": "running", "missing": "interrupted", "failed": "failed"}
+    named = set(record.runs)
+    return Entry(
+        name=path.name,
+        case=record.runs[0].rpartition("-")[0] if record.runs else "",
+        status=next((status for found, status in worst.items() if points.get(found)), "finished"),
+        directory=path,
+        age=_age(path / RECORD_NAME, now),
+        size=sum(run.size for run in runs if run.name in named),
+        parameters={key: len({str(row[at]) for row in record.values}) for at, key in enumerate(record.units)},
+        points=points,
+        runs=record.runs,
+    )
+
+
+def select(
+    entries: Sequence[Entry],
+    *,
+    case: str | None = None,
+    status: str | None = None,
+    older_than: str | None = None,
+    where: Sequence[str] = (),
+) -> list[Entry]:
+    """Those of a folder's entries that are of a case, of a status, older than an age such as ``7 d``.
+
+    And of which all conditions ``where`` hold, such as ``drive.frequency=80 Hz``: no sweeps then. `InputError` if an
+    age or a condition cannot be read, or no run has such a key.
+    """
+    oldest = -inf
+    if older_than is not None:
+        try:
+            oldest = parse_quantity(older_than, AGE)
+        except ValueError as error:
+            raise InputError("--older-than", [Problem("", None, f'"{older_than}": {error}')]) from error
+    conditions = []
+    runs = [entry for entry in entries if not entry.is_sweep]
+    for text in where:
+        key, _, value = (part.strip() for part in text.partition("="))
+        if not (key and value):
+            told = 'expected KEY=VALUE, such as "drive.frequency=80 Hz"'
+            raise InputError("--where", [Problem("", None, f'"{text}": {told}')])
+        if runs and not any(has_key(run.parameters, key) for run in runs):
+            known = ", ".join(dict.fromkeys(one for run in runs for one in run.parameters))
+            raise InputError("--where", [Problem(key, None, f"no run has such a key; they have {known}")])
+        conditions.append((key, value))
+    return [
+        entry
+        for entry in (runs if conditions else entries)
+        if case in (None, entry.case)
+        and status in (None, entry.status)
+        and entry.age > oldest
+        and all(agrees(entry.parameters, key, value) for key, value in conditions)
+    ]
+
+
+def ordered(entries: Sequence[Entry], order: Order, *, reverse: bool = False) -> list[Entry]:
+    """Entries in an order: the fastest, the youngest and the largest first; what has no velocity last."""
+
+    def key(entry: Entry) -> Any:
+        if order == "velocity":
+            return inf if entry.velocity is None else -entry.velocity
+        return -entry.size if order == "size" else getattr(entry, order)
+
+    return sorted(entries, key=key, reverse=reverse)
+
+
+def _varied(runs: Sequence[Entry]) -> Iterator[tuple[str, list[Entry], list[str]]]:
+    """The runs of each case, and the keys by which they differ, see `walkers.inputs.readable.differing`."""
+    for case in dict.fromkeys(run.case for run in runs):
+        of_case = [run for run in runs if run.case == case]
+        yield case, of_case, differing([run.parameters for run in of_case if run.parameters])
+
+
+def as_json(entries: Sequence[Entry]) -> list[dict[str, Any]]:
+    """Entries as JSON objects, SI units; ``varies`` has, of a run, the values by which runs of its case differ."""
+    keys = {case: keys for case, _, keys in _varied([entry for entry in entries if not entry.is_sweep])}
+    common = ("name", "case", "status", "age", "size")
+    of_runs = ("reason", "message", "velocity", "standard_error", "climbs")
+    rows = []
+    for entry in entries:
+        shown = entry.parameters if entry.is_sweep else keys[entry.case]
+        names = (*common, *(("points", "runs") if entry.is_sweep else of_runs))
+        told: dict[str, Any] = {"kind": "sweep" if entry.is_sweep else "run", "directory": str(entry.directory)}
+        told |= {name: getattr(entry, name) for name in names}
+        rows.append({**told, "varies": {key: entry.parameters.get(key) for key in shown}})
+    return rows
+
+
+def as_text(entries: Sequence[Entry]) -> str:
+    """Entries as text: sweeps, then the runs of each case with a column for each key by which they differ; mm/s."""
+    sweeps = [entry for entry in entries if entry.is_sweep]
+    runs = [entry for entry in entries if not entry.is_sweep]
+    rows = [["sweep", "points", "age", "size", "case", "varies (values)"]]
+    for sweep in sweeps:
+        points = ", ".join(f"{number} {status}" for status, number in (sweep.points or {}).items())
+        keys = ", ".join(f"{key} ({number})" for key, number in sweep.parameters.items())
+        rows.append([sweep.name, points, age_text(sweep.age), bytes_text(sweep.size), sweep.case, keys])
+    blocks = [aligned(rows)] if sweeps else []
+    for case, of_case, varied in _varied(runs):
+        last = [key.rpartition(".")[2] for key in varied]
+        names = [key if one == "name" or last.count(one) > 1 else one for key, one in zip(varied, last, strict=True)]
+        rows = [[f"{case} ({len(of_case)})", "status", "result", "age", "size", *names]]
+        for run in of_case:
+            status = f"{run.status}: {run.reason}" if run.reason else run.status
+            result = "-" if run.climbs is None else f"{run.climbs} climb{'' if run.climbs == 1 else 's'}"
+            if run.velocity is not None:
+                result = f"{with_error(1e3 * run.velocity, 1e3 * (run.standard_error or nan))} mm/s"
+            values = [readable(key, run.parameters.get(key)) for key in varied]
+            rows.append([run.name, status, result, age_text(run.age), bytes_text(run.size), *values])
+        blocks.append(aligned(rows))
+    total = [*counted({"sweep": len(sweeps)}), f"{len(runs)} run{'' if len(runs) == 1 else 's'}"]
+    return "\n\n".join([*blocks, f"{', '.join(total)}, {bytes_text(sum(run.size for run in runs))}"])
+
+
+def with_error(value: float, error: float) -> str:
+    """A number with its standard error, if that is known; a dash for none."""
+    if not isfinite(value):
+        return "-"
+    return f"{value:.4g} ± {error:.1g}" if isfinite(error) else f"{value:.4g}"
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> str:
+    """Rows of cells as a text whose columns are aligned."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    filled = ([cell.ljust(width) for cell, width in zip(row, widths, strict=True)] for row in rows)
+    return "\n".join("  ".join(row).rstrip() for row in filled)
+
+
+def counted(counts: Mapping[str, int]) -> list[str]:
+    """Numbers of things in words, without those of which there are none."""
+    return [f"{number} {kind}{'s' if number > 1 else ''}" for kind, number in counts.items() if number]
+
+
+def age_text(seconds: float) -> str:
+    """An age in the largest unit of which it is at least two, such as ``3 d``."""
+    told = (f"{seconds / size:.0f} {unit}" for unit, size in _AGES.items() if seconds >= 2 * size)
+    return next(told, f"{seconds:.0f} s")
+
+
+def bytes_text(size: int) -> str:
+    """A number of bytes, such as ``1.2 MB``."""
+    return next((f"{size / unit:.3g} {name}" for name, unit in _SIZES.items() if size >= unit), f"{size} B")
+
+
+@dataclass(frozen=True)
+class Cleaning:
+    """What is to be removed from a folder: runs and sweeps, lock files that lock nothing; what else to tell of it."""
+
+    remove: Sequence[Entry]
+    locks: Sequence[Path]
+    told: Sequence[str]
+
+    def as_text(self) -> str:
+        """What goes, what of sweeps, what stays, and how much it is."""
+        rows, told, total = [], list(self.told), 0
+        for one in self.remove:
+            size, why = one.size, one.reason or ("" if one.status == "finished" else "would go on where it was")
+            if one.directory.is_symlink():
+                size, why = 0, "a symbolic link: what it leads to stays"
+            elif one.is_sweep:
+                own = _own_files(one.directory)
+                size, why = sum(weigh(path)[0] for path in own), ""
+                theirs = ", ".join(sorted(path.name for path in one.directory.iterdir() if path not in own))
+                if theirs:
+                    told.append(f"stays, for walkers did not write it: {theirs} (in {one.directory})")
+            kind = "sweep" if one.is_sweep else one.status
+            rows.append([one.name, kind, age_text(one.age), bytes_text(size), why])
+            total += size
+        lines = [aligned(rows[:_MOST_LINES])] if rows else []
+        lines += [f"and {len(rows) - _MOST_LINES} more"] if len(rows) > _MOST_LINES else []
+        kinds = Counter("sweep" if entry.is_sweep else f"{entry.status} run" for entry in self.remove)
+        what = ", ".join(counted({**kinds, "stale lock": len(self.locks)})) or "nothing"
+        return "\n".join([*lines, *told, f"{what} to remove, {bytes_text(total)}"])
+
+
+def _own_files(directory: Path) -> list[Path]:
+    """What the project wrote into a sweep's directory: record, Parsl's logs, report and figures of default names."""
+    record = read_record(directory)
+    columns = {*record.units, *derived_columns(record.analyses), *result_columns(record.analyses)}
+    names = {"report.html", *(f"{column}.png" for column in columns)}
+    pages = [path for path in directory.iterdir() if path.name in names and path.is_file() and not path.is_symlink()]
+    known = [path for path in (directory / RECORD_NAME, directory / PARSL) if path.exists()]
+    return [*known, *(path for path in pages if _MARK in path.read_bytes())]
+
+
+def plan_cleaning(
+    out: Path,
+    given: Sequence[str] = (),
+    *,
+    finished: bool = False,
+    case: str | None = None,
+    older_than: str | None = None,
+) -> Cleaning:
+    """See what may go; nothing is removed.
+
+    That is what is ``given``, runs and sweeps by names or directories: these go with those of their runs that no other
+    sweep has. Else it is what is interrupted or failed, and if so wanted finished runs that no sweep has. Of all that
+    only what `select` leaves. `InputError` if there is no such thing, or if it may be of a sweep that cannot be read.
+    """
+    entries = inventory(out)
+    if finished or given:
+        for sweep_file in out.glob(f"*/{RECORD_NAME}"):
+            read_record(sweep_file.parent)  # of one that cannot be read nobody knows which runs it has
+    sweeps_of: dict[str, list[str]] = {}
+    for sweep in entries:
+        for run in sweep.runs:
+            sweeps_of.setdefault(run, []).append(sweep.name)
+    wanted = [entry for name in given for entry in _found(name, entries)]
+    going = {entry.name for entry in wanted if entry.is_sweep}
+    # With sweeps go those of their runs that no other sweep has.
+    wanted += [one for one in entries if one.name in sweeps_of and going.issuperset(sweeps_of[one.name])]
+    if not given:
+        wanted = [one for one in entries if not one.is_sweep and (finished or one.status != "finished")]
+    remove, stay = [], Counter[str]()
+    for entry in select(list({one.directory: one for one in wanted}.values()), case=case, older_than=older_than):
+        sweeps = [] if given else sweeps_of.get(entry.name, [])
+        if entry.status == "running":
+            stay["running"] += 1
+        elif entry.status == "finished" and sweeps:
+            stay[f"finished, of the sweep {sweeps[0]} (give its name to remove it)"] += 1
+        elif entry.directory.name.endswith(REPLACED) and not entry.place.exists():
+            stay["about to be put back in its place"] += 1
+        else:
+            remove.append(entry)
+    going = {entry.name for entry in remove if entry.is_sweep}
+    needing = Counter(name for run in remove for name in sweeps_of.get(run.name, ()) if name not in going)
+    told = [f"needed by the sweep {name}, which would make them again: {number}" for name, number in needing.items()]
+    told += [f"stays: {number} {reason}" for reason, number in stay.items()]
+    locks = [] if given or case or older_than else sorted(out.glob("*.lock"))
+    stale = [lock for lock in locks if is_run_name(lock.stem) and not is_locked(lock.with_suffix(""))]
+    return Cleaning(remove, stale, told)
+
+
+def _found(name: str, entries: Sequence[Entry]) -> list[Entry]:
+    """The entries of a name or directory."""
+    path = Path(name).resolve()
+    found = [one for one in entries if name in (one.name, one.directory.name) or path == one.directory.resolve()]
+    if not found:
+        told = "no run or sweep in the folder of runs (see walkers list; another folder is given by --out)"
+        raise InputError(name, [Problem("", None, told)])
+    return [one for one in found if name == one.directory.name] or found
+
+
+def clean(cleaning: Cleaning) -> dict[Path, str]:
+    """Remove what `plan_cleaning` named; what is still there, and why: somebody makes it now, or the system refused."""
+    left = {}
+    for entry in cleaning.remove:
+        with locked([] if entry.is_sweep else [entry.place]) as ours:
+            if not (ours or entry.is_sweep):
+                left[entry.directory] = "a process has begun to make it, it stays"
+                continue
+            try:
+                _remove(entry)
+            except OSError as error:
+                left[entry.directory] = f"cannot be removed whole: {error.strerror or error} ({error.filename})"
+    with locked(lock.with_suffix("") for lock in cleaning.locks if lock.exists()):
+        pass  # a lock file goes with its lock
+    return left
+
+
+def _remove(entry: Entry) -> None:
+    """Remove a run, its manifest before all else, or what the project wrote into a sweep's directory, its record last.
+
+    Of a symbolic link the link alone; the directory of a sweep if that is all.
+    """
+    directory = entry.directory
+    if not entry.is_sweep:
+        recover(entry.place)
+    if directory.is_symlink():
+        directory.unlink()
+    elif entry.is_sweep:
+        for path in reversed(_own_files(directory)):
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
+        if not any(directory.iterdir()):
+            directory.rmdir()
+    elif directory.exists():
+        (directory / MANIFEST_NAME).unlink(missing_ok=True)
+        shutil.rmtree(directory)
