@@ -279,7 +279,7 @@ def test_walkers_on_a_slope_are_told_apart_by_where_they_go(tmp_path: Path) -> N
     assert "velocity   facing up 0.60" in done.describe()
     assert describe(predict(done.case), done.result).count("engine                            0.60") == 1
     assert len(repr(done.motion)) < 100 > len(repr(done.motion.groups[0]))
-    with pytest.raises(FileNotFoundError, match="has no table bed; it has trajectory, walkers, bridges"):
+    with pytest.raises(FileNotFoundError, match="has no table bed; it has bridges, trajectory, walkers"):
         done.table("bed")
 
 

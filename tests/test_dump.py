@@ -14,8 +14,7 @@ from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import law_of
 from walkers.postprocess import tabulate
-from walkers.postprocess.dump import BinaryDump, DumpError
-from walkers.postprocess.local_dump import local_frames
+from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
 from walkers.runner import finished_run
 from walkers.runner.directory import FIRST_SEGMENT
 from walkers.runner.manifest import FileChanged

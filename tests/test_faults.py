@@ -26,8 +26,7 @@ from walkers.inputs.sweep import expand
 from walkers.postprocess import read_result, tabulate
 from walkers.postprocess.analysis import current_result, describe_result
 from walkers.postprocess.drawing import new_figure, save_figure, styled
-from walkers.postprocess.dump import DumpError
-from walkers.postprocess.local_dump import local_frames
+from walkers.postprocess.dump import DumpError, local_frames
 from walkers.postprocess.motion import read_bridges, read_motion
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, write_deck

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from walkers.calibration.report import RECORD_NAME, as_dict, rows_of
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.origins import text_of
-from walkers.postprocess.quantities import Number
+from walkers.postprocess.analysis import Number
 from walkers.postprocess.report.page import NAME, check_report, fill, picture_uri, write_page
 from walkers.postprocess.report.run import flat
 from walkers.runner.files import read_json

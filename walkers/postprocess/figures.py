@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from walkers.postprocess.drawing import (
 )
 from walkers.postprocess.motion import Group
 from walkers.postprocess.panels import MOST_NAMED, Panel, gait_panels, pile_panels, walk_panels
-from walkers.postprocess.piles import PileAnalysis
+from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -139,9 +139,9 @@ def _gait_figure(group: Group, panels: Sequence[Panel]) -> Figure:
 
 
 @styled
-def climb_figure(found: PileAnalysis) -> Figure:
+def climb_figure(case: Case, tables: Mapping[str, Columns]) -> Figure:
     """What a pile did: `walkers.postprocess.panels.pile_panels`, one below the other."""
-    panels, case = pile_panels(found), found.motion.case
+    panels = pile_panels(tables)
     figure, axes = new_figure(TWO_COLUMNS, 8.0, nrows=len(panels), height_ratios=[2, 1, 1, 1], sharex=True)
     for one, panel in zip(axes, panels, strict=True):
         _draw(one, panel)

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.gait import averages, distance_walked, gait, walk
+from walkers.postprocess.gait import averages, distance_walked, gait, walk, ways
 from walkers.postprocess.motion import Group
-from walkers.postprocess.piles import PileAnalysis
-from walkers.postprocess.posture import ways
 from walkers.postprocess.slopes import fit_slopes
+from walkers.postprocess.tables import Columns
 
 MOST_NAMED = 12
 """Walkers, or climbs, that a legend names."""
 MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
-"""How events are marked (`walkers.postprocess.events`)."""
+"""How events are marked (`walkers.postprocess.clusters.Event`)."""
 _FEWEST_SAMPLES = 8
 """Samples a cycle below which a gait shows nothing."""
 _GREY, _OTHERS = "#5b6770", "#c78a2c"
@@ -136,9 +135,13 @@ def gait_panels(group: Group) -> list[Panel]:
     return panels
 
 
-def pile_panels(found: PileAnalysis) -> list[Panel]:
-    """Heights of the clusters' leaders over the pile's surface with events, segregation, bridges, agitation."""
-    time, bed, x = found.motion.time, found.bed, "time from the begin of the drive (s)"
+def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
+    """Heights of the clusters' leaders over the pile's surface with events, segregation, bridges, agitation.
+
+    Of the tables of a pile (`walkers.postprocess.analysis.tables_of`).
+    """
+    bed, x = tables["bed"], "time from the begin of the drive (s)"
+    time = bed["time"]
 
     def of_bed(name: str, label: str = "", colour: int | str = 0, *, dashed: bool = False, scale: float = 1.0) -> Line:
         return Line(time, scale * bed[name], label, colour, dashed=dashed)
@@ -147,7 +150,13 @@ def pile_panels(found: PileAnalysis) -> list[Panel]:
     surface = of_bed("surface", "surface, median", _GREY, scale=1e3)
     agitation = Line(time, np.maximum(bed["mean_square_velocity"], 1e-12))
     return [
-        Panel("Clusters' leaders", x, "height (mm)", [surface, *_leaders(found), *_events(found)], (edge[0], edge[1])),
+        Panel(
+            "Clusters' leaders",
+            x,
+            "height (mm)",
+            [surface, *_leaders(tables), *_events(tables["events"])],
+            (edge[0], edge[1]),
+        ),
         Panel(
             "Segregation: (z of large − z of small) / their sum",
             x,
@@ -164,32 +173,28 @@ def pile_panels(found: PileAnalysis) -> list[Panel]:
     ]
 
 
-def _leaders(found: PileAnalysis) -> Iterator[Line]:
+def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
     """The height of each cluster's leader, thick where it climbed."""
-    time, height = found.motion.time, found.motion.position[:, :, 2]
-    named = 0
-    for track, climb in zip(found.tracks, found.climbs, strict=True):
-        places = [frame for frame, members in zip(track.frames, track.members, strict=True) if climb.leader in members]
-        leads = "large" if found.motion.large[climb.leader] else "small"
-        named += climb.climbed
-        told = f"{climb.size} beads climb, led by a\n{leads} one: {climb.speed * 1e3:.1f} mm/s"
-        label = told if climb.climbed and named <= MOST_NAMED else ""
-        colour, width = (2, 1.6) if climb.climbed else (_OTHERS, 0.6)
-        yield Line(time[places], height[places, climb.leader] * 1e3, label, colour, width=width)
-    if named > MOST_NAMED:
-        yield Line(time[:0], time[:0], f"and {named - MOST_NAMED} more climbs", 2, width=1.6)
+    clusters, members = tables["clusters"], tables["members"]
+    named = np.cumsum(clusters["climbed"])
+    for track, (climbed, leader) in enumerate(zip(clusters["climbed"], clusters["leader"], strict=True)):
+        own = (members["track"] == track) & (members["bead"] == leader)
+        leads, speed = "large" if clusters["leader_large"][track] else "small", clusters["speed"][track] * 1e3
+        told = f"{clusters['size'][track]} beads climb, led by a\n{leads} one: {speed:.1f} mm/s"
+        label = told if climbed and named[track] <= MOST_NAMED else ""
+        colour, width = (2, 1.6) if climbed else (_OTHERS, 0.6)
+        yield Line(members["time"][own], members["height"][own] * 1e3, label, colour, width=width)
+    if len(named) and named[-1] > MOST_NAMED:
+        nothing = np.empty(0)
+        yield Line(nothing, nothing, f"and {named[-1] - MOST_NAMED} more climbs", 2, width=1.6)
 
 
-def _events(found: PileAnalysis) -> Iterator[Line]:
-    """A mark where something happened to a cluster, at the height of its leader in the frame nearest to it."""
+def _events(events: Columns) -> Iterator[Line]:
+    """A mark where something happened to a cluster, at the height of its leader."""
     for kind, marker in MARKS.items():
-        told = [event for event in found.events if event.kind == kind]
-        if not told:
-            continue
-        times = np.array([event.time for event in told])
-        leaders = np.array([found.climbs[event.track].leader for event in told])
-        heights = found.motion.position[np.searchsorted(found.motion.time, times), leaders, 2]
-        yield Line(times, heights * 1e3, kind, _GREY, marker, width=0.0)
+        these = events["event"] == kind
+        if these.any():
+            yield Line(events["time"][these], events["height"][these] * 1e3, kind, _GREY, marker, width=0.0)
 
 
 def velocity_panel(groups: list[Group]) -> Panel:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion
 from walkers.postprocess.paraview import boundary_of, lines_between
-from walkers.postprocess.piles import Pile, analyse
+from walkers.postprocess.piles import Pile, climbing_beads
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -52,9 +52,8 @@ def pointed_out(motion: Motion) -> Callable[[int], set[int]]:
     walkers = set(np.flatnonzero(motion.walker_of >= 0).tolist())
     if not Pile().applies(motion.case):
         return lambda _: walkers
-    found = analyse(motion)
-    climbing = [track for track, climb in zip(found.tracks, found.climbs, strict=True) if climb.climbed]
-    return lambda frame: walkers | {bead for track in climbing for bead in track.members_at(frame)}
+    climbing = climbing_beads(motion)
+    return lambda frame: walkers | climbing(frame)
 
 
 def against_gravity(motion: Motion) -> FloatArray:

@@ -20,8 +20,9 @@ import numpy.typing as npt
 
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.readable import dotted
+from walkers.postprocess.analysis import tables_of
 from walkers.postprocess.clusters import ClimbCriteria
-from walkers.postprocess.piles import Pile, analyse, classified
+from walkers.postprocess.piles import Pile, climbs_by
 from walkers.runner.directory import CASE_NAME, FinishedRun, finished_places, finished_run
 from walkers.sweeps.record import RECORD_NAME, read_record, result_in, states
 
@@ -215,10 +216,9 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
         tried |= {(name, one): replace(usual, **{name: one}) for one in values if one != getattr(usual, name)}
     climbs: dict[tuple[str, float | None], list[list[tuple[float, bool]]]] = {key: [] for key in tried}
     for run in runs:
-        found = analyse(run)
+        tables = tables_of(run)
         for key, definition in tried.items():
-            climbed = [climb for climb in classified(found, definition).climbs if climb.climbed]
-            climbs[key].append([(climb.speed, bool(found.motion.large[climb.leader])) for climb in climbed])
+            climbs[key].append([(climb.speed, climb.leader_large) for climb in climbs_by(tables, definition)])
     return [
         {
             "threshold": name,

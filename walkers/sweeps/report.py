@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.readable import readable_unit
+from walkers.postprocess.analysis import rounded
 from walkers.postprocess.gait import distance_walked
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.quantities import rounded
 from walkers.postprocess.report.page import LARGEST, NAME, check_report, fill, overhead, packed_plots, write_page
 from walkers.postprocess.report.plots import COLOURS, error_bars, new_plot, with_legend
 from walkers.postprocess.report.run import RunReport

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.postprocess.analysis import analyses_of
+from walkers.postprocess.analysis import analyses_of, tables_of
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.panels import Panel, gait_panels, pile_panels, velocity_panel, walk_panels
-from walkers.postprocess.piles import analyse
 from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ def plots_of(directory: Path) -> Model | None:
         groups = read_motion(directory).groups
         panels += [*walk_panels(groups), velocity_panel(groups), *gait_panels(groups[0])]
     if "pile" in names:
-        panels += pile_panels(analyse(directory))
+        panels += pile_panels(tables_of(directory))
     return column(*map(_plot, panels), sizing_mode="stretch_width") if panels else None
 
 
