@@ -38,35 +38,21 @@ _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
 
 @dataclass(frozen=True)
 class ClimbCriteria:
-    """Thresholds of what a climb is.
-
-    Attributes
-    ----------
-    min_rise
-        Height, m, that a cluster must gain: about two diameters of the paper's large beads.
-    max_gap
-        Seconds for which a cluster may touch the pile or lose the wall and still be the same.
-    min_overlap
-        Share of the smaller one's beads that two clusters must have in common to be one.
-    """
+    """Thresholds of what a climb is."""
 
     min_rise: float = 2e-3
+    """Height, m, that a cluster must gain: about two diameters of the paper's large beads."""
     max_gap: float = 0.1
+    """Seconds for which a cluster may touch the pile or lose the wall and still be the same."""
     min_overlap: float = 0.5
+    """Share of the smaller one's beads that two clusters must have in common to be one."""
 
 
 @dataclass
 class Track:
-    """A cluster through time.
+    """A cluster through time: the frames in which it was free and held, its beads and the side walls in each of them.
 
-    Attributes
-    ----------
-    frames
-        Numbers of the frames in which it was free and held.
-    members, walls
-        Its beads, and the side walls that held it, in each of these.
-    merged_into, merged_at
-        Number of the track that took over its beads, and the frame in which it did; None if none did.
+    And the number of the track that took over its beads, and the frame in which it did; None if none did.
     """
 
     frames: list[int] = field(default_factory=list)
@@ -148,21 +134,10 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: 
 
 @dataclass(frozen=True)
 class Beads:
-    """What is known of a pile's beads: F frames, N beads.
+    """What is known of a pile's beads: times (s, shape (F,)), heights (m, shape (F, N)) and which are large.
 
-    Attributes
-    ----------
-    time, surface : ndarray, shape (F,)
-        s, and the height of the bulk's surface, m.
-    height : ndarray, shape (F, N)
-        m; needed of the members of clusters alone.
-    large : ndarray of bool, shape (N,)
-    bulk
-        Of each frame, which beads are of the bulk.
-    first
-        The first frame of the drive.
-    wall_names
-        By the numbers of the walls.
+    And of each frame the height of the bulk's surface, and which beads are of the bulk; the first frame of the drive;
+    names of walls, by their numbers. Heights are needed of the members of clusters alone.
     """
 
     time: FloatArray

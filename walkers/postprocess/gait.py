@@ -30,16 +30,11 @@ POSTURES = ("upright", "leaning", "turned over")
 
 @dataclass(frozen=True)
 class Gait:
-    """Time series of F frames and W walkers of n beads; SI units. Contacts: the beads with walls, then their pairs.
+    """Time series of F frames and W walkers of n beads; SI units.
 
-    Attributes
-    ----------
-    velocity : ndarray, shape (F, W)
-        Of the mass centre along the heading.
-    rotation : ndarray, shape (F, W, n)
-        Rotation velocity of the beads.
-    sliding, gap : ndarray, shape (F, W, n + pairs)
-        Sliding velocity and gap (negative: overlap) at the contacts.
+    Velocity of the mass centre along the heading, shape (F, W), rotation velocity of the beads, shape (F, W, n), and
+    sliding velocity and gap (negative: overlap) at the contacts, shape (F, W, n + pairs): the beads with walls, then
+    their pairs.
     """
 
     velocity: FloatArray
@@ -66,21 +61,15 @@ def gait(group: Group) -> Gait:
         spin = radii[one] * group.spin[:, :, one] + radii[other] * group.spin[:, :, other]
         sliding.append(-np.einsum("fwx,fwx->fw", spin, np.cross(upward, arm))[..., None])
     velocity = along @ (radii**3 / np.sum(radii**3))
-    return Gait(velocity, rotation, np.concatenate(sliding, axis=-1), _gaps(group, at_walls))
+    return Gait(velocity, rotation, np.concatenate(sliding, axis=-1), gaps(group, at_walls))
 
 
 @dataclass(frozen=True)
 class Averages:
-    """Means over the cycles after the settling ones of W walkers of n beads; contacts as in `Gait`.
+    """Means over the cycles after the settling ones; contacts as in `Gait`.
 
-    Attributes
-    ----------
-    rotation : ndarray, shape (W, n)
-        m/s.
-    sliding : ndarray, shape (W, n + pairs)
-        m/s.
-    open : ndarray, shape (W, n + pairs)
-        Share of the time in which the surfaces do not touch.
+    Rotation, m/s, shape (W, n), sliding, m/s, and the share of the time in which surfaces do not touch, shape
+    (W, n + pairs).
     """
 
     rotation: FloatArray
@@ -112,14 +101,10 @@ def averages(group: Group) -> Averages:
     )
 
 
-def gaps(group: Group) -> FloatArray:
-    """Gaps at the contacts (as in `Gait`), m, shape (F, W, n + pairs)."""
-    return _gaps(group, _nearest_wall(group)[0])
-
-
-def _gaps(group: Group, at_walls: FloatArray) -> FloatArray:
-    """Gaps of beads to walls, then those between beads."""
-    radii, position, found = group.radii, group.position, [at_walls]
+def gaps(group: Group, at_walls: FloatArray | None = None) -> FloatArray:
+    """Gaps at the contacts (as in `Gait`), m, shape (F, W, n + pairs), given those at walls if they are known."""
+    radii, position = group.radii, group.position
+    found = [_nearest_wall(group)[0] if at_walls is None else at_walls]
     for one, other in group.make.pairs:
         distance = np.linalg.norm(position[:, :, one] - position[:, :, other], axis=-1)
         found.append((distance - (radii[one] + radii[other]))[..., None])
