@@ -25,8 +25,7 @@ from walkers.inputs.reading import read_toml
 from walkers.inputs.sweep import expand
 from walkers.postprocess import analysis, read_result, tabulate
 from walkers.postprocess.analysis import current_result
-from walkers.postprocess.dump import DumpError
-from walkers.postprocess.local_dump import local_frames
+from walkers.postprocess.dump import DumpError, local_frames
 from walkers.postprocess.motion import read_bridges, read_motion
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, write_deck

@@ -62,9 +62,9 @@ def test_symmetric_dimer_does_not_walk(walked: Walked) -> None:
 
 def test_exchanged_beads_walk_the_other_way_at_the_same_speed(walked: Walked) -> None:
     there, back = walked(), walked(dimers={"radii": ["0.2 mm", "0.3 mm"]})
-    assert back.axial[0] == pytest.approx(-there.axial[0], rel=1e-3)
+    assert back.axial_velocity[0] == pytest.approx(-there.axial_velocity[0], rel=1e-3)
     assert back.velocity[0] == pytest.approx(there.velocity[0], rel=1e-3)  # toward the large bead in both
-    assert walked(dimers={"facing": "left"}).axial[0] == pytest.approx(-there.axial[0], rel=1e-3)
+    assert walked(dimers={"facing": "left"}).axial_velocity[0] == pytest.approx(-there.axial_velocity[0], rel=1e-3)
 
 
 def test_laboratory_and_container_frame_agree(walked: Walked) -> None:

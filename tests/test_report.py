@@ -18,9 +18,8 @@ from tests.conftest import call, document, make_case, to_toml
 from tests.test_pile import HALF, small
 from walkers.inputs.sweep import expand
 from walkers.postprocess import read_motion
-from walkers.postprocess.analysis import current_result
+from walkers.postprocess.analysis import current_result, number_of, rounded
 from walkers.postprocess.motion import gathered
-from walkers.postprocess.quantities import number_of, rounded
 from walkers.postprocess.report.page import LARGEST, overhead
 from walkers.postprocess.report.player import cameras_of, player_of
 from walkers.postprocess.report.run import report_run, summary_of

@@ -16,7 +16,6 @@ from walkers.inputs import load_case, resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.drive import AXES
 from walkers.inputs.errors import InputError, Stopped
-from walkers.postprocess.analysis import current_result
 from walkers.postprocess.gait import walk
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.steady_state import are_steady
@@ -76,36 +75,6 @@ def test_a_restless_walker_is_driven_for_longer_at_a_stretch(tmp_path: Path) -> 
     assert at_once.directory != asked.directory
     dumps = [(one.directory / FIRST_SEGMENT / "beads.bin").read_bytes() for one in (asked, at_once)]
     assert dumps[0] == dumps[1]
-
-
-def test_walkers_whose_contacts_open_have_the_speeds_of_long_runs(tmp_path: Path) -> None:
-    """At the end of a cycle some bridges between their beads are open; they share decks and go on for longer."""
-    engine = find_engine()
-    cases = []
-    for ratio, peak in ((3.0, "7 g"), (19.0, "7 g"), (19.0, "10 g")):
-        tables: dict[str, Any] = {
-            "dimers": {"radii": ["0.6 mm", "0.3 mm"], "replicates": 2, "spacing": "120 mm"},
-            "beads": {"material": "ruby"},
-            "liquid": {"name": "Si AK10", "viscosity_ratio": ratio},
-            "boundary": {"material": "glass"},
-            "drive": {"frequency": "80 Hz", "peak_acceleration": peak},
-            "run": {"time_step": "3 us"},
-        }
-        cases.append(resolve_case(tables, name="open"))
-    assert len({sharing_key(case) for case in cases}) == 1
-    made = make_runs(cases, tmp_path, engine)
-    long = make_runs([replace(case, run=replace(case.run, until_steady=False)) for case in cases], tmp_path, engine)
-    results = [
-        sorted((current_result(run.directory) for run in one.runs.values()), key=lambda one: one["velocity"]["mean"])
-        for one in (made, long)
-    ]
-    opened = 0
-    for one, other in zip(*results, strict=True):
-        assert one["velocity"]["smallest"] == pytest.approx(other["velocity"]["smallest"], rel=0.005)
-        assert one["velocity"]["largest"] == pytest.approx(other["velocity"]["largest"], rel=0.005)
-        opened += one["open"]["contact_3"] > 0.01
-    assert opened
-    assert len({one["cycles"] for one in results[0]}) > 1
 
 
 def test_a_walker_that_turns_ever_faster_is_not_steady_however_even_its_speed(tmp_path: Path) -> None:

@@ -10,8 +10,7 @@ import pytest
 from walkers.check.scenes import DRY, FLOOR, Bench, bench_case, over, prescribed, recording, standing
 from walkers.inputs.boundary import Flat, Round, Wall
 from walkers.physics.contact import hertz_overlap, reduced_modulus
-from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.local_dump import local_frames
+from walkers.postprocess.dump import FloatArray, local_frames
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import EngineError
 from walkers.templates.deck import Checkpoint, Plan, compose

@@ -23,7 +23,7 @@ from walkers.inputs.schema import AUTO, CaseFile
 from walkers.inputs.units import Kind
 from walkers.main import _program
 from walkers.postprocess.analysis import analyses
-from walkers.postprocess.tables import FAMILIES, TABLES
+from walkers.postprocess.tables import described
 from walkers.sweeps.record import derived_columns, result_columns
 from walkers.sweeps.table import STATE
 
@@ -137,9 +137,9 @@ def _keys() -> str:
 def _tables() -> str:
     """Columns of the tables of a run and of a sweep, from where they are declared."""
     text = "# Tables and their columns\n\nUnits and meanings are in the parquet files, too.\n\n"
-    text += "".join(f"## {name}.parquet\n\n{_described(columns)}\n" for name, columns in TABLES.items())
-    numbered = {f"{name}_1, {name}_2, …": told for name, told in FAMILIES.items()}
-    text += f"## One for each bead or contact\n\nIn `trajectory` and `walkers`.\n\n{_described(numbered)}\n"
+    text += "Of `rotation_*` and the like there is one for each bead or contact: `rotation_1`, `rotation_2`, …\n\n"
+    tables = {name: described(table) for one in analyses() for name, table in one.tables.items()}
+    text += "".join(f"## {name}.parquet\n\n{_described(columns)}\n" for name, columns in tables.items())
     text += "## The table of a sweep\n\nAfter the keys that vary.\n\n"
     for one in analyses():
         columns = {**one.derived, **one.columns}

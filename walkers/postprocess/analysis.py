@@ -1,7 +1,7 @@
 """What is measured of a run, and by what: a list of analyses, each of which says for which cases it means something.
 
-To add one, write a class like `walkers.postprocess.walking.Walking` and name it in `analyses`. What runs have of
-tables, results, text and figures, and sweeps of columns, follows.
+To add one, write a class like `walkers.postprocess.walking.Walking` and name it in `ANALYSES`. What runs have of
+tables, results, text, reports and figures, and sweeps of columns, follows.
 """
 
 from __future__ import annotations
@@ -10,10 +10,12 @@ import errno
 import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
-from math import nan
+from importlib import import_module
+from math import degrees, floor, isfinite, log10, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
@@ -21,20 +23,131 @@ from walkers.inputs.origins import Origin
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.runner.directory import SEGMENTS, case_of
 from walkers.runner.files import read_json, write_json
-from walkers.runner.manifest import FileChanged, check_unchanged, forget_tables, record_tables
+from walkers.runner.manifest import MANIFEST_NAME, FileChanged, check_unchanged, forget_tables, record_tables
 
 if TYPE_CHECKING:  # how far a sweep is can be told without numpy
-    import numpy.typing as npt
     from matplotlib.figure import Figure
 
     from walkers.postprocess.motion import Bridges, Motion
-    from walkers.postprocess.quantities import Quantity
+    from walkers.postprocess.tables import Columns
 
+ANALYSES = ("walking.Walking", "meetings.Meetings", "piles.Pile")
+"""In the order in which results tell of them: their modules in this package and their classes."""
 RESULT_NAME = "result.json"
 _WIDTH = 110
-Columns: TypeAlias = "dict[str, npt.NDArray[Any]]"
 Described = Mapping[str, tuple[str, str]]
 """From the names of columns to their units and meanings."""
+_UNITS = {"m/s": ("mm/s", 1e3), "m": ("mm", 1e3), "rad": ("°", degrees(1.0)), "share": ("%", 100.0)}
+"""For units of the result, those that are shown, and how many of them one is."""
+_DIGITS = 4
+"""Significant, of a number without an error; with one, so many that two digits of the error are seen."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of a result, declared once: rows of reports and columns of sweeps' tables follow.
+
+    Attributes
+    ----------
+    path, error
+        Where a result has it, such as ``surface.end``, and its standard error; at the path of a mean over replicates
+        are its error, smallest and largest.
+    label
+        Of its row in reports, if it has one.
+    unit
+        Of the number; ``share`` for what is read in per cent.
+    column, meaning, of
+        Of its column in a sweep's table, if it has one; and what gives that, if it is no number at the path.
+    """
+
+    path: str
+    label: str = ""
+    unit: str = ""
+    column: str = ""
+    meaning: str = ""
+    error: str = ""
+    of: Callable[[Mapping[str, Any]], Any] | None = None
+
+    def value(self, result: Mapping[str, Any]) -> Any:
+        """What a sweep's table has of it; NaN where the result says that there is none."""
+        if self.of is not None:
+            return self.of(result)
+        value: Any = result
+        for part in self.path.split("."):
+            value = None if value is None else value[part]
+        value = value["mean"] if isinstance(value, dict) else value
+        return nan if value is None else value
+
+    def row(self, result: Mapping[str, Any]) -> Row:
+        """What a report has of it."""
+        keys = [self.path, self.error]
+        if number_of(result, f"{self.path}.n") is not None:
+            keys = [f"{self.path}.{what}" for what in ("mean", "standard_error", "smallest", "largest")]
+        error = number_of(result, keys[1], self.unit)
+        doubt = None if error is None else error.value
+        return Row(
+            self.label, *(number_of(result, key, self.unit, None if key == self.error else doubt) for key in keys)
+        )
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number at a place in a result, such as ``velocity.mean``, SI; the unit in which it is shown, and its factor.
+
+    An error gives its digits: its standard error, or that of the number beside which it stands; None if unknown.
+    """
+
+    key: str
+    value: float
+    unit: str = ""
+    factor: float = 1.0
+    error: float | None = None
+
+    @property
+    def text(self) -> str:
+        """The number in its unit, without it."""
+        return rounded(self.value * self.factor, None if self.error is None else self.error * self.factor)
+
+
+@dataclass(frozen=True)
+class Row:
+    """What it is called, its number, its standard error, and the smallest and largest of those that it is of."""
+
+    name: str
+    value: Number | None
+    error: Number | None = None
+    smallest: Number | None = None
+    largest: Number | None = None
+
+    @property
+    def unit(self) -> str:
+        """In which all of them are shown."""
+        return next((one.unit for one in (self.value, self.smallest) if one is not None), "")
+
+
+def rounded(value: float, error: float | None = None) -> str:
+    """A number with the digits that its error leaves (two of the error's), or four."""
+    if isinstance(value, (bool, int)):
+        return str(value)
+    if not isfinite(value):
+        return "-"
+    if error and isfinite(error):
+        decimals = max(0, 1 - floor(log10(abs(error))))
+        if decimals <= 9:
+            return f"{value:.{decimals}f}"
+    return f"{value:.{_DIGITS}g}"
+
+
+def number_of(result: Mapping[str, Any], key: str, unit: str = "", error: float | None = None) -> Number | None:
+    """The number at a place in a result; None where it has none."""
+    value: Any = result
+    for part in key.split("."):
+        value = value[int(part)] if isinstance(value, list) else value.get(part) if isinstance(value, dict) else None
+        if value is None:
+            return None
+    shown, factor = _UNITS.get(unit, (unit, 1.0))
+    # A whole number stays one.
+    return Number(key, value, shown, 1 if factor == 1.0 else factor, error)
 
 
 class Analysis(ABC):
@@ -42,39 +155,19 @@ class Analysis(ABC):
 
     Attributes
     ----------
-    name
-        Of the analysis.
     version
         Of its method: results of another one are made anew.
     tables
-        Names of the tables that it writes.
-    derived, columns
-        Columns of a sweep's table: what follows from a point's case, and what its run gives.
-    places
-        Where the result has those of `columns` that it has not by their names, such as ``velocity.mean``.
-    headlines
-        Those of `columns` that count first.
-    rows
-        Of the table of a result: what `walkers.postprocess.quantities.quantity` takes after the result.
+        That it writes, by name, as `walkers.postprocess.tables.described` takes them.
+    derived, headlines
+        Columns of a sweep's table that follow from a point's case, and those of `columns` that count first.
     """
 
     name: ClassVar[str]
     version: ClassVar[int]
-    tables: ClassVar[tuple[str, ...]]
+    tables: ClassVar[Mapping[str, type]]
     derived: ClassVar[Described] = {}
-    columns: ClassVar[Described] = {}
-    places: ClassVar[Mapping[str, str]] = {}
     headlines: ClassVar[tuple[str, ...]] = ()
-    rows: ClassVar[tuple[tuple[str, ...], ...]] = ()
-
-    def can_show(self, result: Mapping[str, Any]) -> bool:
-        """Whether a result has all that it gives."""
-        try:
-            self.row(result)
-            self.lines(result)
-        except (KeyError, TypeError, ValueError):
-            return False
-        return True
 
     @abstractmethod
     def applies(self, case: Case) -> bool:
@@ -90,23 +183,37 @@ class Analysis(ABC):
             If a dump of bridges cannot be read, or is too short.
         """
 
-    def derived_of(self, case: Case) -> dict[str, float]:
-        """The columns `derived` of a case."""
-        del case
-        return {}
-
-    def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """The columns `columns` of a result; NaN for what it has not."""
-        return {name: _at(result, self.places.get(name, name)) for name in self.columns}
+    @abstractmethod
+    def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
+        """What it finds, in the order of reports; of an empty result, with all that have a column."""
 
     @abstractmethod
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """What it found, as text: mm, mm/s, degrees."""
 
-    def rows_of(self, result: Mapping[str, Any]) -> Iterable[tuple[str, ...]]:
-        """Its numbers as rows of a table, as `rows` are."""
-        del result
-        return self.rows
+    @property
+    def columns(self) -> Described:
+        """Columns of a sweep's table that a point's run gives."""
+        units = {"share": ""}
+        return {one.column: (units.get(one.unit, one.unit), one.meaning) for one in self.quantities({}) if one.column}
+
+    def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
+        """The columns `columns` of a result; NaN for what it has not."""
+        return {one.column: one.value(result) for one in self.quantities({}) if one.column}
+
+    def can_show(self, result: Mapping[str, Any]) -> bool:
+        """Whether a result has all that it gives."""
+        try:
+            self.row(result)
+            self.lines(result)
+        except (KeyError, TypeError, ValueError):
+            return False
+        return True
+
+    def derived_of(self, case: Case) -> dict[str, float]:
+        """The columns `derived` of a case."""
+        del case
+        return {}
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What a reader of the result should know."""
@@ -124,22 +231,11 @@ class Analysis(ABC):
         return {}
 
 
-def _at(result: Mapping[str, Any], place: str) -> Any:
-    """What a result has at a place; NaN where it says that there is none."""
-    value: Any = result
-    for part in place.split("."):
-        value = None if value is None else value[part]
-    return nan if value is None else value
-
-
 @cache
 def analyses() -> tuple[Analysis, ...]:
     """All analyses."""
-    from walkers.postprocess.meetings import Meetings
-    from walkers.postprocess.piles import Pile
-    from walkers.postprocess.walking import Walking
-
-    return (Walking(), Meetings(), Pile())
+    places = (place.split(".") for place in ANALYSES)
+    return tuple(getattr(import_module(f"walkers.postprocess.{module}"), name)() for module, name in places)
 
 
 def analyses_of(case: Case) -> list[Analysis]:
@@ -153,17 +249,7 @@ def analyses_in(result: Mapping[str, Any]) -> list[Analysis]:
 
 
 def tabulate(directory: str | Path) -> dict[str, Any]:
-    """Write the tables and ``result.json`` of a run directory.
-
-    Parameters
-    ----------
-    directory
-        A run directory with its segments, finished or not.
-
-    Returns
-    -------
-    dict
-        The result, as in ``result.json``: SI units.
+    """Write the tables and ``result.json`` of a run directory, finished or not, and return the result (SI units).
 
     Raises
     ------
@@ -209,11 +295,27 @@ def _write(directory: Path, result: Mapping[str, Any], tables: Mapping[str, Colu
     from walkers.postprocess.tables import write_table
 
     names = [RESULT_NAME, *(f"{name}.parquet" for name in tables)]
+    declared = {name: table for one in analyses_in(result) for name, table in one.tables.items()}
     forget_tables(directory, names)
     for name, columns in tables.items():
-        write_table(directory, name, columns)
+        write_table(directory, name, declared[name], columns)
     write_json(directory / RESULT_NAME, result)
     record_tables(directory, names)
+
+
+def tables_of(directory: Path) -> dict[str, Columns]:
+    """The tables of a run as they were written; of one that is not finished, as they would be now.
+
+    Its errors are those of `current_result`.
+    """
+    from walkers.postprocess.tables import intact, read_columns
+
+    names = [name for one in analyses_of(case_of(directory)) for name in one.tables]
+    if (directory / MANIFEST_NAME).exists():
+        current_result(directory)
+        if intact(directory, names):
+            return {name: read_columns(directory, name) for name in names}
+    return _measured(directory)[1]
 
 
 def read_result(directory: str | Path) -> dict[str, Any]:
@@ -254,10 +356,10 @@ def current_result(directory: str | Path) -> dict[str, Any]:
         result.setdefault("rests_on", [])  # of runs that did not say it
         lines_of_rest(result["rests_on"])
         versions = {one.name: one.version for one in wanted}
-        whole = intact(directory, [name for one in wanted for name in one.tables])
-        if whole and result["analyses"].keys() == versions.keys() and all(one.can_show(result) for one in wanted):
+        if result["analyses"].keys() == versions.keys() and all(one.can_show(result) for one in wanted):
             kept = result
-        if kept and check_unchanged(directory, [RESULT_NAME]) and result["analyses"] == versions:
+        whole = intact(directory, [name for one in wanted for name in one.tables])
+        if kept and whole and check_unchanged(directory, [RESULT_NAME]) and result["analyses"] == versions:
             return result
     except FileChanged:
         raise
@@ -277,11 +379,8 @@ def current_result(directory: str | Path) -> dict[str, Any]:
 def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
     """What a result rests on that nobody measured, and what the case calls uncertain.
 
-    Returns
-    -------
-    list of dict
-        ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``library``, ``calibrated`` or
-        ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.
+    Each has a ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``library``, ``calibrated`` or
+    ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.
     """
     return [
         {
@@ -299,35 +398,27 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
 
 def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     """What a result rests on (`rests_on`) as text: guessed, only said by the case, calibrated."""
-    guessed = [one for one in rests if one["guessed"]]
-    known = [one for one in rests if not one["guessed"]]
-    lines = _listed("guessed", guessed)
-    if guessed:
+
+    def listed(head: str, chosen: Iterable[Mapping[str, Any]]) -> list[str]:
+        told = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
+        wrapper = textwrap.TextWrapper(_WIDTH, f"  {head:10} ", " " * 13, break_on_hyphens=False)
+        return wrapper.wrap(told) if told else []
+
+    lines = listed("guessed", [one for one in rests if one["guessed"]])
+    if lines:
         lines.append("             the result is worth what these are; a band instead: walkers run CASE --spread")
-    lines += _listed("as given", [one for one in known if one["origin"] == "given"])
-    return lines + _listed("calibrated", [one for one in known if one["origin"] == "calibrated"])
-
-
-def _listed(head: str, chosen: Sequence[Mapping[str, Any]]) -> list[str]:
-    told = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
-    indent = {"initial_indent": f"  {head:10} ", "subsequent_indent": " " * 13}
-    return textwrap.wrap(told, _WIDTH, **indent, break_on_hyphens=False) if told else []  # type: ignore[arg-type]
+    for head, origin in (("as given", "given"), ("calibrated", "calibrated")):
+        lines += listed(head, [one for one in rests if not one["guessed"] and one["origin"] == origin])
+    return lines
 
 
 def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool = False) -> str:
-    """The result of a run in a few lines: mm, mm/s, degrees.
+    """The result of a run (as `tabulate` returns it) in a few lines: mm, mm/s, degrees.
 
-    Parameters
-    ----------
-    directory
-        The run directory.
-    result
-        As `tabulate` returns it.
-    cached
-        Whether the run was there before.
+    Where it was ``cached``, it says that it was there before.
     """
-    found = analyses_in(result)
-    lines = [line for one in found for line in one.lines(result)] or [f"{result['case']}: {result['drive']}"]
+    lines = [line for one in analyses_in(result) for line in one.lines(result)]
+    lines = lines or [f"{result['case']}: {result['drive']}"]
     if cached:
         lines[0] += " (already run)"
     warnings = [f"  warning: {warning}" for warning in warnings_of(result)]
@@ -340,42 +431,26 @@ def warnings_of(result: Mapping[str, Any]) -> list[str]:
     return [*warnings, "the dump ends within a frame"] if result["truncated"] else warnings
 
 
-def quantities_of(result: Mapping[str, Any]) -> list[Quantity]:
+def quantities_of(result: Mapping[str, Any]) -> list[Row]:
     """The numbers that a result has, as rows of a table."""
-    from walkers.postprocess.quantities import quantity
-
-    found = (quantity(result, *row) for one in analyses_in(result) for row in one.rows_of(result))
-    return [row for row in found if row.value is not None]
+    rows = (one.row(result) for found in analyses_in(result) for one in found.quantities(result) if one.label)
+    return [row for row in rows if row.value is not None]
 
 
 def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:
-    """Draw the figures of a run.
+    """Draw the figures of a run: of walkers ``walk`` and, if it was sampled often enough, ``gait``; of piles ``climb``.
 
-    Parameters
-    ----------
-    directory
-        A run directory.
-    destination
-        Folder for the pictures; the run directory itself if None.
-    formats
-        Of `walkers.postprocess.drawing.FORMATS`.
-
-    Returns
-    -------
-    list of Path
-        Of walkers ``walk`` and, if the run was sampled at least eight times a cycle, ``gait``; of piles ``climb``; each
-        in all formats.
-
-    Raises
-    ------
-    InputError
-        If there is no such format.
+    Pictures of `walkers.postprocess.drawing.FORMATS` go to a folder, or to the run directory itself; an ``InputError``
+    says that there is no such format.
     """
     check_formats(formats)
     destination = destination or directory
     destination.mkdir(parents=True, exist_ok=True)
-    case = case_of(directory)
-    figures = (pair for one in analyses_of(case) for pair in one.figures(directory).items())
+    figures = {
+        name: figure for one in analyses_of(case_of(directory)) for name, figure in one.figures(directory).items()
+    }
     return [
-        path for name, figure in figures for path in save_figure(figure, destination / name, [directory.name], formats)
+        path
+        for name, figure in figures.items()
+        for path in save_figure(figure, destination / name, [directory.name], formats)
     ]

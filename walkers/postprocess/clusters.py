@@ -1,4 +1,4 @@
-"""Clusters that are free of the pile, followed through time, and what counts as a climb.
+"""Clusters that are free of the pile, followed through time, what became of them, and what counts as a climb.
 
 A *cluster* is a connected component of the beads' bridges (touching or open) of at least two beads that is *free*
 of the pile's bulk: the component of most beads, and all that is bridged to the floor. It is *held* if a bridge joins
@@ -15,18 +15,18 @@ moment.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
-from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges
 
-IntArray = npt.NDArray[np.int64]
 Cluster = tuple[frozenset[int], frozenset[int]]
 """The beads of a cluster in a frame and the side walls that hold it."""
 
@@ -38,37 +38,21 @@ _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
 
 @dataclass(frozen=True)
 class ClimbCriteria:
-    """Thresholds of what a climb is.
-
-    Attributes
-    ----------
-    min_rise
-        Height, m, that a cluster must gain: about two diameters of the paper's large beads.
-    max_gap
-        Seconds for which a cluster may touch the pile or lose the wall and still be the same.
-    min_overlap
-        Share of the smaller one's beads that two clusters must have in common to be one.
-    """
+    """Thresholds of what a climb is."""
 
     min_rise: float = 2e-3
+    """Height, m, that a cluster must gain: about two diameters of the paper's large beads."""
     max_gap: float = 0.1
+    """Seconds for which a cluster may touch the pile or lose the wall and still be the same."""
     min_overlap: float = 0.5
+    """Share of the smaller one's beads that two clusters must have in common to be one."""
 
 
 @dataclass
 class Track:
-    """A cluster through time.
+    """A cluster through time: the frames in which it was free and held, its beads and the side walls in each of them.
 
-    Attributes
-    ----------
-    frames
-        Numbers of the frames in which it was free and held.
-    members
-        Its beads in each of these.
-    walls
-        The side walls that held it in each.
-    merged_into, merged_at
-        Number of the track that took over its beads, and the frame in which it did; None if none did.
+    And the number of the track that took over its beads, and the frame in which it did; None if none did.
     """
 
     frames: list[int] = field(default_factory=list)
@@ -77,23 +61,18 @@ class Track:
     merged_into: int | None = None
     merged_at: int | None = None
 
-    def members_at(self, frame: int) -> frozenset[int]:
-        """Its beads in a frame; none where it was not free and held."""
-        return self.members[self.frames.index(frame)] if frame in self.frames else frozenset()
-
 
 def connected(count: int, pairs: IntArray) -> IntArray:
     """Number of the connected component of each of so many, shape (count,), given joined pairs, shape (K, 2)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    first, second = pairs[:, 0], pairs[:, 1]
-    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(count, count))
+    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     labels: IntArray = connected_components(graph, directed=False)[1].astype(np.int64)
     return labels
 
 
-def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> npt.NDArray[np.bool_]:
+def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> BoolArray:
     """Which beads belong to the component of most beads or to one that is bridged to the floor, shape (N,).
 
     Without a ``heap``, where beads were placed one by one, the component of most beads may be a cluster on a wall: then
@@ -101,56 +80,37 @@ def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> npt.NDA
     """
     on_floor = labels[bridges.wall_beads[bridges.walls == FLOOR]]
     most = [np.bincount(labels).argmax()] if heap else []
-    bulk: npt.NDArray[np.bool_] = np.isin(labels, [*most, *on_floor])
+    bulk: BoolArray = np.isin(labels, [*most, *on_floor])
     return bulk
 
 
-def held_clusters(labels: IntArray, bridges: Bridges, bulk: npt.NDArray[np.bool_]) -> Iterator[Cluster]:
-    """The clusters that are free and held in a frame: their beads and the side walls that hold them."""
+def held_clusters(labels: IntArray, bridges: Bridges, bulk: BoolArray) -> Iterator[Cluster]:
+    """The clusters that are free and held in a frame."""
     side = bridges.walls != FLOOR
     beads, walls = bridges.wall_beads[side], bridges.walls[side]
     for label in np.unique(labels[beads[~bulk[beads]]]):
         members = np.flatnonzero(labels == label)
-        if len(members) < _FEWEST_BEADS:
-            continue
-        holding = walls[np.isin(beads, members)]
-        yield frozenset(members.tolist()), frozenset(holding.tolist())
+        if len(members) >= _FEWEST_BEADS:
+            yield frozenset(members.tolist()), frozenset(walls[np.isin(beads, members)].tolist())
 
 
 def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: ClimbCriteria) -> list[Track]:
-    """Follow clusters from frame to frame.
-
-    Parameters
-    ----------
-    time : ndarray, shape (F,)
-        s.
-    clusters
-        Of each frame, those that are free and held (`held_clusters`).
-    definition
-        What is the same cluster.
-
-    Returns
-    -------
-    list of Track
-        In the order of their births.
-    """
+    """Follow the clusters of each frame (`held_clusters`; time in s, shape (F,)); tracks by their births."""
     tracks: list[Track] = []
     alive: list[int] = []
     for frame, found in enumerate(clusters):
         alive = [number for number in alive if time[frame] - time[tracks[number].frames[-1]] <= definition.max_gap]
         # The larger overlap first: of two tracks that meet, the one that gives more beads goes on.
-        shared = sorted(
-            (
-                (len(tracks[number].members[-1] & members), -number, place)
-                for number in alive
-                for place, (members, _) in enumerate(found)
-                if _same(tracks[number].members[-1], members, definition.min_overlap)
-            ),
-            reverse=True,
-        )
+        shared = []
+        for number in alive:
+            before = tracks[number].members[-1]
+            for place, (members, _) in enumerate(found):
+                common = len(before & members)
+                if common >= definition.min_overlap * min(len(before), len(members)):
+                    shared.append((common, -number, place))
         taken: dict[int, int] = {}
         ended = set()
-        for _, negative, place in shared:
+        for _, negative, place in sorted(shared, reverse=True):
             number = -negative
             if number in taken.values() or number in ended:
                 continue
@@ -172,13 +132,26 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: 
     return tracks
 
 
-def _same(before: frozenset[int], now: frozenset[int], share: float) -> bool:
-    return len(before & now) >= share * min(len(before), len(now))
+@dataclass(frozen=True)
+class Beads:
+    """What is known of a pile's beads: times (s, shape (F,)), heights (m, shape (F, N)) and which are large.
+
+    And of each frame the height of the bulk's surface, and which beads are of the bulk; the first frame of the drive;
+    names of walls, by their numbers. Heights are needed of the members of clusters alone.
+    """
+
+    time: FloatArray
+    height: FloatArray
+    large: BoolArray
+    surface: FloatArray
+    bulk: Sequence[BoolArray] = ()
+    first: int = 0
+    wall_names: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
 class Climb:
-    """What a track did: columns of `walkers.postprocess.tables.CLUSTERS`, which says what they mean.
+    """``clusters.parquet``: one row per cluster of a pile, what it did.
 
     Unlike ``begin``, ``onset`` and ``qualified`` do not depend on what comes later, so that a longer record has no
     other climbs up to a time than a shorter one. The error of the speed is that of a mean over up to ten equal numbers
@@ -186,43 +159,36 @@ class Climb:
     takes; that begin and end are those of the greatest gain makes the speed of a short and unsteady climb too large.
     """
 
-    begin: float
-    end: float
-    onset: float
-    qualified: float
-    gain: float
-    speed: float
-    standard_error: float
-    leader: int
-    height: float
-    size: int
-    large: int
-    walls: tuple[int, ...]
-    climbed: bool
+    track: Annotated[int, "", "number of the cluster, followed through time"]
+    first: Annotated[float, "s", "when it was first free of the bulk and held to a side wall"]
+    last: Annotated[float, "s", "when it was so last"]
+    begin: Annotated[float, "s", "of its greatest gain of height"]
+    end: Annotated[float, "s", "of that gain"]
+    out_of_pile: Annotated[
+        bool, "", "whether most of its first beads were in the bulk before; else it hung there from the start"
+    ]
+    onset: Annotated[float, "s", "when the gain began by which it first counted as a climb; NaN if it never did"]
+    qualified: Annotated[
+        float, "s", "when it first counted as a climb, its gain having reached what counts; NaN if it never did"
+    ]
+    gain: Annotated[float, "m", "greatest gain of height, of the mean of its beads"]
+    speed: Annotated[float, "m/s", "that gain over the time in which it was made"]
+    standard_error: Annotated[float, "m/s", "of the speed, from those in ten parts of that time"]
+    climbed: Annotated[bool, "", "whether it counted as a climb at any time"]
+    leader: Annotated[int, "", "number of the bead that was most often topmost meanwhile, from 0"]
+    leader_large: Annotated[bool, "", "whether it is of the large class"]
+    height: Annotated[float, "m", "of the leader then"]
+    above_surface: Annotated[float, "m", "of the leader then, above the bulk's surface"]
+    size: Annotated[int, "", "beads then"]
+    large: Annotated[int, "", "large beads then"]
+    walls: Annotated[int, "", "number of side walls that held it then: two in a corner"]
+    wall_names: Annotated[str, "", "which ones: -x, +x, -y, +y, of a cylinder side"]
+    merged_into: Annotated[int, "", "number of the track that took it over, -1 if none did"]
 
 
-def classify(
-    track: Track,
-    time: FloatArray,
-    height: FloatArray,
-    large: npt.NDArray[np.bool_],
-    definition: ClimbCriteria,
-) -> Climb:
-    """What a track did, and whether it is a climb.
-
-    Parameters
-    ----------
-    track
-        From `follow`.
-    time : ndarray, shape (F,)
-    height : ndarray, shape (F, N)
-        Of every bead in every frame, m.
-    large : ndarray of bool, shape (N,)
-    definition
-        What counts.
-    """
-    if not track.frames:
-        raise ValueError("a track without a frame")
+def classify(number: int, track: Track, beads: Beads, definition: ClimbCriteria) -> Climb:
+    """What a track of `follow` did, and whether it is a climb."""
+    time, height = beads.time, beads.height
     gained, seconds = _gained(track, time, height)
     risen = gained - np.minimum.accumulate(gained)
     moments = _qualified(gained, definition.min_rise)
@@ -233,28 +199,36 @@ def classify(
     topmost = Counter(max(track.members[place], key=lambda bead: height[track.frames[place], bead]) for place in span)
     leader = topmost.most_common(1)[0][0]
     speed, error = _speed(seconds[begin : end + 1], gained[begin : end + 1])
-    last, members = track.frames[end], track.members[end]
+    last, members, walls, first = track.frames[end], track.members[end], sorted(track.walls[end]), track.members[0]
+    # What was not in the bulk has hung on a wall since the beads were poured.
+    before = beads.bulk[beads.first : track.frames[0]]
     return Climb(
+        track=number,
+        first=float(time[track.frames[0]]),
+        last=float(time[track.frames[-1]]),
         begin=float(time[track.frames[begin]]),
         end=float(time[last]),
+        out_of_pile=any(bulk[list(first)].mean() >= definition.min_overlap for bulk in before),
         onset=onset,
         qualified=qualified,
         gain=float(risen[end]),
         speed=speed,
         standard_error=error,
-        leader=leader,
-        height=float(height[last, leader]),
-        size=len(members),
-        large=int(large[list(members)].sum()),
-        walls=tuple(sorted(track.walls[end])),
         climbed=moments is not None,
+        leader=leader,
+        leader_large=bool(beads.large[leader]),
+        height=float(height[last, leader]),
+        above_surface=float(height[last, leader] - beads.surface[last]),
+        size=len(members),
+        large=int(beads.large[list(members)].sum()),
+        walls=len(walls),
+        wall_names=" ".join(beads.wall_names[wall] for wall in walls),
+        merged_into=-1 if track.merged_into is None else track.merged_into,
     )
 
 
 def _qualified(gained: FloatArray, min_rise: float) -> tuple[int, int] | None:
     """Where what makes a track a climb begins, and the first place up to which it is one; None if it never is.
-
-    Given the height that it gained since its begin, m.
 
     There it is farther above its lowest than ever before, by enough, and that took frames enough: a hop between two
     frames is none.
@@ -286,15 +260,71 @@ def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
     """Gain over time, and its standard error from those of equal numbers of frames; NaN where there are too few."""
     whole = seconds[-1] - seconds[0]
     if len(gained) < _FEWEST_FRAMES or whole == 0.0:
-        return float("nan"), float("nan")
+        return np.nan, np.nan
     speed = float((gained[-1] - gained[0]) / whole)
     blocks = min(_MOST_BLOCKS, len(gained) - 1)
-    if blocks < _FEWEST_BLOCKS:
-        return speed, float("nan")
     edges = np.linspace(0, len(gained) - 1, blocks + 1).round().astype(int)
     lasted, risen = np.diff(seconds[edges]), np.diff(gained[edges])
     there = lasted > 0.0
     if there.sum() < _FEWEST_BLOCKS:
-        return speed, float("nan")
+        return speed, np.nan
     speeds, shares = risen[there] / lasted[there], lasted[there] / lasted[there].sum()
     return speed, float(np.sqrt((shares**2 * (speeds - speed) ** 2).sum() * there.sum() / (there.sum() - 1)))
+
+
+@dataclass(frozen=True)
+class Event:
+    """``events.parquet``: one row per event in the lives of a pile's clusters.
+
+    Freed is what came free of the pile, or reached a wall, split what parted from another track, merged what went into
+    another one; rejoined is what went back to the pile, detached what let go of the walls or whose beads parted.
+    """
+
+    time: Annotated[float, "s", "from the begin of the drive"]
+    event: Annotated[str, "", "freed, split, merged, rejoined or detached"]
+    track: Annotated[int, "", "number of the cluster to which it happened"]
+    other: Annotated[int, "", "that from which it split or into which it merged, -1 for none"]
+    height: Annotated[float, "m", "of the cluster's leader then"]
+
+
+def events_of(tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, definition: ClimbCriteria) -> list[Event]:
+    """The events of all tracks in the order of time.
+
+    A cluster that is free and held in the first frame of the drive was so before, and one that may still be within a
+    brush in the last frame goes on: these begins and ends are no events.
+    """
+    time, events = beads.time, []
+
+    def add(frame: int, kind: str, number: int, other: int = -1) -> None:
+        height = float(beads.height[frame, climbs[number].leader])
+        events.append(Event(float(time[frame]), kind, number, other, height))
+
+    for number, track in enumerate(tracks):
+        born, last, parent = track.frames[0], track.frames[-1], _parent(tracks, number, time, definition)
+        if parent is not None:
+            add(born, "split", number, parent)
+        elif born > beads.first:
+            add(born, "freed", number)
+        if track.merged_at is not None and track.merged_into is not None:
+            add(track.merged_at, "merged", number, track.merged_into)
+        elif time[-1] - time[last] > definition.max_gap:
+            # It is back on the pile if most of its beads were there when it could no longer be the same.
+            until = min(int(np.searchsorted(time, time[last] + definition.max_gap, side="right")), len(time) - 1)
+            members, after = list(track.members[-1]), beads.bulk[last + 1 : until + 1]
+            back = any(bulk[members].mean() >= definition.min_overlap for bulk in after)
+            add(last + 1, "rejoined" if back else "detached", number)
+    return sorted(events, key=lambda event: (event.time, event.track))
+
+
+def _parent(tracks: Sequence[Track], number: int, time: FloatArray, definition: ClimbCriteria) -> int | None:
+    """The track that held most of another one's beads shortly before it began."""
+    first, members = tracks[number].frames[0], tracks[number].members[0]
+    best, most = None, definition.min_overlap * len(members)
+    for other, track in enumerate(tracks):
+        before = bisect_left(track.frames, first) - 1
+        if other == number or before < 0 or time[first] - time[track.frames[before]] > definition.max_gap:
+            continue
+        shared = len(track.members[before] & members)
+        if shared >= most:
+            best, most = other, shared
+    return best

@@ -1,14 +1,15 @@
-"""Read the engine's binary dumps (``dump custom … .bin``) as numpy arrays on a memory map.
+"""Read the engine's dumps: those of beads (``dump custom … .bin``) on a memory map, those of bridges as text.
 
-A frame is int64 step, int64 rows, int32 triclinic, 6 int32 boundary, 6 float64 box, int32 columns, int32 processes,
-then for each process int32 count and that many float64. Columns have no names: the layout beside the dump has them.
+A frame of beads is int64 step, int64 rows, int32 triclinic, 6 int32 boundary, 6 float64 box, int32 columns, int32
+processes, then for each process int32 count and that many float64. Columns have no names: the layout has them.
 """
 
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,9 +17,13 @@ import numpy.typing as npt
 from walkers.inputs.errors import WalkersError
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 _HEADER = struct.Struct("=qqi6i6dii")
 _COUNT = struct.Struct("=i")
+_LINES = 9
+"""Of the head of a frame of bridges."""
 
 
 class DumpError(WalkersError):
@@ -29,25 +34,17 @@ class NoNumberError(DumpError):
     """A dump with a NaN or an infinity: the engine goes on with them and says nothing, and a disk can make them."""
 
 
-@dataclass(frozen=True)
-class _Frame:
+class _Frame(NamedTuple):
+    """Its parts, one a process: their offsets in bytes and numbers of values; and where it ends."""
+
     step: int
     rows: int
-    columns: int
-    blocks: tuple[tuple[int, int], ...]
-    """Offset in bytes and number of values of each process's part."""
+    parts: list[tuple[int, int]]
     end: int
 
 
 class BinaryDump:
-    """The frames of a binary dump.
-
-    Parameters
-    ----------
-    path
-        The ``.bin`` file.
-    columns
-        Names of its columns.
+    """The frames of a binary dump with columns of such names.
 
     Attributes
     ----------
@@ -66,13 +63,10 @@ class BinaryDump:
         self.path = path
         self.columns = columns
         size = path.stat().st_size
-        self._bytes: npt.NDArray[np.uint8] = (
-            np.memmap(path, dtype=np.uint8, mode="r") if size else np.empty(0, dtype=np.uint8)
-        )
+        self._bytes: npt.NDArray[np.uint8] = np.memmap(path, np.uint8, "r") if size else np.empty(0, np.uint8)
+        # Most often all frames are of one process and as long as each other: then one look at the file is enough.
         self._starts = self._starts_of_alike(size)
-        """Offsets of the complete frames, bytes."""
         self._alike = len(self._starts) > 0
-        """Whether they are all of one process and as long as each other."""
         offset = int(self._starts[-1]) + self._stride if self._alike else 0
         starts = []
         while offset < size and (frame := self._read_header(offset, size)) is not None:
@@ -81,8 +75,7 @@ class BinaryDump:
             self._alike = False
         self._starts = np.concatenate([self._starts, np.array(starts, dtype=np.int64)])
         self.truncated = offset < size
-        steps = self._bytes[self._starts[:, None] + np.arange(8)] if len(self._starts) else np.empty((0, 8), np.uint8)
-        self.steps = np.ascontiguousarray(steps).view(np.int64)[:, 0]
+        self.steps = self._bytes[self._starts[:, None] + np.arange(8)].view(np.int64)[:, 0]
 
     def __len__(self) -> int:
         return len(self._starts)
@@ -90,10 +83,10 @@ class BinaryDump:
     def _starts_of_alike(self, size: int) -> npt.NDArray[np.int64]:
         """Offsets of the frames from the first one on that are as that; none if that has several parts."""
         first = self._read_header(0, size) if size else None
-        if first is None or len(first.blocks) > 1:
+        if first is None or len(first.parts) > 1:
             return np.empty(0, dtype=np.int64)
         self._stride = first.end
-        heads = self._bytes[: size // first.end * first.end].reshape(-1, first.end)[:, 8 : first.blocks[0][0]]
+        heads = self._bytes[: size // first.end * first.end].reshape(-1, first.end)[:, 8 : first.parts[0][0]]
         differs = np.flatnonzero((heads != heads[0]).any(axis=1))
         return np.arange(differs[0] if len(differs) else len(heads), dtype=np.int64) * first.end
 
@@ -101,13 +94,11 @@ class BinaryDump:
         """The frame that begins at an offset; None if the file ends within it."""
         if offset + _HEADER.size > size:
             return None
-        values = _HEADER.unpack(self._bytes[offset : offset + _HEADER.size].tobytes())
-        step = values[0]
-        rows, columns, processes = values[1], values[15], values[16]
+        step, rows, *_, columns, processes = _HEADER.unpack(self._bytes[offset : offset + _HEADER.size].tobytes())
         if columns != len(self.columns) or rows < 0 or not 1 <= processes < 1_000_000 or step < 0:
             raise DumpError(f"{self.path}: no dump of {len(self.columns)} columns (byte {offset})")
         offset += _HEADER.size
-        blocks = []
+        parts = []
         for _ in range(processes):
             if offset + _COUNT.size > size:
                 return None
@@ -115,16 +106,11 @@ class BinaryDump:
             offset += _COUNT.size
             if offset + 8 * count > size:
                 return None
-            blocks.append((offset, count))
+            parts.append((offset, count))
             offset += 8 * count
-        if sum(count for _, count in blocks) != rows * columns:
+        if sum(count for _, count in parts) != rows * columns:
             raise DumpError(f"{self.path}: the parts of the frame of step {step} do not add up")
-        return _Frame(step, rows, columns, tuple(blocks), offset)
-
-    def _frame(self, number: int) -> _Frame:
-        frame = self._read_header(int(self._starts[number]), len(self._bytes))
-        assert frame is not None
-        return frame
+        return _Frame(step, rows, parts, offset)
 
     def frame(self, number: int) -> FloatArray:
         """One frame, shape (rows, columns).
@@ -134,9 +120,10 @@ class BinaryDump:
         NoNumberError
             If it holds a NaN or an infinity.
         """
-        frame = self._frame(number)
-        parts = [self._bytes[start : start + 8 * count].view(np.float64) for start, count in frame.blocks]
-        values = np.concatenate(parts).reshape(frame.rows, frame.columns)
+        frame = self._read_header(int(self._starts[number]), len(self._bytes))
+        assert frame is not None
+        parts = [self._bytes[start : start + 8 * count].view(np.float64) for start, count in frame.parts]
+        values = np.concatenate(parts).reshape(frame.rows, len(self.columns))
         if not np.isfinite(values).all():
             column = self.columns[int(np.flatnonzero(~np.isfinite(values).all(axis=0))[0])]
             raise NoNumberError(f"{self.path}: {column} is no number at step {frame.step}")
@@ -157,22 +144,14 @@ class BinaryDump:
             if len({len(frame) for frame in frames}) > 1:
                 raise DumpError(f"{self.path}: the number of beads changes")
             return np.stack(frames)
-        first = self._frame(0)
-        whole = self._bytes[: len(self) * first.end].reshape(len(self), first.end)
-        data = np.ascontiguousarray(whole[:, first.blocks[0][0] :]).view(np.float64)
+        whole = self._bytes[: len(self) * self._stride].reshape(len(self), self._stride)
+        data = np.ascontiguousarray(whole[:, _HEADER.size + _COUNT.size :]).view(np.float64)
         if not np.isfinite(data).all():
             self.frame(int(np.flatnonzero(~np.isfinite(data).all(axis=1))[0]))  # which says where
-        return data.reshape(len(self), first.rows, first.columns)
+        return data.reshape(len(self), data.shape[1] // len(self.columns), len(self.columns))
 
     def write_like(self, data: FloatArray, path: Path) -> None:
-        """Write a dump with the frames' heads of this one and other rows.
-
-        Parameters
-        ----------
-        data : ndarray, shape (frames, rows, columns)
-        path
-            The file; the parts of several processes become one.
-        """
+        """Write a dump, of one process, with the heads of this one's frames and data (frames, rows, columns)."""
         count = data.shape[1] * data.shape[2]
         heads = []
         for start in self._starts:
@@ -186,3 +165,48 @@ class BinaryDump:
     def column(self, name: str) -> int:
         """Number of a column."""
         return self.columns.index(name)
+
+
+def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, FloatArray]]:
+    """Step and rows, shape (rows, columns), of each frame of a text dump of bridges (``dump local``), one by one.
+
+    Raises
+    ------
+    DumpError
+        If the file is not such a dump, ends within a frame, or holds a NaN or an infinity.
+    """
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise DumpError(f"{path}: cannot be read ({error.strerror})") from error
+    with file:
+        while line := file.readline():
+            head = [line, *(file.readline() for _ in range(_LINES - 1))]
+            if head[0] != b"ITEM: TIMESTEP\n":
+                raise DumpError(f"{path}: not a local dump")
+            try:
+                step, count = int(head[1]), int(head[3])
+            except ValueError as error:
+                raise DumpError(f"{path}: no header of a frame, or a part of one") from error
+            body = [file.readline() for _ in range(count)]
+            if not head[-1].endswith(b"\n") or (body and not body[-1].endswith(b"\n")):
+                raise DumpError(f"{path}: ends within the frame of step {step}")
+            try:
+                values = np.fromstring(b"".join(body), dtype=np.float64, sep=" ")
+            except ValueError as error:
+                raise DumpError(f"{path}: no number in the frame of step {step} ({error})") from error
+            if len(values) != count * len(columns):
+                raise DumpError(f"{path}: expected {len(columns)} columns in the frame of step {step}")
+            if not np.isfinite(values).all():
+                raise DumpError(f"{path}: a NaN or an infinity in the frame of step {step}")
+            yield step, values.reshape(count, len(columns))
+
+
+def write_local_dump(path: Path, columns: tuple[str, ...], frames: Iterable[tuple[int, FloatArray]]) -> None:
+    """Write a local dump as the engine does, twelve digits, without the bounds of its box."""
+    lines = []
+    for step, rows in frames:
+        lines += ["ITEM: TIMESTEP", str(step), "ITEM: NUMBER OF ENTRIES", str(len(rows)), "ITEM: BOX BOUNDS ff ff ff"]
+        lines += ["0 0"] * 3 + [f"ITEM: ENTRIES {' '.join(columns)}"]
+        lines += [" ".join([f"{value:.12g}" for value in row]) + " " for row in rows.tolist()]
+    path.write_text("\n".join(lines) + "\n", "ascii")

@@ -5,7 +5,7 @@ Where walkers went and turned, and their gait; what a pile did.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,11 +15,10 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, series_look, styled
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.gait import averages, distance_walked, gait, walk
+from walkers.postprocess.gait import averages, distance_walked, gait, walk, ways
 from walkers.postprocess.motion import Group
-from walkers.postprocess.piles import PileAnalysis
-from walkers.postprocess.posture import ways
 from walkers.postprocess.slopes import fit_slopes
+from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -136,14 +135,19 @@ def gait_panels(group: Group) -> list[Panel]:
     return panels
 
 
-def pile_panels(found: PileAnalysis) -> list[Panel]:
-    """Heights of the clusters' leaders over the pile's surface with events, segregation, bridges, agitation."""
-    time, bed, x = found.motion.time, found.bed, "time from the begin of the drive (s)"
+def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
+    """Heights of the clusters' leaders over the pile's surface with events, segregation, bridges, agitation.
+
+    Of the tables of a pile (`walkers.postprocess.analysis.tables_of`).
+    """
+    bed, x = tables["bed"], "time from the begin of the drive (s)"
+    time = bed["time"]
     surface = Line(time, 1e3 * bed["surface"], "surface, median", _GREY)
     low, high = (
         Line(time, 1e3 * bed[f"surface_{side}"], "surface, 10th to\n90th percentile") for side in ("low", "high")
     )
-    panels = [Panel("Clusters' leaders", x, "height (mm)", [surface, *_leaders(found), *_events(found)], (low, high))]
+    leaders = [surface, *_leaders(tables), *_events(tables["events"])]
+    panels = [Panel("Clusters' leaders", x, "height (mm)", leaders, (low, high))]
     segregation = {"brazil_nut": "all beads", "brazil_nut_of_bulk": "bulk alone"}
     joined = {"bridges": "bridges", "contacts": "contacts"}
     for title, y, columns in (
@@ -157,30 +161,28 @@ def pile_panels(found: PileAnalysis) -> list[Panel]:
     return panels
 
 
-def _leaders(found: PileAnalysis) -> Iterator[Line]:
+def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
     """The height of each cluster's leader, thick where it climbed."""
-    time, height = found.motion.time, found.motion.position[:, :, 2]
-    named = 0
-    for track, climb in zip(found.tracks, found.climbs, strict=True):
-        places = [frame for frame, members in zip(track.frames, track.members, strict=True) if climb.leader in members]
-        leads = "large" if found.motion.large[climb.leader] else "small"
-        named += climb.climbed
-        told = f"{climb.size} beads climb, led by a\n{leads} one: {climb.speed * 1e3:.1f} mm/s"
-        label = told if climb.climbed and named <= _MOST_NAMED else ""
-        colour, width = (2, 1.6) if climb.climbed else (_OTHERS, 0.6)
-        yield Line(time[places], height[places, climb.leader] * 1e3, label, colour, width=width)
-    if named > _MOST_NAMED:
-        yield Line(time[:0], time[:0], f"and {named - _MOST_NAMED} more climbs", 2, width=1.6)
+    clusters, members = tables["clusters"], tables["members"]
+    named = np.cumsum(clusters["climbed"])
+    for track, (climbed, leader) in enumerate(zip(clusters["climbed"], clusters["leader"], strict=True)):
+        own = (members["track"] == track) & (members["bead"] == leader)
+        leads, speed = "large" if clusters["leader_large"][track] else "small", clusters["speed"][track] * 1e3
+        told = f"{clusters['size'][track]} beads climb, led by a\n{leads} one: {speed:.1f} mm/s"
+        label = told if climbed and named[track] <= _MOST_NAMED else ""
+        colour, width = (2, 1.6) if climbed else (_OTHERS, 0.6)
+        yield Line(members["time"][own], members["height"][own] * 1e3, label, colour, width=width)
+    if len(named) and named[-1] > _MOST_NAMED:
+        nothing = np.empty(0)
+        yield Line(nothing, nothing, f"and {named[-1] - _MOST_NAMED} more climbs", 2, width=1.6)
 
 
-def _events(found: PileAnalysis) -> Iterator[Line]:
-    """A mark where something happened to a cluster, at the height of its leader in the frame nearest to it."""
+def _events(events: Columns) -> Iterator[Line]:
+    """A mark where something happened to a cluster, at the height of its leader."""
     for kind, marker in _MARKS.items():
-        if told := [event for event in found.events if event.kind == kind]:
-            times = np.array([event.time for event in told])
-            leaders = [found.climbs[event.track].leader for event in told]
-            heights = found.motion.position[np.searchsorted(found.motion.time, times), leaders, 2]
-            yield Line(times, heights * 1e3, kind, _GREY, marker, width=0.0)
+        these = events["event"] == kind
+        if these.any():
+            yield Line(events["time"][these], events["height"][these] * 1e3, kind, _GREY, marker, width=0.0)
 
 
 @styled
@@ -217,11 +219,10 @@ def walk_figures(groups: list[Group]) -> dict[str, Figure]:
 
 
 @styled
-def climb_figure(found: PileAnalysis) -> Figure:
+def climb_figure(case: Case, tables: Mapping[str, Columns]) -> Figure:
     """What a pile did: `pile_panels`, one below the other."""
-    case = found.motion.case
     title = f"{plain_text(case.title or case.name)}\n{case.count} beads, {case.drive.described()}"
-    figure, axes = _stacked(pile_panels(found), title, 8.0, [2, 1, 1, 1])
+    figure, axes = _stacked(pile_panels(tables), title, 8.0, [2, 1, 1, 1])
     axes[2].set_ylim(0.0, None)
     return figure
 

@@ -1,4 +1,4 @@
-"""How walkers walk: velocities, rotation and sliding, orientation, contacts.
+"""How walkers walk: velocities, rotation and sliding, orientation, contacts, posture.
 
 Velocities are along the walker's heading, from the small bead to the large one, relative to the substrate. With e the
 heading, z the normal of the substrate and ω a bead's angular velocity, the rotation velocity R ω·(z × e) is the paper's
@@ -12,9 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from walkers.postprocess.dump import DumpError, FloatArray
+from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group
 from walkers.postprocess.slopes import fit_slopes
 
@@ -22,20 +21,20 @@ STEADY_DIFFERENCE = 0.05
 """A walker is steady if the velocities of the two halves of the fitted cycles differ by less than this share …"""
 STEADY_SPEED = 1e-5
 """… or by less than this, m/s."""
+UPRIGHT = np.radians(15.0)
+"""rad; how far off an upright walker may end."""
+_NO_MORE = np.radians(0.5)
+"""rad; what it may go off by in the second half of a run."""
+POSTURES = ("upright", "leaning", "turned over")
 
 
 @dataclass(frozen=True)
 class Gait:
-    """Time series of F frames and W walkers of n beads; SI units. Contacts: the beads with walls, then their pairs.
+    """Time series of F frames and W walkers of n beads; SI units.
 
-    Attributes
-    ----------
-    velocity : ndarray, shape (F, W)
-        Of the mass centre along the heading.
-    rotation : ndarray, shape (F, W, n)
-        Rotation velocity of the beads.
-    sliding, gap : ndarray, shape (F, W, n + pairs)
-        Sliding velocity and gap (negative: overlap) at the contacts.
+    Velocity of the mass centre along the heading, shape (F, W), rotation velocity of the beads, shape (F, W, n), and
+    sliding velocity and gap (negative: overlap) at the contacts, shape (F, W, n + pairs): the beads with walls, then
+    their pairs.
     """
 
     velocity: FloatArray
@@ -49,7 +48,6 @@ def gait(group: Group) -> Gait:
     radii, heading, upward = group.radii, group.heading, np.array([0.0, 0.0, 1.0])
     along = np.einsum("fwbx,fwx->fwb", group.velocity, heading)
     rotation = radii * np.einsum("fwbx,fwx->fwb", group.spin, np.cross(upward, heading))
-    weights = radii**3 / np.sum(radii**3)
     at_walls, normal = _nearest_wall(group)
     turning = rotation if normal is None else radii * np.einsum(
         "fwbx,fwbx->fwb", group.spin, np.cross(normal, heading[:, :, None])
@@ -62,26 +60,16 @@ def gait(group: Group) -> Gait:
         arm /= np.maximum(np.linalg.norm(arm, axis=-1, keepdims=True), 1e-300)
         spin = radii[one] * group.spin[:, :, one] + radii[other] * group.spin[:, :, other]
         sliding.append(-np.einsum("fwx,fwx->fw", spin, np.cross(upward, arm))[..., None])
-    return Gait(
-        velocity=along @ weights,
-        rotation=rotation,
-        sliding=np.concatenate(sliding, axis=-1),
-        gap=_gaps(group, at_walls),
-    )
+    velocity = along @ (radii**3 / np.sum(radii**3))
+    return Gait(velocity, rotation, np.concatenate(sliding, axis=-1), gaps(group, at_walls))
 
 
 @dataclass(frozen=True)
 class Averages:
-    """Means over the cycles after the settling ones of W walkers of n beads; contacts as in `Gait`.
+    """Means over the cycles after the settling ones; contacts as in `Gait`.
 
-    Attributes
-    ----------
-    rotation : ndarray, shape (W, n)
-        m/s.
-    sliding : ndarray, shape (W, n + pairs)
-        m/s.
-    open : ndarray, shape (W, n + pairs)
-        Share of the time in which the surfaces do not touch.
+    Rotation, m/s, shape (W, n), sliding, m/s, and the share of the time in which surfaces do not touch, shape
+    (W, n + pairs).
     """
 
     rotation: FloatArray
@@ -113,14 +101,10 @@ def averages(group: Group) -> Averages:
     )
 
 
-def gaps(group: Group) -> FloatArray:
-    """Gaps at the contacts (as in `Gait`), m, shape (F, W, n + pairs)."""
-    return _gaps(group, _nearest_wall(group)[0])
-
-
-def _gaps(group: Group, at_walls: FloatArray) -> FloatArray:
-    """Gaps of beads to walls, then those between beads."""
-    radii, position, found = group.radii, group.position, [at_walls]
+def gaps(group: Group, at_walls: FloatArray | None = None) -> FloatArray:
+    """Gaps at the contacts (as in `Gait`), m, shape (F, W, n + pairs), given those at walls if they are known."""
+    radii, position = group.radii, group.position
+    found = [_nearest_wall(group)[0] if at_walls is None else at_walls]
     for one, other in group.make.pairs:
         distance = np.linalg.norm(position[:, :, one] - position[:, :, other], axis=-1)
         found.append((distance - (radii[one] + radii[other]))[..., None])
@@ -144,7 +128,7 @@ class Walk:
     """Velocities of W walkers after the settling cycles, m/s, each of shape (W,).
 
     ``velocity`` is the slope of the distance walked along the heading, one sample a cycle, with its standard error
-    (`walkers.postprocess.slopes.fit_slopes`); ``axial`` and ``lateral`` are the mass centre's velocities along and
+    (`walkers.postprocess.slopes.fit_slopes`); the axial and the lateral ones are the mass centre's velocities along and
     across the drive axis in the frame of the substrate; ``steady`` says whether the first and the second half agree.
     """
 
@@ -152,21 +136,16 @@ class Walk:
     standard_error: FloatArray
     first_half: FloatArray
     second_half: FloatArray
-    axial: FloatArray
-    lateral: FloatArray
-    steady: npt.NDArray[np.bool_]
+    axial_velocity: FloatArray
+    lateral_velocity: FloatArray
+    steady: BoolArray
 
 
 def distance_walked(group: Group) -> tuple[FloatArray, FloatArray]:
-    """Distance along the heading at the end of each cycle, as a stroboscope sees it.
+    """Time (s, shape (cycles + 1,)) and distance along the heading (m, shape (cycles + 1, W)) at the end of each cycle.
 
-    Returns
-    -------
-    time : ndarray, shape (cycles + 1,)
-        s.
-    distance : ndarray, shape (cycles + 1, W)
-        m; each cycle's displacement is projected on the mean of the headings at its ends, so that a walker that turns
-        is followed around the curve.
+    Each cycle's displacement is projected on the mean of the headings at its ends, so that a walker that turns is
+    followed around the curve.
     """
     strobe = group.case.run.samples_per_cycle
     centre, heading = group.mass_centre[::strobe], group.heading[::strobe]
@@ -189,23 +168,20 @@ def walk(group: Group) -> Walk:
         raise DumpError(f"the dump holds {len(time) - 1} cycles, no more than the {settled} settling ones")
     time, distance = time[settled:], distance[settled:]
     velocity, error = fit_slopes(time, distance)
+    first = second = velocity
     middle = (len(time) + 1) // 2
     if middle >= 2:
         first, _ = fit_slopes(time[:middle], distance[:middle])
         second, _ = fit_slopes(time[middle - 1 :], distance[middle - 1 :])
-    else:
-        first = second = velocity
-    strobe = group.case.run.samples_per_cycle
-    centre = group.mass_centre[::strobe][settled:]
-    allowed = np.maximum(STEADY_DIFFERENCE * np.abs(velocity), STEADY_SPEED)
+    centre = group.mass_centre[:: group.case.run.samples_per_cycle][settled:]
     return Walk(
         velocity=velocity,
         standard_error=error,
         first_half=first,
         second_half=second,
-        axial=fit_slopes(time, centre @ group.drive_axis)[0],
-        lateral=fit_slopes(time, centre @ group.across_axis)[0],
-        steady=np.abs(first - second) <= allowed,
+        axial_velocity=fit_slopes(time, centre @ group.drive_axis)[0],
+        lateral_velocity=fit_slopes(time, centre @ group.across_axis)[0],
+        steady=np.abs(first - second) <= np.maximum(STEADY_DIFFERENCE * np.abs(velocity), STEADY_SPEED),
     )
 
 
@@ -214,3 +190,43 @@ def settled_samples(group: Group) -> slice:
     run = group.case.run
     samples = run.samples_per_cycle
     return slice(run.settled_strobes * samples, run.cycles // run.cycles_per_sample * samples)
+
+
+def ways(*, uphill: bool) -> tuple[str, str]:
+    """What the ways along the drive axis are called, the one that is positive first."""
+    return ("up", "down") if uphill else ("right", "left")
+
+
+def turned_over_at(group: Group) -> FloatArray:
+    """When each walker was first off by more than a right angle at the end of a cycle, s; NaN if never, shape (W,)."""
+    strobe = group.case.run.samples_per_cycle
+    over = np.abs(group.orientation[::strobe]) > np.pi / 2.0
+    return np.where(over.any(axis=0), group.time[::strobe][over.argmax(axis=0)], np.nan)
+
+
+def postures(group: Group) -> list[str]:
+    """What became of each walker on a slope or a wall, of `POSTURES`.
+
+    A walker that leads uphill with its large bead stands on its head, as a pendulum would; a velocity says nothing of
+    it unless it is known whether it still does. Judged once a cycle, by the angle from where it was to face: one has
+    turned over that was off by more than a right angle at some time; one is upright that ends within 15° and is tilting
+    no more (in the second half of the run it came nearer, or went off by less than half a degree).
+    """
+    off = np.abs(group.orientation[:: group.case.run.samples_per_cycle])
+    end, middle = off[-1], off[len(off) // 2]
+    stands = (end <= UPRIGHT) & (end <= middle + _NO_MORE)
+    turned = np.isfinite(turned_over_at(group))
+    return [POSTURES[number] for number in np.select([turned, stands], [2, 0], 1)]
+
+
+def came_near(centre: FloatArray, near: float) -> bool:
+    """Whether two of several points, shape (F, W, 2), ever came within a distance of each other."""
+    # Only walkers whose ranges overlap can have met: of a thousand, a few pairs are left to be followed.
+    middle = (centre.max(axis=0) + centre.min(axis=0)) / 2.0
+    reach = np.linalg.norm(centre - middle, axis=-1).max(axis=0)
+    for number in range(len(middle) - 1):
+        apart = np.linalg.norm(middle[number + 1 :] - middle[number], axis=-1)
+        within = number + 1 + np.flatnonzero(apart < reach[number + 1 :] + reach[number] + near)
+        if np.any(np.linalg.norm(centre[:, within] - centre[:, number, None], axis=-1) < near):
+            return True
+    return False

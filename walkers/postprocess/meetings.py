@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from walkers.inputs.case import Case
-from walkers.postprocess.analysis import Analysis, Columns, Described
+from walkers.postprocess.analysis import Analysis, Quantity
 from walkers.postprocess.clusters import connected
 from walkers.postprocess.motion import Motion, read_bridges
+from walkers.postprocess.tables import Columns, columns_of_rows
 
-Pair = tuple[int, int]
+
+@dataclass(frozen=True)
+class Meeting:
+    """``meetings.parquet``: one row per event between two walkers that are meant to meet."""
+
+    time: Annotated[float, "s", "from the begin of the drive"]
+    event: Annotated[str, "", "merged: the first bridge between two walkers is there; parted: the last one is gone"]
+    walker: Annotated[int, "", "number of one of the two"]
+    other: Annotated[int, "", "number of the other"]
+    size: Annotated[int, "", "walkers that are joined by bridges, directly or by others, with the first one after that"]
 
 
 class Meetings(Analysis):
@@ -20,17 +31,7 @@ class Meetings(Analysis):
 
     name = "meetings"
     version = 1
-    tables = ("meetings",)
-    columns: ClassVar[Described] = {
-        "merged": ("", "how often two walkers stuck together"),
-        "parted": ("", "how often two of them parted again"),
-        "largest_group": ("", "walkers in the largest group that bridges ever joined"),
-    }
-    rows = (
-        ("meetings of walkers: merged", "merged"),
-        ("meetings of walkers: parted", "parted"),
-        ("most walkers together", "largest_group"),
-    )
+    tables: ClassVar[Mapping[str, type]] = {"meetings": Meeting}
 
     def applies(self, case: Case) -> bool:
         """Where walkers are meant to meet."""
@@ -38,8 +39,8 @@ class Meetings(Analysis):
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """Events from one recorded frame of bridges to the next; who stands together from the first has merged then."""
-        rows: list[tuple[float, str, int, int, int]] = []
-        before: frozenset[Pair] = frozenset()
+        rows: list[Meeting] = []
+        before: frozenset[tuple[int, int]] = frozenset()
         groups: list[list[int]] = []
         largest = 1
         for bridges in read_bridges(motion):
@@ -50,17 +51,25 @@ class Meetings(Analysis):
             size = {walker: len(group) for group in groups for walker in group}
             largest = max([largest, *size.values()])
             seconds = float(motion.time[bridges.frame])
-            rows += [(seconds, "merged", one, other, size[one]) for one, other in sorted(now - before)]
-            rows += [(seconds, "parted", one, other, size[one]) for one, other in sorted(before - now)]
+            for event, pairs in (("merged", now - before), ("parted", before - now)):
+                rows += [Meeting(seconds, event, one, other, size[one]) for one, other in sorted(pairs)]
             before = now
-        kinds = [row[1] for row in rows]
-        summary = {
-            "merged": kinds.count("merged"),
-            "parted": kinds.count("parted"),
+        events = [row.event for row in rows]
+        return {"meetings": columns_of_rows(Meeting, rows)}, {
+            "merged": events.count("merged"),
+            "parted": events.count("parted"),
             "largest_group": largest,
             "groups_at_end": sorted((group for group in groups if len(group) > 1), key=len, reverse=True),
         }
-        return {"meetings": _columns(rows)}, summary
+
+    def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
+        """How often, and how many together."""
+        del result
+        label = "meetings of walkers"
+        yield Quantity("merged", f"{label}: merged", "", "merged", "how often two walkers stuck together")
+        yield Quantity("parted", f"{label}: parted", "", "parted", "how often two of them parted again")
+        told = "walkers in the largest group that bridges ever joined"
+        yield Quantity("largest_group", "most walkers together", "", "largest_group", told)
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """How often, and who is together at the end."""
@@ -71,15 +80,7 @@ class Meetings(Analysis):
         ]
 
 
-def groups_of(joined: frozenset[Pair], count: int) -> list[list[int]]:
+def groups_of(joined: frozenset[tuple[int, int]], count: int) -> list[list[int]]:
     """Connected components of so many walkers, given which pairs are joined."""
     labels = connected(count, np.array(sorted(joined), dtype=np.int64).reshape(-1, 2))
     return [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
-
-
-def _columns(rows: list[tuple[float, str, int, int, int]]) -> Columns:
-    kinds = {"time": np.float64, "event": np.str_, "walker": np.int64, "other": np.int64, "size": np.int64}
-    columns = zip(*rows, strict=True) if rows else ([] for _ in kinds)
-    return {
-        name: np.array(list(values), dtype=kind) for (name, kind), values in zip(kinds.items(), columns, strict=True)
-    }

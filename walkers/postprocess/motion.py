@@ -9,19 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive
-from walkers.postprocess.dump import BinaryDump, DumpError, FloatArray, NoNumberError
-from walkers.postprocess.local_dump import local_frames
+from walkers.postprocess.dump import BinaryDump, BoolArray, DumpError, FloatArray, IntArray, NoNumberError, local_frames
 from walkers.runner.directory import SEGMENT_NAME, case_of, layout_of, segment_directories
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 
-IntArray = npt.NDArray[np.int64]
 FLOOR = 0
 """Number of the floor among the walls of a container; the others are the side walls."""
 _OF_FRAMES = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin")
@@ -38,26 +35,20 @@ class Motion:
         Of the run; if it was driven until its walkers were steady, with the cycles that it took.
     time : ndarray, shape (F,)
         s, from the begin of the drive; negative while the beads come to rest.
-    position, velocity : ndarray, shape (F, N, 3)
-        Of the centres.
-    spin : ndarray, shape (F, N, 3)
-        Angular velocity, rad/s.
+    position, velocity, spin : ndarray, shape (F, N, 3)
+        Of the centres; angular velocity, rad/s.
     substrate, substrate_velocity : ndarray, shape (F, 3)
         Displacement and velocity of the boundary in the laboratory, whichever frame the run was made in, m and m/s.
     radius : ndarray, shape (N,)
     walkers
-        Which beads are whose.
-    first_id
-        The engine's id of the first bead.
+        Which beads are whose, by their numbers from 0.
     frames : list of (Path, int)
         Segment and number of each frame within it, for the bridges.
+    truncated, ended_early
+        Whether the dump ends within a frame; whether the run ended before the most cycles that it may take, for its
+        walkers were steady.
     mean_spin : ndarray, shape (F, N, 3), or None
-        Angular velocity averaged over all steps since the frame before, where there are walkers (nothing in the first
-        frame).
-    truncated : bool
-        Whether the dump ends within a frame.
-    ended_early : bool
-        Whether the run ended before the most cycles that it may take, for its walkers were steady.
+        Angular velocity averaged over all steps since the frame before (nothing in the first frame), of walkers.
     """
 
     case: Case
@@ -69,7 +60,6 @@ class Motion:
     substrate_velocity: FloatArray
     radius: FloatArray
     walkers: tuple[PlacedWalker, ...]
-    first_id: int
     frames: list[tuple[Path, int]]
     truncated: bool
     ended_early: bool = False
@@ -77,6 +67,11 @@ class Motion:
 
     def __repr__(self) -> str:
         return f"<Motion of {self.case.name}: {len(self.time)} frames of {len(self.radius)} beads>"
+
+    @property
+    def directory(self) -> Path:
+        """Of the run."""
+        return self.frames[0][0].parent.parent
 
     @property
     def first_driven(self) -> int:
@@ -92,10 +87,11 @@ class Motion:
         """Some of the frames and beads, with changes; beads are numbered anew, walkers keep their numbers."""
         parts: dict[str, Any] = {
             name: None if (one := getattr(self, name)) is None else one[frames] for name in _OF_FRAMES
-        } | changes
+        }
+        parts |= changes
         if beads is not None:
             parts |= {name: None if (one := parts[name]) is None else one[:, beads] for name in _OF_BEADS}
-            place = {bead + self.first_id: number for number, bead in enumerate(beads.tolist(), self.first_id)}
+            place = {bead: number for number, bead in enumerate(beads.tolist())}
             kept = (one for one in self.walkers if place.keys() >= set(one.beads))
             parts["radius"] = self.radius[beads]
             parts["walkers"] = tuple(replace(one, beads=tuple(place[bead] for bead in one.beads)) for one in kept)
@@ -103,7 +99,7 @@ class Motion:
 
     def of_walkers(self, walkers: Collection[PlacedWalker]) -> Motion:
         """That of the beads of some walkers alone."""
-        return self.select(beads=np.array([bead - self.first_id for one in walkers for bead in one.beads]))
+        return self.select(beads=np.array([bead for one in walkers for bead in one.beads]))
 
     @property
     def averaged(self) -> Motion:
@@ -113,9 +109,8 @@ class Motion:
         averaged; elsewhere they are the mean of both ends.
         """
         spin = (self.spin[1:] + self.spin[:-1]) / 2.0 if self.mean_spin is None else self.mean_spin[1:]
-        interval = np.diff(self.time)[:, None, None]
         position = (self.position[1:] + self.position[:-1]) / 2.0
-        velocity = np.diff(self.position, axis=0) / interval
+        velocity = np.diff(self.position, axis=0) / np.diff(self.time)[:, None, None]
         return self.select(slice(1, None), position=position, velocity=velocity, spin=spin)
 
     def between(self, share: float) -> Motion:
@@ -127,9 +122,9 @@ class Motion:
         return self.select(slice(1, None), position=position)
 
     @property
-    def large(self) -> npt.NDArray[np.bool_]:
+    def large(self) -> BoolArray:
         """Whether a bead is of the large class, shape (N,)."""
-        large: npt.NDArray[np.bool_] = self.radius > self.case.border
+        large: BoolArray = self.radius > self.case.border
         return large
 
     @cached_property
@@ -137,7 +132,7 @@ class Motion:
         """Number of the walker that each bead belongs to, −1 for none, shape (N,)."""
         owner = np.full(len(self.radius), -1, dtype=np.int64)
         for walker in self.walkers:
-            owner[np.array(walker.beads) - self.first_id] = walker.walker
+            owner[list(walker.beads)] = walker.walker
         return owner
 
     @cached_property
@@ -152,17 +147,7 @@ class Motion:
 
 @dataclass(frozen=True, repr=False)
 class Group:
-    """The walkers of one make in a motion: W walkers of n beads each.
-
-    Attributes
-    ----------
-    motion
-        Of all beads.
-    make
-        Of these.
-    walkers
-        How each was started.
-    """
+    """The walkers of one make in a motion of all beads: W walkers of n beads each, and how each was started."""
 
     motion: Motion
     make: Walkers
@@ -189,7 +174,7 @@ class Group:
     @cached_property
     def rows(self) -> IntArray:
         """Numbers of the beads in the motion, shape (W, n)."""
-        return np.array([walker.beads for walker in self.walkers], dtype=np.int64) - self.motion.first_id
+        return np.array([walker.beads for walker in self.walkers], dtype=np.int64)
 
     @cached_property
     def position(self) -> FloatArray:
@@ -258,18 +243,13 @@ def gathered(motion: Motion, lane: float = 2.0) -> Motion:
     across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
     shift = np.zeros((len(motion.radius), 3))
     for number, one in enumerate(motion.walkers):
-        shift[np.array(one.beads) - motion.first_id] = -number * lane * across - [*one.origin, 0.0]
+        shift[list(one.beads)] = -number * lane * across - [*one.origin, 0.0]
     moved = replace(motion, position=motion.position + shift)
     return moved if case.boundary.bare else moved.of_walkers(moved.walkers[:1])
 
 
 def read_motion(directory: str | Path) -> Motion:
-    """Read the beads of a run, finished or not.
-
-    Parameters
-    ----------
-    directory
-        A run directory with its segments.
+    """Read the beads of a run directory with its segments, finished or not.
 
     Raises
     ------
@@ -288,34 +268,37 @@ def read_motion(directory: str | Path) -> Motion:
     """
     directory = Path(directory)
     case = case_of(directory)
-    segments = segment_directories(directory)
+    segments = {path: _opened(path) for path in segment_directories(directory)}
     if not segments:
         raise DumpError(f"{directory}: no segment of the run is finished yet")
     try:
-        return motion_of(case, segments, [_segment(segment) for segment in segments])
+        return _motion(case, segments)
     except NoNumberError as error:
         finished = (directory / MANIFEST_NAME).is_file()  # then it was tabulated, without such numbers
         told = "the dump was damaged since the run was finished" if finished else "the beads' motion blew up"
         raise DumpError(f"{error}: {told}") from error
 
 
-def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -> Motion:
-    """The motion in the dumps of segments, each with its record (``begin``, ``end``, ``drive_from``).
+def _opened(segment: Path) -> tuple[dict[str, Any], Layout, BinaryDump]:
+    """The record, the layout and the beads' dump of a segment."""
+    path = segment / SEGMENT_NAME
+    try:
+        record = read_json(path)
+        record = {name: record[name] for name in ("begin", "end", "drive_from")}
+        path = segment
+        layout = layout_of(segment)
+        return record, layout, BinaryDump(segment / layout.bead_dump, layout.bead_columns)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DumpError(f"{path}: cannot be read ({error})") from error
 
-    Raises
-    ------
-    postprocess.dump.DumpError
-        If one cannot be read, or one is missing.
-    """
-    start = next((one["drive_from"] for one in records if one["drive_from"] is not None), None)
+
+def _motion(case: Case, segments: dict[Path, tuple[dict[str, Any], Layout, BinaryDump]]) -> Motion:
     steps: list[int] = []
-    parts: list[FloatArray] = []
+    stacks: list[FloatArray] = []
     frames: list[tuple[Path, int]] = []
-    truncated = False
-    for segment, record in zip(segments, records, strict=True):
+    for segment, (record, layout, dump) in segments.items():
         if record["begin"] != (steps[-1] if steps else 0):
             raise DumpError(f"{segment}: the segment before it is missing")
-        layout, dump = _dump_of(segment)
         data = dump.stack()
         whole = len(data) and not dump.truncated and dump.steps[-1] == record["end"]
         if not whole and (len(segments) > 1 or case.run.rests):
@@ -324,19 +307,16 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
             raise DumpError(f"{dump.path}: {len(data)} complete frames, too few for a motion")
         if data.shape[1] != layout.atoms:
             raise DumpError(f"{segment}: {data.shape[1]} rows, expected {layout.atoms}")
-        truncated = truncated or dump.truncated
         begin = 1 if steps else 0  # the first frame is the last one of the segment before
-        parts.append(data[begin:])
-        steps += [int(step) for step in dump.steps[begin:]]
+        stacks.append(data[begin:])
+        steps += dump.steps[begin:].tolist()
         frames += [(segment, number) for number in range(begin, len(data))]
-    data = np.concatenate(parts) if len(parts) > 1 else parts[0]
-    ended_early = False
-    if case.run.until_steady:
-        cycles = records[-1]["end"] // case.run.steps_per_cycle
-        ended_early, case = cycles < case.run.cycles, case.for_cycles(cycles)
+    data = np.concatenate(stacks) if len(stacks) > 1 else stacks[0]
+    cycles = record["end"] // case.run.steps_per_cycle if case.run.until_steady else case.run.cycles
     # Before the drive has begun it is as if it would with the next frame.
-    zero = start if start is not None else steps[-1] + case.run.steps_per_sample
-    time = (np.array(steps, dtype=np.float64) - zero) * case.run.time_step
+    starts = [one["drive_from"] for one, _, _ in segments.values() if one["drive_from"] is not None]
+    start = starts[0] if starts else steps[-1] + case.run.steps_per_sample
+    time = (np.array(steps, dtype=np.float64) - start) * case.run.time_step
 
     def vectors(name: str) -> FloatArray:
         column = dump.column(name)
@@ -344,12 +324,11 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
 
     # In the laboratory frame the walls move, in the container's they rest.
     shift, speed = prescribed_motion(case.drive, time)
-    lab = case.drive.frame == "lab"
-    if start:  # the frame at which the drive begins is the last one of the rest before it
+    if starts and start:  # the frame at which the drive begins is the last one of the rest before it
         speed[time == 0.0] = 0.0
-    substrate, substrate_velocity = (shift, speed) if lab else boundary_motion(case.drive, time)
+    substrate, substrate_velocity = (shift, speed) if case.drive.frame == "lab" else boundary_motion(case.drive, time)
     return Motion(
-        case=case,
+        case=case.for_cycles(cycles) if case.run.until_steady else case,
         time=time,
         position=vectors("x") - shift[:, None],
         velocity=vectors("vx") - speed[:, None],
@@ -357,39 +336,22 @@ def motion_of(case: Case, segments: list[Path], records: list[dict[str, Any]]) -
         substrate=substrate,
         substrate_velocity=substrate_velocity,
         radius=data[0, :, dump.column("radius")],
-        walkers=layout.walkers,
-        first_id=1,
+        walkers=tuple(replace(one, beads=tuple(bead - 1 for bead in one.beads)) for one in layout.walkers),
         frames=frames,
-        truncated=truncated,
-        ended_early=ended_early,
+        truncated=any(dump.truncated for _, _, dump in segments.values()),
+        ended_early=cycles < case.run.cycles,
         mean_spin=vectors(MEAN_SPIN_COLUMNS[0]) if MEAN_SPIN_COLUMNS[0] in layout.bead_columns else None,
     )
 
 
-def _segment(directory: Path) -> dict[str, Any]:
-    try:
-        record = read_json(directory / SEGMENT_NAME)
-        return {name: record[name] for name in ("begin", "end", "drive_from")}
-    except (OSError, ValueError, KeyError) as error:
-        raise DumpError(f"{directory / SEGMENT_NAME}: cannot be read ({error})") from error
-
-
-def _dump_of(segment: Path) -> tuple[Layout, BinaryDump]:
-    try:
-        layout = layout_of(segment)
-        return layout, BinaryDump(segment / layout.bead_dump, layout.bead_columns)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DumpError(f"{segment}: cannot be read ({error})") from error
-
-
-def prescribed_motion(drive: Drive, time: npt.NDArray[np.floating[Any]]) -> tuple[FloatArray, FloatArray]:
+def prescribed_motion(drive: Drive, time: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Displacement and velocity of the walls in the frame of the run, m and m/s, each of shape (F, 3)."""
     if drive.frame == "lab":
         return boundary_motion(drive, time)
     return np.zeros((len(time), 3)), np.zeros((len(time), 3))
 
 
-def boundary_motion(drive: Drive, time: npt.NDArray[np.floating[Any]]) -> tuple[FloatArray, FloatArray]:
+def boundary_motion(drive: Drive, time: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Displacement and velocity of the boundary in the laboratory, m and m/s, each of shape (F, 3); before 0 s none."""
     displacement, velocity = np.zeros((len(time), 3)), np.zeros((len(time), 3))
     driven = time >= 0.0
@@ -416,10 +378,8 @@ class Bridges:
     force, gap : ndarray, shape (K,)
         Net normal force (capillary, viscous and elastic), positive where it pulls the two together, N; and the gap, m,
         negative where they touch.
-    wall_beads, walls : ndarray of int, shape (M,)
-        Bead and wall, 0 being the floor.
-    wall_force, wall_gap : ndarray, shape (M,)
-        The same of bridges to walls.
+    wall_beads, walls, wall_force, wall_gap : ndarray, shape (M,)
+        Bead and wall, 0 being the floor, and the same of bridges to walls.
     """
 
     frame: int
@@ -457,25 +417,15 @@ def read_bridges(motion: Motion) -> Iterator[Bridges]:
 
 def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: Layout) -> Bridges:
     """The bridges of a frame, given the rows of its dumps."""
-    place = motion.position[frame]
-    pair, wall = layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
+    place, pair, wall = motion.position[frame], layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
     # Neighbours without a bridge are reported too, with no force.
     between = between[np.any(between[:, pair("fx") : pair("fx") + 3] != 0.0, axis=1)]
     against = against[np.any(against[:, wall("fx") : wall("fx") + 3] != 0.0, axis=1)]
-    ids = between[:, [pair("id1"), pair("id2")]].astype(np.int64) - motion.first_id
+    ids = between[:, [pair("id1"), pair("id2")]].astype(np.int64) - 1
     arm = place[ids[:, 1]] - place[ids[:, 0]]
-    force = between[:, pair("fx") : pair("fx") + 3]
-    beads = against[:, wall("id")].astype(np.int64) - motion.first_id
-    walls = against[:, wall("wall")].astype(np.int64)
-    normals = np.stack([one.normals(place[beads]) for one in motion.case.boundary.walls])
-    pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals[walls, np.arange(len(walls))])
-    return Bridges(
-        frame=frame,
-        beads=ids,
-        force=np.einsum("kx,kx->k", force, arm) / np.linalg.norm(arm, axis=1),
-        gap=-between[:, pair("overlap")],
-        wall_beads=beads,
-        walls=walls,
-        wall_force=pull,
-        wall_gap=-against[:, wall("overlap")],
-    )
+    pull = np.einsum("kx,kx->k", between[:, pair("fx") : pair("fx") + 3], arm) / np.linalg.norm(arm, axis=1)
+    beads, walls = against[:, wall("id")].astype(np.int64) - 1, against[:, wall("wall")].astype(np.int64)
+    normals = np.stack([one.normals(place[beads]) for one in motion.case.boundary.walls])[walls, np.arange(len(walls))]
+    wall_pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals)
+    gap, wall_gap = -between[:, pair("overlap")], -against[:, wall("overlap")]
+    return Bridges(frame, ids, pull, gap, beads, walls, wall_pull, wall_gap)

@@ -3,33 +3,36 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.postprocess.analysis import Analysis, Columns, Described
-from walkers.postprocess.bed import bed_of, coordination_of_inner, liquid_of_beads, packing_profile
+from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
+from walkers.postprocess.analysis import Analysis, Described, Quantity, tables_of
 from walkers.postprocess.clusters import (
+    Beads,
     Climb,
     ClimbCriteria,
     Cluster,
+    Event,
     Track,
     bulk_of,
     classify,
     connected,
+    events_of,
     follow,
     held_clusters,
 )
-from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.events import Event, events_of
-from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
+from walkers.postprocess.dump import BoolArray, FloatArray
+from walkers.postprocess.motion import Bridges, Motion, read_bridges
+from walkers.postprocess.tables import Columns, columns_of, columns_of_rows
+from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,140 +42,73 @@ _LAYERS = 0.5
 
 
 @dataclass(frozen=True)
-class PileAnalysis:
-    """Everything that is measured of a pile.
+class Bed:
+    """``bed.parquet``: one row per frame of a pile."""
 
-    Attributes
-    ----------
-    motion
-        Of the beads.
-    bed
-        The columns of `walkers.postprocess.bed.bed_of`, one row a frame.
-    liquid : ndarray, shape (F, N)
-        In the bridges of each bead, m³.
-    inner
-        Contacts and bridges of the beads at no wall (`coordination_of_inner`) at rest, just before the drive.
-    bulks, held
-        Of each frame, which beads were of the bulk, and the clusters that were free and held (none before the drive).
-    tracks, climbs, out_of_pile
-        These clusters followed through time, what each of them did, and whether it came out of the pile.
-    events
-        When they came free, met, parted and ended.
-    definition
-        What counted as a climb.
-    """
-
-    motion: Motion
-    bed: Columns
-    liquid: FloatArray
-    inner: dict[str, float | None]
-    bulks: list[npt.NDArray[np.bool_]]
-    held: list[list[Cluster]]
-    tracks: list[Track] = field(default_factory=list)
-    climbs: list[Climb] = field(default_factory=list)
-    out_of_pile: list[bool] = field(default_factory=list)
-    events: list[Event] = field(default_factory=list)
-    definition: ClimbCriteria = field(default_factory=ClimbCriteria)
+    time: Annotated[float, "s", "from the begin of the drive; negative while the pile settles"]
+    surface: Annotated[float, "m", "height of the bulk's surface: median over x-y cells of the highest bead top"]
+    surface_low: Annotated[float, "m", "the same, 10th percentile"]
+    surface_high: Annotated[float, "m", "the same, 90th percentile"]
+    brazil_nut: Annotated[float, "", "(mean height of large beads - of small ones) / (their sum)"]
+    brazil_nut_of_bulk: Annotated[float, "", "the same without the beads that are free of the bulk"]
+    mean_square_velocity: Annotated[
+        float, "m^2/s^2", "of the beads, relative to the container, at the frames' phase of the drive"
+    ]
+    contacts: Annotated[
+        float, "", "a bead: twice the bridges between beads that touch, over the beads; those to walls do not count"
+    ]
+    bridges: Annotated[
+        float, "", "a bead: twice the bridges between beads, touching or open, over the beads; not those to walls"
+    ]
+    touching: Annotated[int, "", "bridges between beads that touch"]
+    opened: Annotated[int, "", "bridges between beads that do not"]
+    mean_force: Annotated[float, "N", "normal force of the bridges between beads, positive: pulling together"]
+    liquid_in_bridges: Annotated[float, "m^3", "sum of the volumes of all bridges, those to walls too"]
+    bulk: Annotated[int, "", "beads in the bulk"]
+    clusters: Annotated[int, "", "clusters that are free of the bulk and held to a side wall"]
+    highest: Annotated[float, "m", "height of the topmost bead of these; the surface where there is none"]
 
 
-def analyse(run: str | Path | Motion, definition: ClimbCriteria | None = None) -> PileAnalysis:
-    """Measure a pile, finished or not.
+@dataclass(frozen=True)
+class Profile:
+    """``profile.parquet``: one row per layer of a pile."""
 
-    Parameters
-    ----------
-    run
-        A run directory, or the motion in it.
-    definition
-        What counts as a climb.
-
-    Raises
-    ------
-    postprocess.dump.DumpError
-        If a dump cannot be read.
-    """
-    motion = run if isinstance(run, Motion) else read_motion(run)
-    case, count = motion.case, len(motion.radius)
-    beds, liquid, bulks, held = [], [], [], []
-    inner: dict[str, float | None] = {}
-    rest = _at_rest(motion)
-    for bridges in read_bridges(motion):
-        labels = connected(count, bridges.beads)
-        bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
-        liquid.append(liquid_of_beads(motion.radius, case.liquid.volume_fraction, bridges))
-        beds.append(bed_of(motion, bulks[-1], bridges, liquid[-1]))
-        if bridges.frame == rest:
-            inner = coordination_of_inner(bridges, count)
-        # While the pile falls and settles, most of it is free of the rest.
-        driven = motion.time[bridges.frame] >= 0.0
-        held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
-    bed = {name: np.array([one[name] for one in beds]) for name in beds[0]}
-    return classified(PileAnalysis(motion, bed, np.stack(liquid), inner, bulks, held), definition or ClimbCriteria())
+    height: Annotated[FloatArray, "m", "middle of a layer"]
+    packing_fraction: Annotated[
+        FloatArray, "", "volume of beads over that of the container, mean over the second half of the drive"
+    ]
+    liquid_fraction: Annotated[FloatArray, "", "volume of bridges over that of the container, as above"]
 
 
-def _at_rest(motion: Motion) -> int:
-    """Number of the last frame before the beads are shaken, at the begin of the drive."""
-    return max(int(np.searchsorted(motion.time, 0.0, side="right")) - 1, 0)
+@dataclass(frozen=True)
+class Member:
+    """``members.parquet``: one row per bead of a cluster that is free and held, and frame."""
 
-
-def classified(found: PileAnalysis, definition: ClimbCriteria) -> PileAnalysis:
-    """The same pile with another definition of a climb."""
-    motion = found.motion
-    tracks = follow(motion.time, found.held, definition)
-    climbs = [classify(track, motion.time, motion.position[:, :, 2], motion.large, definition) for track in tracks]
-    out = [_came_out_of_pile(track, found.bulks, motion.first_driven, definition) for track in tracks]
-    events = events_of(tracks, motion.time, found.bulks, definition, motion.first_driven)
-    return replace(found, tracks=tracks, climbs=climbs, out_of_pile=out, events=events, definition=definition)
-
-
-def _came_out_of_pile(
-    track: Track, bulks: Sequence[npt.NDArray[np.bool_]], first: int, definition: ClimbCriteria
-) -> bool:
-    """Whether most of a cluster's first beads were in the bulk before it, from the first frame of the drive on."""
-    # What was not has hung on a wall since the beads were poured.
-    members = list(track.members[0])
-    return any(bulk[members].mean() >= definition.min_overlap for bulk in bulks[first : track.frames[0]])
+    time: Annotated[float, "s", "from the begin of the drive"]
+    track: Annotated[int, "", "number of the cluster"]
+    bead: Annotated[int, "", "number of the bead, from 0"]
+    large: Annotated[bool, "", "whether it is of the large class"]
+    height: Annotated[float, "m", "of its centre"]
 
 
 class Pile(Analysis):
     """What loose beads in a container do: the bed, and the clusters that climb."""
 
     name = "pile"
-    version = 5
-    tables = ("bed", "clusters", "events", "profile")
+    version = 6
+    tables: ClassVar[Mapping[str, type]] = {
+        "bed": Bed,
+        "clusters": Climb,
+        "events": Event,
+        "profile": Profile,
+        "members": Member,
+    }
     headlines = ("climbs", "highest", "speed")
     derived: ClassVar[Described] = {
         "beads": ("", "number of beads"),
         "large": ("", "number of large beads"),
         "duration": ("s", "shaken"),
     }
-    columns: ClassVar[Described] = {
-        "climbs": ("", "clusters that climbed a wall"),
-        "onset": ("s", "when the first of them began"),
-        "speed": ("m/s", "mean of their speeds"),
-        "highest": ("m", "height that the highest of them reached"),
-        "led_by_large": ("", "how many of them were led by a large bead"),
-        "clusters": ("", "clusters that were free of the pile and held to a wall for a while"),
-        "surface_end": ("m", "height of the pile's surface at the end"),
-        "brazil_nut_end": ("", "Brazil-nut index at the end"),
-        "settling": ("s", "before the drive"),
-    }
-    rows = (
-        ("beads", "beads"),
-        ("of them large", "large"),
-        ("time shaken", "driven", "s"),
-        ("time to settle before", "settling", "s"),
-        ("height of the surface at the start", "surface.start", "m"),
-        ("Brazil-nut index at the start", "brazil_nut.start"),
-        ("height of the surface at the end", "surface.end", "m"),
-        ("Brazil-nut index at the end", "brazil_nut.end"),
-        ("contacts per bead, at rest", "coordination.rest.contacts"),
-        ("bridges per bead, at rest", "coordination.rest.bridges"),
-        ("contacts per bead, at rest, beads at no wall", "coordination.rest_inner.contacts"),
-        ("bridges per bead, at rest, beads at no wall", "coordination.rest_inner.bridges"),
-        ("contacts per bead, while shaken", "coordination.shaken.contacts"),
-        ("bridges per bead, while shaken", "coordination.shaken.bridges"),
-        ("clusters free of the pile and held to a wall", "clusters"),
-    )
 
     def applies(self, case: Case) -> bool:
         """Of loose beads in a container."""
@@ -180,14 +116,41 @@ class Pile(Analysis):
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """The bed, the clusters, what happened to them, and the packing."""
-        found = analyse(motion)
+        case, first, definition = motion.case, motion.first_driven, ClimbCriteria()
+        rows, wet, bulks, held = [], [], [], []
+        inner: dict[str, float | None] = {}
+        for bridges in read_bridges(motion):
+            labels = connected(len(motion.radius), bridges.beads)
+            bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
+            wet.append(liquid_of_beads(motion.radius, case.liquid.volume_fraction, bridges))
+            # While the pile falls and settles, most of it is free of the rest.
+            driven = motion.time[bridges.frame] >= 0.0
+            held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
+            rows.append(_bed(motion, bridges, bulks[-1], wet[-1], held[-1]))
+            if motion.time[bridges.frame] <= 0.0 or not inner:
+                inner = coordination_of_inner(bridges, len(motion.radius))
+        bed, names = columns_of_rows(Bed, rows), [wall.name for wall in case.boundary.walls]
+        beads = Beads(motion.time, motion.position[..., 2], motion.large, bed["surface"], bulks, first, names)
+        tracks = follow(motion.time, held, definition)
+        climbs = [classify(number, track, beads, definition) for number, track in enumerate(tracks)]
+        events = events_of(tracks, climbs, beads, definition)
+        late = _late(motion)
+        layer, liquid = 2.0 * _LAYERS * float(motion.radius.max()), np.stack(wet)
+        profile = packing_profile(motion.position[late], motion.radius, liquid[late], case.boundary, layer)
         tables = {
-            "bed": _bed_columns(found),
-            "clusters": _cluster_columns(found),
-            "events": _event_columns(found.events),
-            "profile": _profile_columns(found),
+            "bed": bed,
+            "clusters": columns_of_rows(Climb, climbs),
+            "events": columns_of_rows(Event, events),
+            "profile": columns_of(profile),
+            "members": columns_of_rows(Member, _members(tracks, beads)),
         }
-        return tables, _result(found)
+        return tables, {
+            **_bed_result(motion, bed, inner),
+            "clusters": len(tracks),
+            "events": dict(Counter(event.event for event in events)),
+            "climbs": [_told_climb(climb) for climb in climbs if climb.climbed],
+            "definition": vars(definition),
+        }
 
     def derived_of(self, case: Case) -> dict[str, float]:
         """Numbers of beads and the length of the drive."""
@@ -197,72 +160,97 @@ class Pile(Analysis):
             "duration": case.run.cycles / case.drive.frequency,
         }
 
-    def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """Its climbs, and the bed at the end."""
-        climbs = result["climbs"]
-        speeds = [climb["speed"] for climb in climbs if climb["speed"] is not None]
-        return {
-            "climbs": len(climbs),
-            "onset": min((climb["onset"] for climb in climbs), default=nan),
-            "speed": sum(speeds) / len(speeds) if speeds else nan,
-            "highest": max((climb["height"] for climb in climbs), default=nan),
-            "led_by_large": sum(climb["leader_large"] for climb in climbs),
-            "clusters": result["clusters"],
-            "surface_end": result["surface"]["end"],
-            "brazil_nut_end": result["brazil_nut"]["end"],
-            "settling": result["settling"],
-        }
+    def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
+        """Of the climbs, the bed, and each climb."""
+
+        def of_climbs(fold: Callable[[list[Any]], Any], key: str) -> Callable[[Mapping[str, Any]], Any]:
+            """What is made of a number of all climbs that have it; NaN where there is none."""
+
+            def folded(result: Mapping[str, Any]) -> Any:
+                values = [climb[key] for climb in result["climbs"] if climb[key] is not None]
+                return fold(values) if values or fold is sum else nan
+
+            return folded
+
+        yield Quantity("climbs", "", "", "climbs", "clusters that climbed a wall", of=lambda one: len(one["climbs"]))
+        yield Quantity("climbs", "", "s", "onset", "when the first of them began", of=of_climbs(min, "onset"))
+        mean = of_climbs(lambda speeds: sum(speeds) / len(speeds), "speed")
+        yield Quantity("climbs", "", "m/s", "speed", "mean of their speeds", of=mean)
+        highest = of_climbs(max, "height")
+        yield Quantity("climbs", "", "m", "highest", "height that the highest of them reached", of=highest)
+        told, led = "how many of them were led by a large bead", of_climbs(sum, "leader_large")
+        yield Quantity("climbs", "", "", "led_by_large", told, of=led)
+        yield Quantity("beads", "beads")
+        yield Quantity("large", "of them large")
+        yield Quantity("driven", "time shaken", "s")
+        told = "clusters that were free of the pile and held to a wall for a while"
+        yield Quantity("clusters", "clusters free of the pile and held to a wall", "", "clusters", told)
+        for event in result.get("events", ()):
+            yield Quantity(f"events.{event}", f"of them {event}")
+        yield Quantity("surface.start", "height of the surface at the start", "m")
+        label = "height of the surface at the end"
+        yield Quantity("surface.end", label, "m", "surface_end", "height of the pile's surface at the end")
+        yield Quantity("brazil_nut.start", "Brazil-nut index at the start")
+        label = "Brazil-nut index at the end"
+        yield Quantity("brazil_nut.end", label, "", "brazil_nut_end", label)
+        yield Quantity("settling", "time to settle before", "s", "settling", "before the drive")
+        whens = {"rest": "at rest", "rest_inner": "at rest, beads at no wall", "shaken": "while shaken"}
+        for when, told in whens.items():
+            for what in ("contacts", "bridges"):
+                yield Quantity(f"coordination.{when}.{what}", f"{what} per bead, {told}")
+        for number, climb in enumerate(result.get("climbs", ())):
+            place = f"climbs.{number}"
+            name = f"climb {number + 1} ({' '.join(climb['walls'])}, led by a {_leader(climb)} bead)"
+            for what, unit in {"begin": "s", "end": "s", "gain": "m", "height": "m"}.items():
+                yield Quantity(f"{place}.{what}", f"{name}: {what}", unit)
+            yield Quantity(f"{place}.speed", f"{name}: speed", "m/s", error=f"{place}.standard_error")
+            yield Quantity(f"{place}.size", f"{name}: beads")
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Did it climb, when, how fast, who led."""
-        surface, nuts = result["surface"], result["brazil_nut"]
+        surface, nuts, bridges = result["surface"], result["brazil_nut"], result["coordination"]
+        rest, inner, shaken = bridges["rest"], bridges["rest_inner"], bridges["shaken"]
+        alone = ""
+        if inner["beads"]:
+            alone = f"; {inner['beads']} beads at no wall have {inner['bridges']:.2f} and {inner['contacts']:.2f}"
         lines = [
             f"{result['case']}: {result['beads']} beads ({result['large']} large), {result['drive']}",
             f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling",
             f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
             f"  segregation (z of large - z of small)/sum: {nuts['start']:.3f} at the start, "
             f"{nuts['end']:.3f} at the end",
-            *_told_coordination(result["coordination"]),
+            f"  bridges    between beads, at rest: {_told_bridges(rest)}{alone}",
+        ]
+        if shaken:
+            lines.append(f"             while shaken: {_told_bridges(shaken)}")
+        lines += [
             f"  clusters   {result['clusters']} were free of the pile and held to a wall for a while"
             + "".join(f", {count} {kind}" for kind, count in result["events"].items()),
             f"  climbs     {len(result['climbs']) or 'none'}",
         ]
         for climb in result["climbs"]:
             speed = "-" if climb["speed"] is None else f"{climb['speed'] * 1e3:.2f}"
-            names = " ".join(climb["walls"])
-            where = f"in the corner {names}" if len(climb["walls"]) > 1 else f"on the wall {names}"
+            where = "in the corner" if len(climb["walls"]) > 1 else "on the wall"
             lines.append(
                 f"    {climb['begin']:.2f} to {climb['end']:.2f} s: {climb['gain'] * 1e3:.2f} mm up to "
-                f"{climb['height'] * 1e3:.2f} mm {where} at {speed} mm/s, led by a {_leader(climb)} bead, "
-                f"{climb['size']} beads ({climb['large']} large)"
+                f"{climb['height'] * 1e3:.2f} mm {where} {' '.join(climb['walls'])} at {speed} mm/s, led by a "
+                f"{_leader(climb)} bead, {climb['size']} beads ({climb['large']} large)"
                 + ("" if climb["out_of_pile"] else "; it has hung on a wall since the pouring")
             )
         return lines
 
-    def rows_of(self, result: Mapping[str, Any]) -> Iterable[tuple[str, ...]]:
-        """The same as rows of a table."""
-        yield from self.rows
-        yield from ((f"of them {event}", f"events.{event}") for event in result["events"])
-        for number, climb in enumerate(result["climbs"]):
-            place = f"climbs.{number}"
-            name = f"climb {number + 1} ({' '.join(climb['walls'])}, led by a {_leader(climb)} bead)"
-            for what, unit in {"begin": "s", "end": "s", "gain": "m", "height": "m"}.items():
-                yield f"{name}: {what}", f"{place}.{what}", unit
-            yield f"{name}: speed", f"{place}.speed", "m/s", f"{place}.standard_error"
-            yield f"{name}: beads", f"{place}.size"
-
     def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
         """Cluster and track of each bead, the liquid in its bridges (m³), and whether it climbs."""
-        found = analyse(motion)
+        tables = tables_of(motion.directory)
+        members, climbed, count = tables["members"], tables["clusters"]["climbed"], len(motion.radius)
 
         def of_frame(bridges: Bridges) -> Columns:
-            count = len(motion.radius)
             track, climber = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
-            for number, (one, climb) in enumerate(zip(found.tracks, found.climbs, strict=True)):
-                if members := list(one.members_at(bridges.frame)):
-                    track[members] = number
-                    climber[members] = int(climb.climbed)
-            component, liquid = connected(count, bridges.beads), found.liquid[bridges.frame].copy()
+            now = members["time"] == motion.time[bridges.frame]
+            beads, tracks = members["bead"][now], members["track"][now]
+            track[beads], climber[beads] = tracks, climbed[tracks]
+            liquid = liquid_of_beads(motion.radius, motion.case.liquid.volume_fraction, bridges)
+            component = connected(count, bridges.beads)
             return {"component": component, "liquid": liquid, "track": track, "is_climber": climber}
 
         return of_frame
@@ -271,136 +259,199 @@ class Pile(Analysis):
         """Heights of the clusters, their events, segregation and agitation."""
         from walkers.postprocess.figures import climb_figure
 
-        return {"climb": climb_figure(analyse(directory))}
+        return {"climb": climb_figure(case_of(directory), tables_of(directory))}
 
 
-def _bed_columns(found: PileAnalysis) -> Columns:
-    held = np.zeros(len(found.motion.time), dtype=np.int64)
-    highest = found.bed["surface"].copy()
-    for track in found.tracks:
-        for frame, members in zip(track.frames, track.members, strict=True):
-            held[frame] += 1
-            highest[frame] = max(highest[frame], found.motion.position[frame, list(members), 2].max())
-    return {"time": found.motion.time, **found.bed, "clusters": held, "highest": highest}
-
-
-_KINDS = {
-    np.float64: ("begin", "end", "onset", "qualified", "gain", "speed", "standard_error", "height"),
-    np.int64: ("leader", "size", "large"),
-    np.bool_: ("climbed",),
-}
-"""Of what a climb is told by, as columns."""
-
-
-def _cluster_columns(found: PileAnalysis) -> Columns:
-    time, tracks, climbs = found.motion.time, found.tracks, found.climbs
-    names = [names_of_walls(climb.walls, found.motion.case.boundary) for climb in climbs]
-    merged = [-1 if track.merged_into is None else track.merged_into for track in tracks]
-    columns: Columns = {
-        name: np.array([getattr(climb, name) for climb in climbs], dtype=kind)
-        for kind, keys in _KINDS.items()
-        for name in keys
-    }
-    return columns | {
-        "track": np.arange(len(tracks), dtype=np.int64),
-        "first": np.array([time[track.frames[0]] for track in tracks], dtype=np.float64),
-        "last": np.array([time[track.frames[-1]] for track in tracks], dtype=np.float64),
-        "leader_large": found.motion.large[columns["leader"]],
-        "above_surface": columns["height"] - found.bed["surface"][np.searchsorted(time, columns["end"])],
-        "walls": np.array([len(climb.walls) for climb in climbs], dtype=np.int64),
-        "wall_names": np.array(names, dtype=np.str_),
-        "merged_into": np.array(merged, dtype=np.int64),
-        "out_of_pile": np.array(found.out_of_pile, dtype=np.bool_),
-    }
-
-
-def _event_columns(events: list[Event]) -> Columns:
-    return {
-        "time": np.array([event.time for event in events], dtype=np.float64),
-        "event": np.array([event.kind for event in events], dtype=np.str_),
-        "track": np.array([event.track for event in events], dtype=np.int64),
-        "other": np.array([-1 if event.other is None else event.other for event in events], dtype=np.int64),
-    }
-
-
-def _profile_columns(found: PileAnalysis) -> Columns:
-    motion = found.motion
-    driven = _in_second_half(motion)
-    layer = _LAYERS * 2.0 * float(motion.radius.max())
-    names = ("height", "packing_fraction", "liquid_fraction")
-    profile = packing_profile(motion.position[driven], motion.radius, found.liquid[driven], motion.case.boundary, layer)
-    return dict(zip(names, profile, strict=True))
-
-
-def _in_second_half(motion: Motion) -> npt.NDArray[np.bool_]:
+def _late(motion: Motion) -> BoolArray:
     """Which frames are those of the second half of the drive; the last one where it has not begun."""
-    late: npt.NDArray[np.bool_] = motion.time >= min(motion.time[motion.first_driven :].mean(), motion.time[-1])
+    late: BoolArray = motion.time >= min(motion.time[motion.first_driven :].mean(), motion.time[-1])
     return late
 
 
-def _coordination(found: PileAnalysis) -> dict[str, Any]:
-    """Contacts and bridges a bead: at rest, then those of the inner beads, and in the second half of the drive."""
-    rest, late = _at_rest(found.motion), _in_second_half(found.motion)
-    counts = {name: found.bed[name] for name in ("contacts", "bridges")}
-    return {
-        "rest": {name: float(values[rest]) for name, values in counts.items()},
-        "rest_inner": found.inner,
-        "shaken": {name: float(np.mean(values[late])) for name, values in counts.items()}
-        if found.motion.time[-1] > 0.0
-        else None,
-    }
-
-
-def _result(found: PileAnalysis) -> dict[str, Any]:
-    motion, start = found.motion, found.motion.first_driven
-    ends = {
-        name: {"start": float(found.bed[name][start]), "end": float(found.bed[name][-1])}
-        for name in ("surface", "brazil_nut")
-    }
+def _bed_result(motion: Motion, bed: Columns, inner: Mapping[str, float | None]) -> dict[str, Any]:
+    """What a result says of the bed; ``inner`` are the beads at no wall, just before the drive."""
+    first, end = motion.first_driven, motion.time[-1]
+    rest = max(int(np.searchsorted(motion.time, 0.0, side="right")) - 1, 0)
+    ends = ("surface", "brazil_nut")
+    counts = {name: bed[name] for name in ("contacts", "bridges")}
+    shaken = {name: float(np.mean(values[_late(motion)])) for name, values in counts.items()}
     return {
         "beads": len(motion.radius),
         "large": int(motion.large.sum()),
-        "driven": float(max(motion.time[-1], 0.0)),
-        "settling": float(min(motion.time[-1], 0.0) - motion.time[0]),
-        **ends,
-        "coordination": _coordination(found),
-        "clusters": len(found.tracks),
-        "events": dict(Counter(event.kind for event in found.events)),
-        "climbs": [
-            {
-                **{name: getattr(climb, name) for name in ("begin", "end", "onset", "qualified", "gain")},
-                "speed": climb.speed if np.isfinite(climb.speed) else None,
-                "standard_error": climb.standard_error if np.isfinite(climb.standard_error) else None,
-                "leader_large": bool(motion.large[climb.leader]),
-                **{name: getattr(climb, name) for name in ("height", "size", "large")},
-                "walls": names_of_walls(climb.walls, motion.case.boundary).split(),
-                "out_of_pile": out_of_pile,
-            }
-            for climb, out_of_pile in zip(found.climbs, found.out_of_pile, strict=True)
-            if climb.climbed
-        ],
-        "definition": vars(found.definition),
+        "driven": float(max(end, 0.0)),
+        "settling": float(min(end, 0.0) - motion.time[0]),
+        **{name: {"start": float(bed[name][first]), "end": float(bed[name][-1])} for name in ends},
+        "coordination": {
+            "rest": {name: float(values[rest]) for name, values in counts.items()},
+            "rest_inner": inner,
+            "shaken": shaken if end > 0.0 else None,
+        },
     }
 
 
-def names_of_walls(walls: tuple[int, ...], boundary: Boundary) -> str:
-    """Names of some walls, such as ``-x +y`` for a corner of a box."""
-    return " ".join(boundary.walls[wall].name for wall in sorted(walls))
+def _told_climb(climb: Climb) -> dict[str, Any]:
+    """What a result says of a climb."""
+    names = ("begin", "end", "onset", "qualified", "gain", "speed", "standard_error", "leader_large", "height")
+    known = {name: getattr(climb, name) for name in (*names, "size", "large")}
+    told = {name: value if np.isfinite(value) else None for name, value in known.items()}
+    return {**told, "walls": climb.wall_names.split(), "out_of_pile": climb.out_of_pile}
+
+
+def climbing_beads(motion: Motion) -> Callable[[int], set[int]]:
+    """What gives, for a frame of a pile's motion, the beads of the clusters that climb and are free and held then."""
+    tables = tables_of(motion.directory)
+    members = tables["members"]
+    climbing = tables["clusters"]["climbed"][members["track"]]
+    beads: dict[float, set[int]] = {}
+    for time, bead in zip(members["time"][climbing].tolist(), members["bead"][climbing].tolist(), strict=True):
+        beads.setdefault(time, set()).add(bead)
+    return lambda frame: beads.get(float(motion.time[frame]), set())
+
+
+def climbs_by(tables: Mapping[str, Columns], definition: ClimbCriteria) -> list[Climb]:
+    """What climbs in a pile by another definition, from its tables; neither walls nor the bulk are told."""
+    time, members = tables["bed"]["time"], tables["members"]
+    frame, bead = np.searchsorted(time, members["time"]), members["bead"]
+    height = np.full((len(time), bead.max(initial=0) + 1), nan)
+    height[frame, bead] = members["height"]
+    large = np.zeros(height.shape[1], dtype=np.bool_)
+    large[bead] = members["large"]
+    held: list[dict[int, set[int]]] = [{} for _ in time]
+    for now, track, one in zip(frame.tolist(), members["track"].tolist(), bead.tolist(), strict=True):
+        held[now].setdefault(track, set()).add(one)
+    clusters: list[list[Cluster]] = [[(frozenset(one), frozenset()) for one in found.values()] for found in held]
+    beads = Beads(time, height, large, tables["bed"]["surface"])
+    tracks = enumerate(follow(time, clusters, definition))
+    return [one for track in tracks if (one := classify(*track, beads, definition)).climbed]
+
+
+def _members(tracks: Sequence[Track], beads: Beads) -> list[Member]:
+    """Frame by frame, and in a frame in the order of their smallest beads, as `held_clusters` finds clusters."""
+    found = [
+        (frame, number, sorted(own))
+        for number, one in enumerate(tracks)
+        for frame, own in zip(one.frames, one.members, strict=True)
+    ]
+    return [
+        Member(float(beads.time[frame]), number, bead, bool(beads.large[bead]), float(beads.height[frame, bead]))
+        for frame, number, members in sorted(found, key=lambda one: (one[0], one[2]))
+        for bead in members
+    ]
+
+
+def _told_bridges(counts: Mapping[str, Any]) -> str:
+    return f"{counts['bridges']:.2f} a bead, {counts['contacts']:.2f} of them contacts"
 
 
 def _leader(climb: Mapping[str, Any]) -> str:
     return "large" if climb["leader_large"] else "small"
 
 
-def _told_coordination(found: Mapping[str, Any]) -> list[str]:
-    rest, inner, shaken = found["rest"], found["rest_inner"], found["shaken"]
-    told = [
-        f"  bridges    between beads, at rest: {rest['bridges']:.2f} a bead, {rest['contacts']:.2f} of them contacts"
-    ]
-    if inner["beads"]:
-        told[0] += f"; {inner['beads']} beads at no wall have {inner['bridges']:.2f} and {inner['contacts']:.2f}"
-    if shaken:
-        told.append(
-            f"             while shaken: {shaken['bridges']:.2f} a bead, {shaken['contacts']:.2f} of them contacts"
-        )
-    return told
+def _bed(motion: Motion, bridges: Bridges, bulk: BoolArray, liquid: FloatArray, held: Sequence[Cluster]) -> Bed:
+    """The state of a pile in a frame, given its bulk, the liquid of each bead and the clusters that are held."""
+    frame = bridges.frame
+    position, radius, large = motion.position[frame], motion.radius, motion.large
+    container = motion.case.boundary  # its cross-section is cut into cells of about four large radii
+    tops = _surface_cells(position[bulk], radius[bulk], container, 4.0 * float(radius.max()))
+    # With no bulk the floor is the surface.
+    low, middle, high = (float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0)))
+    touching = int((bridges.gap <= 0.0).sum())
+    return Bed(
+        time=float(motion.time[frame]),
+        surface=middle,
+        surface_low=low,
+        surface_high=high,
+        brazil_nut=segregation(position[:, 2], large),
+        brazil_nut_of_bulk=segregation(position[bulk, 2], large[bulk]),
+        mean_square_velocity=float(np.mean(np.sum(motion.velocity[frame] ** 2, axis=1))),
+        contacts=2.0 * touching / len(position),
+        bridges=2.0 * len(bridges.beads) / len(position),
+        touching=touching,
+        opened=len(bridges.gap) - touching,
+        mean_force=float(bridges.force.mean()) if len(bridges.force) else 0.0,
+        liquid_in_bridges=float(liquid.sum()),
+        bulk=int(bulk.sum()),
+        clusters=len(held),
+        highest=max([middle, *(float(position[bead, 2]) for members, _ in held for bead in members)]),
+    )
+
+
+def coordination_of_inner(bridges: Bridges, count: int) -> dict[str, float | None]:
+    """Contacts and bridges, to other beads, of those of so many beads that are bridged to no wall and not to the floor.
+
+    Beads at a wall have fewer neighbours among the beads than those within, which a small pile has few of. Told are
+    ``beads``, how many they are, and their mean ``contacts`` and ``bridges``; None where there is none.
+    """
+    inner = np.ones(count, dtype=bool)
+    inner[bridges.wall_beads] = False
+    beads = int(inner.sum())
+    ends = inner[bridges.beads]
+    if not beads:
+        return {"beads": 0, "contacts": None, "bridges": None}
+    return {
+        "beads": beads,
+        "contacts": float(ends[bridges.gap <= 0.0].sum() / beads),
+        "bridges": float(ends.sum() / beads),
+    }
+
+
+def liquid_of_beads(radius: FloatArray, volume_fraction: float, bridges: Bridges) -> FloatArray:
+    """Liquid in the bridges of each bead, m³, shape (N,): half of that of each of its bridges, all of that at walls.
+
+    The engine gives a bridge a share of the films of its two beads, that of the caps which they cover of each other
+    (Shi and McCarthy 2008), and half of a bead's film to a bridge with a wall, whatever other bridges it has. Caps of
+    beads that touch do not overlap, so that a frame's liquid is less than was given; the rest is on the beads.
+    """
+    sizes, which = np.unique(radius, return_inverse=True)
+    between = np.array([[bridge_volume_between_beads(one, other, volume_fraction) for other in sizes] for one in sizes])
+    at_wall = np.array([bridge_volume_at_wall(size, volume_fraction) for size in sizes])
+    liquid = np.zeros(len(radius))
+    pairs = bridges.beads
+    np.add.at(liquid, pairs, between[which[pairs[:, 0]], which[pairs[:, 1]]][:, None] / 2.0)
+    np.add.at(liquid, bridges.wall_beads, at_wall[which[bridges.wall_beads]])
+    return liquid
+
+
+def _surface_cells(position: FloatArray, radius: FloatArray, container: Boundary, cell: float) -> FloatArray:
+    """Height of the highest bead top in each x-y cell that has a bead, m."""
+    across = max(1, int(container.inner_width / cell))
+    place = np.clip(((position[:, :2] / container.inner_width + 0.5) * across).astype(int), 0, across - 1)
+    tops = np.full(across * across, -np.inf)
+    np.maximum.at(tops, place[:, 0] * across + place[:, 1], position[:, 2] + radius)
+    found: FloatArray = tops[np.isfinite(tops)]
+    return found
+
+
+def segregation(height: FloatArray, large: BoolArray) -> float:
+    """The Brazil-nut index: ⟨z⟩ of the large beads minus ⟨z⟩ of the small ones, over their sum; 0 without a class."""
+    if not large.any() or large.all():
+        return 0.0
+    above, below = float(height[large].mean()), float(height[~large].mean())
+    return (above - below) / (above + below)
+
+
+def packing_profile(
+    position: FloatArray, radius: FloatArray, liquid: FloatArray, container: Boundary, layer: float
+) -> Profile:
+    """Packing fraction and liquid against height, averaged over frames.
+
+    Parameters
+    ----------
+    position : ndarray, shape (F, N, 3)
+    radius : ndarray, shape (N,)
+    liquid : ndarray, shape (F, N)
+        Of `liquid_of_beads`; it is taken to be where the bead's centre is.
+    container
+        Gives the cross-section.
+    layer
+        Thickness of the layers, m. A sphere's volume is shared out exactly between the layers that it reaches into.
+    """
+    edges = np.arange(0.0, float((position[..., 2] + radius).max()) + layer, layer)
+    below = np.zeros(len(edges))
+    for frame in position:
+        # Volume of a sphere below an edge that lies h above its centre.
+        h = np.clip(edges[:, None] - frame[:, 2], -radius, radius)
+        below += (np.pi * (2.0 / 3.0 * radius**3 + radius**2 * h - h**3 / 3.0)).sum(axis=1) / len(position)
+    wet = np.histogram(position[..., 2], bins=edges, weights=liquid)[0] / len(position)
+    room = container.cross_section * layer
+    return Profile((edges[1:] + edges[:-1]) / 2.0, np.diff(below) / room, wet / room)

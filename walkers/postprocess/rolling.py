@@ -13,25 +13,17 @@ import numpy as np
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion
 
-_FINE_SAMPLES = 8
-"""Samples a cycle from which on a cycle's motion can be followed between them."""
-
 
 def follows_cycles(motion: Motion) -> bool:
     """Whether frames follow each other closely enough to show what happens within a cycle of the drive."""
-    return motion.case.run.samples_per_cycle >= _FINE_SAMPLES
+    return motion.case.run.samples_per_cycle >= 8
 
 
 @dataclass(frozen=True)
 class Turns:
-    """How beads have turned since the first frame of a motion.
+    """Quaternions (x, y, z, w) from the axes at the first frame to those of each frame, shape (F, N, 4).
 
-    Attributes
-    ----------
-    turned : ndarray, shape (F, N, 4)
-        Quaternions (x, y, z, w) from the axes at the first frame to those of each frame.
-    step : ndarray, shape (F, N, 3)
-        Rotation vectors from each frame to the next one, rad; of the last frame nothing.
+    And rotation vectors from each frame to the next one, rad, shape (F, N, 3); of the last frame nothing.
     """
 
     turned: FloatArray

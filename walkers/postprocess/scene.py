@@ -19,7 +19,7 @@ import numpy.typing as npt
 from walkers.inputs.boundary import Flat
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, boundary_motion
-from walkers.postprocess.piles import Pile, analyse
+from walkers.postprocess.piles import Pile, climbing_beads
 from walkers.postprocess.rolling import Turns, turns_of
 
 if TYPE_CHECKING:
@@ -99,10 +99,9 @@ class Scene:
         motion = self.motion
         chosen = np.tile(motion.walker_of >= 0, (len(motion.time), 1))
         if Pile().applies(motion.case):
-            pile = analyse(motion)
-            for track, climb in zip(pile.tracks, pile.climbs, strict=True):
-                for frame, members in zip(track.frames, track.members, strict=True):
-                    chosen[frame, list(members)] |= climb.climbed
+            climbing = climbing_beads(motion)
+            for frame, beads in enumerate(chosen):
+                beads[list(climbing(frame))] = True
         return chosen
 
     def colours(self, chosen: npt.NDArray[np.bool_]) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import replace
 from math import ceil
 from pathlib import Path
@@ -178,12 +179,13 @@ def _frames_apart(motion: Motion, images: int, apart: float, directory: Path) ->
     """The last frames of a run that are so many seconds apart, to a tenth of that."""
     last = len(motion.time) - 1
     between = motion.case.run.steps_per_sample * motion.case.run.time_step
-    every = round(apart / between)
+    every, expected = round(apart / between), ""
     if not every or abs(every * between / apart - 1.0) > _TOLERANCE:
-        told = f"{apart:.4g} s between pictures: expected a multiple of the {between:.4g} s between frames"
-        raise InputError(str(directory), [Problem("", None, told)])
-    if every > last - motion.first_driven:
-        told = f"{apart:.4g} s between pictures: expected less than the {max(motion.time[-1], 0.0):.3g} s of the drive"
+        expected = f"a multiple of the {between:.4g} s between frames"
+    elif every > last - motion.first_driven:
+        expected = f"less than the {max(motion.time[-1], 0.0):.3g} s of the drive"
+    if expected:
+        told = f"{apart:.4g} s between pictures: expected {expected}"
         raise InputError(str(directory), [Problem("", None, told)])
     return list(range(last, motion.first_driven - 1, -every))[:images][::-1]
 
@@ -191,20 +193,15 @@ def _frames_apart(motion: Motion, images: int, apart: float, directory: Path) ->
 def seconds_apart(text: str, directory: Path) -> float:
     """Read a time between pictures: a duration, or a part or multiple of the drive's cycle such as ``T/4`` or ``2 T``.
 
-    Raises
-    ------
-    InputError
-        If the text is neither.
+    An ``InputError`` says that the text is neither.
     """
     cycles = re.fullmatch(r"(?P<many>[\d.]*)\s*T\s*(/\s*(?P<parts>\d+))?", text.strip())
-    try:
+    seconds = 0.0
+    with suppress(ValueError, ZeroDivisionError):
         if cycles:
-            frequency = case_of(directory).drive.frequency
-            seconds = float(cycles["many"] or 1) / int(cycles["parts"] or 1) / frequency
+            seconds = float(cycles["many"] or 1) / int(cycles["parts"] or 1) / case_of(directory).drive.frequency
         else:
             seconds = parse_quantity(text, DURATION)
-        if seconds > 0.0:
-            return seconds
-    except (ValueError, ZeroDivisionError):
-        pass
+    if seconds > 0.0:
+        return seconds
     raise InputError("--interval", [Problem("", None, f'{text!r}: expected a time such as "2 s", or "T/4" of a cycle')])

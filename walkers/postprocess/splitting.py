@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from walkers.inputs.case import Case
-from walkers.postprocess.dump import BinaryDump, FloatArray
-from walkers.postprocess.local_dump import local_frames, write_local_dump
-from walkers.postprocess.walking import NEAR, came_near
+from walkers.postprocess.dump import BinaryDump, local_frames, write_local_dump
+from walkers.postprocess.gait import came_near
+from walkers.postprocess.walking import NEAR
 from walkers.runner.failures import WalkersMet
 from walkers.runner.files import write_json
 from walkers.templates.deck import LAYOUT_NAME
-from walkers.templates.layout import Layout, PlacedWalker
+from walkers.templates.layout import Layout
 
 
 def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) -> None:
@@ -25,10 +25,8 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
 
     Parameters
     ----------
-    directory
-        Where the deck ran.
-    layout
-        What it wrote.
+    directory, layout
+        Where the deck ran, and what it wrote.
     cases
         From each case's directory to the case, in the order of the deck.
 
@@ -40,8 +38,11 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
         If a dump cannot be read.
     """
     dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
-    frames = dump.stack()
-    _check_apart(frames, layout, cases, directory)
+    frames, x = dump.stack(), layout.bead_columns.index("x")
+    sampled = frames[:: next(iter(cases.values())).run.samples_per_cycle, :, x : x + 2]
+    centre = np.stack([sampled[:, np.array(one.beads) - 1].mean(axis=1) for one in layout.walkers], axis=1)
+    if came_near(centre, NEAR * max(make.length for case in cases.values() for make in case.walkers)):
+        raise WalkersMet(directory)
     owner, renumbered = (np.zeros(layout.atoms + 1, dtype=np.int64) for _ in range(2))
     walkers = iter(layout.walkers)
     for number, (place, case) in enumerate(cases.items()):
@@ -53,7 +54,12 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
         own_frames[..., dump.column("id")] = new
         own_frames[..., dump.column("type")] = 1
         dump.write_like(own_frames, place / layout.bead_dump)
-        write_json(place / LAYOUT_NAME, _own_layout(layout, own).as_dict(), at_once=False)
+        placed = tuple(
+            replace(one, walker=walker, beads=tuple(renumbered[list(one.beads)].tolist()))
+            for walker, one in enumerate(own)
+        )
+        own_layout = replace(layout, atoms=len(old), walkers=placed, ranks=1)
+        write_json(place / LAYOUT_NAME, own_layout.as_dict(), at_once=False)
     for name, columns, ids in (
         (layout.pair_bridge_dump, layout.pair_bridge_columns, ("id1", "id2")),
         (layout.wall_bridge_dump, layout.wall_bridge_columns, ("id",)),
@@ -69,20 +75,3 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
             write_local_dump(place / name, columns, parts)
     for name in (layout.bead_dump, layout.pair_bridge_dump, layout.wall_bridge_dump, LAYOUT_NAME):
         (directory / name).unlink()
-
-
-def _own_layout(layout: Layout, walkers: list[PlacedWalker]) -> Layout:
-    renumbered, bead = [], 1
-    for number, walker in enumerate(walkers):
-        after = bead + len(walker.beads)
-        renumbered.append(replace(walker, walker=number, beads=tuple(range(bead, after))))
-        bead = after
-    return replace(layout, atoms=bead - 1, walkers=tuple(renumbered), ranks=1)
-
-
-def _check_apart(frames: FloatArray, layout: Layout, cases: Mapping[Path, Case], directory: Path) -> None:
-    x, sampled = layout.bead_columns.index("x"), frames[:: next(iter(cases.values())).run.samples_per_cycle]
-    rows = [np.array(walker.beads) - 1 for walker in layout.walkers]
-    centre = np.stack([sampled[:, beads, x : x + 2].mean(axis=1) for beads in rows], axis=1)
-    if came_near(centre, NEAR * max(make.length for case in cases.values() for make in case.walkers)):
-        raise WalkersMet(directory)

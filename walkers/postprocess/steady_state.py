@@ -21,50 +21,37 @@ if TYPE_CHECKING:
 
 ASTRAY = np.pi / 4.0
 """rad; a walker that ends farther from where it was to face has left the axis."""
-
-
 AGREEING = 0.002
 """Share by which the velocities of the halves of a steady walker's cycles may differ."""
 _LEAST_SPEED = 2e-6
 """m/s; what velocities may differ by however slow the walkers are."""
-_LITTLE = 0.005
-"""rad; a steady walker turns by less in a cycle, or by less and less: by no more than …"""
-_FADING = 0.9
-"""… so much of what it did before."""
-_NO_MORE = 1e-4
-"""rad; what turns by little must not turn by so much more than before."""
+_LITTLE, _FADING, _NO_MORE = 0.005, 0.9, 1e-4
+"""A steady walker turns by less rad in a cycle, and not by so much more than before; or by so much of what it did."""
 
 
 def are_steady(directory: Path) -> bool:
-    """Whether the walkers of a run walk as they would go on to: then there is no need to drive them any longer.
+    """Whether the walkers of a run, made or being made, walk as they would go on to: they need no more cycles.
 
     After a third of the cycles, at most 20, the velocities of both halves of the others agree, and no walker turns ever
     faster. Of 362 dimers of the shipped sweeps that ran for 60 cycles, those that are steady so after 12, 24 … had
     speeds within 0.2 % of the final ones; by their velocities alone some were 4 % off (they had begun to turn, faster
     and faster).
-
-    Parameters
-    ----------
-    directory
-        Of a run that may still be being made.
     """
     return all(_is_steady(group) for group in read_motion(directory).groups)
 
 
 def _is_steady(group: Group) -> bool:
-    found = walk(group)
-    allowed = max(AGREEING * float(np.abs(found.velocity).max()), _LEAST_SPEED)
-    run = group.case.run
-    strobed = group.orientation[:: run.samples_per_cycle][run.settled_strobes :]
-    turned = np.abs(np.diff(strobed, axis=0))
+    found, run = walk(group), group.case.run
+    turned = np.abs(np.diff(group.orientation[:: run.samples_per_cycle][run.settled_strobes :], axis=0))
     before, after = turned[: len(turned) // 2].max(axis=0), turned[len(turned) // 2 :].max(axis=0)
     little = (after < _LITTLE) & (after < before + _NO_MORE)
+    allowed = max(AGREEING * float(np.abs(found.velocity).max()), _LEAST_SPEED)
     agree = np.abs(found.first_half - found.second_half).max() <= allowed
     return bool(agree and np.all(little | (after < _FADING * before)))
 
 
 def on_axis(walkers: pd.DataFrame) -> pd.Series[bool]:
-    """Whether walkers of a table `walkers` end near the direction that they started to face."""
+    """Whether walkers of a table ``walkers`` end near the direction that they started to face."""
     return walkers["orientation_end"].abs() < ASTRAY
 
 
@@ -74,14 +61,9 @@ def together(walkers: pd.DataFrame) -> pd.Series[bool]:
 
 
 def steady_walkers(run: str | Path) -> pd.DataFrame:
-    """Rows of a run's table ``walkers`` that are steady, have not left the axis and whose beads stay together.
+    """Rows of a finished run's table ``walkers`` that are steady, on the axis and whose beads stay together.
 
     Symmetric dimers turn across the axis and need only stay together: they have no way to walk.
-
-    Parameters
-    ----------
-    run
-        A finished run directory.
     """
     walkers = read_table(run, "walkers")
     kept = together(walkers)

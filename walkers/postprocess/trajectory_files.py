@@ -7,7 +7,6 @@ of a length in m would be 10 nm. Places and velocities are relative to the bound
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
@@ -24,21 +23,12 @@ _MM = 1e3
 
 
 def write_trajectory(directory: Path, destination: Path, *, every: int = 1) -> Path:
-    """Write the motion of a run's beads while it is driven.
+    """Write the motion of a run's beads while it is driven, one of so many samples.
 
     Parameters
     ----------
-    directory
-        A run directory.
     destination
         The file to write: ``.xyz`` or ``.extxyz`` for extended XYZ, ``.lammpstrj`` for a LAMMPS text dump.
-    every
-        Take one of so many samples of the drive.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------
@@ -51,15 +41,11 @@ def write_trajectory(directory: Path, destination: Path, *, every: int = 1) -> P
         raise InputError("--to", [Problem("", None, expected)])
     motion = read_motion(directory).driven.select(slice(None, None, every))
     destination.parent.mkdir(parents=True, exist_ok=True)
-    with beside(destination) as new, new.open("w", encoding="ascii") as file:
-        _write(file, motion, write)
-    return destination
-
-
-def _write(file: TextIO, motion: Motion, write: Callable[[TextIO, Motion, int, FloatArray], None]) -> None:
     box = box_of(motion)
-    for frame in range(len(motion.time)):
-        write(file, motion, frame, box)
+    with beside(destination) as new, new.open("w", encoding="ascii") as file:
+        for frame in range(len(motion.time)):
+            write(file, motion, frame, box)
+    return destination
 
 
 def box_of(motion: Motion) -> FloatArray:
@@ -78,7 +64,7 @@ def _write_xyz(file: TextIO, motion: Motion, frame: int, box: FloatArray) -> Non
     from ase.io.extxyz import write_extxyz
 
     beads = Atoms(["X"] * len(motion.radius), positions=_MM * motion.position[frame], cell=box[1] - box[0], pbc=False)
-    arrays = {
+    beads.arrays |= {
         "id": np.arange(len(motion.radius)) + 1,
         "radius": _MM * motion.radius,
         "velo": _MM * motion.velocity[frame],
@@ -86,27 +72,16 @@ def _write_xyz(file: TextIO, motion: Motion, frame: int, box: FloatArray) -> Non
         "walker": motion.walker_of,
         "large": motion.large.astype(np.int64),
     }
-    for name, values in arrays.items():
-        beads.arrays[name] = values
     beads.info = {"Origin": box[0], "Time": float(motion.time[frame]), "units": "mm, s, rad"}
     write_extxyz(file, [beads])
 
 
 def _write_lammps(file: TextIO, motion: Motion, frame: int, box: FloatArray) -> None:
-    count = len(motion.radius)
-    step = round(float(motion.time[frame]) / motion.case.run.time_step)
+    count, step = len(motion.radius), round(float(motion.time[frame]) / motion.case.run.time_step)
     bounds = "".join(f"{low:.10g} {high:.10g}\n" for low, high in box.T)
     file.write(f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n{bounds}")
     file.write(f"ITEM: ATOMS {' '.join(_COLUMNS)}\n")
-    rows = np.column_stack(
-        [
-            np.arange(count) + 1,
-            1 + (motion.large.any() & ~motion.large),
-            motion.walker_of + 1,
-            _MM * motion.radius,
-            _MM * motion.position[frame],
-            _MM * motion.velocity[frame],
-            motion.spin[frame],
-        ]
-    )
+    kinds = 1 + (motion.large.any() & ~motion.large)
+    lengths = _MM * np.column_stack([motion.radius, motion.position[frame], motion.velocity[frame]])
+    rows = np.column_stack([np.arange(count) + 1, kinds, motion.walker_of + 1, lengths, motion.spin[frame]])
     np.savetxt(file, rows, fmt=_FORMAT)

@@ -6,22 +6,35 @@ smallest, with the walkers that face left and right also apart.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
 from math import degrees, nan, sqrt
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
-from walkers.postprocess.analysis import Analysis, Columns, Described
-from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.gait import STEADY_SPEED, Gait, Walk, averages, gait, settled_samples, walk
+from walkers.postprocess.analysis import Analysis, Described, Quantity
+from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
+from walkers.postprocess.gait import (
+    POSTURES,
+    STEADY_SPEED,
+    Gait,
+    averages,
+    came_near,
+    gait,
+    postures,
+    settled_samples,
+    turned_over_at,
+    walk,
+    ways,
+)
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges, read_motion
-from walkers.postprocess.posture import POSTURES, describe_posture, posture_summary, postures, turned_over_at, ways
-from walkers.postprocess.tables import WALKERS, described
+from walkers.postprocess.tables import NUMBERED, Columns, columns_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,10 +45,81 @@ SAME = 0.05
 """Walkers that faced either way and differ by more than this share are told apart first of all."""
 NEAR = 1.5
 """Walkers whose mass centres come within this many lengths of one have met."""
-_DIMERS = [
-    *(f"rotation_{bead}" for bead in (1, 2)),
-    *(f"{what}_{at}" for what in ("sliding", "open") for at in (1, 2, 3)),
-]
+
+_CONTACTS = "contacts: the beads with walls in their order, then the pairs of beads that touched at the start"
+_ROTATION = "rotation velocity -R dphi/dt of a bead"
+_SLIDING = f"sliding velocity; {_CONTACTS}"
+_OPEN = f"share of the time for which the contact is open; {_CONTACTS}"
+_SEPARATED = "share of the samples in which two beads are farther apart than the bridge between them reaches"
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """``trajectory.parquet``: one row per sample and walker."""
+
+    walker: Annotated[IntArray, "", "number of the walker, from 0"]
+    time: Annotated[FloatArray, "s", "from the begin of the drive"]
+    cycle: Annotated[FloatArray, "", "time in cycles of the drive"]
+    x: Annotated[FloatArray, "m", "mass centre relative to the substrate"]
+    y: Annotated[FloatArray, "m", "mass centre relative to the substrate"]
+    z: Annotated[FloatArray, "m", "mass centre above the substrate"]
+    orientation: Annotated[FloatArray, "rad", "angle of the walker from the direction that it was to face"]
+    velocity: Annotated[
+        FloatArray, "m/s", "mass centre relative to the substrate, along the heading (small beads to large ones)"
+    ]
+    rotation: Annotated[FloatArray, "m/s", _ROTATION, NUMBERED]
+    sliding: Annotated[FloatArray, "m/s", _SLIDING, NUMBERED]
+    gap: Annotated[FloatArray, "m", f"gap, negative where they touch; {_CONTACTS}", NUMBERED]
+
+
+@dataclass(frozen=True)
+class WalkerRows:
+    """``walkers.parquet``: one row per walker; means are over the cycles after the settling ones."""
+
+    walker: Annotated[IntArray, "", "number of the walker, from 0"]
+    make: Annotated[IntArray, "", "number of the walker's make in the case, from 0: its dimers, then its clusters"]
+    facing: Annotated[
+        IntArray, "", "where it is to face at the start: 1 along the drive axis (right), -1 against it (left)"
+    ]
+    start_angle: Annotated[FloatArray, "rad", "orientation at the start"]
+    velocity: Annotated[
+        FloatArray, "m/s", "along the heading after the settling cycles, positive toward the large beads"
+    ]
+    standard_error: Annotated[FloatArray, "m/s", "of the fit of the velocity"]
+    first_half: Annotated[FloatArray, "m/s", "velocity in the first half of the fitted cycles"]
+    second_half: Annotated[FloatArray, "m/s", "velocity in the second half of the fitted cycles"]
+    steady: Annotated[BoolArray, "", "whether the two halves agree"]
+    axial_velocity: Annotated[FloatArray, "m/s", "mass centre along the drive axis"]
+    lateral_velocity: Annotated[FloatArray, "m/s", "mass centre across the drive axis"]
+    orientation_mean: Annotated[FloatArray, "rad", "mean orientation after the settling cycles"]
+    orientation_end: Annotated[FloatArray, "rad", "orientation at the end"]
+    turned_at: Annotated[
+        FloatArray, "s", "when it was first, at the end of a cycle, off by more than a right angle; NaN if it never was"
+    ]
+    separated_fraction: Annotated[FloatArray, "", _SEPARATED]
+    rotation: Annotated[FloatArray, "m/s", _ROTATION, NUMBERED]
+    sliding: Annotated[FloatArray, "m/s", _SLIDING, NUMBERED]
+    open: Annotated[FloatArray, "", _OPEN, NUMBERED]
+
+
+@dataclass(frozen=True)
+class BridgeRows:
+    """``bridges.parquet``: one row per bridge and frame."""
+
+    time: Annotated[FloatArray, "s", "from the begin of the drive"]
+    walker: Annotated[IntArray, "", "number of the walker, from 0"]
+    contact: Annotated[
+        IntArray, "", "number of the contact, from 1: beads with walls, then pairs of beads; 0 for any other bridge"
+    ]
+    bead_1: Annotated[IntArray, "", "number of the bead in the run, from 0"]
+    bead_2: Annotated[IntArray, "", "number of the other bead, -1 for a wall"]
+    wall: Annotated[IntArray, "", "number of the wall, 0 for the floor if there is one, -1 for none"]
+    other_walker: Annotated[IntArray, "", "number of the walker that the bridge joins it to, -1 for none"]
+    gap: Annotated[FloatArray, "m", "gap, negative where they touch"]
+    touching: Annotated[BoolArray, "", "whether the surfaces touch"]
+    normal_force: Annotated[
+        FloatArray, "N", "net normal force (capillary, viscous, elastic), positive where it pulls the two together"
+    ]
 
 
 class Walking(Analysis):
@@ -43,7 +127,7 @@ class Walking(Analysis):
 
     name = "walking"
     version = 5
-    tables = ("trajectory", "walkers", "bridges")
+    tables: ClassVar[Mapping[str, type]] = {"trajectory": Trajectory, "walkers": WalkerRows, "bridges": BridgeRows}
     headlines = ("velocity",)
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
@@ -52,43 +136,6 @@ class Walking(Analysis):
         "radius_1": ("m", "of bead 1"),
         "radius_2": ("m", "of bead 2"),
     }
-    columns: ClassVar[Described] = {
-        "velocity": ("m/s", "mean over the walkers, along the heading, positive toward the large bead"),
-        "smallest": ("m/s", "velocity of the slowest walker"),
-        "largest": ("m/s", "velocity of the fastest walker; the paper's error bar is largest minus smallest"),
-        "standard_error": ("m/s", "of the velocity"),
-        "right_facing": ("m/s", "mean velocity of the walkers that started facing right"),
-        "left_facing": ("m/s", "mean velocity of the walkers that started facing left"),
-        "axial_velocity": ("m/s", "mean of the mass centres along the drive axis, on a slope up it"),
-        # Means over the walkers of what the table of a run says of each.
-        **{name: meaning for name, meaning in described("walkers", _DIMERS).items() if name in _DIMERS},
-        "separated_fraction": WALKERS["separated_fraction"],
-        "orientation_end": ("rad", "mean orientation at the end"),
-        "walkers": ("", "replicates"),
-        "steady": ("", "how many of them are steady"),
-        "turned_round": ("", "how many of them turned by more than 90 degrees"),
-        "upright": ("", "on a slope: how many of them end as they were to face, and tilt no more"),
-        "cycles": ("", "driven, those to settle among them"),
-        "ended_early": ("", "whether that was less than it might have been, for the walkers were steady"),
-        "walkers_met": ("", "whether two of them came near each other"),
-    }
-    places: ClassVar[Mapping[str, str]] = {
-        "velocity": "velocity.mean",
-        **{name: f"velocity.{name}" for name in ("smallest", "largest", "standard_error")},
-        **{name: f"{name}.mean" for name in ("right_facing", "left_facing", "axial_velocity", "orientation_end")},
-        "upright": "posture.upright",
-        **{name: f"{name[:-2]}.{'bead' if 'rotation' in name else 'contact'}{name[-2:]}" for name in _DIMERS},
-    }
-    rows = (
-        ("walkers", "walkers"),
-        ("of them steady", "steady"),
-        ("of them turned round by more than 90°", "turned_round"),
-        ("beads farther apart than a bridge reaches", "separated_fraction", "share"),
-        ("cycles driven", "cycles"),
-        ("of them to settle", "settling_cycles"),
-        ("dimensionless peak force Γ0", "gamma0"),
-        ("asymmetry sin δ", "sin_delta"),
-    )
 
     def applies(self, case: Case) -> bool:
         """Of walkers."""
@@ -96,19 +143,17 @@ class Walking(Analysis):
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """Tables of all walkers; the result is of all of them, its contacts of the first make, and of each make."""
-        groups, gaits, walks = motion.groups, [gait(one) for one in motion.groups], [walk(one) for one in motion.groups]
-        rows = [_walker_columns(*one) for one in zip(groups, gaits, walks, strict=True)]
-        walkers = _stacked(rows)
+        case, groups = motion.case, motion.groups
+        gaits = [gait(group) for group in groups]
+        rows = [columns_of(_rows(*one)) for one in zip(groups, gaits, strict=True)]
         tables = {
-            "trajectory": _stacked([_trajectory_columns(group, one) for group, one in zip(groups, gaits, strict=True)]),
-            "walkers": walkers,
-            "bridges": _bridge_columns(motion),
+            "trajectory": _stacked([columns_of(_trajectory(*one)) for one in zip(groups, gaits, strict=True)]),
+            "walkers": _stacked(rows),
+            "bridges": _bridges(motion),
         }
-        case, known = motion.case, self.derived_of(motion.case)
-        turned = [np.isfinite(row["turned_at"]) for row in rows]
-        makes = [_summary(*one) for one in zip(rows, turned, strict=True)]
+        known, makes = self.derived_of(case), [_summary(one) for one in rows]
         summary = {
-            **_summary(walkers, np.concatenate(turned)),
+            **_summary(tables["walkers"]),
             # A contact's number means another one in another make: these are of the first.
             **{name: makes[0][name] for name in ("rotation", "sliding", "open")},
             "walkers_met": walkers_met(groups),
@@ -117,7 +162,7 @@ class Walking(Analysis):
             "cycles": case.run.cycles,
             "settling_cycles": case.run.settling_cycles,
             "ended_early": motion.ended_early,
-            "posture": _posture(groups, walkers) if case.goes_uphill else None,
+            "posture": _posture(groups, tables["walkers"]) if case.goes_uphill else None,
             **{name: known.get(name) for name in ("gamma0", "sin_delta")},
         }
         if len(groups) > 1:
@@ -136,12 +181,61 @@ class Walking(Analysis):
         known |= {"sin_delta": dimer.sin_delta, "mass_asymmetry": dimer.mass_asymmetry}
         return {"gamma0": dimer.gamma0(case.drive.peak_acceleration), **known}
 
+    def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
+        """Of all walkers, their contacts, makes and postures; sweeps have the contacts of dimers."""
+        first, second = ways(uphill=result.get("goes_uphill", False))
+        label = "along the heading, positive toward the large bead"
+        yield Quantity("velocity", f"velocity {label}", "m/s", "velocity", f"mean over the walkers, {label}")
+        yield Quantity("velocity.smallest", "", "m/s", "smallest", "velocity of the slowest walker")
+        told = "velocity of the fastest walker; the paper's error bar is largest minus smallest"
+        yield Quantity("velocity.largest", "", "m/s", "largest", told)
+        yield Quantity("velocity.standard_error", "", "m/s", "standard_error", "of the velocity")
+        for name, way in (("right", first), ("left", second)):
+            label = f"velocity of those that started facing {way}"
+            told = f"mean velocity of the walkers that started facing {name}"
+            yield Quantity(f"{name}_facing", label, "m/s", f"{name}_facing", told)
+        if result.get("turned_round"):
+            yield Quantity("kept_heading", "velocity of those that kept their heading", "m/s")
+        told = "mean of the mass centres along the drive axis, on a slope up it"
+        yield Quantity("axial_velocity.mean", "velocity along the drive axis", "m/s", "axial_velocity", told)
+        yield Quantity("lateral_velocity.mean", "velocity across the drive axis", "m/s")
+        for bead in result.get("rotation", ("bead_1", "bead_2")):
+            number = bead.partition("_")[2]
+            label = f"rotation of bead {number}, −R dφ/dt"
+            yield Quantity(f"rotation.{bead}", label, "m/s", f"rotation_{number}", _ROTATION)
+        contacts = result.get("contacts", {f"contact_{number}": "" for number in (1, 2, 3)})
+        families = {"sliding": ("sliding", "m/s", _SLIDING), "open": ("contact open", "share", _OPEN)}
+        for (family, (label, unit, told)), (contact, name) in product(families.items(), contacts.items()):
+            column = f"{family}_{contact.partition('_')[2]}"
+            yield Quantity(f"{family}.{contact}", f"{label}, {name}", unit, column, told)
+        label = "beads farther apart than a bridge reaches"
+        yield Quantity("separated_fraction", label, "share", "separated_fraction", _SEPARATED)
+        told = "mean orientation at the end"
+        yield Quantity("orientation_end", "orientation at the end", "rad", "orientation_end", told)
+        for number, make in enumerate(result.get("makes", [])):
+            yield Quantity(f"makes.{number}.velocity", f"velocity of those of {_radii(make)} mm", "m/s")
+        yield Quantity("walkers", "walkers", column="walkers", meaning="replicates")
+        yield Quantity("steady", "of them steady", column="steady", meaning="how many of them are steady")
+        told = "how many of them turned by more than 90 degrees"
+        yield Quantity("turned_round", "of them turned round by more than 90°", column="turned_round", meaning=told)
+        told = "on a slope: how many of them end as they were to face, and tilt no more"
+        yield Quantity("posture.upright", "walkers that are upright", column="upright", meaning=told)
+        yield from (Quantity(f"posture.{one}", f"walkers that are {one}") for one in POSTURES[1:])
+        yield Quantity("cycles", "cycles driven", column="cycles", meaning="driven, those to settle among them")
+        yield Quantity("settling_cycles", "of them to settle")
+        told = "whether that was less than it might have been, for the walkers were steady"
+        yield Quantity("ended_early", column="ended_early", meaning=told)
+        yield Quantity("walkers_met", column="walkers_met", meaning="whether two of them came near each other")
+        yield Quantity("gamma0", "dimensionless peak force Γ0")
+        yield Quantity("sin_delta", "asymmetry sin δ")
+
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Velocities, rotation, sliding and orientation of all walkers, and velocities of each make."""
-        rotation, end, names = result["rotation"], result["orientation_end"], result["contacts"]
-        numbers = [result[name] for name in ("gamma0", "sin_delta")]
-        drive = result["drive"] + (f", Γ0 = {numbers[0]:.3g}, sin δ = {numbers[1]:.3g}" if None not in numbers else "")
-        beads = ", ".join(f"bead {number} {_speed(value)}" for number, value in enumerate(rotation.values(), 1))
+        end, names, open_ones = result["orientation_end"], result["contacts"], result["open"]
+        drive = result["drive"]
+        if None not in (result["gamma0"], result["sin_delta"]):
+            drive += f", Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}"
+        beads = ", ".join(f"bead {place} {_speed(one)}" for place, one in enumerate(result["rotation"].values(), 1))
         sliding = ", ".join(f"{name} {_speed(result['sliding'][contact])}" for contact, name in names.items())
         lines = [
             *(_of_turned(result, drive) if result["turned_round"] else _of_walkers(result, drive)),
@@ -149,43 +243,22 @@ class Walking(Analysis):
             f"  sliding    {sliding} mm/s",
             f"  orientation at the end {degrees(end['smallest']):.2f}° to {degrees(end['largest']):.2f}°",
         ]
-        if any(result["open"].values()):
-            shares = ", ".join(f"{name} {100 * result['open'][contact]:.1f} %" for contact, name in names.items())
+        if any(open_ones.values()):
+            shares = ", ".join(f"{name} {100 * open_ones[contact]:.1f} %" for contact, name in names.items())
             lines.append(f"  contacts open: {shares} of the time")
-        makes = result.get("makes", [])
         return lines + [
-            f"  of {_radii(one)} mm  {_speed(one['velocity']['mean'])} mm/s; {_steady(one)}" for one in makes
+            f"  of {_radii(one)} mm  {_speed(one['velocity']['mean'])} mm/s; {_steady(one)}"
+            for one in result.get("makes", [])
         ]
-
-    def rows_of(self, result: Mapping[str, Any]) -> Iterable[tuple[str, ...]]:
-        """The same as rows of a table."""
-        first, second = ways(uphill=result["goes_uphill"])
-        yield "velocity along the heading, positive toward the large bead", "velocity", "m/s"
-        yield f"velocity of those that started facing {first}", "right_facing", "m/s"
-        yield f"velocity of those that started facing {second}", "left_facing", "m/s"
-        if result["turned_round"]:
-            yield "velocity of those that kept their heading", "kept_heading", "m/s"
-        yield "velocity along the drive axis", "axial_velocity.mean", "m/s"
-        yield "velocity across the drive axis", "lateral_velocity.mean", "m/s"
-        for bead in result["rotation"]:
-            yield f"rotation of {bead.replace('_', ' ')}, −R dφ/dt", f"rotation.{bead}", "m/s"
-        for family, told, unit in (("sliding", "sliding", "m/s"), ("open", "contact open", "share")):
-            for contact, name in result["contacts"].items():
-                yield f"{told}, {name}", f"{family}.{contact}", unit
-        yield "orientation at the end", "orientation_end", "rad"
-        for number, make in enumerate(result.get("makes", [])):
-            yield f"velocity of those of {_radii(make)} mm", f"makes.{number}.velocity", "m/s"
-        yield from ((f"walkers that are {posture}", f"posture.{posture}") for posture in POSTURES)
-        yield from self.rows
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What makes the velocity doubtful."""
         warnings = []
         if result["steady"] < result["walkers"]:
             warnings.append("some walkers are not steady: the velocity depends on the length of the run")
-        if (result["separated_fraction"] or 0.0) > SEPARATED:
-            share = f"{100.0 * result['separated_fraction']:.0f} %"
-            warnings.append(f"beads of walkers are farther apart than a bridge reaches for {share} of the time")
+        if (share := result["separated_fraction"] or 0.0) > SEPARATED:
+            told = f"for {100.0 * share:.0f} % of the time"
+            warnings.append(f"beads of walkers are farther apart than a bridge reaches {told}")
         if result["walkers_met"] and not result["meet"]:
             warnings.append("walkers came close to each other and are not independent: give them more spacing")
         return warnings
@@ -197,115 +270,79 @@ class Walking(Analysis):
         return walk_figures(read_motion(directory).groups)
 
 
-def _radii(make: Mapping[str, Any]) -> str:
-    """Of the beads of a make, mm."""
-    return "/".join(f"{radius * 1e3:g}" for radius in make["radii"])
-
-
 def _stacked(parts: list[Columns]) -> Columns:
     """Tables one below the other; numbers that one lacks are NaN."""
-    if len(parts) == 1:
-        return parts[0]
-    lengths = [len(next(iter(part.values()))) for part in parts]
+    lengths = [len(part["walker"]) for part in parts]
+    keys = dict.fromkeys(key for part in parts for key in part)
     return {
-        key: np.concatenate(
-            [part.get(key, np.full(length, np.nan)) for part, length in zip(parts, lengths, strict=True)]
-        )
-        for key in dict.fromkeys(key for part in parts for key in part)
+        key: np.concatenate([part.get(key, np.full(rows, nan)) for part, rows in zip(parts, lengths, strict=True)])
+        for key in keys
     }
 
 
-def _numbered(name: str, values: FloatArray) -> dict[str, FloatArray]:
-    """Columns such as ``rotation_1`` of the last axis."""
-    return {f"{name}_{number + 1}": values[..., number] for number in range(values.shape[-1])}
+def _trajectory(group: Group, motion: Gait) -> Trajectory:
+    def along(values: FloatArray) -> FloatArray:
+        """One walker after the other."""
+        return np.moveaxis(values, 0, 1).reshape(-1, *values.shape[2:])
+
+    time = np.tile(group.time, len(group.walkers))
+    return Trajectory(
+        np.repeat([walker.walker for walker in group.walkers], len(group.time)),
+        time,
+        time * group.case.drive.frequency,
+        *along(group.mass_centre).T,
+        *map(along, (group.orientation, motion.velocity, motion.rotation, motion.sliding, motion.gap)),
+    )
 
 
-def _trajectory_columns(group: Group, motion: Gait) -> Columns:
-    frames, walkers = motion.velocity.shape
-    centre = group.mass_centre
-    columns: dict[str, FloatArray] = {
-        "x": centre[..., 0],
-        "y": centre[..., 1],
-        "z": centre[..., 2],
-        "orientation": group.orientation,
-        "velocity": motion.velocity,
-        **_numbered("rotation", motion.rotation),
-        **_numbered("sliding", motion.sliding),
-        **_numbered("gap", motion.gap),
-    }
-    time = np.tile(group.time, walkers)
-    return {
-        "walker": np.repeat([walker.walker for walker in group.walkers], frames),
-        "time": time,
-        "cycle": time * group.case.drive.frequency,
-        **{key: values.T.reshape(-1) for key, values in columns.items()},
-    }
-
-
-def _walker_columns(group: Group, motion: Gait, walked: Walk) -> Columns:
-    samples, beads, means = settled_samples(group), len(group.radii), averages(group)
-    between = motion.gap[samples, :, beads:]
+def _rows(group: Group, motion: Gait) -> WalkerRows:
+    samples, beads = settled_samples(group), len(group.radii)
     reach = np.array(contact_loads(group.case, group.make).rupture[beads:])
-    return {
-        "walker": np.array([walker.walker for walker in group.walkers], dtype=np.int64),
-        "make": np.array([walker.make for walker in group.walkers], dtype=np.int64),
-        "facing": np.array([walker.facing for walker in group.walkers], dtype=np.int64),
-        "start_angle": np.array([walker.start_angle for walker in group.walkers]),
-        "velocity": walked.velocity,
-        "standard_error": walked.standard_error,
-        "first_half": walked.first_half,
-        "second_half": walked.second_half,
-        "steady": walked.steady,
-        "axial_velocity": walked.axial,
-        "lateral_velocity": walked.lateral,
-        "orientation_mean": group.orientation[samples].mean(axis=0),
-        "orientation_end": group.orientation[-1],
-        "turned_at": turned_over_at(group),
-        "separated_fraction": (between > reach).any(axis=-1).mean(axis=0),
-        **_numbered("rotation", means.rotation),
-        **_numbered("sliding", means.sliding),
-        **_numbered("open", means.open),
-    }
+    starts = ("walker", "make", "facing", "start_angle")
+    return WalkerRows(
+        **{name: np.array([getattr(walker, name) for walker in group.walkers]) for name in starts},
+        **vars(walk(group)),
+        **vars(averages(group)),
+        orientation_mean=group.orientation[samples].mean(axis=0),
+        orientation_end=group.orientation[-1],
+        turned_at=turned_over_at(group),
+        separated_fraction=(motion.gap[samples, :, beads:] > reach).any(axis=-1).mean(axis=0),
+    )
 
 
-def _bridge_columns(motion: Motion) -> Columns:
-    """Columns of the table ``bridges``, sorted by time, walker and contact."""
-    contact_of = {
-        (walker.beads[one] - motion.first_id, walker.beads[other] - motion.first_id): len(walker.beads) + number
-        for walker in motion.walkers
-        for number, (one, other) in enumerate(motion.case.walkers[walker.make].pairs, 1)
-    }
-    bead_of = {bead - motion.first_id: place for one in motion.walkers for place, bead in enumerate(one.beads, 1)}
-    parts = [_bridge_rows(motion, bridges, contact_of, bead_of) for bridges in read_bridges(motion)]
-    merged = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    order = np.lexsort((merged["bead_2"], merged["contact"], merged["walker"], merged["time"]))
-    return {key: values[order] for key, values in merged.items()}
+def _bridges(motion: Motion) -> Columns:
+    """Sorted by time, walker and contact."""
+    contact_of: dict[tuple[int, int], int] = {}  # of two beads, or of a bead (with −1) and a wall
+    for walker in motion.walkers:
+        touching = [(bead, -1) for bead in walker.beads]
+        touching += [(walker.beads[one], walker.beads[other]) for one, other in motion.case.walkers[walker.make].pairs]
+        contact_of |= {ends: number for number, ends in enumerate(touching, 1)}
+    parts = [columns_of(_bridge_rows(motion, bridges, contact_of)) for bridges in read_bridges(motion)]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    order = np.lexsort([columns[name] for name in ("bead_2", "contact", "walker", "time")])
+    return {name: values[order] for name, values in columns.items()}
 
 
-def _bridge_rows(
-    motion: Motion, bridges: Bridges, contact_of: Mapping[tuple[int, int], int], bead_of: Mapping[int, int]
-) -> Columns:
+def _bridge_rows(motion: Motion, bridges: Bridges, contact_of: Mapping[tuple[int, int], int]) -> BridgeRows:
     """The rows of a frame: bridges between beads, then those to walls."""
     pairs, walls = np.sort(bridges.beads, axis=1), len(bridges.wall_beads)
     first = np.concatenate([pairs[:, 0], bridges.wall_beads])
     second = np.concatenate([pairs[:, 1], np.full(walls, -1)])
-    owner = motion.walker_of
-    gap = np.concatenate([bridges.gap, bridges.wall_gap])
-    joined = np.where(second >= 0, owner[second], owner[first])
-    contacts = [contact_of.get((one, other), 0) for one, other in pairs.tolist()]
-    contacts += [bead_of.get(bead, 0) for bead in bridges.wall_beads.tolist()]
-    return {
-        "time": np.full(len(first), motion.time[bridges.frame]),
-        "walker": owner[first],
-        "contact": np.array(contacts, dtype=np.int64),
-        "bead_1": first,
-        "bead_2": second,
-        "wall": np.concatenate([np.full(len(pairs), -1), bridges.walls]),
-        "other_walker": np.where(joined == owner[first], -1, joined),
-        "gap": gap,
-        "touching": gap <= 0.0,
-        "normal_force": np.concatenate([bridges.force, bridges.wall_force]),
-    }
+    owner, gap = motion.walker_of[first], np.concatenate([bridges.gap, bridges.wall_gap])
+    joined = np.where(second >= 0, motion.walker_of[second], owner)
+    ends = zip(first.tolist(), second.tolist(), strict=True)
+    return BridgeRows(
+        time=np.full(len(first), motion.time[bridges.frame]),
+        walker=owner,
+        contact=np.array([contact_of.get(one, 0) for one in ends], dtype=np.int64),
+        bead_1=first,
+        bead_2=second,
+        wall=np.concatenate([np.full(len(pairs), -1), bridges.walls]),
+        other_walker=np.where(joined == owner, -1, joined),
+        gap=gap,
+        touching=gap <= 0.0,
+        normal_force=np.concatenate([bridges.force, bridges.wall_force]),
+    )
 
 
 def _spread(values: FloatArray, error_of_one: float = nan) -> dict[str, Any]:
@@ -323,9 +360,16 @@ def _spread(values: FloatArray, error_of_one: float = nan) -> dict[str, Any]:
     }
 
 
-def _summary(walkers: Columns, turned: npt.NDArray[np.bool_]) -> dict[str, Any]:
-    velocity, facing = walkers["velocity"], walkers["facing"]
-    axial = walkers["axial_velocity"]
+def _mean(values: FloatArray) -> float | None:
+    """Mean over those that have the number."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else None
+
+
+def _summary(walkers: Columns) -> dict[str, Any]:
+    """What a result says of some rows of the table of walkers."""
+    velocity, axial, facing = (walkers[name] for name in ("velocity", "axial_velocity", "facing"))
+    turned = np.isfinite(walkers["turned_at"])
 
     def means(family: str, named: str) -> dict[str, float | None]:
         columns = [name for name in walkers if name.rpartition("_")[0] == family]
@@ -354,20 +398,21 @@ def _summary(walkers: Columns, turned: npt.NDArray[np.bool_]) -> dict[str, Any]:
 
 
 def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
-    found = [posture for group in groups for posture in postures(group)]
-    return posture_summary(found, walkers["turned_at"], walkers["orientation_end"])
-
-
-def _mean(values: FloatArray) -> float | None:
-    """Mean over those that have the number."""
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else None
+    """How many walkers are how, when the first and the last turned over (s), and how far off the others end (rad)."""
+    counts = Counter(posture for group in groups for posture in postures(group))
+    turned_at, end = walkers["turned_at"], np.abs(walkers["orientation_end"])
+    over, kept = turned_at[np.isfinite(turned_at)], end[np.isnan(turned_at)]
+    return {
+        **{name: counts[name] for name in POSTURES},
+        "turned_at": [float(over.min()), float(over.max())] if len(over) else None,
+        "ends_within": float(kept.max()) if len(kept) else None,
+    }
 
 
 def _contact_names(group: Group) -> dict[str, str]:
     """What the contacts of the first make are called."""
-    count, pairs = len(group.radii), group.make.pairs
-    names = [f"bead {bead}" for bead in range(1, count + 1)]
+    pairs = group.make.pairs
+    names = [f"bead {bead + 1}" for bead in range(len(group.radii))]
     names += ["bead on bead"] if len(pairs) == 1 else [f"beads {one + 1}-{other + 1}" for one, other in pairs]
     return {f"contact_{number}": name for number, name in enumerate(names, 1)}
 
@@ -379,27 +424,6 @@ def walkers_met(groups: Iterable[Group]) -> bool:
     return came_near(centre, NEAR * max(one.make.length for one in groups))
 
 
-def came_near(centre: FloatArray, near: float) -> bool:
-    """Whether two of several points ever came within a distance of each other.
-
-    Parameters
-    ----------
-    centre : ndarray, shape (F, W, 2)
-        Their places in F frames, m.
-    near
-        The distance, m.
-    """
-    # Only walkers whose ranges overlap can have met: of a thousand, a few pairs are left to be followed.
-    middle = (centre.max(axis=0) + centre.min(axis=0)) / 2.0
-    reach = np.linalg.norm(centre - middle, axis=-1).max(axis=0)
-    for number in range(len(middle) - 1):
-        apart = np.linalg.norm(middle[number + 1 :] - middle[number], axis=-1)
-        within = number + 1 + np.flatnonzero(apart < reach[number + 1 :] + reach[number] + near)
-        if np.any(np.linalg.norm(centre[:, within] - centre[:, number, None], axis=-1) < near):
-            return True
-    return False
-
-
 def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     """How fast walkers are that kept their heading."""
     velocity = result["velocity"]
@@ -408,33 +432,24 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     doubt = f" (standard error {_speed(error)} {of_what})" if error is not None else ""
     toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
     first, second = ways(uphill=result["goes_uphill"])
-    one, other = (result[side]["mean"] for side in ("right_facing", "left_facing"))
+    sides = right, left = result["right_facing"], result["left_facing"]
     headline = f"{_speed(velocity['mean'])} mm/s, positive {toward}{doubt}"
-    if (
-        None not in (one, other)
-        and abs(one - other) > SAME * max(abs(one), abs(other))
-        and abs(one - other) > STEADY_SPEED
-    ):
-        # The mean over both is no walker's.
-        headline = f"facing {first} {_speed(one)}, facing {second} {_speed(other)} mm/s, positive {toward}"
+    if all(side["n"] for side in sides):
+        one, other = (side["mean"] for side in sides)
+        if abs(one - other) > max(SAME * max(abs(one), abs(other)), STEADY_SPEED):  # the mean over both is no walker's
+            headline = f"facing {first} {_speed(one)}, facing {second} {_speed(other)} mm/s, positive {toward}"
+    told_right, told_left = (f"{_speed(side['mean'])} ({side['n']})" if side["n"] else "none" for side in (right, left))
     return [
         *_headlines(result, drive),
         f"  velocity   {headline}",
         f"    smallest {_speed(velocity['smallest'])}, largest {_speed(velocity['largest'])}; {_steady(result)}",
-        f"    started facing {first} {_side(result['right_facing'])}, {second} {_side(result['left_facing'])}",
+        f"    started facing {first} {told_right}, {second} {told_left}",
     ]
-
-
-def _headlines(result: Mapping[str, Any], drive: str, level: str = "") -> list[str]:
-    """The drive; before it, on a slope, whether walkers stay as they were to face, and what is to be said elsewhere."""
-    told = level if result["posture"] is None else describe_posture(result["posture"])
-    return [f"{result['case']}: {told}", f"  drive      {drive}"] if told else [f"{result['case']}: {drive}"]
 
 
 def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
     """What became of walkers of which some turned by more than 90°: a velocity along their heading says nothing."""
-    axial, kept = result["axial_velocity"], result["kept_heading"]
-    tilted = result["goes_uphill"]
+    axial, kept, tilted = result["axial_velocity"], result["kept_heading"], result["goes_uphill"]
     first, second = ways(uphill=tilted)
     round_ones = f"{result['turned_round']} of {result['walkers']} turned round"
     return [
@@ -447,6 +462,38 @@ def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
     ]
 
 
+def _headlines(result: Mapping[str, Any], drive: str, level: str = "") -> list[str]:
+    """The drive; before it, on a slope, whether walkers stay as they were to face, and what is to be said elsewhere."""
+    told = level if result["posture"] is None else _told_posture(result["posture"])
+    return [f"{result['case']}: {told}", f"  drive      {drive}"] if told else [f"{result['case']}: {drive}"]
+
+
+def _told_posture(summary: Mapping[str, Any]) -> str:
+    """Angles in degrees: "upright to the end, within 0.1°"."""
+    count = sum(summary[name] for name in POSTURES)
+    within = "" if summary["ends_within"] is None else f", within {degrees(summary['ends_within']):.1f}°"
+    first, last = (f"{time:.2f}" for time in summary["turned_at"] or (nan, nan))
+    when = f" after {first} s" if first == last else f" after {first} to {last} s"
+    told = {
+        "upright": "upright to the end",
+        "leaning": "leaning, and may turn over yet",
+        "turned over": f"turned over{when if summary['turned_at'] else ''}",
+    }
+    there = [name for name in POSTURES if summary[name]]
+    last_kept = [name for name in there if name != "turned over"][-1:]
+    return "; ".join(
+        ("" if summary[name] == count else f"{summary[name]} of {count} ")
+        + told[name]
+        + (within if name in last_kept else "")
+        for name in there
+    )
+
+
+def _radii(make: Mapping[str, Any]) -> str:
+    """Of the beads of a make, mm."""
+    return "/".join(f"{radius * 1e3:g}" for radius in make["radii"])
+
+
 def _steady(result: Mapping[str, Any]) -> str:
     cycles = f" after {result['cycles']} cycles" if result.get("ended_early") else ""
     return f"{result['steady']} of {result['walkers']} steady{cycles}"
@@ -457,7 +504,3 @@ def _speed(value: float | None) -> str:
     if value is None:
         return "-"
     return f"{value * 1e3:.3f}" if abs(value) >= 5e-7 or value == 0.0 else f"{value * 1e3:.1e}"
-
-
-def _side(side: Mapping[str, Any]) -> str:
-    return f"{_speed(side['mean'])} ({side['n']})" if side["n"] else "none"

@@ -20,8 +20,9 @@ import numpy.typing as npt
 
 from walkers.inputs.changes import dotted
 from walkers.inputs.errors import InputError, Problem
+from walkers.postprocess.analysis import tables_of
 from walkers.postprocess.clusters import ClimbCriteria
-from walkers.postprocess.piles import Pile, analyse, classified
+from walkers.postprocess.piles import Pile, climbs_by
 from walkers.runner.directory import CASE_NAME, FinishedRun, finished_places, finished_run
 from walkers.sweeps.record import RECORD_NAME, read_record, result_in, states
 from walkers.sweeps.table import value_text
@@ -193,13 +194,13 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
         {"threshold": name, "value": value, "runs": len(runs), **counts, "median_speed": []} for name, value in tried
     ]
     for run in runs:
-        pile = analyse(run)
+        tables = tables_of(run)
         for row in rows:
             definition = replace(usual, **{row["threshold"]: row["value"]}) if row["threshold"] else usual
-            climbs = [climb for climb in classified(pile, definition).climbs if climb.climbed]
+            climbs = climbs_by(tables, definition)
             row["climbed"] += bool(climbs)
             row["climbs"] += len(climbs)
-            row["led_by_large"] += sum(bool(pile.motion.large[climb.leader]) for climb in climbs)
+            row["led_by_large"] += sum(climb.leader_large for climb in climbs)
             row["median_speed"] += [climb.speed for climb in climbs]
     return [{**row, "median_speed": median(row["median_speed"]) if row["climbs"] else None} for row in rows]
 

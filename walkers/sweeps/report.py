@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.inputs.readable import readable_unit
-from walkers.postprocess.quantities import rounded
+from walkers.postprocess.analysis import rounded
 from walkers.postprocess.report.page import (
     COLOURS,
     LARGEST,

@@ -10,10 +10,9 @@ from typing import Any
 from walkers.inputs.case import Case
 from walkers.inputs.changes import dotted
 from walkers.inputs.origins import Origin, text_of
-from walkers.postprocess.analysis import analyses_in, analyses_of, current_result, quantities_of, warnings_of
+from walkers.postprocess.analysis import analyses_in, analyses_of, current_result, quantities_of, tables_of, warnings_of
 from walkers.postprocess.figures import Panel, gait_panels, pile_panels, velocity_panel, walk_panels
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.piles import analyse
 from walkers.postprocess.report.page import NAME, check_report, drawn, fill, packed_plots, write_page
 from walkers.postprocess.report.player import MOST_PLACES, player_of
 from walkers.runner.directory import case_of
@@ -53,7 +52,7 @@ def _panels(directory: Path) -> list[Panel]:
     if "walking" in names:
         groups = read_motion(directory).groups
         panels += [*walk_panels(groups), velocity_panel(groups), *gait_panels(groups[0])]
-    return [*panels, *(pile_panels(analyse(directory)) if "pile" in names else [])]
+    return [*panels, *(pile_panels(tables_of(directory)) if "pile" in names else [])]
 
 
 def report_run(directory: Path, to: Path | None = None, origins: Origins = None) -> Path:
