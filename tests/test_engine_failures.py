@@ -242,6 +242,7 @@ def test_a_disk_without_room_for_the_dump_and_one_that_fills_up_during_the_run(t
         with pytest.raises(failures.DiskFull, match="disk full"):
             _launch(make_case(run={"cycles": 600, "samples_per_cycle": 20}), place / "before")
         assert _reason(place / "before") == "DiskFull"
+    with mounted(tmp_path / "other", "2m") as place:
 
         def fill_soon() -> None:
             wait_for(lambda: list(place.glob("during/*.incomplete/segments/0000.new/beads.bin")))

@@ -23,7 +23,7 @@ from walkers.inputs import InputError, load_case
 from walkers.inputs.calibration import read_calibration
 from walkers.inputs.reading import read_toml
 from walkers.inputs.sweep import expand
-from walkers.postprocess import analysis, read_result, tabulate
+from walkers.postprocess import read_result, tabulate
 from walkers.postprocess.analysis import current_result
 from walkers.postprocess.dump import DumpError, local_frames
 from walkers.postprocess.motion import read_bridges, read_motion
@@ -345,14 +345,14 @@ def test_a_disk_that_is_full_when_the_tables_are_written_is_a_failure_of_the_run
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The engine has ended well by then; with room again only the tables are made."""
-    case, tabulated = make_case(run=SHORT), analysis.tabulate
+    case = make_case(run=SHORT)
     with mounted(tmp_path / "disk", "2m") as place:
 
         def tabulate_without_room(directory: Path) -> object:
             fill(place)
-            return tabulated(directory)
+            return tabulate(directory)
 
-        monkeypatch.setattr(analysis, "tabulate", tabulate_without_room)
+        monkeypatch.setattr("walkers.sweeps.shared_deck.tabulate", tabulate_without_room)
         with pytest.raises(DiskFull, match="disk full"):
             run_case(case, place / "runs")
         assert not list(place.glob("runs/*/manifest.json"))

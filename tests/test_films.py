@@ -53,7 +53,7 @@ def test_pictures_are_as_far_apart_as_the_slow_motion_says(motion: Motion) -> No
 def test_a_scale_bar_is_as_long_as_beads_say(motion: Motion) -> None:
     """The red of one bead, seen without perspective, is as wide and as high as its diameter in pixels."""
     single = motion.of_walkers(motion.walkers[:1]).select(slice(1))
-    single = replace(single.select(beads=np.array([0])), walkers=(replace(single.walkers[0], beads=(1,)),))
+    single = replace(single.select(beads=np.array([0])), walkers=(replace(single.walkers[0], beads=(0,)),))
     window = Window(Scene.around(single, camera_axes(single), 1.2, shaken=False), (400, 300))
     picture = window.picture(0).astype(int)
     window.close()

@@ -113,6 +113,8 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         told += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
     elif kind in ("model_type", "dict_type", "model_attributes_type"):
         told = f"expected a table [{key}]"
+    elif kind == "string_pattern_mismatch" and example:
+        told = f"expected {example}"
     elif example:
         told += f", {example}"
     return Problem(key, quoted(document, parts_of(key)), told)

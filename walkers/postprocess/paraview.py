@@ -85,7 +85,9 @@ def write_vtk(
         if place.exists():
             shutil.rmtree(place)
         beside.rename(place)
-    except BaseException:
+    except BaseException as error:
+        if isinstance(error, OSError) and error.filename is None:  # a disk that is full does not say which
+            error.filename = str(destination)
         shutil.rmtree(beside, ignore_errors=True)
         raise
     return destination / _COLLECTION
