@@ -255,7 +255,7 @@ def _draw(axes: Axes, panel: Panel) -> None:
     if panel.settled:
         axes.axvspan(0.0, panel.settled, color="0.93", zorder=0)
     if panel.log:
-        axes.set_yscale("log")
+        axes.set_yscale("log", nonpositive="mask")
     axes.set_ylabel(panel.y)
 
 
