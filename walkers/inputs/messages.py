@@ -114,7 +114,7 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
     elif kind in ("model_type", "dict_type", "model_attributes_type"):
         told = f"expected a table [{key}]"
     elif example:
-        told += f", {example}"
+        told = f"{told}, {example}" if told.startswith("expected") else f"expected {example}"
     return Problem(key, quoted(document, parts_of(key)), told)
 
 
