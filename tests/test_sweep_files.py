@@ -92,9 +92,15 @@ def test_a_key_that_says_the_same_in_other_words_gives_way(make: Make) -> None:
 
 
 def test_a_descent_is_the_last_axis_downward(make: Make) -> None:
-    descend = {"key": "drive.peak_acceleration", "from": "1 g", "to": "0.1 g", "step": "0.3 g", "until_below": "1 um/s"}
+    descend = {
+        "key": "drive.peak_acceleration",
+        "from": "0.5 g",
+        "to": "0.2 g",
+        "step": "0.1 g",
+        "until_below": "1 um/s",
+    }
     sweep = make(axes={"drive.frequency": ["60 Hz", "80 Hz"]}, descend=descend)
-    assert [row[1] for row in sweep.rows] == ["1.0 g", "0.7 g", "0.4 g", "0.1 g"] * 2
+    assert [row[1] for row in sweep.rows] == ["0.5 g", "0.4 g", "0.3 g", "0.2 g"] * 2
     assert sweep.descent is not None
     assert (sweep.descent.steps, sweep.descent.until_below) == (4, pytest.approx(1e-6))
 

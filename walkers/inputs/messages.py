@@ -116,7 +116,7 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
     elif kind == "string_pattern_mismatch" and example:
         told = f"expected {example}"
     elif example:
-        told += f", {example}"
+        told = f"{told}, {example}" if told.startswith("expected") else f"expected {example}"
     return Problem(key, quoted(document, parts_of(key)), told)
 
 
