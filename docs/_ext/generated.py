@@ -17,8 +17,8 @@ from sphinx.application import Sphinx
 from sphinx.config import Config
 
 import walkers.inputs
-from walkers.inputs.matter import SUPPLIED
 from walkers.inputs.reading import read_toml
+from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.schema import AUTO, CaseFile
 from walkers.inputs.units import Kind
 from walkers.main import _program

@@ -11,7 +11,6 @@ from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_v
 from walkers.inputs.errors import unusable
 from walkers.inputs.origins import Notes
 from walkers.inputs.schema import DriveTable, HarmonicTable, RunTable
-from walkers.inputs.units import ACCELERATION, DURATION, FILE_SIZE, SPEED, TIME
 from walkers.physics.dimer import Dimer
 from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 
@@ -42,9 +41,9 @@ def resolve_drive(table: DriveTable, boundary: Shape, dimer: Dimer | None, notes
     else:
         first = _harmonic(table, "drive", boundary, dimer)
         harmonics = waveform(table.waveform, first)
-        notes.default("drive.axis", boundary.drive_axis, source=f"of a {boundary.shape}")
+        notes.default("drive.axis", boundary.drive_axis, f"of a {boundary.shape}")
         peak = first.peak_acceleration
-        notes.derived("drive.peak_acceleration", peak, "from gamma0, the dimer and the liquid", ACCELERATION)
+        notes.derived("drive.peak_acceleration", peak, "from gamma0, the dimer and the liquid")
     try:
         common_frequency([one.frequency for one in harmonics])
     except ValueError as error:
@@ -134,15 +133,15 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
     notes.default("run.samples_per_cycle", often)
     if case.loose:
         notes.derived("run.samples_per_cycle", often, "from frames_per_second")
-        notes.derived("run.segment", run.cycles_per_segment / case.drive.frequency, "about 0.5 s", DURATION)
-        notes.default("run.longest_settling", run.longest_settling, DURATION, "of loose beads")
+        notes.derived("run.segment", run.cycles_per_segment / case.drive.frequency, "about 0.5 s")
+        notes.default("run.longest_settling", run.longest_settling, "of loose beads")
     if run.rests:
-        notes.default("run.settled_below", run.settled_below, SPEED)
-    notes.derived("run.time_step", run.time_step, "auto: its share of the limits, fitted into a cycle", TIME)
+        notes.default("run.settled_below", run.settled_below)
+    notes.derived("run.time_step", run.time_step, "auto: its share of the limits, fitted into a cycle")
     notes.derived("run.cycles", cycles, whence)
     notes.derived("run.settling_cycles", run.settling_cycles, "a third of the cycles, at most 20")
-    notes.derived("run.silence", silence, "an engine that writes nothing for so long is ended", DURATION)
-    notes.derived("run.log_limit", run.most_log, "an engine that writes a longer log is ended", FILE_SIZE)
+    notes.derived("run.silence", silence, "an engine that writes nothing for so long is ended")
+    notes.derived("run.log_limit", run.most_log, "an engine that writes a longer log is ended")
 
 
 def _check_length(table: RunTable, case: Case, cycles: int, settling: int, cycles_per_sample: int) -> None:

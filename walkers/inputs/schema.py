@@ -1,7 +1,7 @@
 """What a case file may say: keys, types, defaults and bounds, as pydantic models.
 
 A quantity is written as a string with its unit and held here as a number in SI units. What the library of materials
-and liquids supplies (`walkers.inputs.matter.SUPPLIED`) has been filled in before.
+and liquids supplies (`walkers.inputs.resolving.SUPPLIED`) has been filled in before.
 """
 
 from __future__ import annotations
