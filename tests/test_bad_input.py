@@ -33,7 +33,7 @@ def bead(radius: str, x: str, z: str = "1 mm") -> dict[str, Any]:
 HARMONICS = {"harmonics": [{"frequency": "80 Hz", "peak_acceleration": "1 g"}]}
 # Changed tables (None: left out), and what the message says after the file.
 BAD: list[tuple[dict[str, Any], str]] = [
-    # Quantities: of which kinds test_units tells
+    # Quantities
     ({"dimers": {"radii": ["0.3", "0.2 mm"]}}, 'dimers.radii[0] = "0.3": expected a length with its unit'),
     ({"dimers": {"radii": ["0.3 mm", "0 mm"]}}, "must be more than zero"),
     ({"dimers": {"radii": ["1e999 mm", "0.2 mm"]}}, 'dimers.radii[0] = "1e999 mm": expected a length'),

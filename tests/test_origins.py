@@ -183,15 +183,11 @@ def test_settings_are_read_as_a_file_would() -> None:
             settings_of(wrong)
 
 
-def test_set_on_the_command_line(in_folder: Path) -> None:
+def test_set_on_the_command_line() -> None:
     shown = json.loads(call("show", "fig1b", "--set", "drive.frequency=70Hz", "--json", check=True).stdout)
     assert shown["case"]["drive"]["harmonics"][0]["frequency"] == 70.0
     (given,) = [one for one in shown["case"]["origins"] if one["key"] == "drive.frequency"]
     assert {"text": "70Hz", "value": 70.0, "origin": "given"}.items() <= given.items()
-    predicted = json.loads(call("theory", "fig1b", "--set", "dimers.radii[1]=0.25mm", "--json", check=True).stdout)
-    assert predicted["sin_delta"] == pytest.approx(0.05 / 0.55)
-    deck = call("deck", "fig1b", "--set", "dimers.replicates=1", check=True).stdout
-    assert deck != call("deck", "fig1b", check=True).stdout
     text = call("show", "fig1b", check=True).stdout
     assert re.search(r"^ +frequency +80 Hz +given$", text, flags=re.MULTILINE)
     assert re.search(r"^ +volume_fraction .* calibrated with Si AK5 and Si AK10, may be ", text, flags=re.MULTILINE)
@@ -199,7 +195,6 @@ def test_set_on_the_command_line(in_folder: Path) -> None:
         told = call(command, "fig1b", "--set", "drive.frequency=70 mm")
         assert told.returncode == 2
         assert told.stderr.startswith('walkers: fig1b: drive.frequency = "70 mm": expected a frequency')
-    assert list(in_folder.iterdir()) == []
 
 
 def test_a_sweep_with_a_setting_has_a_directory_of_its_own(in_folder: Path) -> None:

@@ -357,6 +357,8 @@ def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
 
 def _check_places(case: Case, keys: list[str]) -> None:
     """Walkers (each with its table's key) and beads that are placed: between the walls, and not within each other."""
+    import numpy as np
+
     boundary = case.boundary
     standing: list[Standing] = []
     try:
@@ -373,9 +375,10 @@ def _check_places(case: Case, keys: list[str]) -> None:
     placed = case.placed.beads if case.placed is not None else ()
     walking = len(beads)
     beads += [(f"placed[{number}]", (x, y, z), radius) for number, (x, y, z, radius) in enumerate(placed)]
-    for number, (key, (x, y, z), radius) in enumerate(beads):
+    clearances = boundary.side_clearance(np.array([bead[1] for bead in beads]))
+    for number, ((key, (_, _, z), radius), clearance) in enumerate(zip(beads, clearances, strict=True)):
         least = (1.0 - _OVERLAP) * radius
-        beside = boundary.side_clearance(x, y, z) < least
+        beside = clearance < least
         if number < walking and beside:
             told = f"so many walkers, or such, do not fit between the walls of the {boundary.shape}"
             raise unusable(f"{key}.replicates", told)

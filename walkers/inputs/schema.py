@@ -25,19 +25,6 @@ def _auto(value: object) -> object:
     return None if isinstance(value, str) and value.strip().lower() == "auto" else value
 
 
-def _plain_number(value: object) -> object:
-    """Accept TOML's integers and floats only: neither "0.3" nor true is a coefficient."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ValueError("expected a plain number without a unit")
-    return value
-
-
-def _whole_number(value: object) -> object:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ValueError("expected a whole number")
-    return value
-
-
 def _axis(value: object) -> object:
     """An axis by its name, or a direction by its components."""
     if value in ("x", "y", "z"):
@@ -82,8 +69,9 @@ ALTERNATIVES: Mapping[str, tuple[str, ...]] = {
 MOST_BEADS = 20_000
 AUTO = BeforeValidator(_auto)
 """Reads "auto" as None."""
-Number = Annotated[float, BeforeValidator(_plain_number), Field(allow_inf_nan=False)]
-Whole = Annotated[int, BeforeValidator(_whole_number)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+"""TOML's integers and floats only: neither "0.3" nor true is a coefficient."""
+Whole = Annotated[int, Field(strict=True)]
 UpToRightAngle = Annotated[float, replace(units.ANGLE, largest=1.5708, sign=units.NOT_NEGATIVE)]
 Coefficient = Annotated[Number, Field(ge=0, le=1e3)]
 Axis = Annotated[Any, BeforeValidator(_axis)]
