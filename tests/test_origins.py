@@ -114,7 +114,6 @@ def test_a_changed_value_is_validated_like_a_file() -> None:
     assert case == resolve_case(case.document, name="fig1b")
     assert case.run.period == pytest.approx(1.0 / 70.0, rel=1e-12)
     for changes, told in (
-        ({"drive.frequency": "70 mm"}, 'drive.frequency = "70 mm": expected a frequency'),
         ({"drive.frequenzy": "70 Hz"}, 'did you mean "frequency"?'),
         ({"dimers.radii[2]": "1 mm"}, "the base case has no dimers.radii of that length"),
         ({"drive": "70 Hz"}, "is a table of a case"),
@@ -234,11 +233,8 @@ def test_a_result_says_what_it_rests_on(run_directory: Callable[..., Path], tmp_
     assert told["contact.friction.bead_wall"]["origin"] == "given"
     assert told.keys() == library.unmeasured().keys()
     assert "  as given   " in done.describe()
-    # The same numbers from the library are the same run, and told otherwise.
-    stored = done.case
-    assert stored == case
-    assert {one.key: one.origin for one in stored.origins} == {one.key: one.origin for one in case.origins}
-    assert stored.document == case.document
+    assert (done.case, done.case.document) == (case, case.document)
+    assert [(one.key, one.origin) for one in done.case.origins] == [(one.key, one.origin) for one in case.origins]
 
 
 def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
