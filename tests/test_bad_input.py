@@ -33,23 +33,20 @@ def bead(radius: str, x: str, z: str = "1 mm") -> dict[str, Any]:
 HARMONICS = {"harmonics": [{"frequency": "80 Hz", "peak_acceleration": "1 g"}]}
 # Changed tables (None: left out), and what the message says after the file.
 BAD: list[tuple[dict[str, Any], str]] = [
-    # Quantities: of which kinds test_units tells
+    # Quantities
     ({"dimers": {"radii": ["0.3", "0.2 mm"]}}, 'dimers.radii[0] = "0.3": expected a length with its unit'),
     ({"dimers": {"radii": ["0.3 mm", "0 mm"]}}, "must be more than zero"),
     ({"dimers": {"radii": ["1e999 mm", "0.2 mm"]}}, 'dimers.radii[0] = "1e999 mm": expected a length'),
     ({"beads": {"density": 4000}}, "beads.density = 4000: expected a density with its unit"),
-    ({"drive": {"peak_acceleration": "4 kg"}}, 'drive.peak_acceleration = "4 kg": expected an acceleration'),
     ({"drive": {"peak_acceleration": "-4 g"}}, "must be zero or more"),
     ({"drive": {"frequency": "500 rad/s"}}, "(cycles a second, not an angular frequency)"),
     ({"contact": {"youngs_modulus": "1 MPa"}}, "must lie within 5e+06 and 1e+09 Pa"),
     ({"liquid": {"contact_angle": "120 deg"}}, "must lie within 0 and 1.5708 rad"),
     # Numbers, lists, tables, names
     ({"dimers": {"radii": ["0.3 mm"]}}, 'dimers.radii = ["0.3 mm"]: too short; expected two radii'),
-    ({"dimers": {"radii": ["0.3 mm"] * 3}}, "expected two radii"),
     ({"dimers": {"radii": "0.3 mm"}}, 'dimers.radii = "0.3 mm": expected a list'),
     ({"beads": {"material": 3}}, "beads.material = 3: expected text"),
     ({"liquid": {"volume_fraction": "1 %"}}, 'liquid.volume_fraction = "1 %": expected a plain number'),
-    ({"liquid": {"volume_fraction": 1e-320}}, "liquid.volume_fraction = 1e-320: expected at least "),
     ({"contact": {"friction": 0.1}}, "contact.friction = 0.1: expected a table"),
     ({"contact": {"restitution": 1.2}}, "contact.restitution = 1.2: expected at most 1"),
     ({"contact": {"restitution": 0}}, "expected more than 0.05"),
@@ -62,7 +59,6 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"liquid": {"name": "Si AK 5"}}, 'did you mean "Si AK5"'),
     # Keys
     ({"liquid": {"volume_fracton": 0.01}}, 'liquid.volume_fracton = 0.01: unknown key; [liquid] takes name, '),
-    ({"boundry": {"material": "glass"}}, 'did you mean "boundary"'),
     ({"frequency": "80 Hz"}, 'frequency = "80 Hz": unknown key; a case takes '),
     ({"dimers": {"seed": 2}}, 'did you mean "run.seed"'),
     # What contradicts something else
@@ -104,8 +100,6 @@ BAD: list[tuple[dict[str, Any], str]] = [
     # What is missing
     ({"dimers": None}, "dimers: missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"),
     ({"beads": {"material": None}}, "beads.density: missing; expected such as"),
-    ({"liquid": {"name": None}}, "liquid.surface_tension: missing"),
-    ({"boundary": {"material": None}}, "boundary.material: missing"),
     ({"drive": {"frequency": None}}, "drive.frequency: missing"),
     ({"drive": {"peak_acceleration": None}}, "drive.peak_acceleration: missing"),
     ({"beads": {"material": "polystyrene"}, "contact": {"friction": None}}, "contact.friction: missing"),

@@ -1,4 +1,7 @@
-"""A user's texts in other languages: what a template makes of them is the same program, page and deck."""
+"""A user's texts in other languages: what a template makes of them is the same program, page and deck.
+
+They become code where one language is put into another without quoting: titles, names, paths, settings.
+"""
 
 import ast
 import json
@@ -13,7 +16,6 @@ from xml.etree import ElementTree
 import pytest
 
 from tests.conftest import SHORT, call, document, make_case
-from tests.hostile import HOSTILE
 from walkers.archive.writing import write_archive
 from walkers.inputs import resolve_case
 from walkers.inputs.case import Case
@@ -29,6 +31,34 @@ from walkers.runner.manifest import record_tables
 from walkers.runner.summary import describe, summarise
 from walkers.templates.deck import render_deck
 
+HOSTILE: dict[str, str] = {
+    "three double quotes": '"""; open("pwned", "w"); """',
+    "three single quotes": "'''; open('pwned', 'w'); '''",
+    "quotes": '"a" \'b\' "',
+    "braces": "{0} {x!r} }{",
+    "backslashes": r"C:\Users\new\x \N{BULLET}",
+    "backslash at the end": "ends in \\",
+    "newline": "one\nimport os; open('pwned', 'w')\nshell touch pwned",
+    "carriage return": "one\ropen('pwned', 'w')\rshell touch pwned",
+    "other ends of lines": "one\x0bshell touch pwned\x0cshell touch pwned\x85shell touch pwned\u2028shell touch pwned",
+    "tab and escape": "one\ttwo \x1b[31mred\x1b[0m",
+    "script": "</title></script><script>open('pwned')</script>",
+    "attribute": '" onload="open(1)" x="',
+    "comment of HTML": "--><script>open('pwned')</script><!--",
+    "expression of jinja": "{{ 7 * 7 }}{{7*7}}",
+    "block of jinja": "{% raw %}{% include 'x' %}{# comment #}",
+    "ampersand": "a & b &amp; &lt;script&gt;",
+    "variable of a shell": "${HOME} $HOME $(touch pwned)",
+    "backquotes": "`touch pwned`",
+    "shell": "; touch pwned; '\"; touch pwned #",
+    "hash": "# heading # comment",
+    "table of markdown": "a | b | [link](javascript:open) ![x](y) *z* <b>",
+    "end of CDATA": "]]><x/>",
+    "YAML": "- a: *b\n%x",
+    "no ASCII": "Γ0 = 0,38 · 粒子 · é · \U0001f41d · \u202e",
+    "very long": "long " * 20_000,
+}
+"""From what they hold to texts that a case file may hold; whoever runs one finds a file ``pwned``."""
 EACH = pytest.mark.parametrize("name", HOSTILE)
 
 

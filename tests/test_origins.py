@@ -114,7 +114,6 @@ def test_a_changed_value_is_validated_like_a_file() -> None:
     assert case == resolve_case(case.document, name="fig1b")
     assert case.run.period == pytest.approx(1.0 / 70.0, rel=1e-12)
     for changes, told in (
-        ({"drive.frequency": "70 mm"}, 'drive.frequency = "70 mm": expected a frequency'),
         ({"drive.frequenzy": "70 Hz"}, 'did you mean "frequency"?'),
         ({"dimers.radii[2]": "1 mm"}, "the base case has no dimers.radii of that length"),
         ({"drive": "70 Hz"}, "is a table of a case"),
@@ -183,15 +182,11 @@ def test_settings_are_read_as_a_file_would() -> None:
             settings_of(wrong)
 
 
-def test_set_on_the_command_line(in_folder: Path) -> None:
+def test_set_on_the_command_line() -> None:
     shown = json.loads(call("show", "fig1b", "--set", "drive.frequency=70Hz", "--json", check=True).stdout)
     assert shown["case"]["drive"]["harmonics"][0]["frequency"] == 70.0
     (given,) = [one for one in shown["case"]["origins"] if one["key"] == "drive.frequency"]
     assert {"text": "70Hz", "value": 70.0, "origin": "given"}.items() <= given.items()
-    predicted = json.loads(call("theory", "fig1b", "--set", "dimers.radii[1]=0.25mm", "--json", check=True).stdout)
-    assert predicted["sin_delta"] == pytest.approx(0.05 / 0.55)
-    deck = call("deck", "fig1b", "--set", "dimers.replicates=1", check=True).stdout
-    assert deck != call("deck", "fig1b", check=True).stdout
     text = call("show", "fig1b", check=True).stdout
     assert re.search(r"^ +frequency +80 Hz +given$", text, flags=re.MULTILINE)
     assert re.search(r"^ +volume_fraction .* calibrated with Si AK5 and Si AK10, may be ", text, flags=re.MULTILINE)
@@ -199,7 +194,6 @@ def test_set_on_the_command_line(in_folder: Path) -> None:
         told = call(command, "fig1b", "--set", "drive.frequency=70 mm")
         assert told.returncode == 2
         assert told.stderr.startswith('walkers: fig1b: drive.frequency = "70 mm": expected a frequency')
-    assert list(in_folder.iterdir()) == []
 
 
 def test_a_sweep_with_a_setting_has_a_directory_of_its_own(in_folder: Path) -> None:
@@ -239,11 +233,8 @@ def test_a_result_says_what_it_rests_on(run_directory: Callable[..., Path], tmp_
     assert told["contact.friction.bead_wall"]["origin"] == "given"
     assert told.keys() == library.unmeasured().keys()
     assert "  as given   " in done.describe()
-    # The same numbers from the library are the same run, and told otherwise.
-    stored = done.case
-    assert stored == case
-    assert {one.key: one.origin for one in stored.origins} == {one.key: one.origin for one in case.origins}
-    assert stored.document == case.document
+    assert (done.case, done.case.document) == (case, case.document)
+    assert [(one.key, one.origin) for one in done.case.origins] == [(one.key, one.origin) for one in case.origins]
 
 
 def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:

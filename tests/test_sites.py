@@ -22,7 +22,7 @@ from tests.conftest import (
     wait_for,
     wait_for_engines,
 )
-from tests.hostile import HOSTILE
+from tests.test_hostile import HOSTILE
 from tests.test_sweeps import SLOW, TINY, contents_of
 from walkers.inputs import InputError
 from walkers.runner.launch import _off_the_network

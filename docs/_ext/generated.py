@@ -17,8 +17,8 @@ from sphinx.application import Sphinx
 from sphinx.config import Config
 
 import walkers.inputs
-from walkers.inputs.matter import SUPPLIED
 from walkers.inputs.reading import read_toml
+from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.schema import AUTO, CaseFile
 from walkers.inputs.units import Kind
 from walkers.main import _program
@@ -85,7 +85,8 @@ def _expected(hint: Any) -> str:
     if get_origin(hint) in (list, tuple):
         parts = list(dict.fromkeys(_expected(one) for one in get_args(hint)))
         return f"a list, each {' or '.join(parts)}"
-    return {str: "text", bool: "true or false"}.get(hint, getattr(hint, "__name__", str(hint)))
+    words = {str: "text", bool: "true or false", int: "a whole number", float: "a plain number without a unit"}
+    return words.get(hint, getattr(hint, "__name__", str(hint)))
 
 
 def _refusal(validator: BeforeValidator | Kind) -> str | None:

@@ -35,10 +35,6 @@ class Flat:
     normal: Vector
     name: str = FLOOR
 
-    def clearance(self, *place: float) -> float:
-        """Distance of a place (x, y, z in m) from it, m."""
-        return sum((one - at) * along for one, at, along in zip(place, self.point, self.normal, strict=True))
-
     def distances(self, places: FloatArray) -> FloatArray:
         """Of places, shape (..., 3), m."""
         found: FloatArray = (places - self.point) @ self.normal
@@ -55,10 +51,6 @@ class Round:
 
     radius: float
     name: str = "side"
-
-    def clearance(self, *place: float) -> float:
-        """Distance of a place (x, y, z in m) from it, m."""
-        return self.radius - hypot(*place[:2])
 
     def distances(self, places: FloatArray) -> FloatArray:
         """Of places, shape (..., 3), m."""
@@ -140,9 +132,13 @@ class Boundary:
         """Whether it is a floor without any side walls."""
         return self.walls == (BOTTOM,)
 
-    def side_clearance(self, x: float, y: float, z: float = 0.0) -> float:
-        """Distance of a place from the nearest side wall, m."""
-        return min((wall.clearance(x, y, z) for wall in self.walls if wall.name != FLOOR), default=inf)
+    def side_clearance(self, places: FloatArray) -> FloatArray:
+        """Distance of each place, shape (n, 3), from the nearest side wall, shape (n,), m."""
+        found = places[:, 0] + inf
+        for wall in self.walls:
+            if wall.name != FLOOR:
+                found = found.clip(max=wall.distances(places))
+        return found
 
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
         """Places for walkers that stand ``spacing`` (m) apart: a square grid about the origin."""

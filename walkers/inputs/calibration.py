@@ -216,23 +216,18 @@ def read_calibration(document: Mapping[str, Any], *, source: str, name: str, fol
         *_problems_of_keys(file),
     ]:
         raise InputError(source, problems)
-    parameters = {
-        label: {**vars(table), "symbol": table.symbol or label, "experiments": _experiments(file, table)}
-        for label, table in file.parameters.items()
-    }
+    parameters = []
+    for label, table in file.parameters.items():
+        filled = {"symbol": table.symbol or label, "experiments": table.experiments or list(file.experiments)}
+        parameters.append(Parameter(**{**vars(table), **filled}, name=label))
     return Calibration(
         name=name,
         source=source,
         folder=folder,
         file=file,
-        parameters=tuple(Parameter(**values, name=label) for label, values in parameters.items()),
+        parameters=tuple(parameters),
         experiments={label: flatten(table) for label, table in file.experiments.items()},
     )
-
-
-def _experiments(file: CalibrationFile, table: ParameterTable) -> list[str]:
-    """Those that a parameter belongs to."""
-    return list(file.experiments) if table.experiments is None else table.experiments
 
 
 def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
@@ -241,7 +236,7 @@ def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
     named: list[tuple[str, Collection[str], Collection[str], str]] = []
     for label, parameter in file.parameters.items():
         place = f"parameters.{label}.experiments"
-        named.append((place, _experiments(file, parameter), file.experiments, "an experiment"))
+        named.append((place, parameter.experiments or file.experiments, file.experiments, "an experiment"))
     for number, one in enumerate(file.observations):
         place = f"observations[{number}]"
         named.append((f"{place}.of", one.of, file.experiments, "an experiment"))
@@ -308,7 +303,7 @@ def _problems_of_keys(file: CalibrationFile) -> Iterator[Problem]:
     taken: dict[str, dict[str, str]] = {}
     for name, table in file.parameters.items():
         for key in table.keys:
-            for experiment in _experiments(file, table):
+            for experiment in table.experiments or file.experiments:
                 other = taken.setdefault(key, {}).setdefault(experiment, name)
                 if other != name:
                     told = f"{key} of the experiment {experiment} is set by {other} already"

@@ -63,11 +63,8 @@ def _known(key: str, entry: Mapping[str, Any], liquids: tuple[str, ...] = ()) ->
     kind, value = _KINDS.get(key.rpartition(".")[2]), entry["value"]
     number = units.parse_quantity(value, kind) if kind else float(value)
     source = f"calibrated with {' and '.join(liquids)}" if liquids else entry.get("source", "")
-    return Known(number, value, source, _range(entry), liquids)
-
-
-def _range(entry: Mapping[str, Any]) -> tuple[Any, Any] | None:
-    return (entry["range"][0], entry["range"][1]) if "range" in entry else None
+    ends = (entry["range"][0], entry["range"][1]) if "range" in entry else None
+    return Known(number, value, source, ends, liquids)
 
 
 def materials() -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, pi
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.dimer import Dimer
@@ -38,8 +38,7 @@ class ContactLoads:
     overlaps: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class BridgeAtRest:
+class BridgeAtRest(NamedTuple):
     """Liquid (m³), pull (N) and rupture distance (m) of a bridge between surfaces that touch."""
 
     volume: float
@@ -88,7 +87,7 @@ def contact_loads(case: Case, walkers: Walkers | None = None) -> ContactLoads:
         pair = (radii[one], radii[other])
         bridges.append(bridge_at_rest(case, *pair))
         overlaps.append(hertz_overlap(bridges[-1].pull, pair[0] * pair[1] / sum(pair), modulus))
-    volumes, pulls, ruptures = zip(*((one.volume, one.pull, one.rupture) for one in bridges), strict=True)
+    volumes, pulls, ruptures = zip(*bridges, strict=True)
     return ContactLoads(volumes, pulls, ruptures, tuple(overlaps))
 
 

@@ -53,6 +53,8 @@ _WORDS = {
     "a valid tuple": "a list",
     "a valid list": "a list (a table of tables is written [[name]])",
     "a valid string": "text in quotes",
+    "a valid number": "a plain number without a unit",
+    "a valid integer": "a whole number",
     "a valid boolean": "true or false",
 }
 """What pydantic says, and what this does."""
@@ -113,8 +115,6 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         told += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
     elif kind in ("model_type", "dict_type", "model_attributes_type"):
         told = f"expected a table [{key}]"
-    elif kind == "string_pattern_mismatch" and example:
-        told = f"expected {example}"
     elif example:
         told = f"{told}, {example}" if told.startswith("expected") else f"expected {example}"
     return Problem(key, quoted(document, parts_of(key)), told)

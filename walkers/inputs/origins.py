@@ -59,15 +59,18 @@ class Origin:
 
 
 class Notes(dict[str, Origin]):
-    """Where values come from that a case leaves out, by their keys, noted as they are filled in."""
+    """Where values come from that a case leaves out, by their keys, noted as they are filled in.
 
-    def derived(self, key: str, value: Any, source: str, kind: Kind | None = None) -> None:
+    One without a text is told as its value, in the unit of its key.
+    """
+
+    def derived(self, key: str, value: Any, source: str) -> None:
         """Note what follows from other values."""
-        self[key] = Origin(key, text_of(value, kind), "derived", source, value=value)
+        self[key] = Origin(key, "", "derived", source, value=value)
 
-    def default(self, key: str, value: Any, kind: Kind | None = None, source: str = "") -> None:
+    def default(self, key: str, value: Any, source: str = "") -> None:
         """Note a default that depends on other values."""
-        self[key] = Origin(key, text_of(value, kind), "default", source, value=value)
+        self[key] = Origin(key, "", "default", source, value=value)
 
 
 def origins_of(file: CaseFile, document: Mapping[str, Any], notes: Mapping[str, Origin]) -> tuple[Origin, ...]:
@@ -81,13 +84,13 @@ def origins_of(file: CaseFile, document: Mapping[str, Any], notes: Mapping[str, 
         On what it leaves out and has no default of its own.
     """
     found: dict[str, Origin] = {}
-    for key, raw, value, default in _leaves(file, document):
+    for key, raw, value, kind in _leaves(file, document):
         if raw is not None and not (isinstance(raw, str) and raw.strip().lower() == "auto"):
             found[key] = Origin(key, text_of(raw), "given", value=value)
-        elif key in notes:
-            found[key] = notes[key]
-        elif default:
-            found[key] = Origin(key, default, "default", value=value)
+        elif one := notes.get(key):
+            found[key] = replace(one, key=key, text=one.text or text_of(one.value, kind))
+        elif value is not None:
+            found[key] = Origin(key, text_of(value, kind), "default", value=value)
     for key, given in file.uncertain.items():
         ((distribution, (low, high)),) = given.items()
         # What has no line of its own, such as one of two radii, has one if the case calls it uncertain.
@@ -97,8 +100,10 @@ def origins_of(file: CaseFile, document: Mapping[str, Any], notes: Mapping[str, 
     return tuple(found.values())
 
 
-def _leaves(table: BaseModel, document: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any, Any, str]]:
-    """Keys of a table: each with what the document says (None: nothing), its value, and its default as text."""
+def _leaves(
+    table: BaseModel, document: Mapping[str, Any], prefix: str = ""
+) -> Iterator[tuple[str, Any, Any, Kind | None]]:
+    """Keys of a table: each with what the document says (None: nothing), its value, and of which kind it is."""
     from pydantic import BaseModel
 
     from walkers.inputs.units import kind_in
@@ -113,7 +118,7 @@ def _leaves(table: BaseModel, document: Mapping[str, Any], prefix: str = "") -> 
             for number, (one, said) in enumerate(zip(value, raw or [], strict=True)):
                 yield from _leaves(one, said, f"{key}[{number}].")
         elif raw is not None or not isinstance(value, list):
-            yield key, raw, value, "" if value is None else text_of(value, kind_in([*about.metadata, about.annotation]))
+            yield key, raw, value, kind_in([*about.metadata, about.annotation])
 
 
 def text_of(value: Any, kind: Kind | None = None) -> str:
@@ -123,7 +128,7 @@ def text_of(value: Any, kind: Kind | None = None) -> str:
         return ", ".join(
             f"({text})" if isinstance(one, (list, tuple)) else text for one, text in zip(value, texts, strict=True)
         )
-    if kind is not None:
+    if kind is not None and not isinstance(value, str):
         from walkers.inputs.units import quantity_text
 
         return quantity_text(value, kind)

@@ -143,10 +143,9 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     """
     # Not above: that there is no such file is told before all that a case may say is built.
     from walkers.inputs.changes import changed
-    from walkers.inputs.matter import supplied
     from walkers.inputs.messages import blaming, check_key, validated
     from walkers.inputs.origins import Notes
-    from walkers.inputs.resolving import resolve
+    from walkers.inputs.resolving import resolve, supplied
     from walkers.inputs.schema import CaseFile
 
     notes = Notes()

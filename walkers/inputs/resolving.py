@@ -1,26 +1,119 @@
-"""From a validated file to a resolved case: what the library supplies and what follows from the rest is filled in."""
+"""From what a case file says to a resolved case: what it leaves out is the library's, usual, or follows from the rest.
+
+First what beads, liquid and contacts are made of, then the bodies and the checks that they fit into the boundary and
+beside each other.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from functools import partial
-from math import atan2
-from typing import Any
+from functools import cache, partial
+from itertools import islice
+from math import atan2, dist, pi
+from typing import Any, Literal
 
-from walkers.inputs.bodies import Placed
-from walkers.inputs.body_tables import check_bodies, mixture_of, spaced, walkers_of
-from walkers.inputs.boundary import SHAPES, Shape
+from walkers.inputs import library
+from walkers.inputs.bodies import ARRANGEMENTS, Mixture, Placed, Standing, Walkers, touching
+from walkers.inputs.boundary import SHAPES, Boundary, Shape
 from walkers.inputs.case import Case, Run
+from walkers.inputs.changes import MISSING, changed, parts_of, value_at
 from walkers.inputs.errors import unusable
-from walkers.inputs.matter import contact_of, liquid_of
+from walkers.inputs.library import Known, suggestion
+from walkers.inputs.loads import contact_loads, reach
 from walkers.inputs.origins import Notes, Origin, origins_of
 from walkers.inputs.run_tables import resolve_drive, resolve_run
-from walkers.inputs.schema import BoundaryTable, CaseFile
-from walkers.inputs.units import ANGLE
+from walkers.inputs.schema import (
+    MOST_BEADS,
+    BoundaryTable,
+    CaseFile,
+    ClusterTable,
+    DimersTable,
+    LiquidTable,
+    MixtureTable,
+    WalkersTable,
+)
 from walkers.physics.dimer import Dimer
+from walkers.physics.laws import LAWS, by_name
+from walkers.physics.matter import DEFAULT_LAW, Contact, Liquid
 
 _EXAMPLES = {"opening": "120 deg", "width": "5.3 mm", "height": "5.3 mm"}
+_PACKING = 0.55
+"""Packing fraction of a settled wet pile, for the count that fills a height."""
+_OVERLAP = 0.01
+"""Radii by which beads that are given places may overlap with each other and the walls."""
+_WAYS: dict[str, Literal["both", "right", "left"]] = {
+    **{"both": "both", "right": "right", "left": "left"},
+    **{"up": "right", "down": "left"},
+}
+"""What ``facing`` says; up and down are a climber's words."""
+_FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction")
+_OF_SURFACES = (
+    *("liquid.viscosity_ratio", "liquid.volume_fraction", "liquid.contact_angle"),
+    *("contact.rolling_friction", "contact.restitution", "contact.minimum_separation_ratio"),
+)
+_OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", "liquid.kinematic_viscosity")
+SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
+"""Keys that a case may leave out because the library has them, or says what is usual."""
+
+
+def supplied(document: Mapping[str, Any], notes: Notes) -> dict[str, Any]:
+    """The tables of a case with what they leave out and the library has of the materials and the liquid they name.
+
+    Raises `InputError` if they name what the library has not, and do not say all about it themselves.
+    """
+    said = {key: value_at(document, parts_of(key)) for key in (*SUPPLIED, "liquid.dynamic_viscosity", "liquid.law")}
+    given = {key for key, value in said.items() if value is not MISSING}
+    named = {key: value_at(document, parts_of(key)) for key in ("beads.material", "boundary.material", "liquid.name")}
+    for key, name in named.items():
+        if name is not MISSING and not isinstance(name, str):
+            raise unusable(key, "expected text in quotes")
+    bead, wall, liquid = (None if name is MISSING else str(name) for name in named.values())
+    described = given.issuperset(_FRICTION)
+    for key, name, names, says_all in (
+        ("beads.material", bead, library.materials(), described and "beads.density" in given),
+        ("liquid.name", liquid, library.liquids(), False),
+        ("boundary.material", wall, library.materials(), described),
+    ):
+        if name is not None and name not in names and not says_all:
+            told = f"not in the library; expected one of {', '.join(names)}{suggestion(name, names)}"
+            raise unusable(key, told)
+    known, settings = _known(bead, wall, liquid), {}
+    # What was calibrated was so with one law of the bridges: with another it is a guess.
+    calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
+    for key in SUPPLIED:
+        there = isinstance(document.get(key.split(".")[0]), Mapping) or key.startswith("contact")
+        instead = key == "liquid.kinematic_viscosity" and "liquid.dynamic_viscosity" in given
+        if there and key in known and not (key in given or instead):
+            settings[key] = known[key].written
+            notes[key] = _origin_of(key, known[key], calibrated)
+    return changed({"contact": {"friction": {}}, **document}, settings)
+
+
+@cache
+def _known(bead: str | None, wall: str | None, liquid: str | None) -> dict[str, Known]:
+    """What is usual, and what the library has of materials and a liquid, by the keys of a case."""
+    on_bead, on_wall = library.surface_pair(bead, bead), library.surface_pair(bead, wall)
+    found = {
+        "beads.density": library.material(bead).get("density") if bead in library.materials() else None,
+        "contact.friction.bead_bead": on_bead.get("friction"),
+        "contact.friction.bead_wall": on_wall.get("friction"),
+        **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
+        **{f"liquid.{key}": known for key, known in (library.liquid(liquid) if liquid else {}).items()},
+    }
+    usual = {key: loose.usual for key, loose in library.unmeasured().items()}
+    return {key: known for key, known in (usual | {key: one for key, one in found.items() if one}).items() if known}
+
+
+@cache
+def _origin_of(key: str, known: Known, liquid: str | None) -> Origin:
+    """What was calibrated with other liquids is a guess for this one."""
+    loose, text = library.unmeasured().get(key), str(known.written)
+    if loose is None or (known.source and not known.calibrated_with):
+        return Origin(key, text, "library", known.source, value=known.value)
+    if liquid in known.calibrated_with:
+        return Origin(key, text, "calibrated", known.source, known.range, loose.logarithmic, value=known.value)
+    return Origin(key, text, "default", known.source, loose.range, loose.logarithmic, value=known.value)
 
 
 def resolve(file: CaseFile, name: str, document: Mapping[str, Any], notes: Notes) -> Case:
@@ -29,12 +122,12 @@ def resolve(file: CaseFile, name: str, document: Mapping[str, Any], notes: Notes
     Raises `InputError` if something is missing that the library does not know, or keys contradict each other.
     """
     boundary = _boundary(file.boundary)
-    walkers = tuple(walkers_of(key, table, file.boundary, notes) for key, table in file.walkers.items())
-    mixture = mixture_of(file.mixture, boundary) if file.mixture else None
+    walkers = tuple(_walkers_of(key, table, file.boundary, notes) for key, table in file.walkers.items())
+    mixture = _mixture_of(file.mixture, boundary) if file.mixture else None
     placed = Placed(tuple((*bead.at, bead.radius) for bead in file.placed)) if file.placed else None
     if not (walkers or mixture or placed):
         raise unusable("dimers", "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
-    liquid, density = liquid_of(file.liquid, notes), file.beads.density
+    liquid, density = _liquid_of(file.liquid, notes), file.beads.density
     first = walkers[0].radii if walkers else ()
     dimer = Dimer((first[0], first[1]), density, liquid.surface_tension) if len(first) == 2 else None
     case = Case(
@@ -49,7 +142,10 @@ def resolve(file: CaseFile, name: str, document: Mapping[str, Any], notes: Notes
         material=file.beads.material,
         density=density,
         liquid=liquid,
-        contact=contact_of(file.contact),
+        contact=Contact(
+            **{f"friction_{pair}": coefficient for pair, coefficient in file.contact.friction},
+            **file.contact.model_dump(exclude={"friction"}),
+        ),
         seed=file.run.seed,
         run=Run(0.0, 1, 1, 0, False, 1, 1, 1, 1, 0.0, 0.0, 1),  # its step follows from the rest
     )
@@ -58,12 +154,12 @@ def resolve(file: CaseFile, name: str, document: Mapping[str, Any], notes: Notes
         along, across, _ = case.drive_axis
         case = replace(case, boundary=replace(boundary, uphill=atan2(across, along) + file.boundary.uphill))
     made = zip(file.walkers, case.walkers, strict=True)
-    case = replace(case, walkers=tuple(spaced(case, key, one, notes) for key, one in made))
-    check_bodies(case, file)
+    case = replace(case, walkers=tuple(_spaced(case, key, one, notes) for key, one in made))
+    _check_bodies(case, file)
     if boundary.tilt and file.boundary.uphill == 0.0:
-        notes.default("boundary.uphill", 0.0, ANGLE, "the direction of the drive")
-    gravity = case.gravity
-    notes["environment.gravity"] = Origin("environment.gravity", f"{gravity:g} m/s^2", "default", value=gravity)
+        notes.default("boundary.uphill", 0.0, "the direction of the drive")
+    # Not in g: the paper's, 9.8 m/s², is not the case's gravity.
+    notes["environment.gravity"] = Origin("", f"{case.gravity:g} m/s^2", "default", value=case.gravity)
     return case.read_from(document, partial(origins_of, file, document, notes))
 
 
@@ -75,3 +171,227 @@ def _boundary(table: BoundaryTable) -> Shape:
             missing = f'missing; expected such as "{example}"'
             raise unusable(f"boundary.{key}", missing if key in needed else f"expected none of a {table.shape}")
     return made(material=table.material, tilt=table.tilt, **{key: getattr(table, key) for key in needed})
+
+
+def _liquid_of(table: LiquidTable, notes: Notes) -> Liquid:
+    """The liquid of the bridges and their law; raises `InputError` if its viscosity is missing or said twice."""
+    dynamic, kinematic = table.dynamic_viscosity, table.kinematic_viscosity
+    if dynamic is not None and kinematic is not None:
+        told = "expected either kinematic_viscosity or dynamic_viscosity, not both"
+        raise unusable("liquid.dynamic_viscosity", told)
+    if kinematic is not None:
+        if table.density is None:
+            raise unusable("liquid.density", "missing; a kinematic_viscosity needs the liquid's density")
+        dynamic = float(f"{kinematic * table.density:.15g}")
+        notes.derived("liquid.dynamic_viscosity", dynamic, "from kinematic_viscosity and density")
+    if dynamic is None:
+        told = "missing; expected a liquid of the library by name, or this number"
+        raise unusable("liquid.dynamic_viscosity", told)
+    if table.law not in LAWS:
+        try:
+            by_name(table.law)
+        except ValueError as error:
+            raise unusable("liquid.law", str(error)) from error
+    return Liquid(
+        surface_tension=table.surface_tension,
+        dynamic_viscosity=float(f"{dynamic * table.viscosity_ratio:.15g}"),
+        density=table.density,
+        volume_fraction=table.volume_fraction,
+        contact_angle=table.contact_angle,
+        name=table.name,
+        law=table.law,
+    )
+
+
+def _walkers_of(key: str, table: DimersTable | ClusterTable, boundary: BoundaryTable, notes: Notes) -> Walkers:
+    """The walkers of a table, which stands under a key."""
+    if table.facing in ("up", "down") and (not boundary.tilt or boundary.uphill):
+        told = "on a plane that is tilted along the drive alone walkers face up or down"
+        raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {told}')
+    if table.gap is None:
+        notes.derived(f"{key}.gap", "auto", "where the forces at rest balance")
+    said = {name: getattr(table, name) for name in WalkersTable.model_fields}
+    said |= {"facing": _WAYS[table.facing], "spacing": table.spacing or 0.0}
+    walkers = Walkers(radii=_radii(table, notes) if isinstance(table, DimersTable) else tuple(table.radii), **said)
+    if isinstance(table, DimersTable):
+        return walkers
+    if (table.arrangement is None) == (table.at is None):
+        told = f"expected either an arrangement ({', '.join(ARRANGEMENTS)}) or places (at)"
+        raise unusable(f"{key}.arrangement", told)
+    if table.arrangement is not None:
+        return _arranged(walkers, key, table.arrangement)
+    return _at_places(walkers, key, tuple(table.at or ()))
+
+
+def _radii(table: DimersTable, notes: Notes) -> tuple[float, float]:
+    given = {name: getattr(table, name) for name in ("mean_radius", "sin_delta") if getattr(table, name) is not None}
+    if table.radii is not None:
+        if given:
+            told = "expected either the radii or mean_radius and sin_delta, not both"
+            raise unusable(f"dimers.{next(iter(given))}", told)
+        return table.radii
+    if table.mean_radius is None or table.sin_delta is None:
+        examples = {"mean_radius": '"0.25 mm"', "sin_delta": "0.2"} if given else {"radii": '["0.3 mm", "0.2 mm"]'}
+        lacking = next(name for name in examples if name not in given)
+        raise unusable(f"dimers.{lacking}", f"missing; expected such as {examples[lacking]}")
+    first, second = (float(f"{table.mean_radius * share:.15g}") for share in (1 + table.sin_delta, 1 - table.sin_delta))
+    notes.derived("dimers.radii", (first, second), "from mean_radius and sin_delta")
+    return first, second
+
+
+def _arranged(walkers: Walkers, key: str, name: str) -> Walkers:
+    """A cluster in an arrangement."""
+    known = ARRANGEMENTS.get(name)
+    if known is None:
+        told = f"expected one of {', '.join(ARRANGEMENTS)}{suggestion(name, ARRANGEMENTS)}"
+        raise unusable(f"{key}.arrangement", told)
+    key = f"{key}.radii"
+    if not known.fewest <= len(walkers.radii) <= known.most:
+        bound = f"at least {known.fewest}" if known.fewest < known.most else str(known.most)
+        raise unusable(key, f"expected {bound} beads in a {name}")
+    walkers = replace(walkers, arrangement=name)
+    try:
+        overlapping = touching(walkers.design, walkers.radii, -_OVERLAP)
+    except ValueError as error:
+        raise unusable(key, str(error)) from error
+    if overlapping:
+        raise unusable(key, f"beads {overlapping[0][0] + 1} and {overlapping[0][1] + 1} would overlap in a {name}")
+    return walkers
+
+
+def _at_places(walkers: Walkers, key: str, places: tuple[tuple[float, float], ...]) -> Walkers:
+    """A cluster whose beads are given places: they touch, do not overlap, and have a heading."""
+    key, everyone = f"{key}.at", set(range(len(walkers.radii)))
+    if len(places) != len(everyone):
+        raise unusable(key, f"expected a place for each of the {len(everyone)} beads")
+    walkers = replace(walkers, arrangement="given", places=places)
+    if overlapping := touching(places, walkers.radii, -_OVERLAP):
+        raise unusable(f"{key}[{overlapping[0][1]}]", f"overlaps with {key}[{overlapping[0][0]}]")
+    if not any(walkers.front):
+        raise unusable(key, "expected some beads ahead of others: this has no heading")
+    joined = {0}
+    for _ in everyone:
+        joined |= {bead for pair in walkers.pairs if joined & {*pair} for bead in pair}
+    if alone := everyone - joined:
+        raise unusable(f"{key}[{min(alone)}]", "expected beads that touch: nothing joins this one to the first")
+    return walkers
+
+
+def _mixture_of(table: MixtureTable, boundary: Boundary) -> Mixture:
+    """A mixture, its numbers of beads from shares, count or height."""
+    small, large = (_sizes(key, getattr(table, key), table.sizes) for key in ("small", "large"))
+    if max(small) >= min(large):
+        raise unusable("mixture.large", "expected radii above those of the small beads")
+    if (table.count is None) == (table.fill_height is None):
+        raise unusable("mixture.count", "expected either a count or a fill_height")
+    if not boundary.closed:
+        raise unusable("boundary.shape", 'expected "box" or "cylinder": a mixture is poured into it')
+    volumes = [sum(4.0 / 3.0 * pi * radius**3 for radius in sizes) / len(sizes) for sizes in (small, large)]
+    share = table.small_share
+    if table.mixed_by != "number":  # one density: by mass is by volume
+        by_number = [share / volumes[0], (1.0 - share) / volumes[1]]
+        share = by_number[0] / sum(by_number)
+    count = table.count
+    if count is None:
+        mean = share * volumes[0] + (1.0 - share) * volumes[1]
+        count = round(_PACKING * boundary.cross_section * (table.fill_height or 0.0) / mean)
+        if not 1 <= count <= MOST_BEADS:
+            raise unusable("mixture.fill_height", f"that takes {count} beads; expected 1 to {MOST_BEADS}")
+    few = round(count * share)
+    return Mixture(small, large, (few, count - few))
+
+
+def _sizes(key: str, bounds: tuple[float, float], number: int) -> tuple[float, ...]:
+    """The middles of equal shares of a range of radii, m."""
+    low, high = bounds
+    if low > high:
+        raise unusable(f"mixture.{key}", "expected the smaller radius first")
+    return tuple(dict.fromkeys(float(f"{low + (high - low) * (k + 0.5) / number:.12g}") for k in range(number)))
+
+
+def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
+    """Settle the spacing of the walkers under a key and refuse starts in which beads overlap."""
+    gap = walkers.gap
+    if gap is not None and gap > 0.0:
+        raise unusable(f"{key}.gap", "expected zero or less: a bridge forms on contact, beads apart have none")
+    overlaps = contact_loads(case, walkers).overlaps if gap is None else (-gap,)
+    if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
+        blamed = f"{key}.gap" if gap is not None else "contact.youngs_modulus"
+        raise unusable(blamed, "the beads overlap by more than 2 % of the smallest radius")
+    if not walkers.spacing:
+        spacing = 2.0 * (walkers.length if walkers.meet else reach(case))
+        notes.derived(f"{key}.spacing", spacing, "so that walkers do not meet")
+        return replace(walkers, spacing=spacing)
+    # Beads of different walkers may touch, but not overlap, if they are meant to meet.
+    least = (1.0 if walkers.meet else 1.5) * walkers.length
+    if walkers.spacing < least and sum(one.replicates for one in case.walkers) > 1:
+        told = f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"'
+        raise unusable(f"{key}.spacing", told)
+    return walkers
+
+
+def _check_bodies(case: Case, file: CaseFile) -> None:
+    """Refuse bodies for which there is no room within the boundary or beside each other."""
+    boundary, mixture = case.boundary, case.mixture
+    if case.run.ranks > 1 and not boundary.closed:
+        raise unusable("run.ranks", "expected 1: walkers on a plane are slower on several")
+    if not case.walkers and mixture is None and "seed" in file.run.model_fields_set:
+        raise unusable("run.seed", "expected none where the beads are placed: every start would be the same")
+    if mixture is not None:
+        _check_pour(mixture, boundary, case.tops_of_others(mixture))
+    if case.placed is not None or (case.walkers and not boundary.bare):
+        _check_places(case, [key for key, table in file.walkers.items() for _ in range(table.replicates)])
+
+
+def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
+    largest = max(mixture.large)
+    if boundary.inner_width < 4.0 * largest:
+        raise unusable("boundary.width", "expected at least two of the large beads side by side")
+    if boundary.layer(largest).tight and boundary.inner_width < 8.0 * largest:
+        raise unusable("boundary.width", "expected at least four of the large beads across a cylinder")
+    level = floor + mixture.level(boundary)
+    if level > 2.0 * boundary.top:  # walls and simulation go on to there
+        needed = f"{level / 2.0 * 1e3:.3g} mm"
+        raise unusable("boundary.height", f"too low for {mixture.count} beads; expected {needed} or more")
+
+
+def _check_places(case: Case, keys: list[str]) -> None:
+    """Walkers (each with its table's key) and beads that are placed: between the walls, and not within each other."""
+    import numpy as np
+
+    boundary = case.boundary
+    standing: list[Standing] = []
+    try:
+        standing.extend(one for _, one in islice(case.standing(), len(keys)))
+    except ValueError as error:
+        raise unusable(f"{keys[len(standing)]}.radii", str(error)) from error
+    if boundary.inner_width < 2.0 * (1.0 - _OVERLAP) * max((max(one.radii) for one in case.walkers), default=0.0):
+        raise unusable("boundary.width", "expected more than a bead's diameter")
+    grid = boundary.grid(len(keys), max(one.spacing for one in case.walkers)) if keys else []
+    of_walkers = zip(keys, grid, standing, strict=True)
+    beads = [
+        (key, (x + one.x, y + one.y, one.z), one.radius) for key, (x, y), walker in of_walkers for one in walker.beads
+    ]
+    placed = case.placed.beads if case.placed is not None else ()
+    walking = len(beads)
+    beads += [(f"placed[{number}]", (x, y, z), radius) for number, (x, y, z, radius) in enumerate(placed)]
+    clearances = boundary.side_clearance(np.array([bead[1] for bead in beads]))
+    for number, ((key, (_, _, z), radius), clearance) in enumerate(zip(beads, clearances, strict=True)):
+        least = (1.0 - _OVERLAP) * radius
+        beside = clearance < least
+        if number < walking and beside:
+            told = f"so many walkers, or such, do not fit between the walls of the {boundary.shape}"
+            raise unusable(f"{key}.replicates", told)
+        if number < walking and z + radius > boundary.top:
+            raise unusable("boundary.height", f"too low for the walkers of {key}")
+        if number >= walking and (beside or z < least or z + radius > boundary.top):
+            raise unusable(f"{key}.at", "expected a bead within the boundary")
+    if not placed:
+        return
+    from scipy.spatial import cKDTree
+
+    near = cKDTree([place for _, place, _ in beads]).query_pairs(2.0 * max(radius for *_, radius in beads))
+    for one, other in sorted((pair for pair in near if pair[1] >= walking), key=lambda pair: pair[::-1]):
+        (key, place, first), (other_key, other_place, second) = beads[one], beads[other]
+        if dist(place, other_place) < first + second - _OVERLAP * min(first, second):
+            raise unusable(f"{other_key}.at", f"overlaps with {key if one >= walking else f'one of {key}'}")

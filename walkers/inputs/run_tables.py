@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from math import ceil, inf
 
-from walkers.inputs.bodies import Walkers
 from walkers.inputs.boundary import Shape
 from walkers.inputs.case import Case, Run, settling_of
 from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector, waveform
 from walkers.inputs.errors import unusable
 from walkers.inputs.origins import Notes
 from walkers.inputs.schema import DriveTable, HarmonicTable, RunTable
-from walkers.inputs.units import ACCELERATION, DURATION, FILE_SIZE, SPEED, TIME
 from walkers.physics.dimer import Dimer
 from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 
@@ -42,9 +40,9 @@ def resolve_drive(table: DriveTable, boundary: Shape, dimer: Dimer | None, notes
     else:
         first = _harmonic(table, "drive", boundary, dimer)
         harmonics = waveform(table.waveform, first)
-        notes.default("drive.axis", boundary.drive_axis, source=f"of a {boundary.shape}")
+        notes.default("drive.axis", boundary.drive_axis, f"of a {boundary.shape}")
         peak = first.peak_acceleration
-        notes.derived("drive.peak_acceleration", peak, "from gamma0, the dimer and the liquid", ACCELERATION)
+        notes.derived("drive.peak_acceleration", peak, "from gamma0, the dimer and the liquid")
     try:
         common_frequency([one.frequency for one in harmonics])
     except ValueError as error:
@@ -89,7 +87,7 @@ def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
     Raises `InputError` if they contradict each other, or the time step is beyond its limits.
     """
     frequency, loose = case.drive.frequency, case.loose
-    samples, cycles_per_sample = _sampling(table, case)
+    samples, cycles_per_sample, samples_per_bridge_sample = _sampling(table, case)
     time_step, steps = fit_into_cycle(_largest_time_step(table, case), frequency, samples)
     cycles, until_steady = _cycles(table, case, cycles_per_sample), _until_steady(table, case, cycles_per_sample)
     settling = table.settling_cycles
@@ -114,7 +112,7 @@ def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
         until_steady=until_steady,
         samples_per_cycle=samples,
         cycles_per_sample=cycles_per_sample,
-        samples_per_bridge_sample=_bridge_sampling(table, case, samples),
+        samples_per_bridge_sample=samples_per_bridge_sample,
         cycles_per_segment=min(samples_of_segment * cycles_per_sample, cycles),
         settled_below=(table.settled_below or _SETTLED_BELOW) if rest else 0.0,
         longest_settling=rest,
@@ -134,15 +132,15 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
     notes.default("run.samples_per_cycle", often)
     if case.loose:
         notes.derived("run.samples_per_cycle", often, "from frames_per_second")
-        notes.derived("run.segment", run.cycles_per_segment / case.drive.frequency, "about 0.5 s", DURATION)
-        notes.default("run.longest_settling", run.longest_settling, DURATION, "of loose beads")
+        notes.derived("run.segment", run.cycles_per_segment / case.drive.frequency, "about 0.5 s")
+        notes.default("run.longest_settling", run.longest_settling, "of loose beads")
     if run.rests:
-        notes.default("run.settled_below", run.settled_below, SPEED)
-    notes.derived("run.time_step", run.time_step, "auto: its share of the limits, fitted into a cycle", TIME)
+        notes.default("run.settled_below", run.settled_below)
+    notes.derived("run.time_step", run.time_step, "auto: its share of the limits, fitted into a cycle")
     notes.derived("run.cycles", cycles, whence)
     notes.derived("run.settling_cycles", run.settling_cycles, "a third of the cycles, at most 20")
-    notes.derived("run.silence", silence, "an engine that writes nothing for so long is ended", DURATION)
-    notes.derived("run.log_limit", run.most_log, "an engine that writes a longer log is ended", FILE_SIZE)
+    notes.derived("run.silence", silence, "an engine that writes nothing for so long is ended")
+    notes.derived("run.log_limit", run.most_log, "an engine that writes a longer log is ended")
 
 
 def _check_length(table: RunTable, case: Case, cycles: int, settling: int, cycles_per_sample: int) -> None:
@@ -169,25 +167,22 @@ def _largest_time_step(table: RunTable, case: Case) -> float:
     return given
 
 
-def _sampling(table: RunTable, case: Case) -> tuple[int, int]:
-    """Samples a cycle and cycles a sample, one of which is 1."""
+def _sampling(table: RunTable, case: Case) -> tuple[int, int, int]:
+    """Samples a cycle and cycles a sample, one of which is 1, and samples a sample of bridges."""
     if table.samples_per_cycle is not None and table.frames_per_second is not None:
         raise unusable("run.frames_per_second", "expected either samples_per_cycle or frames_per_second")
-    if table.samples_per_cycle is not None or (table.frames_per_second is None and not case.loose):
-        return table.samples_per_cycle or 20, 1
-    wanted = case.drive.frequency / (table.frames_per_second or _FRAMES_PER_SECOND)
-    return (round(1.0 / wanted), 1) if wanted < 1.0 else (1, round(wanted))
-
-
-def _bridge_sampling(table: RunTable, case: Case, samples: int) -> int:
+    samples, cycles_per_sample = table.samples_per_cycle or 20, 1
+    if table.samples_per_cycle is None and (table.frames_per_second is not None or case.loose):
+        wanted = case.drive.frequency / (table.frames_per_second or _FRAMES_PER_SECOND)
+        samples, cycles_per_sample = (round(1.0 / wanted), 1) if wanted < 1.0 else (1, round(wanted))
     key, bridges = "run.bridge_samples_per_cycle", table.bridge_samples_per_cycle
     if bridges is None:
-        return 1 if case.loose else samples
+        return samples, cycles_per_sample, 1 if case.loose else samples
     if case.loose:
         raise unusable(key, "expected none: bridges of loose beads are in every frame")
     if samples % bridges:
         raise unusable(key, f"expected a divisor of samples_per_cycle = {samples}")
-    return samples // bridges
+    return samples, cycles_per_sample, samples // bridges
 
 
 def _cycles(table: RunTable, case: Case, cycles_per_sample: int) -> int:
@@ -214,14 +209,12 @@ def _until_steady(table: RunTable, case: Case, cycles_per_sample: int) -> bool:
         raise unusable(f"run.{given[0]}", f"expected none where run.{asked[0]} lets walkers run until steady")
     if asked and not case.apart:
         raise unusable(f"run.{asked[0]}", "expected run.duration: only walkers apart can be steady")
-    alone = case.apart and not given and table.ranks == 1 and cycles_per_sample == 1
-    return alone and all(_settles_soon(walkers) for walkers in case.walkers)
-
-
-def _settles_soon(walkers: Walkers) -> bool:
-    """Whether a few cycles may show how walkers walk: asymmetric dimers that start near the axis."""
-    if len(walkers.radii) != 2:
+    if not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:
         return False
-    first, second = walkers.radii
-    asymmetry = abs(first - second) / (first + second)
-    return asymmetry >= _NEARLY_SYMMETRIC and abs(walkers.angle) + walkers.angle_spread < _ASLANT
+    # A few cycles may show how walkers walk that are asymmetric dimers which start near the axis.
+    return all(
+        len(walkers.radii) == 2
+        and abs(walkers.radii[0] - walkers.radii[1]) / sum(walkers.radii) >= _NEARLY_SYMMETRIC
+        and abs(walkers.angle) + walkers.angle_spread < _ASLANT
+        for walkers in case.walkers
+    )

@@ -1,7 +1,7 @@
 """What a case file may say: keys, types, defaults and bounds, as pydantic models.
 
 A quantity is written as a string with its unit and held here as a number in SI units. What the library of materials
-and liquids supplies (`walkers.inputs.matter.SUPPLIED`) has been filled in before.
+and liquids supplies (`walkers.inputs.resolving.SUPPLIED`) has been filled in before.
 """
 
 from __future__ import annotations
@@ -23,19 +23,6 @@ from walkers.physics.matter import DEFAULT_LAW
 
 def _auto(value: object) -> object:
     return None if isinstance(value, str) and value.strip().lower() == "auto" else value
-
-
-def _plain_number(value: object) -> object:
-    """Accept TOML's integers and floats only: neither "0.3" nor true is a coefficient."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ValueError("expected a plain number without a unit")
-    return value
-
-
-def _whole_number(value: object) -> object:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ValueError("expected a whole number")
-    return value
 
 
 def _axis(value: object) -> object:
@@ -82,8 +69,9 @@ ALTERNATIVES: Mapping[str, tuple[str, ...]] = {
 MOST_BEADS = 20_000
 AUTO = BeforeValidator(_auto)
 """Reads "auto" as None."""
-Number = Annotated[float, BeforeValidator(_plain_number), Field(allow_inf_nan=False)]
-Whole = Annotated[int, BeforeValidator(_whole_number)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+"""TOML's integers and floats only: neither "0.3" nor true is a coefficient."""
+Whole = Annotated[int, Field(strict=True)]
 UpToRightAngle = Annotated[float, replace(units.ANGLE, largest=1.5708, sign=units.NOT_NEGATIVE)]
 Coefficient = Annotated[Number, Field(ge=0, le=1e3)]
 Axis = Annotated[Any, BeforeValidator(_axis)]
