@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, cos, hypot, inf, pi, sin, sqrt
+from math import ceil, cos, inf, pi, sin, sqrt
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 from walkers.inputs.drive import Vector
@@ -256,6 +256,8 @@ class Container(Boundary):
 
     drive_axis: ClassVar[Literal["x", "z"]] = "z"
     closed: ClassVar[bool] = True
+    cuts: ClassVar[bool] = True
+    """Whether its walls cut a square lattice of places."""
 
     @property
     def inner_width(self) -> float:
@@ -273,11 +275,17 @@ class Container(Boundary):
         return _room_above((edge, edge), 2.0 * self.height, span.largest)
 
     def layer(self, largest: float) -> Layer:
-        """A square lattice as wide as the container."""
+        """A square lattice as wide as the container, where walls that cut it leave room; beads stray less then."""
+        import numpy as np
+
         across = int(self.width / (2.0 * LOOSE * largest))
         pitch = self.width / max(across, 1)
         line = [(index + 0.5) * pitch - self.width / 2.0 for index in range(across)]
-        return Layer([(x, y) for x in line for y in line], pitch)
+        square = [(x, y) for x in line for y in line]
+        near = (1.0 - 1e-9) * LOOSE * largest
+        room = self.side_clearance(np.array([(x, y, 0.0) for x, y in square]).reshape(-1, 3))
+        places = [place for place, clear in zip(square, room, strict=True) if clear > near]
+        return Layer(places, pitch, tight=self.cuts)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -285,6 +293,7 @@ class Box(Container):
     """A container with a square cross-section."""
 
     shape: Literal["box"] = "box"
+    cuts: ClassVar[bool] = False
 
     @property
     def walls(self) -> tuple[Wall, ...]:
@@ -312,12 +321,6 @@ class Cylinder(Container):
     def cross_section(self) -> float:
         """Inner area, m²."""
         return self.width**2 * (pi / 4.0)
-
-    def layer(self, largest: float) -> Layer:
-        """The places of a box that lie within; the wall cuts the outer ones, whose beads stray less."""
-        square = super().layer(largest)
-        within = self.width / 2.0 - LOOSE * largest
-        return Layer([(x, y) for x, y in square.places if hypot(x, y) <= within], square.pitch, tight=True)
 
 
 Shape = Plane | Channel | Groove | Box | Cylinder
