@@ -1,4 +1,4 @@
-"""What beads stand on and lie in: planes, channels, boxes, cylinders. To add one, write a class, name it in `Shape`.
+"""What beads stand on and lie in: planes, channels, containers. To add one, write a class, name it in `Shape`.
 
 Most have a floor, the plane z = 0 in their own frame, and may have side walls.
 """
@@ -323,7 +323,32 @@ class Cylinder(Container):
         return self.width**2 * (pi / 4.0)
 
 
-Shape = Plane | Channel | Groove | Box | Cylinder
+@dataclass(frozen=True, kw_only=True)
+class Octagon(Container):
+    """A box whose corners are cut: a regular octagon, the angles between its walls are 135°."""
+
+    shape: Literal["octagon"] = "octagon"
+
+    @property
+    def walls(self) -> tuple[Wall, ...]:
+        """The floor, four walls as of a box, and four across its corners."""
+        half, across = self.width / 2.0, sqrt(0.5)
+        ways = {
+            "+x+y": (across, across),
+            "+x-y": (across, -across),
+            "-x+y": (-across, across),
+            "-x-y": (-across, -across),
+        }
+        corners = [Flat((half * x, half * y, 0.0), (-x, -y, 0.0), name) for name, (x, y) in ways.items()]
+        return (BOTTOM, *_facing_walls("x", self.width), *_facing_walls("y", self.width), *corners)
+
+    @property
+    def cross_section(self) -> float:
+        """Inner area, m²."""
+        return self.width**2 * 2.0 * (sqrt(2.0) - 1.0)
+
+
+Shape = Plane | Channel | Groove | Box | Cylinder | Octagon
 """The boundaries that there are."""
 SHAPES: Mapping[str, type[Shape]] = {one.shape: one for one in get_args(Shape)}
 """By the names that case files use."""

@@ -285,7 +285,7 @@ def _mixture_of(table: MixtureTable, boundary: Boundary) -> Mixture:
     if (table.count is None) == (table.fill_height is None):
         raise unusable("mixture.count", "expected either a count or a fill_height")
     if not boundary.closed:
-        raise unusable("boundary.shape", 'expected "box" or "cylinder": a mixture is poured into it')
+        raise unusable("boundary.shape", 'expected a container, such as "box": a mixture is poured into it')
     volumes = [sum(4.0 / 3.0 * pi * radius**3 for radius in sizes) / len(sizes) for sizes in (small, large)]
     share = table.small_share
     if table.mixed_by != "number":  # one density: by mass is by volume
@@ -348,7 +348,7 @@ def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
     if boundary.inner_width < 4.0 * largest:
         raise unusable("boundary.width", "expected at least two of the large beads side by side")
     if boundary.layer(largest).tight and boundary.inner_width < 8.0 * largest:
-        raise unusable("boundary.width", "expected at least four of the large beads across a cylinder")
+        raise unusable("boundary.width", "expected at least four of the large beads side by side")
     level = floor + mixture.level(boundary)
     if level > 2.0 * boundary.top:  # walls and simulation go on to there
         needed = f"{level / 2.0 * 1e3:.3g} mm"

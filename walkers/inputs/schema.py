@@ -177,7 +177,7 @@ class BoundaryTable(Table):
     way up, from that of the drive within the floor.
     """
 
-    shape: Literal["plane", "channel", "groove", "box", "cylinder"] = "plane"
+    shape: Literal["plane", "channel", "groove", "box", "cylinder", "octagon"] = "plane"
     material: str
     opening: Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)] | None = None
     width: Length | None = None
