@@ -15,9 +15,8 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, series_look, styled
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.gait import averages, distance_walked, gait, walk, ways
+from walkers.postprocess.gait import averages, distance_walked, fit_slopes, gait, walk, ways
 from walkers.postprocess.motion import Group
-from walkers.postprocess.slopes import fit_slopes
 from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:
@@ -28,7 +27,6 @@ _MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """How events are marked (`walkers.postprocess.events`)."""
 _MARKERS = "so^vD"
-_FEWEST_SAMPLES = 8  # a cycle, below which a gait shows nothing
 _GREY, _OTHERS = "#5b6770", "#c78a2c"
 
 
@@ -113,7 +111,7 @@ def gait_panels(group: Group) -> list[Panel]:
     None if the run was sampled less than eight times a cycle.
     """
     samples, first = group.case.run.samples_per_cycle, group.walkers[0]
-    if samples < _FEWEST_SAMPLES or len(group.time) <= 2 * samples:
+    if not group.motion.follows_cycles or len(group.time) <= 2 * samples:
         return []
     motion = gait(group)
     cycles = (len(group.time) - 1) // samples
