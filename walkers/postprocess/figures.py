@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
-"""How events are marked (`walkers.postprocess.events`)."""
+"""How events are marked (`walkers.postprocess.clusters.Event`)."""
 _MARKERS = "so^vD"
 _GREY, _OTHERS = "#5b6770", "#c78a2c"
 
@@ -108,7 +108,7 @@ def velocity_panel(groups: list[Group]) -> Panel:
 def gait_panels(group: Group) -> list[Panel]:
     """Velocities of the first walker through its last two cycles (Fig. 4 of Khan et al.), and of the substrate.
 
-    None if the run was sampled less than eight times a cycle.
+    None of them if the run was sampled less than eight times a cycle.
     """
     samples, first = group.case.run.samples_per_cycle, group.walkers[0]
     if not group.motion.follows_cycles or len(group.time) <= 2 * samples:
