@@ -18,7 +18,7 @@ from walkers.inputs.changes import changed, settings_of
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import resolve_case
 from walkers.inputs.sweep import load_sweep
-from walkers.postprocess.walking import SEPARATED
+from walkers.postprocess.gait import SEPARATED
 from walkers.runner.files import read_json
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.spread import describe, run_spread, spread_sweep

@@ -29,8 +29,7 @@ from walkers.paper.published import OBSERVATIONS
 from walkers.paper.sensitivity import OBSERVED, PARAMETERS, sensitivities
 from walkers.paper.sources import NothingFinishedError, Sources
 from walkers.postprocess.drawing import save_figure
-from walkers.postprocess.gait import gait
-from walkers.postprocess.steady_state import steady_walkers
+from walkers.postprocess.gait import gait, steady_walkers
 from walkers.sweeps.record import read_record
 from walkers.sweeps.scheduler import Options
 from walkers.theory.mathieu import turning

@@ -13,10 +13,8 @@ import pytest
 from walkers.inputs import load_case
 from walkers.postprocess import read_motion, read_result, read_table
 from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result
-from walkers.postprocess.gait import gait, settled_samples, walk
+from walkers.postprocess.gait import fit_slopes, gait, settled_samples, steady_walkers, walk
 from walkers.postprocess.motion import Group
-from walkers.postprocess.slopes import fit_slopes
-from walkers.postprocess.steady_state import steady_walkers
 from walkers.postprocess.tables import described
 from walkers.postprocess.walking import Walking, walkers_met
 from walkers.runner.directory import SEGMENTS

@@ -16,9 +16,8 @@ from walkers.inputs import load_case, resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.drive import AXES
 from walkers.inputs.errors import InputError, Stopped
-from walkers.postprocess.gait import walk
+from walkers.postprocess.gait import are_steady, walk
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.steady_state import are_steady
 from walkers.postprocess.tables import read_table
 from walkers.runner import find_engine
 from walkers.runner.directory import FIRST_SEGMENT

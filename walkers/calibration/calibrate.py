@@ -25,7 +25,7 @@ from walkers.inputs.schema import ALTERNATIVES
 from walkers.inputs.sweep import Sweep, expand
 from walkers.paper.comparison import misalignment
 from walkers.paper.sources import ProgressOf
-from walkers.postprocess.steady_state import steady_walkers, together
+from walkers.postprocess.gait import steady_walkers, together
 from walkers.postprocess.tables import read_table
 from walkers.runner.failures import BeadsLost, BlowUp
 from walkers.runner.files import read_json, write_json
@@ -125,7 +125,7 @@ def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path
 def _seen(table: pd.DataFrame, experiments: int) -> dict[str, FloatArray]:
     """Quantities of each run of a wave's table; NaN where there is none, or the run failed.
 
-    Speeds are means over the walkers that are some until the end (`walkers.postprocess.steady_state.steady_walkers`).
+    Speeds are means over the walkers that are some until the end (`walkers.postprocess.gait.steady_walkers`).
     """
     rows: list[dict[str, float]] = []
     for run, status in zip(table["run"], table["status"], strict=True):

@@ -55,7 +55,7 @@ class Run:
     settling_cycles: int
     """Of the cycles, those before velocities are measured."""
     until_steady: bool
-    """Whether fewer do if the walkers are steady after them (`walkers.postprocess.steady_state.are_steady`)."""
+    """Whether fewer do if the walkers are steady after them (`walkers.postprocess.gait.are_steady`)."""
     samples_per_cycle: int
     cycles_per_sample: int
     samples_per_bridge_sample: int

@@ -15,7 +15,7 @@ from walkers.inputs.text import rendered
 from walkers.paper.maps import paper_drives
 from walkers.paper.published import GRAVITY, OBSERVATIONS, Observation, Point, driven, shipped
 from walkers.paper.sources import NothingFinishedError, Sources
-from walkers.postprocess.steady_state import on_axis, steady_walkers
+from walkers.postprocess.gait import on_axis, steady_walkers
 from walkers.postprocess.tables import read_table
 from walkers.sweeps.table import thresholds
 from walkers.theory.mathieu import largest_stable_v
@@ -35,7 +35,7 @@ class Value(NamedTuple):
     """One of our numbers, in the unit of the published one; NaN where there is none.
 
     ``low`` and ``high`` of the engine's are over walkers, or over the frequencies where a number is a mean over these;
-    ``left_out`` of all walkers are not steady until the end (`walkers.postprocess.steady_state`). Theory is Coulomb
+    ``left_out`` of all walkers are not steady until the end (`walkers.postprocess.gait`). Theory is Coulomb
     friction with the resistance of bridges, nothing fitted.
     """
 

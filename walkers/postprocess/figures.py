@@ -15,9 +15,8 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, series_look, styled
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.gait import averages, distance_walked, gait, walk, ways
+from walkers.postprocess.gait import averages, distance_walked, fit_slopes, gait, walk, ways
 from walkers.postprocess.motion import Group
-from walkers.postprocess.slopes import fit_slopes
 from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:
@@ -26,9 +25,8 @@ if TYPE_CHECKING:
 
 _MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
-"""How events are marked (`walkers.postprocess.events`)."""
+"""How events are marked (`walkers.postprocess.clusters.Event`)."""
 _MARKERS = "so^vD"
-_FEWEST_SAMPLES = 8  # a cycle, below which a gait shows nothing
 _GREY, _OTHERS = "#5b6770", "#c78a2c"
 
 
@@ -110,10 +108,10 @@ def velocity_panel(groups: list[Group]) -> Panel:
 def gait_panels(group: Group) -> list[Panel]:
     """Velocities of the first walker through its last two cycles (Fig. 4 of Khan et al.), and of the substrate.
 
-    None if the run was sampled less than eight times a cycle.
+    None of them if the run was sampled less than eight times a cycle.
     """
     samples, first = group.case.run.samples_per_cycle, group.walkers[0]
-    if samples < _FEWEST_SAMPLES or len(group.time) <= 2 * samples:
+    if not group.motion.follows_cycles or len(group.time) <= 2 * samples:
         return []
     motion = gait(group)
     cycles = (len(group.time) - 1) // samples

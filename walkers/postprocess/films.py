@@ -20,7 +20,6 @@ from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
-from walkers.postprocess.rolling import follows_cycles
 from walkers.postprocess.scene import Picture, Scene, Window, camera_axes, round_below
 from walkers.runner.files import beside
 
@@ -181,7 +180,7 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
     if not 0.0 <= begin < end:
         told = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --from before --until"
         raise _refused("--from, --until", told)
-    follows, slowdown = follows_cycles(motion), options.slowdown
+    follows, slowdown = motion.follows_cycles, options.slowdown
     if slowdown is None:
         largest = _SECONDS / (end - begin)
         if not follows:

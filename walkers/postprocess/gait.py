@@ -1,4 +1,4 @@
-"""How walkers walk: velocities, rotation and sliding, orientation, contacts, posture.
+"""How walkers walk: velocities, rotation and sliding, orientation, contacts, posture; and whether they are steady.
 
 Velocities are along the walker's heading, from the small bead to the large one, relative to the substrate. With e the
 heading, z the normal of the substrate and ω a bead's angular velocity, the rotation velocity R ω·(z × e) is the paper's
@@ -10,12 +10,18 @@ line that is level and across the one between them; a bead slides on the wall th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from walkers.postprocess.analysis import read_result
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
-from walkers.postprocess.motion import Group
-from walkers.postprocess.slopes import fit_slopes
+from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.tables import read_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 STEADY_DIFFERENCE = 0.05
 """A walker is steady if the velocities of the two halves of the fitted cycles differ by less than this share …"""
@@ -26,6 +32,29 @@ UPRIGHT = np.radians(15.0)
 _NO_MORE = np.radians(0.5)
 """rad; what it may go off by in the second half of a run."""
 POSTURES = ("upright", "leaning", "turned over")
+SEPARATED = 0.1
+"""Share of the time beyond which beads that no bridge can hold together are no walker."""
+ASTRAY = np.pi / 4.0
+"""rad; a walker that ends farther from where it was to face has left the axis."""
+AGREEING = 0.002
+"""Share by which the velocities of the halves of a steady walker's cycles may differ."""
+_LEAST_SPEED = 2e-6
+"""m/s; what velocities may differ by however slow the walkers are."""
+_LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
+"""A steady walker turns by less rad in a cycle, and not by so much more than before; or by so much of what it did."""
+_PARTLY = np.linspace(-0.95, -0.1, 9)
+_LASTING = np.linspace(0.1, 0.9, 9)
+_MODELS = np.array(
+    [
+        (0.0, 0.0, 2.0),
+        (0.0, -1.0, 1.0),
+        *((0.0, theta, 1.0 / len(_PARTLY)) for theta in _PARTLY),
+        *((phi, 0.0, 1.0 / len(_LASTING)) for phi in _LASTING),
+    ]
+).T
+"""What steps may be, φ, θ and a weight beforehand: independent; differences of independent positions; some of both;
+autocorrelated. The first is twice as likely as each of the others."""
+_TINY = 1e-300
 
 
 @dataclass(frozen=True)
@@ -79,8 +108,6 @@ class Averages:
 
 _PARTS = 10
 """Of an interval between samples, at which gaps are looked at: with 20 samples a cycle 200 times."""
-_FEWEST = 8
-"""Samples a cycle from which on a cubic between two of them is the way of a bead that hops."""
 
 
 def averages(group: Group) -> Averages:
@@ -92,7 +119,7 @@ def averages(group: Group) -> Averages:
     """
     samples = settled_samples(group)
     mean = gait(Group(group.motion.averaged, group.make, group.walkers))
-    parts = _PARTS if group.case.run.samples_per_cycle >= _FEWEST else 1
+    parts = _PARTS if group.motion.follows_cycles else 1
     looks = (Group(group.motion.between(part / parts), group.make, group.walkers) for part in range(parts))
     return Averages(
         rotation=mean.rotation[samples].mean(axis=0),
@@ -128,8 +155,8 @@ class Walk:
     """Velocities of W walkers after the settling cycles, m/s, each of shape (W,).
 
     ``velocity`` is the slope of the distance walked along the heading, one sample a cycle, with its standard error
-    (`walkers.postprocess.slopes.fit_slopes`); the axial and the lateral ones are the mass centre's velocities along and
-    across the drive axis in the frame of the substrate; ``steady`` says whether the first and the second half agree.
+    (`fit_slopes`); the axial and the lateral ones are the mass centre's velocities along and across the drive axis in
+    the frame of the substrate; ``steady`` says whether the first and the second half agree.
     """
 
     velocity: FloatArray
@@ -185,6 +212,78 @@ def walk(group: Group) -> Walk:
     )
 
 
+def fit_slopes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Slopes of the columns of ``values`` against time (least squares) and their standard errors.
+
+    Values are cumulated step by step, so that their residuals are anything but independent, as the textbook's error
+    takes them: of forty random steps it is eight times too small. The slope is Σ c_s d_s of the steps d_s,
+    c_s = Σ_{t > s} (t − t̄)/Σ (t − t̄)², its variance cᵀ Γ c. Γ is that of an autoregressive moving average,
+    d_s − v = φ (d_{s−1} − v) + e_s + θ e_{s−1}, averaged over φ and θ with their restricted likelihoods (v and the
+    variance of e integrated out; Patterson and Thompson 1971, doi 10.1093/biomet/58.3.545), which the innovations give
+    (Brockwell and Davis 1991, doi 10.1007/978-1-4419-0320-4, chapter 5). Few steps do not tell random ones from noise
+    about a steady walk; the error is then nearer to that of random steps, the larger one.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        s; equally spaced.
+    values : ndarray, shape (N, K)
+
+    Returns
+    -------
+    slope, standard_error : ndarray, shape (K,)
+        The error is NaN for fewer than three points.
+    """
+    # Moving the origin keeps rounding out of the sums: positions reach metres, steps micrometres.
+    time, values = time - time.mean(), values - values.mean(axis=0)
+    square = float(np.sum(time**2))
+    slope = time @ values / square
+    if len(time) < 3:
+        return slope, np.full(slope.shape, np.nan)
+    weights = np.cumsum(time[::-1])[::-1][1:] / square
+    return slope, np.sqrt(_variance(np.diff(values, axis=0), weights))
+
+
+def _variance(steps: FloatArray, weights: FloatArray) -> FloatArray:
+    """Of sums of steps (N, K), weighted (N,), averaged over the models: shape (K,)."""
+    phi, theta, before = _MODELS
+    squares, logarithm = _innovations(steps - steps.mean(axis=0), phi, theta)
+    likelihood = np.log(before)[:, None] + logarithm[:, None] - 0.5 * (len(steps) - 1) * np.log(squares)
+    share = np.exp(likelihood - likelihood.max(axis=0))
+    share /= share.sum(axis=0)
+    # Autocovariances of steps whose e has a variance of one, times those of the weights.
+    own = np.correlate(weights, weights, "full")[len(weights) - 1 :]
+    next_one = (1.0 + phi * theta) * (phi + theta) / (1.0 - phi**2)
+    later = phi[:, None] ** np.arange(len(steps) - 1) @ own[1:]
+    variance = _of_one_step(phi, theta) * own[0] + 2.0 * next_one * later
+    return np.asarray((share * variance[:, None] * squares).sum(axis=0) / (len(steps) - 1))
+
+
+def _of_one_step(phi: FloatArray, theta: FloatArray) -> FloatArray:
+    """The variance of a step if that of e is one."""
+    return np.asarray((1.0 + 2.0 * phi * theta + theta**2) / (1.0 - phi**2))
+
+
+def _innovations(steps: FloatArray, phi: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Squares of standardised innovations, shape (M, K), and the likelihoods' logarithms without them, shape (M,).
+
+    The common mean of the steps is taken out by generalised least squares: a column of ones goes with them.
+    """
+    columns = np.concatenate([steps, np.ones((len(steps), 1))], axis=1)
+    variance, expected = _of_one_step(phi, theta), np.zeros((len(phi), columns.shape[1]))
+    squares, cross, logarithm = np.zeros_like(expected), np.zeros_like(expected), np.zeros(len(phi))
+    for row in columns:
+        innovation = row - expected
+        squares += innovation**2 / variance[:, None]
+        cross += innovation * innovation[:, -1:] / variance[:, None]
+        logarithm -= 0.5 * np.log(variance)
+        expected = phi[:, None] * row + (theta / variance)[:, None] * innovation
+        variance = 1.0 + theta**2 - theta**2 / variance
+    ones = squares[:, -1]
+    left = squares[:, :-1] - cross[:, :-1] ** 2 / ones[:, None]
+    return np.maximum(left, _TINY), logarithm - 0.5 * np.log(ones)
+
+
 def settled_samples(group: Group) -> slice:
     """The samples of whole cycles after the settling ones, each phase equally often."""
     run = group.case.run
@@ -230,3 +329,47 @@ def came_near(centre: FloatArray, near: float) -> bool:
         if np.any(np.linalg.norm(centre[:, within] - centre[:, number, None], axis=-1) < near):
             return True
     return False
+
+
+def are_steady(directory: Path) -> bool:
+    """Whether the walkers of a run, made or being made, walk as they would go on to: they need no more cycles.
+
+    After a third of the cycles, at most 20, the velocities of both halves of the others agree, and no walker turns ever
+    faster. Of 362 dimers of the shipped sweeps that ran for 60 cycles, those that are steady so after 12, 24 … had
+    speeds within 0.2 % of the final ones; by their velocities alone some were 4 % off (they had begun to turn, faster
+    and faster).
+    """
+    return all(_is_steady(group) for group in read_motion(directory).groups)
+
+
+def _is_steady(group: Group) -> bool:
+    found, run = walk(group), group.case.run
+    turned = np.abs(np.diff(group.orientation[:: run.samples_per_cycle][run.settled_strobes :], axis=0))
+    before, after = turned[: len(turned) // 2].max(axis=0), turned[len(turned) // 2 :].max(axis=0)
+    little = (after < _LITTLE) & (after < before + _NO_FASTER)
+    allowed = max(AGREEING * float(np.abs(found.velocity).max()), _LEAST_SPEED)
+    agree = np.abs(found.first_half - found.second_half).max() <= allowed
+    return bool(agree and np.all(little | (after < _FADING * before)))
+
+
+def on_axis(walkers: pd.DataFrame) -> pd.Series[bool]:
+    """Whether walkers of a table ``walkers`` end near the direction that they started to face."""
+    return walkers["orientation_end"].abs() < ASTRAY
+
+
+def together(walkers: pd.DataFrame) -> pd.Series[bool]:
+    """Whether the beads of walkers of a table ``walkers`` stay where a bridge can hold them."""
+    return walkers["separated_fraction"] < SEPARATED
+
+
+def steady_walkers(run: str | Path) -> pd.DataFrame:
+    """Rows of a finished run's table ``walkers`` that are steady, on the axis and whose beads stay together.
+
+    Symmetric dimers turn across the axis and need only stay together: they have no way to walk.
+    """
+    walkers = read_table(run, "walkers")
+    kept = together(walkers)
+    if read_result(run)["sin_delta"] != 0.0:
+        kept &= walkers["steady"] & on_axis(walkers)
+    chosen: pd.DataFrame = walkers[kept]
+    return chosen

@@ -47,7 +47,8 @@ class Meetings(Analysis):
             owners = np.sort(motion.walker_of[bridges.beads], axis=1)
             apart = (owners[:, 0] >= 0) & (owners[:, 0] != owners[:, 1])
             now = frozenset((int(one), int(other)) for one, other in owners[apart])
-            groups = groups_of(now, len(motion.walkers))
+            labels = connected(len(motion.walkers), np.array(sorted(now), dtype=np.int64).reshape(-1, 2))
+            groups = [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
             size = {walker: len(group) for group in groups for walker in group}
             largest = max([largest, *size.values()])
             seconds = float(motion.time[bridges.frame])
@@ -78,9 +79,3 @@ class Meetings(Analysis):
             f"  meetings   {result['merged']} merged, {result['parted']} parted, at most {result['largest_group']} "
             f"together; at the end {f'walkers {together}' if together else 'all are alone'}"
         ]
-
-
-def groups_of(joined: frozenset[tuple[int, int]], count: int) -> list[list[int]]:
-    """Connected components of so many walkers, given which pairs are joined."""
-    labels = connected(count, np.array(sorted(joined), dtype=np.int64).reshape(-1, 2))
-    return [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]

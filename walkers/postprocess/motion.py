@@ -79,6 +79,11 @@ class Motion:
         return min(int(np.searchsorted(self.time, 0.0)), len(self.time) - 1)
 
     @property
+    def follows_cycles(self) -> bool:
+        """Whether frames follow each other closely enough to show what happens within a cycle of the drive."""
+        return self.case.run.samples_per_cycle >= 8
+
+    @property
     def driven(self) -> Motion:
         """The motion without the rest before the drive."""
         return self.select(slice(self.first_driven, None)) if self.first_driven else self

@@ -20,7 +20,6 @@ from walkers.inputs.boundary import Flat
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, boundary_motion
 from walkers.postprocess.piles import Pile, climbing_beads
-from walkers.postprocess.rolling import Turns, turns_of
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -41,6 +40,47 @@ _ELEVATION_OF_ONE, _ELEVATION = radians(35.0), radians(60.0)
 """From which a level floor is seen: with one walker on it, and with several."""
 _STEEP, _ASIDE = pi / 4.0, radians(25.0)
 """The tilt of a wall that is seen from its normal, and how far aside from it."""
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Quaternions (x, y, z, w) from the axes at the first frame to those of each frame, shape (F, N, 4).
+
+    And rotation vectors from each frame to the next one, rad, shape (F, N, 3); of the last frame nothing.
+    """
+
+    turned: FloatArray
+    step: FloatArray
+
+    def at(self, frame: int, share: float) -> FloatArray:
+        """Rotation matrices of the beads, shape (N, 3, 3), at a share of the way from a frame to the next one."""
+        from scipy.spatial.transform import Rotation
+
+        further = Rotation.from_rotvec(share * self.step[frame])
+        matrices: FloatArray = (further * Rotation.from_quat(self.turned[frame])).as_matrix()
+        return matrices
+
+
+def turns_of(motion: Motion) -> Turns | None:
+    """Integrate the spins of a motion, dR/dt = [ω]× R; None where they are not known well enough.
+
+    The engine keeps no orientation of a sphere: over each interval between frames it turns by ω Δt about ω. Where there
+    are walkers the engine averaged spins over all steps between frames, and the sum is exact for axes that keep their
+    direction between two frames. Elsewhere spins are known at the frames alone: their means do (trapezoids) if the
+    frames follow the cycle, and nothing is known if they are whole cycles apart.
+    """
+    from scipy.spatial.transform import Rotation
+
+    if motion.mean_spin is None and not motion.follows_cycles:
+        return None
+    step = np.zeros_like(motion.spin)
+    step[:-1] = motion.averaged.spin * np.diff(motion.time)[:, None, None]
+    turned = np.empty((*step.shape[:2], 4))
+    now = Rotation.identity(step.shape[1])
+    for frame, vectors in enumerate(step):
+        turned[frame] = now.as_quat()
+        now = Rotation.from_rotvec(vectors) * now
+    return Turns(turned, step)
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
         If a dump cannot be read.
     """
     dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
-    frames, x = dump.stack(), layout.bead_columns.index("x")
+    frames, x = dump.stack(), dump.column("x")
     sampled = frames[:: next(iter(cases.values())).run.samples_per_cycle, :, x : x + 2]
     centre = np.stack([sampled[:, np.array(one.beads) - 1].mean(axis=1) for one in layout.walkers], axis=1)
     if came_near(centre, NEAR * max(make.length for case in cases.values() for make in case.walkers)):

@@ -22,6 +22,7 @@ from walkers.postprocess.analysis import Analysis, Described, Quantity
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.gait import (
     POSTURES,
+    SEPARATED,
     STEADY_SPEED,
     Gait,
     averages,
@@ -39,8 +40,6 @@ from walkers.postprocess.tables import NUMBERED, Columns, columns_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SEPARATED = 0.1
-"""Share of the time beyond which beads that no bridge can hold together are no walker."""
 SAME = 0.05
 """Walkers that faced either way and differ by more than this share are told apart first of all."""
 NEAR = 1.5

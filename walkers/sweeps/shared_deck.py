@@ -173,7 +173,7 @@ def _link(source: str, to: str) -> None:
 
 
 def _are_steady(directory: Path) -> bool:
-    from walkers.postprocess.steady_state import are_steady  # numpy is loaded while the engine runs
+    from walkers.postprocess.gait import are_steady  # numpy is loaded while the engine runs
 
     return are_steady(directory)
 

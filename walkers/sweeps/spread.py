@@ -17,7 +17,7 @@ from walkers.inputs.origins import Origin
 from walkers.inputs.readable import readable_unit
 from walkers.inputs.sweep import Sweep
 from walkers.postprocess.analysis import analyses, analyses_of
-from walkers.postprocess.walking import SEPARATED
+from walkers.postprocess.gait import SEPARATED
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_name
 from walkers.sweeps.record import row_of

@@ -145,11 +145,6 @@ def error_bars(plot: Figure, x: Sequence[Any] | FloatArray, y: FloatArray, error
     plot.add_layout(Whisker(source=ColumnDataSource(columns), base="x", lower="low", upper="high"))
 
 
-def picture_uri(path: Path) -> str:
-    """A PNG as the source of an image."""
-    return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"
-
-
 def _packed(text: str) -> str:
     return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
 

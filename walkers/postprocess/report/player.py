@@ -1,7 +1,7 @@
 """The beads of a run in three dimensions, to be played and turned: a K3D plot for reports and for notebooks.
 
 Seen in the frame of the boundary, in mm. Beads are beach balls, which shows how they roll, but for those whose spins
-are recorded too seldom to be added up (`walkers.postprocess.rolling`).
+are recorded too seldom to be added up (`walkers.postprocess.scene.turns_of`).
 """
 
 from __future__ import annotations

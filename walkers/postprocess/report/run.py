@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -99,18 +98,15 @@ def shown_of(directory: Path, result: dict[str, Any], origins: Origins = None) -
         vars(one) | {"range": " … ".join(map(text_of, one.range or ())), "guessed": one.guessed}
         for one in (case.origins if origins is None else origins)
     ]
+    said = ((key, value) for key, value in dotted(case.as_dict()) if value not in (None, "", [], ()))
+    as_run = [{"key": key, "text": text_of(value)} for key, value in said]
     return {
         "summary": summary_of(case),
         "warnings": warnings_of(result),
         "quantities": quantities_of(result),
         "guessed": [one for one in parameters if one["guessed"]],
-        "parameters": parameters or [{"key": key, "text": text_of(value)} for key, value in flat(case.as_dict())],
+        "parameters": parameters or as_run,
     }
-
-
-def flat(values: Any) -> Iterator[tuple[str, Any]]:
-    """Values of nested tables by dotted keys, of those that say something."""
-    return ((key, value) for key, value in dotted(values) if value not in (None, "", [], ()))
 
 
 def result_html(directory: Path, result: dict[str, Any], origins: Origins = None) -> str:
