@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers import DEFAULT_OUT, RECORDS
-from walkers.inputs.errors import InputError, Problem, WalkersError, check_utf8
+from walkers.inputs.errors import InputError, Problem, WalkersError, check_utf8, refused
 from walkers.inputs.reading import load_case, shipped_cases
 from walkers.progress import progress_of, progress_of_sweep, shown_if
 from walkers.runner.binary import find_engine
@@ -371,7 +371,7 @@ def locate(what: Case | str | Path, out: Path = DEFAULT_OUT) -> Place:
         name, case = what.name, what
     if run := _run_of(case, out):
         return Place(run, "run", case)
-    raise InputError(name, [Problem("", None, f"no finished run in {out}; first do: walkers run {name}")])
+    raise refused(name, f"no finished run in {out}; first do: walkers run {name}")
 
 
 def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
@@ -398,7 +398,7 @@ def find_run(run: Case | str | Path, out: Path = DEFAULT_OUT) -> Run:
 def run_at(place: Place, name: str) -> Run:
     """The run at a place that a user named so; refused as by `find_run` if it is none, or cannot be read."""
     if place.kind != "run":
-        raise InputError(name, [Problem("", None, _NO_RUN[place.kind])])
+        raise refused(name, _NO_RUN[place.kind])
     _check(place.path)
     return Run(place.path, origins=None if place.case is None else place.case.origins)
 
@@ -418,7 +418,7 @@ def find_side(run: str | Path, out: Path = DEFAULT_OUT) -> Side:
         try:
             return Side(there.path.name, case_of(there.path), there.path if there.kind == "run" else None)
         except (OSError, ValueError) as error:
-            raise InputError(str(run), [Problem("", None, f"its case cannot be read ({error})")]) from error
+            raise refused(run, f"its case cannot be read ({error})") from error
     case, directory = load_case(run), None
     with suppress(EngineMissing):
         directory = _run_of(case, out)
@@ -485,7 +485,7 @@ def _told(directory: Path, message: str) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, WalkersError) as error:
-        raise InputError(str(directory), [Problem("", None, f"{message} ({error})")]) from error
+        raise refused(directory, f"{message} ({error})") from error
 
 
 def _check_dumps(run: FinishedRun) -> None:
@@ -497,7 +497,7 @@ def _check_dumps(run: FinishedRun) -> None:
         if dump.relative_to(run.directory).as_posix() in left_out:
             continue
         if not dump.is_file():
-            raise InputError(str(run.directory), [Problem("", None, f"the run's {layout.bead_dump} is missing")])
+            raise refused(run.directory, f"the run's {layout.bead_dump} is missing")
         if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
             told = f"{dump} is incomplete: what is drawn or written ends early"
             warnings.warn(told, IncompleteRunWarning, stacklevel=5)

@@ -7,7 +7,7 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.postprocess.drawing import FORMATS, save_figure
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure import draw, drawn_column, layout_of
@@ -47,7 +47,7 @@ def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: A
     form = place.suffix.lower().lstrip(".")
     if form not in FORMATS or place.is_dir():
         expected = f"expected the name of a file that ends in .{', .'.join(FORMATS)}"
-        raise InputError("--to", [Problem("", None, f"{place}: {expected}")])
+        raise refused("--to", f"{place}: {expected}")
     figure = sweep_figure(directory, **choices)
     runs = [Path(run).name for run in table.loc[table["status"] == "finished", "run"]]
     return save_figure(figure, place, runs, (form,), str(table.attrs["sweep"]))[0]
@@ -97,8 +97,7 @@ def sweep_figure(
     counts = Counter(table["status"][table["status"] != "finished"])
     others = ", ".join(f"{number} {status}" for status, number in counts.items())
     if done.empty:
-        told = f"no point is finished ({others or 'there is none'})"
-        raise InputError(str(directory), [Problem("", None, told)])
+        raise refused(directory, f"no point is finished ({others or 'there is none'})")
     if counts:
         _tell(f"{sum(counts.values())} of {len(table)} points left out: {others}")
     if empty := int(done[column].isna().sum()):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.runner.directory import CASE_NAME, FinishedRun, name_of
 from walkers.runner.files import json_bytes
 from walkers.runner.manifest import MANIFEST_NAME, checksum
@@ -133,7 +133,7 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
     unfinished = sum(state.status not in ("finished", "not needed") for state in found)
     if unfinished:
         told = f"{unfinished} of {len(found)} points are not finished; see: walkers status {directory}"
-        raise InputError(str(directory), [Problem("", None, told)])
+        raise refused(directory, told)
     runs = list(dict.fromkeys(state.directory for state in found if state.directory is not None))
     name = name_of(record.directory.name)
     place, table = f"{RUNS}/{name}", load(record.directory)

@@ -15,7 +15,7 @@ from typing import IO
 from urllib.parse import unquote
 
 from walkers.archive.crate import METADATA_NAME, PREVIEW_NAME
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.runner.directory import Verification, compare, files_below, made_since, verify_run
 from walkers.runner.files import json_object
 from walkers.runner.manifest import MANIFEST_NAME
@@ -65,11 +65,7 @@ def verify(path: Path) -> list[Verification]:
     if path.is_file():
         return [_verify_zip(path)]
     told = f"expected a run directory (with a {MANIFEST_NAME}), a sweep's ({RECORD_NAME}), or an archive ({SUMS_NAME})"
-    raise _refused(path, told)
-
-
-def _refused(path: Path, told: str) -> InputError:
-    return InputError(str(path), [Problem("", None, told)])
+    raise refused(path, told)
 
 
 def _verify_sweep(directory: Path) -> list[Verification]:
@@ -94,13 +90,13 @@ def _verify_zip(path: Path) -> Verification:
             unpacked, size = sum(member.file_size for member in archive.infolist()), path.stat().st_size
             if unpacked > max(_MOST_TIMES * size, _MOST_ANYWAY):
                 told = f"expected at most {_MOST_TIMES} times its {size / 1e6:.1f} MB"
-                raise _refused(path, f"unpacks to {unpacked / 1e6:.0f} MB, {told}")
+                raise refused(path, f"unpacks to {unpacked / 1e6:.0f} MB, {told}")
             files = [name for name in archive.namelist() if not name.endswith("/")]
             folders = {f"{parent}/" for name in files for parent in Path(name).parents}
             there = [name for name in archive.namelist() if name not in folders]
             return _verify_archive(path, there, files, archive.open, lambda _: False)
     except (OSError, zipfile.BadZipFile, RuntimeError, ValueError) as error:
-        raise _refused(path, f"not a zip file that can be read ({error})") from error
+        raise refused(path, f"not a zip file that can be read ({error})") from error
 
 
 def _verify_archive(
@@ -112,7 +108,7 @@ def _verify_archive(
 ) -> Verification:
     """Compare what is in an archive, of which some are files that can be opened, with its lists."""
     if SUMS_NAME not in files:
-        raise _refused(path, f"no archive of runs: it has no {SUMS_NAME}")
+        raise refused(path, f"no archive of runs: it has no {SUMS_NAME}")
     listed = _listed(path, opened)
     now = {place: _checksum(opened, place) for place in files if place in listed}
     doubtful = [] if any(_is_manifest(place) for place in listed) else [f"{SUMS_NAME} (it lists no run)"]
@@ -167,6 +163,6 @@ def _listed(path: Path, opened: Callable[[str], IO[bytes]]) -> dict[str, str]:
     for line in text.removesuffix("\n").split("\n"):
         checksum, _, place = line.partition("  ")
         if len(checksum) != hashlib.sha256().digest_size * 2 or not place or place in listed:
-            raise _refused(path, f"{SUMS_NAME}: expected a checksum and a path, each path once, found {line[:80]!r}")
+            raise refused(path, f"{SUMS_NAME}: expected a checksum and a path, each path once, found {line[:80]!r}")
         listed[place] = checksum
     return listed

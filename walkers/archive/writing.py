@@ -15,7 +15,7 @@ from pathlib import Path
 from walkers.archive.contents import Contents, Item, contents_of, item
 from walkers.archive.crate import LICENCES, METADATA_NAME, PAPER, PREVIEW_NAME, Author, describe_crate
 from walkers.archive.verification import SUMS_NAME, verify
-from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.errors import WalkersError, refused
 from walkers.postprocess.report.page import fill
 from walkers.runner.files import beside, json_bytes
 
@@ -73,7 +73,7 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
     contents = contents_of(directory, dumps=options.dumps)
     to = Path(f"{contents.name}.zip") if to is None else to
     if to.suffix != ".zip" or to.is_dir():
-        raise InputError("--to", [Problem("", None, f"expected the name of a .zip file, not {to}")])
+        raise refused("--to", f"expected the name of a .zip file, not {to}")
     metadata = json_bytes(describe_crate(contents, options.authors, options.licence))
     described = [item(METADATA_NAME, metadata), item(PREVIEW_NAME, _preview(contents, options))]
     sums = "".join(f"{one.sha256}  {one.place}\n" for one in [*contents.items, *described])
@@ -91,13 +91,12 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
 def _check(options: ArchiveOptions) -> None:
     if options.licence not in LICENCES:
         told = f"expected one of {', '.join(LICENCES)}"
-        raise InputError("--licence", [Problem("", None, f"{told}, not {options.licence}")])
+        raise refused("--licence", f"{told}, not {options.licence}")
     for author in options.authors:
         if not author.name.strip():
-            raise InputError("--author", [Problem("", None, "expected a name")])
+            raise refused("--author", "expected a name")
         if author.orcid is not None and not _is_orcid(author.orcid):
-            told = f"expected an ORCID such as 0000-0002-1825-0097, found {author.orcid}"
-            raise InputError("--orcid", [Problem("", None, told)])
+            raise refused("--orcid", f"expected an ORCID such as 0000-0002-1825-0097, found {author.orcid}")
 
 
 def _is_orcid(text: str) -> bool:

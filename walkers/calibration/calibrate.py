@@ -20,7 +20,7 @@ from walkers.calibration.emulator import LARGEST, Emulators, FloatArray, Space, 
 from walkers.calibration.posterior import Density, Posterior, sample_posterior
 from walkers.inputs.calibration import QUANTITIES, Calibration, Speed
 from walkers.inputs.changes import flatten
-from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.errors import InputError, Problem, WalkersError, refused
 from walkers.inputs.schema import ALTERNATIVES
 from walkers.inputs.sweep import Sweep, expand
 from walkers.paper.comparison import misalignment
@@ -266,7 +266,7 @@ def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArra
             if unit.ndim != 2 or unit.shape[1] != len(kept["parameters"]) or not ((unit >= 0.0) & (unit <= 1.0)).all():
                 raise ValueError("no points of the unit cube")
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(str(path), [Problem("", None, f"cannot be read ({error}); delete it")]) from error
+            raise refused(path, f"cannot be read ({error}); delete it") from error
         for key, now in determinants.items():
             if key not in kept:
                 raise InputError(str(path), [Problem(key, None, "missing: of an earlier version; delete the file")])

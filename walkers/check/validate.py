@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 from walkers.check.report import Chapter, Line, Verdict
-from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.errors import WalkersError, refused
 from walkers.inputs.library import suggestion
 from walkers.inputs.text import rendered
 from walkers.postprocess.drawing import save_figure
@@ -64,7 +64,7 @@ def validate(
     for name in only:
         if name not in CHAPTERS:
             told = f"no chapter {name!r}; expected one of {', '.join(CHAPTERS)}{suggestion(name, CHAPTERS)}"
-            raise InputError("walkers validate", [Problem("", None, told)])
+            raise refused("walkers validate", told)
     names = tuple(name for name in CHAPTERS if name in only or not only)
     made: dict[str, Chapter] = {}
     works = Parallel(jobs, return_as="generator_unordered")

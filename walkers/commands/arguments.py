@@ -59,10 +59,10 @@ def on_cores(jobs: int | None) -> Options:
 
 def refuse(option: str, wrong: bool, told: str) -> None:
     """Refuse an option if something is wrong with it, and tell what."""
-    from walkers.inputs.errors import InputError, Problem
+    from walkers.inputs.errors import refused
 
     if wrong:
-        raise InputError(option, [Problem("", None, told)])
+        raise refused(option, told)
 
 
 def check_folder(option: str, folder: Path) -> None:

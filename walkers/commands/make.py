@@ -53,7 +53,7 @@ class _By(TypedDict):
 
 def deck(case: Case, settings: Set = None, to: Path | None = Option(None, help=_DECK)) -> None:
     """Print the LIGGGHTS deck of a case (of a run in segments, the first), or write it with its files."""
-    from walkers.inputs.errors import InputError, Problem
+    from walkers.inputs.errors import refused
     from walkers.runner.binary import find_engine, plugin_of, run_script
     from walkers.runner.directory import write_deck
     from walkers.templates.deck import DECK_NAME, RUN_NAME, render_deck
@@ -66,8 +66,7 @@ def deck(case: Case, settings: Set = None, to: Path | None = Option(None, help=_
     try:
         to.mkdir(parents=True)
     except OSError as error:
-        told = f"expected a folder that can be made ({error.strerror})"
-        raise InputError(str(to), [Problem("", None, told)]) from error
+        raise refused(to, f"expected a folder that can be made ({error.strerror})") from error
     write_deck(made, to)
     (to / RUN_NAME).write_text(run_script(plugin, made.layout.ranks), encoding="utf-8")
     print(f"{to / DECK_NAME}    run it there with: sh {RUN_NAME}")
@@ -236,7 +235,7 @@ def audit(
 ) -> int:
     """Measure forces of engine and contact model beside a second engine and closed forms; exit 1 if a line fails."""
     from walkers.check.audit import record, run_audit, selected
-    from walkers.inputs.errors import InputError, Problem
+    from walkers.inputs.errors import refused
     from walkers.runner.binary import find_engine
     from walkers.runner.failures import EngineMissing
 
@@ -246,7 +245,7 @@ def audit(
     except EngineMissing as missing:
         if engine is None:
             raise
-        raise InputError("--engine", [Problem("", None, str(missing))]) from missing
+        raise refused("--engine", str(missing)) from missing
     report = run_audit(checks, engine=binary, on_done=_tell_seconds)
     print_as(as_json, report.as_dict, report.as_text)
     if not only:
@@ -272,7 +271,7 @@ def crosscheck(
     from walkers.check.crosscheck import crosscheck, shortened
     from walkers.check.engine import TERMS
     from walkers.check.report import as_dict
-    from walkers.inputs.errors import InputError, Problem
+    from walkers.inputs.errors import refused
     from walkers.progress import progress_of
 
     loaded = load(case, settings)
@@ -283,7 +282,7 @@ def crosscheck(
     try:
         loaded = loaded if cycles is None else shortened(loaded, cycles)
     except ValueError as error:
-        raise InputError("--cycles", [Problem("", None, str(error))]) from error
+        raise refused("--cycles", str(error)) from error
 
     def make(one: Resolved, folder: Path) -> walkers.Run:
         with progress_of(one.name) as advance:

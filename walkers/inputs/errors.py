@@ -55,6 +55,11 @@ class InputError(WalkersError):
         super().__init__("\n".join(f"{named}: {problem}" for problem in self.problems))
 
 
+def refused(source: object, expected: str) -> InputError:
+    """A file, an option or another source that cannot be used as a whole, and what was expected of it."""
+    return refused(source, expected)
+
+
 def unusable(key: str, expected: str, value: object = None) -> InputError:
     """What cannot be used under a key; who reads the file adds its name and the value there (`messages.blaming`)."""
     return InputError("", [Problem(key, None if value is None else shown(value), expected)])
@@ -82,4 +87,4 @@ def check_utf8(word: str | Path) -> None:
         str(word).encode("utf-8")
     except UnicodeEncodeError as error:
         odd = os.fsencode(str(word)).decode("utf-8", "backslashreplace")
-        raise InputError(odd, [Problem("", None, "expected UTF-8 text")]) from error
+        raise refused(odd, "expected UTF-8 text") from error

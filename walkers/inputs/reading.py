@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import InputError, Problem, check_utf8, shortened
+from walkers.inputs.errors import InputError, check_utf8, refused, shortened
 from walkers.inputs.library import suggestion
 
 if TYPE_CHECKING:
@@ -91,18 +91,17 @@ def find_input(name: str | Path, kind: str) -> Path:
     path, known = Path(name), shipped(kind)
     found = None if str(name) in known else _kind_of(path)
     if found not in (None, kind):
-        raise InputError(str(name), [Problem("", None, f"is {_COMMANDS[str(found)].format(name)}")])
+        raise refused(name, f"is {_COMMANDS[str(found)].format(name)}")
     try:
         if path.is_file() or (path.exists() and str(name) not in known):
             if path.stem in (".", ".."):  # of "...toml"
-                raise InputError(str(name), [Problem("", None, "expected a name before .toml")])
+                raise refused(name, "expected a name before .toml")
             return path
     except OSError as error:
-        raise InputError(shortened(str(name)), [Problem("", None, f"cannot be read: {error.strerror}")]) from error
+        raise refused(shortened(str(name)), f"cannot be read: {error.strerror}") from error
     if str(name) in known:
         return known[str(name)]
-    told = f"no such file, nor a shipped {kind} ({', '.join(known)}){suggestion(str(name), known)}"
-    raise InputError(str(name), [Problem("", None, told)])
+    raise refused(name, f"no such file, nor a shipped {kind} ({', '.join(known)}){suggestion(str(name), known)}")
 
 
 def _kind_of(path: Path) -> str | None:
@@ -124,15 +123,15 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         about = path.stat()
         if not stat.S_ISDIR(about.st_mode) and (not stat.S_ISREG(about.st_mode) or about.st_size > _MOST_BYTES):
-            raise InputError(str(path), [Problem("", None, f"expected a file of at most {_MOST_BYTES >> 20} MB")])
+            raise refused(path, f"expected a file of at most {_MOST_BYTES >> 20} MB")
         return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         found = f"byte {error.object[error.start]:#04x} at offset {error.start}"
-        raise InputError(str(path), [Problem("", None, f"expected UTF-8 text, found {found}")]) from error
+        raise refused(path, f"expected UTF-8 text, found {found}") from error
     except (ValueError, RecursionError) as error:  # TOML's own errors, integers of 5000 digits, brackets without end
-        raise InputError(str(path), [Problem("", None, f"not TOML: {error}")]) from error
+        raise refused(path, f"not TOML: {error}") from error
     except OSError as error:
-        raise InputError(str(path), [Problem("", None, f"cannot be read: {error.strerror}")]) from error
+        raise refused(path, f"cannot be read: {error.strerror}") from error
 
 
 def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> Case:
@@ -155,7 +154,7 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
         try:
             case = resolve(file, name, document, notes)
         except ArithmeticError as error:
-            raise InputError(source, [Problem("", None, f"inconsistent values: {error}")]) from error
+            raise refused(source, f"inconsistent values: {error}") from error
         for key, given in file.uncertain.items():  # it is a key of the case, which could say both ends
             try:
                 check_key(key)

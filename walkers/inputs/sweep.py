@@ -34,7 +34,7 @@ from walkers.inputs.axes import (
 )
 from walkers.inputs.case import BOUNDS, Case
 from walkers.inputs.changes import Value, changed, flatten
-from walkers.inputs.errors import InputError, Problem, unusable
+from walkers.inputs.errors import InputError, Problem, refused, unusable
 from walkers.inputs.messages import blaming, check_key, validated
 from walkers.inputs.reading import find_input, read_toml, resolve_case, shipped
 from walkers.inputs.schema import Table, Whole
@@ -211,7 +211,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
             tables = changed(read_toml(base), settings)
             changed(tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
-        raise InputError(source, [Problem("", None, "has tables within tables without end")]) from error
+        raise refused(source, "has tables within tables without end") from error
     descend = file.descend
     return Sweep(
         name=name,

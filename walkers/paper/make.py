@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
 from walkers.paper.figures import fig1b, fig2, fig3, fig4
@@ -103,7 +103,7 @@ def make_figures(  # noqa: PLR0913
     check_formats(formats)
     for option, folder in (("--out", out), ("--to", to)):
         if folder.exists() and not folder.is_dir():
-            raise InputError(option, [Problem("", None, f"expected a folder, {folder} is a file")])
+            raise refused(option, f"expected a folder, {folder} is a file")
     needed = [FIGURES[name].sweeps if name in FIGURES else COMPARED for name in chosen]
     failed: dict[str, list[Failure]] = {}
     how: dict[str, Any] = {"engine": engine, "allow_failed_audit": allow_failed_audit}

@@ -9,7 +9,7 @@ from pathlib import Path
 from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.inputs.text import printable
 from walkers.runner.files import beside
 
@@ -97,14 +97,14 @@ def check_formats(formats: Sequence[str]) -> None:
     """Refuse formats that are none of `FORMATS` by an InputError."""
     for form in formats:
         if form not in FORMATS:
-            raise InputError("--format", [Problem("", None, f"{form!r}: expected one of {', '.join(FORMATS)}")])
+            raise refused("--format", f"{form!r}: expected one of {', '.join(FORMATS)}")
 
 
 def check_place(path: Path, *suffixes: str) -> None:
     """Refuse a place for a file that is a folder or has none of these suffixes by an InputError."""
     if path.suffix.lower() not in suffixes or path.is_dir():
         expected = f"expected the name of a {' or '.join(suffixes)} file"
-        raise InputError("--to", [Problem("", None, f"{path}: {expected}")])
+        raise refused("--to", f"{path}: {expected}")
 
 
 def save_figure(

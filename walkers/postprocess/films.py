@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.errors import WalkersError, refused
 from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
@@ -115,7 +115,7 @@ def parse_size(text: str) -> tuple[int, int]:
     if text in _SIZES:
         return _SIZES[text]
     expected = f"expected {', '.join(_SIZES)}, or pixels across and up such as 1280x720, 64 at least"
-    raise _refused("--size", f"{text!r}: {expected}")
+    raise refused("--size", f"{text!r}: {expected}")
 
 
 def parse_time(option: str, text: str) -> float:
@@ -123,11 +123,7 @@ def parse_time(option: str, text: str) -> float:
     try:
         return parse_quantity(text, DURATION)
     except ValueError as error:
-        raise _refused(option, f'{text!r}: expected a time such as "0.1 s"') from error
-
-
-def _refused(option: str, told: str) -> InputError:
-    return InputError(option, [Problem("", None, told)])
+        raise refused(option, f'{text!r}: expected a time such as "0.1 s"') from error
 
 
 def _check_format(path: Path, options: FilmOptions) -> None:
@@ -135,9 +131,9 @@ def _check_format(path: Path, options: FilmOptions) -> None:
     suffix, (wide, tall), fps = path.suffix.lower(), options.size, options.fps
     check_place(path, ".mp4", ".gif")
     if suffix == ".mp4" and (wide % 2 or tall % 2):
-        raise _refused("--size", f"{wide}x{tall}: expected even numbers for an MP4")
+        raise refused("--size", f"{wide}x{tall}: expected even numbers for an MP4")
     if suffix == ".gif" and (100 % fps or fps > 50):  # pictures last whole hundredths of a second
-        raise _refused("--fps", f"{fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF")
+        raise refused("--fps", f"{fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF")
 
 
 def _shown(motion: Motion, walker: int | None) -> Motion:
@@ -145,12 +141,12 @@ def _shown(motion: Motion, walker: int | None) -> Motion:
     count = len(motion.walkers)
     if not motion.case.apart:
         if walker is not None:
-            raise _refused(
+            raise refused(
                 "--walker", "the walkers of this run are shown together" if count else "the run has no walkers"
             )
         return motion
     if walker is not None and walker >= count:
-        raise _refused("--walker", f"{walker}: expected less than {count}, the run's walkers")
+        raise refused("--walker", f"{walker}: expected less than {count}, the run's walkers")
     return motion.of_walkers(motion.walkers[walker or 0 :][:1])
 
 
@@ -179,7 +175,7 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
     end = last if options.end is None else min(options.end, last)
     if not 0.0 <= begin < end:
         told = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --from before --until"
-        raise _refused("--from, --until", told)
+        raise refused("--from, --until", told)
     follows, slowdown = motion.follows_cycles, options.slowdown
     if slowdown is None:
         largest = _SECONDS / (end - begin)

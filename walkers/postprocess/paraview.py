@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.inputs.text import rendered
 from walkers.postprocess.analysis import analyses_of
 from walkers.postprocess.motion import Bridges, Motion, gathered, read_bridges, read_motion
@@ -107,8 +107,7 @@ def write_paraview(
         names.update(*(one.point_data(driven)(bridges) for one in analyses_of(driven.case)))
     colour = colour or ("walker" if driven.walkers else "speed")
     if colour not in names:
-        told = f"{colour!r}: expected one of {', '.join(sorted(names))}"
-        raise InputError("--colour", [Problem("", None, told)])
+        raise refused("--colour", f"{colour!r}: expected one of {', '.join(sorted(names))}")
     folder = write_vtk(directory, destination=destination, **options).parent
     write_text(folder / _SCRIPT, _script(driven, colour, folder.resolve()))
     return folder / _SCRIPT
@@ -118,8 +117,7 @@ def open_paraview(script: Path) -> None:
     """Start ParaView with a script, and do not wait for it; an InputError if there is none."""
     program = shutil.which("paraview")
     if program is None:
-        told = f"no program paraview is installed; {script} shows the run in one"
-        raise InputError("--open", [Problem("", None, told)])
+        raise refused("--open", f"no program paraview is installed; {script} shows the run in one")
     subprocess.Popen([program, f"--script={script}"], start_new_session=True)
 
 
@@ -152,7 +150,7 @@ def _check_replaceable(place: Path) -> None:
         held = "it is a file"
     if held:
         expected = "expected a new or empty folder, or one that an earlier walkers vtk wrote"
-        raise InputError(str(place), [Problem("", None, f"{expected}; {held}")])
+        raise refused(place, f"{expected}; {held}")
 
 
 def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, pv.PolyData]]]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place, new_figure, save_figure, styled
 from walkers.postprocess.motion import Group, Motion, gathered, read_motion
@@ -185,8 +185,7 @@ def _frames_apart(motion: Motion, images: int, apart: float, directory: Path) ->
     elif every > last - motion.first_driven:
         expected = f"less than the {max(motion.time[-1], 0.0):.3g} s of the drive"
     if expected:
-        told = f"{apart:.4g} s between pictures: expected {expected}"
-        raise InputError(str(directory), [Problem("", None, told)])
+        raise refused(directory, f"{apart:.4g} s between pictures: expected {expected}")
     return list(range(last, motion.first_driven - 1, -every))[:images][::-1]
 
 
@@ -204,4 +203,4 @@ def seconds_apart(text: str, directory: Path) -> float:
             seconds = parse_quantity(text, DURATION)
     if seconds > 0.0:
         return seconds
-    raise InputError("--interval", [Problem("", None, f'{text!r}: expected a time such as "2 s", or "T/4" of a cycle')])
+    raise refused("--interval", f'{text!r}: expected a time such as "2 s", or "T/4" of a cycle')

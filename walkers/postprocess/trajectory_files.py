@@ -12,7 +12,7 @@ from typing import TextIO
 
 import numpy as np
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.runner.files import beside
@@ -38,7 +38,7 @@ def write_trajectory(directory: Path, destination: Path, *, every: int = 1) -> P
     write = {".xyz": _write_xyz, ".extxyz": _write_xyz, ".lammpstrj": _write_lammps}.get(destination.suffix.lower())
     if write is None or destination.is_dir():
         expected = f"{destination}: expected the name of a .xyz, .extxyz or .lammpstrj file"
-        raise InputError("--to", [Problem("", None, expected)])
+        raise refused("--to", expected)
     motion = read_motion(directory).driven.select(slice(None, None, every))
     destination.parent.mkdir(parents=True, exist_ok=True)
     box = box_of(motion)

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.changes import dotted
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.postprocess.analysis import tables_of
 from walkers.postprocess.clusters import ClimbCriteria
 from walkers.postprocess.piles import Pile, climbs_by
@@ -52,9 +52,9 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
         piles = {run.directory.name.rpartition("-")[2]: run for run in runs if Pile().applies(run.case)}
         cases = {run.directory: _determinants(run) for run in piles.values()}
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(str(directory), [Problem("", None, f"a case cannot be read ({error})")]) from error
+        raise refused(directory, f"a case cannot be read ({error})") from error
     if not cases:
-        raise InputError(str(directory), [Problem("", None, "expected a finished run of a pile, or a folder or sweep")])
+        raise refused(directory, "expected a finished run of a pile, or a folder or sweep")
     keys = dict.fromkeys(key for case in cases.values() for key in case if key not in _NO_CONDITION)
     differ = [key for key in keys if len({str(case.get(key)) for case in cases.values()}) > 1]
     groups: dict[str, dict[Any, Path]] = {}

@@ -8,7 +8,7 @@ from math import hypot, isfinite, nan, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.inputs.readable import differing, flattened, readable, readable_unit
 from walkers.runner.directory import case_of
 from walkers.sweeps.folder import aligned, with_error
@@ -129,14 +129,13 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
     keys = [[with_unit(key, unit) for key, unit in one.units.items()] for one in records]
     if dict(records[0].units) != dict(records[1].units):
         told = " and ".join(", ".join(one) or "nothing" for one in keys)
-        told = f"expected sweeps that vary the same keys in the same units: {told}"
-        raise InputError(source, [Problem("", None, told)])
+        raise refused(source, f"expected sweeps that vary the same keys in the same units: {told}")
     tables = [load(directory) for directory in (first, second)]
     numbers = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
     column = find_name("--y", column, numbers) if column else default_column(tables[0])
     both = _matched([table[table["status"] == "finished"] for table in tables], varied_columns(tables[0]))
     if both.empty:
-        raise InputError(source, [Problem("", None, "have no finished point in common")])
+        raise refused(source, "have no finished point in common")
     names = [record.name for record in records]
     names = [str(first), str(second)] if names[0] == names[1] else names
     parameters, told = _different([case_of(Path(both[f"run_{side}"].iloc[0])) for side in _SIDES], names)

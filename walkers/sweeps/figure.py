@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.inputs.readable import readable_unit
 from walkers.postprocess.drawing import letter_panels, new_figure, plain_text, styled
 from walkers.sweeps.table import ERRORS, find_name, value_text, varied_columns, with_unit
@@ -171,7 +171,7 @@ def _numbers(rows: pd.DataFrame, name: str, option: str) -> Factor:
     unit, size = readable_unit(rows.attrs["units"].get(name, ""))
     values = pd.to_numeric(rows[name], errors="coerce").to_numpy(dtype=float, na_value=np.nan)
     if len(rows) and np.isnan(values).all():
-        raise InputError(option, [Problem("", None, f'"{name}" has no number that could be drawn')])
+        raise refused(option, f'"{name}" has no number that could be drawn')
     return Factor((name,), with_unit(readable_key(name), unit), (values / size).tolist(), True, unit=unit)
 
 
@@ -223,7 +223,7 @@ def layout_of(
     colours = asked.get("hue") or (left.pop(0) if left and hue is None else None)
     apart = asked.get("panels")
     if len(along) > 1 and apart is not None:
-        raise InputError("--panels", [Problem("", None, "expected --x too: the samples have a panel for each key")])
+        raise refused("--panels", "expected --x too: the samples have a panel for each key")
     if apart is None and panels is None and left and len(along) == 1:
         while prod(len(one.levels) for one in left) > _MOST_PANELS:
             untold.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
@@ -271,7 +271,7 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
     What is not positive is left out along axes that are logarithmic, as ``log`` says: ``x``, ``y`` or ``xy``.
     """
     if "x" in log and not all(one.is_number for one in layout.x):
-        raise InputError("--logx", [Problem("", None, f"{layout.x[0].label} has no numbers")])
+        raise refused("--logx", f"{layout.x[0].label} has no numbers")
     parts = [(x, np.ones(len(drawn.values), dtype=bool), "") for x in layout.x]
     if (told := layout.panels) is not None:
         parts = [(layout.x[0], told.where(level), told.told(level, by_name=True)) for level in told.levels]

@@ -20,7 +20,7 @@ from pathlib import Path
 from stat import S_ISDIR
 from typing import Any, Literal
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, differing, flattened, has_key, readable
 from walkers.inputs.units import Kind, parse_quantity
 from walkers.runner.directory import CASE_NAME, REPLACED, UNFINISHED, holds_unfinished, is_run_name, recover
@@ -91,7 +91,7 @@ def _run_name(directory: Path) -> str:
 def inventory(out: Path) -> list[Entry]:
     """All runs and sweeps in a folder, sweeps first, each kind by name; none where there is no folder."""
     if out.exists() and not out.is_dir():
-        raise InputError(str(out), [Problem("", None, "expected a folder of runs, this is a file")])
+        raise refused(out, "expected a folder of runs, this is a file")
     try:
         with os.scandir(out) as entries:
             folders = sorted(Path(entry) for entry in entries if entry.is_dir())
@@ -191,14 +191,14 @@ def select(
         try:
             oldest = parse_quantity(older_than, AGE)
         except ValueError as error:
-            raise InputError("--older-than", [Problem("", None, f'"{older_than}": {error}')]) from error
+            raise refused("--older-than", f'"{older_than}": {error}') from error
     conditions = []
     runs = [entry for entry in entries if not entry.is_sweep]
     for text in where:
         key, _, value = (part.strip() for part in text.partition("="))
         if not (key and value):
             told = 'expected KEY=VALUE, such as "drive.frequency=80 Hz"'
-            raise InputError("--where", [Problem("", None, f'"{text}": {told}')])
+            raise refused("--where", f'"{text}": {told}')
         if runs and not any(has_key(run.parameters, key) for run in runs):
             known = ", ".join(dict.fromkeys(one for run in runs for one in run.parameters))
             raise InputError("--where", [Problem(key, None, f"no run has such a key; they have {known}")])
@@ -397,7 +397,7 @@ def _found(name: str, entries: Sequence[Entry]) -> list[Entry]:
     found = [one for one in entries if name in (one.name, one.directory.name) or path == one.directory.resolve()]
     if not found:
         told = "no run or sweep in the folder of runs (see walkers list; another folder is given by --out)"
-        raise InputError(name, [Problem("", None, told)])
+        raise refused(name, told)
     return [one for one in found if name == one.directory.name] or found
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.axes import is_axis, plain
 from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
-from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.errors import InputError, Problem, WalkersError, refused
 from walkers.postprocess.analysis import RESULT_NAME, Described, analyses, analyses_in, analyses_of, current_result
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, finished_run, run_place, unfinished
@@ -162,10 +162,9 @@ def read_record(directory: str | Path) -> SweepRecord:
             file=contents.get("file", {}),
         )
     except (FileNotFoundError, NotADirectoryError) as error:
-        told = f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"
-        raise InputError(str(given), [Problem("", None, told)]) from error
+        raise refused(given, f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2") from error
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(str(given), [Problem("", None, f"{RECORD_NAME} cannot be read ({error})")]) from error
+        raise refused(given, f"{RECORD_NAME} cannot be read ({error})") from error
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 from uuid import uuid4
 
 from walkers.inputs.case import Case
-from walkers.inputs.errors import InputError, Problem, WalkersError
+from walkers.inputs.errors import WalkersError, refused
 from walkers.runner.binary import Engine
 from walkers.runner.cost import pairs_of_beads, predicted_seconds
 from walkers.runner.locks import is_locked
@@ -79,7 +79,7 @@ class Options:
         site = replace(self.site, ranks=ranks) if self.site else None
         if site is not None and ranks > site.file.cores:
             told = f"a deck has {ranks} MPI processes (run.ranks), more than the {site.file.cores} cores of a node"
-            raise InputError("cores", [Problem("", None, told)])
+            raise refused("cores", told)
         return replace(self, workers=max(1, self.workers // ranks), site=site)
 
     @property

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.library import suggestion
 from walkers.inputs.messages import quoted, validated
 from walkers.inputs.reading import read_toml
@@ -120,7 +120,7 @@ def load_site(path: str | Path) -> Site:
         pilots(site, Path("parsl"))
     except Exception as error:  # whatever Parsl's classes raise about what they are given
         told = " ".join(str(error).split())
-        raise InputError(str(path), [Problem("", None, f"Parsl cannot use it: {told}")]) from error
+        raise refused(path, f"Parsl cannot use it: {told}") from error
     return site
 
 
@@ -185,8 +185,7 @@ def check_path(folder: Path) -> None:
     """Refuse a folder with a space, a quote or the like in its path: Parsl writes it into shell scripts as it is."""
     whole = str(folder.resolve())
     if odd := _ODD.search(whole):
-        told = f"with a site file {_TAKEN} in the path, found {odd[0]!r} in {whole!r}"
-        raise InputError("--out", [Problem("", None, told)])
+        raise refused("--out", f"with a site file {_TAKEN} in the path, found {odd[0]!r} in {whole!r}")
 
 
 def threads(workers: int, run_dir: Path) -> Config:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.axes import sampled, unit_cube, unit_of
 from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin
 from walkers.inputs.readable import readable_unit
@@ -89,12 +89,11 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
     import numpy as np
 
     if not case.as_read:
-        told = "was changed after it was read; expected a case as load_case(name, changes) gives it"
-        raise InputError(case.name, [Problem("", None, told)])
+        raise refused(case.name, "was changed after it was read; expected a case as load_case(name, changes) gives it")
     varied = [one for one in case.origins if one.range is not None]
     if not varied:
         told = "nothing here is uncertain: say ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
-        raise InputError(case.name, [Problem("", None, told)])
+        raise refused(case.name, told)
     ranges = {one.key: {"loguniform" if one.logarithmic else "uniform": list(one.range or ())} for one in varied}
 
     def likeness(seed: int) -> float:

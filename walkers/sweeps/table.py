@@ -14,7 +14,7 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.inputs.library import suggestion
 from walkers.runner.files import write_bytes
 from walkers.sweeps.record import (
@@ -123,7 +123,7 @@ def find_name(option: str, wanted: str, names: Iterable[str]) -> str:
     if len(found) == 1:
         return found[0]
     told = f"expected one of {', '.join(found or known)}{'' if found else suggestion(wanted, known)}"
-    raise InputError(option, [Problem("", None, f'"{wanted}": {told}')])
+    raise refused(option, f'"{wanted}": {told}')
 
 
 def with_unit(words: str, unit: str | None) -> str:
@@ -165,7 +165,7 @@ def encoded(frame: pd.DataFrame, form: str) -> bytes:
 def write_table_file(frame: pd.DataFrame, path: Path) -> None:
     """Write a table in the form that the file's name ends in; `InputError` if that is none of `FORMATS`."""
     if path.suffix.lstrip(".") not in FORMATS:
-        raise InputError(str(path), [Problem("", None, f"expected a name that ends in .{', .'.join(FORMATS)}")])
+        raise refused(path, f"expected a name that ends in .{', .'.join(FORMATS)}")
     write_bytes(path, encoded(frame, path.suffix.lstrip(".")))
 
 
@@ -198,7 +198,7 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
     record = read_record(directory)
     descent = record.descent
     if descent is None:
-        raise InputError(str(directory), [Problem("", None, "the sweep has no descent, hence no thresholds")])
+        raise refused(directory, "the sweep has no descent, hence no thresholds")
     frame = load(directory)
     others = [name for name in varied_columns(frame) if name != descent.key]
     rows = []
@@ -226,8 +226,7 @@ def sweeps_in(directory: Path) -> list[Path]:
         return [directory]
     found = sorted(path.parent for path in directory.glob(f"*/{RECORD_NAME}"))
     if not found:
-        told = f"neither a sweep's directory (with a {RECORD_NAME}) nor a folder of such"
-        raise InputError(str(directory), [Problem("", None, told)])
+        raise refused(directory, f"neither a sweep's directory (with a {RECORD_NAME}) nor a folder of such")
     return found
 
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import refused
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.figures import Panel
@@ -45,7 +45,7 @@ def check_report(path: Path) -> None:
     """Refuse a place for a report that is no .html file in a folder that there is by an InputError."""
     check_place(path, ".html", ".htm")
     if not path.absolute().parent.is_dir():
-        raise InputError("--to", [Problem("", None, f"{path.absolute().parent}: there is no such folder")])
+        raise refused("--to", f"{path.absolute().parent}: there is no such folder")
 
 
 def write_page(path: Path, title: str, body: str, carried: Mapping[str, str]) -> Path:
