@@ -18,8 +18,6 @@ from tests.printed import spoilt
 from walkers.calibration.calibrate import (
     FINAL,
     Wave,
-    _determinants,
-    _kept,
     calibrate,
     next_wave,
     ranking,
@@ -28,7 +26,7 @@ from walkers.calibration.calibrate import (
 )
 from walkers.calibration.emulator import Emulator, Emulators, FloatArray, Space, fit_emulators
 from walkers.calibration.posterior import Density, Posterior, log_likelihood, observation_covariance, sample_posterior
-from walkers.calibration.report import draw_corners, figures_of, record_of, words_of
+from walkers.calibration.report import figures_of, record_of, words_of
 from walkers.inputs import InputError
 from walkers.inputs.calibration import (
     Calibration,
@@ -80,14 +78,6 @@ def test_the_cube_and_the_parameters_are_one() -> None:
     expected = -0.5 * (np.log(SPACE.values(np.array([0.9, 0.0]))[0]) / 0.5) ** 2
     assert densities[1] - densities[0] == pytest.approx(expected)
     assert densities[2] == -np.inf
-
-
-def test_a_corner_of_one_parameter_marks_the_best_set() -> None:
-    sets = np.random.default_rng(1).normal(0.5, 0.1, (400, 1)).clip(0.0, 1.0)
-    figure = draw_corners(Space(SPACE.parameters[:1]), sets, np.full(1, 0.25))
-    marks = [line for line in figure.axes[0].lines if line.get_color() == "C1"]
-    assert [list(line.get_xdata()) for line in marks] == [pytest.approx([-0.5, -0.5])]  # a from 0.1 to 10, a quarter up
-    assert spoilt(figure) == []
 
 
 def _known(unit: FloatArray) -> FloatArray:
@@ -382,14 +372,6 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
         assert spoilt(figure) == []
 
 
-@pytest.mark.parametrize("unit", [[[0.5, 3.0]], [[0.5]], [0.5, 0.5], "half"])
-def test_designs_that_cannot_be_ones_are_refused(unit: Any, tmp_path: Path) -> None:
-    file, determinants = tmp_path / "wave-1.json", _determinants(small(tmp_path), 1)
-    file.write_text(json.dumps({**determinants, "unit": unit}))
-    with pytest.raises(InputError, match=r"wave-1\.json: cannot be read"):
-        _kept(file, determinants, lambda: np.full((4, 2), 0.5))
-
-
 def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
     """They roll fast, each for itself; there is nothing to be observed."""
     few = {"dimers": {"replicates": 1}, "run": {"cycles": 40, "settling_cycles": 20, "samples_per_cycle": 10}}
@@ -446,15 +428,6 @@ def test_the_example_of_the_docs_can_be_read(tmp_path: Path) -> None:
     assert [one.group for one in found.observations] == ["fig2", "fig4a"]
 
 
-@pytest.mark.parametrize("option", ["--out", "--to"])
-def test_a_file_is_no_folder_to_write_into(option: str, tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    told = call("calibrate", "ruby", option, "file", folder=tmp_path)
-    assert (told.returncode, told.stdout) == (2, "")
-    assert told.stderr == f"walkers: {option}: expected a folder, file is a file\n"
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
 @pytest.mark.parametrize("name", shipped("calibration"))
 def test_shipped_calibrations_can_be_run(name: str) -> None:
     found = load_calibration(name)
@@ -488,6 +461,7 @@ _BOTH = {"observations": ["slow", "fast"], "share": 0.5}
         ("parameters/drag/experiments", [], r"parameters\.drag\.experiments"),
         ("parameters/drag/experiments", ["slow"], r"no parameter gives liquid\.viscosity_ratio to fast, strong"),
         ("observations/0/of", ["slo"], r'observations\[0\]\.of.*"slow"'),
+        ("observations/3/over", ["fast"], r"observations\[3\]\.over: expected other experiments"),
         ("observations/0/value", 1.0, r"observations\[0\]\.value.*speed"),
         ("observations/3/value", "1 mm/s", r"observations\[3\]\.value.*ratio"),
         ("observations/3/derived", 3, r"observations\[3\]\.derived"),

@@ -183,12 +183,6 @@ def test_an_input_of_another_kind_is_told_with_its_command(looked_through: Path,
         assert told in done.stderr
 
 
-def test_sweeps_are_found_in_another_folder_of_runs(looked_through: Path, in_folder: Path) -> None:
-    out = ("--out", str(looked_through))
-    assert call("status", "grid", *out, check=True).stdout.startswith("grid: 6 points, 6 finished")
-    assert call("table", "grid", *out, "--csv", check=True).stdout.count("\n") == 7
-
-
 def test_a_folder_does_not_shadow_the_run_of_the_case_that_it_is_named_like(in_folder: Path) -> None:
     call("deck", "fig1b", "--to", "fig1b", check=True)
     place = run_case(load_case("fig1b", {"run.cycles": 6, "run.settling_cycles": 2}), in_folder / "short").directory

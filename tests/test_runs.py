@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -118,12 +119,12 @@ def test_a_run_is_found_by_its_directory_or_its_case(in_folder: Path) -> None:
         assert f"{first['velocity']['mean'] * 1e3:.3f}" in call("result", str(named), check=True).stdout
 
 
-@pytest.mark.parametrize("damage", ["result.json", "walkers.parquet", "bridges.parquet"])
-def test_damaged_tables_are_made_anew(tmp_path: Path, damage: str) -> None:
+def test_damaged_tables_are_made_anew(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
     outcome = run_case(case, tmp_path)
-    result, path = outcome.result, outcome.directory / damage
-    for contents in (None, b"{", b"[]"):
+    result = outcome.result
+    for name, contents in product(("result.json", "walkers.parquet", "bridges.parquet"), (None, b"{")):
+        path = outcome.directory / name
         path.unlink()
         if contents is not None:
             path.write_bytes(contents)
@@ -132,12 +133,13 @@ def test_damaged_tables_are_made_anew(tmp_path: Path, damage: str) -> None:
         assert path.stat().st_size > 100
 
 
-@pytest.mark.parametrize("name", ["manifest.json", "case.json", "segments/0000/layout.json", "segments/0000/beads.bin"])
-def test_a_run_without_its_description_is_told(tmp_path: Path, name: str) -> None:
-    directory = run_case(make_case(run=SHORT), tmp_path / "runs").directory
-    (directory / name).unlink()
-    with pytest.raises(InputError, match=Path(name).name if name != "manifest.json" else "not a finished run"):
-        find_run(directory)
+def test_a_run_without_its_description_is_told(run_directory: Callable[..., Path], tmp_path: Path) -> None:
+    whole = run_directory(run=SHORT)
+    for name in ("manifest.json", "case.json", "layout.json", "beads.bin"):
+        directory = Path(shutil.copytree(whole, tmp_path / name / whole.name))
+        next(directory.rglob(name)).unlink()
+        with pytest.raises(InputError, match="not a finished run" if name == "manifest.json" else name):
+            find_run(directory)
 
 
 def test_a_cut_dump_is_drawn_as_far_as_it_goes(tmp_path: Path) -> None:
