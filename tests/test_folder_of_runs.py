@@ -199,7 +199,7 @@ def test_points_of_sweeps_match_by_what_their_numbers_are() -> None:
 def test_one_number_of_a_list_is_a_key_like_any_other(tmp_path: Path) -> None:
     """Sweeps over it are matched by it, and their reports show it."""
     key, runs = "dimers.radii[0]", ["base-0", "base-1"]
-    record = SweepRecord(tmp_path / "test", "", "", {key: "mm"}, [[0.2], [0.3]], [[0.0] * 4] * 2, runs, None, [], {})
+    record = SweepRecord(tmp_path / "test", "", "", {key: "mm"}, [[0.2], [0.3]], [{}, {}], runs, None, [], {})
     write_record(record)
     assert varied_columns(walkers.load(record.directory)) == [key]
 

@@ -57,7 +57,7 @@ class InputError(WalkersError):
 
 def refused(source: object, expected: str) -> InputError:
     """A file, an option or another source that cannot be used as a whole, and what was expected of it."""
-    return refused(source, expected)
+    return InputError(str(source), [Problem("", None, expected)])
 
 
 def unusable(key: str, expected: str, value: object = None) -> InputError:

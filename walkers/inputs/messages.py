@@ -37,7 +37,6 @@ _EXAMPLES = {
     "boundary": 'a [boundary] table, such as material = "chromium-coated glass"',
     "boundary.material": 'such as "chromium-coated glass"',
     "drive": "a [drive] table with a frequency and a peak_acceleration or gamma0",
-    "drive.frequency": 'such as "80 Hz"',
     "walltime": 'hours, minutes and seconds, such as "02:00:00"',
     "case": 'a case file, or the name of a shipped case, such as "fig1b"',
     "descend.from": 'where the descent begins, such as "4 g"',

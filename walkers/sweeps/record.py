@@ -55,7 +55,7 @@ class SweepRecord:
     title: str
     units: Mapping[str, str | None]
     values: Sequence[Sequence[Any]]
-    derived: Sequence[Sequence[float]]
+    derived: Sequence[Mapping[str, float]]
     runs: Sequence[str]
     descent: Descent | None
     analyses: Sequence[str]
@@ -111,7 +111,7 @@ def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Pat
     for case in cases:
         known = {key: value for one in analyses_of(case) for key, value in one.derived_of(case).items()}
         known |= {key: getattr(case.drive, key) for key in _DRIVE}
-        derived.append([known.get(key, nan) for key in derived_columns(names)])
+        derived.append({key: known.get(key, nan) for key in derived_columns(names)})
     return SweepRecord(
         directory=out / sweep.name,
         name=sweep.name,
@@ -129,7 +129,10 @@ def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Pat
 def write_record(record: SweepRecord) -> None:
     """Make the sweep's directory, if need be, and write its ``sweep.json``."""
     record.directory.mkdir(parents=True, exist_ok=True)
-    points = zip(record.values, record.derived, record.runs, strict=True)
+    points = [
+        {"values": list(values), "derived": list(derived.values()), "run": run}
+        for values, derived, run in zip(record.values, record.derived, record.runs, strict=True)
+    ]
     contents = {
         "format": _FORMAT,
         "name": record.name,
@@ -138,8 +141,8 @@ def write_record(record: SweepRecord) -> None:
         "units": dict(record.units),
         "descent": vars(record.descent) if record.descent else None,
         "analyses": list(record.analyses),
-        "derived": list(derived_columns(record.analyses)),
-        "points": [{"values": list(values), "derived": list(derived), "run": run} for values, derived, run in points],
+        "derived": list(record.derived[0]) if record.derived else [],
+        "points": points,
     }
     write_json(record.directory / RECORD_NAME, contents)
 
@@ -156,7 +159,7 @@ def read_record(directory: str | Path) -> SweepRecord:
             directory=directory,
             **{key: contents[key] for key in ("name", "title", "units", "analyses")},
             values=[point["values"] for point in points],
-            derived=[point["derived"] for point in points],
+            derived=[dict(zip(contents["derived"], point["derived"], strict=True)) for point in points],
             runs=[point["run"] for point in points],
             descent=Descent(**contents["descent"]) if contents["descent"] else None,
             file=contents.get("file", {}),

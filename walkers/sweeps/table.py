@@ -94,7 +94,7 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
     row: dict[str, Any] = {"point": number}
     for key, value in zip(record.units, record.values[number], strict=True):
         row |= {f"{key}[{part}]": one for part, one in enumerate(value)} if isinstance(value, list) else {key: value}
-    row |= dict(zip(derived_columns(record.analyses), record.derived[number], strict=True))
+    row |= {key: record.derived[number].get(key, nan) for key in derived_columns(record.analyses)}
     row |= dict.fromkeys(result_columns(record.analyses), nan)
     row |= {"status": state.status, "lost": state.lost, "reason": state.reason or ""}
     row["run"] = os.path.relpath(state.directory) if state.directory else ""
