@@ -23,7 +23,6 @@ from walkers.runner.directory import (
     case_of,
     finished_run,
     layout_of,
-    run_name,
     run_place,
     unfinished,
 )
@@ -354,7 +353,7 @@ def placed(name: str | Path, out: Path = DEFAULT_OUT) -> Place | None:
 
 def _run_of(case: Case, out: Path) -> Path | None:
     """The directory of a case's finished run with the installed engine."""
-    place = out / run_name(case, find_engine())
+    place = run_place(case, find_engine(), out)
     return place if finished_run(place) else None
 
 

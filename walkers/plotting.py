@@ -48,7 +48,7 @@ def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: A
     if form not in FORMATS or place.is_dir():
         expected = f"expected the name of a file that ends in .{', .'.join(FORMATS)}"
         raise refused("--to", f"{place}: {expected}")
-    figure = sweep_figure(directory, **choices)
+    figure = _figure_of(table, directory, **choices)
     runs = [Path(run).name for run in table.loc[table["status"] == "finished", "run"]]
     return save_figure(figure, place, runs, (form,), str(table.attrs["sweep"]))[0]
 
@@ -91,20 +91,26 @@ def sweep_figure(
     InputError
         If it is no sweep's directory, no point is finished, or there is no such column.
     """
-    table = load(directory)
+    return _figure_of(load(directory), directory, x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)
+
+
+def _figure_of(
+    table: pd.DataFrame, source: str | Path, *, y: str | None = None, log: str = "", theory: bool = False, **layout: Any
+) -> Figure:
+    """The figure of a table that was read from a sweep's directory; ``layout`` is what `layout_of` takes."""
     column = _column(table, y)
     done = table[table["status"] == "finished"]
     counts = Counter(table["status"][table["status"] != "finished"])
     others = ", ".join(f"{number} {status}" for status, number in counts.items())
     if done.empty:
-        raise refused(directory, f"no point is finished ({others or 'there is none'})")
+        raise refused(source, f"no point is finished ({others or 'there is none'})")
     if counts:
         _tell(f"{sum(counts.values())} of {len(table)} points left out: {others}")
     if empty := int(done[column].isna().sum()):
         _tell(f"{empty} of {len(done)} finished points have no {column}")
-    layout = layout_of(table, done, x=x, hue=hue, panels=panels)
-    if layout.untold:
-        _tell(f"not told apart: {'; '.join(layout.untold)}")
+    laid_out = layout_of(table, done, **layout)
+    if laid_out.untold:
+        _tell(f"not told apart: {'; '.join(laid_out.untold)}")
     predicted: dict[str, FloatArray] = {}
     if theory:
         from walkers.theory.prediction import predicted_column
@@ -112,7 +118,7 @@ def sweep_figure(
         predicted, reasons = predicted_column([case_of(Path(run)) for run in done["run"]], column)
         for reason, number in reasons.items():
             _tell(f"not drawn at {number} of {len(done)} points: {reason}")
-    return draw(layout, drawn_column(done, column, predicted), title=table.attrs["title"], log=log)
+    return draw(laid_out, drawn_column(done, column, predicted), title=table.attrs["title"], log=log)
 
 
 def _column(table: pd.DataFrame, wanted: str | None) -> str:
@@ -120,4 +126,4 @@ def _column(table: pd.DataFrame, wanted: str | None) -> str:
 
 
 def _tell(message: str) -> None:
-    warnings.warn(message, LeftOutWarning, stacklevel=3)
+    warnings.warn(message, LeftOutWarning, stacklevel=4)

@@ -13,7 +13,7 @@ from typing import Any
 from walkers.check.report import Chapter, Line, Verdict, as_dict, count, outcome
 from walkers.check.scenes import CHECKS, LONG, Bench
 from walkers.inputs.errors import refused
-from walkers.inputs.library import suggestion
+from walkers.inputs.library import expected_of
 from walkers.runner.binary import AuditRecord, Engine, find_engine, write_audit
 
 
@@ -51,7 +51,7 @@ def selected(only: Collection[str] = (), *, quick: bool = False) -> tuple[str, .
     """
     for name in only:
         if name not in CHECKS:
-            raise refused("--only", f"no check {name!r}; expected one of {', '.join(CHECKS)}{suggestion(name, CHECKS)}")
+            raise refused("--only", f"no check {name!r}; {expected_of(name, CHECKS)}")
     return tuple(name for name in CHECKS if (name in only if only else not (quick and name in LONG)))
 
 

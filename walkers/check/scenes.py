@@ -132,10 +132,10 @@ def pair(
     ]
 
 
-def standing(beads: Sequence[Bead], walls: Sequence[Wall] = (FLOOR,), edge: float = 0.01) -> Scene:
-    """Beads, which are numbered here, between walls in a box about the origin, ``edge`` (m) half its width."""
+def standing(beads: Sequence[Bead], walls: Sequence[Wall] = (FLOOR,)) -> Scene:
+    """Beads, which are numbered here, between walls in a box of 2 cm about the origin."""
     numbered = tuple(replace(bead, id=number) for number, bead in enumerate(beads, 1))
-    return Scene(numbered, tuple(walls), (-edge,) * 3, (edge,) * 3)
+    return Scene(numbered, tuple(walls), (-0.01,) * 3, (0.01,) * 3)
 
 
 def recording(steps: int, sample_every: int = 1) -> Recording:

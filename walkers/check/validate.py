@@ -9,7 +9,7 @@ from pathlib import Path
 
 from walkers.check.report import Chapter, Line, Verdict
 from walkers.inputs.errors import WalkersError, refused
-from walkers.inputs.library import suggestion
+from walkers.inputs.library import expected_of
 from walkers.inputs.text import rendered
 from walkers.postprocess.drawing import save_figure
 from walkers.runner.files import write_text
@@ -63,8 +63,7 @@ def validate(
 
     for name in only:
         if name not in CHAPTERS:
-            told = f"no chapter {name!r}; expected one of {', '.join(CHAPTERS)}{suggestion(name, CHAPTERS)}"
-            raise refused("walkers validate", told)
+            raise refused("walkers validate", f"no chapter {name!r}; {expected_of(name, CHAPTERS)}")
     names = tuple(name for name in CHAPTERS if name in only or not only)
     made: dict[str, Chapter] = {}
     works = Parallel(jobs, return_as="generator_unordered")

@@ -118,6 +118,12 @@ def unmeasured() -> Mapping[str, Unmeasured]:
     return found
 
 
+def expected_of(word: str, known: Iterable[str]) -> str:
+    """``expected one of …``, with the known name that the word is close to, if it is to one."""
+    names = list(known)
+    return f"expected one of {', '.join(names)}{suggestion(word, names)}"
+
+
 def suggestion(word: str, known: Iterable[str]) -> str:
     """``; did you mean "…"?`` where a known name is close to the word, else nothing."""
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)

@@ -19,7 +19,7 @@ from walkers.inputs.boundary import SHAPES, Boundary, Shape
 from walkers.inputs.case import Case, Run
 from walkers.inputs.changes import MISSING, changed, parts_of, value_at
 from walkers.inputs.errors import unusable
-from walkers.inputs.library import Known, suggestion
+from walkers.inputs.library import Known, expected_of
 from walkers.inputs.loads import contact_loads, reach
 from walkers.inputs.origins import Notes, Origin, origins_of
 from walkers.inputs.run_tables import resolve_drive, resolve_run
@@ -76,8 +76,7 @@ def supplied(document: Mapping[str, Any], notes: Notes) -> dict[str, Any]:
         ("boundary.material", wall, library.materials(), described),
     ):
         if name is not None and name not in names and not says_all:
-            told = f"not in the library; expected one of {', '.join(names)}{suggestion(name, names)}"
-            raise unusable(key, told)
+            raise unusable(key, f"not in the library; {expected_of(name, names)}")
     known, settings = _known(bead, wall, liquid), {}
     # What was calibrated was so with one law of the bridges: with another it is a guess.
     calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
@@ -243,8 +242,7 @@ def _arranged(walkers: Walkers, key: str, name: str) -> Walkers:
     """A cluster in an arrangement."""
     known = ARRANGEMENTS.get(name)
     if known is None:
-        told = f"expected one of {', '.join(ARRANGEMENTS)}{suggestion(name, ARRANGEMENTS)}"
-        raise unusable(f"{key}.arrangement", told)
+        raise unusable(f"{key}.arrangement", expected_of(name, ARRANGEMENTS))
     key = f"{key}.radii"
     if not known.fewest <= len(walkers.radii) <= known.most:
         bound = f"at least {known.fewest}" if known.fewest < known.most else str(known.most)

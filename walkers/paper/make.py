@@ -128,7 +128,7 @@ def make_figures(  # noqa: PLR0913
     return Made(files, failed, left_out, *count(rows, measured=True))
 
 
-def draw_figure(name: str, out: Path, to: Path, formats: Sequence[str] = FORMATS) -> list[Path] | str:
+def draw_figure(name: str, out: Path, to: Path, formats: Sequence[str]) -> list[Path] | str:
     """Draw one of `FIGURES` from finished sweeps; the files, or why nothing could be drawn."""
     drawing, sources = FIGURES[name], Sources(out)
     try:

@@ -81,14 +81,11 @@ def series_look(number: int) -> dict[str, Any]:
     }
 
 
-def legend_below(axes: Axes, lines: int = 2, **options: Any) -> Legend:
-    """A legend below axes of a figure with constrained layout, where it covers nothing.
-
-    ``lines`` of text stand between the axes and it: tick labels and the label of the abscissa are 2.
-    """
+def legend_below(axes: Axes, **options: Any) -> Legend:
+    """A legend below axes of a figure with constrained layout, below tick labels and the label of the abscissa."""
     from matplotlib.transforms import ScaledTranslation
 
-    down = ScaledTranslation(0.0, -(6.0 + 12.0 * lines) / 72.0, axes.figure.dpi_scale_trans)
+    down = ScaledTranslation(0.0, -30.0 / 72.0, axes.figure.dpi_scale_trans)
     options |= {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": axes.transAxes + down, "borderaxespad": 0.0}
     return axes.legend(loc="upper center", **options)
 

@@ -91,17 +91,14 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
     ]
 
 
-def velocity_panel(groups: list[Group]) -> Panel:
-    """The velocity of each walker with the standard error of its fit."""
-    walkers = [walker for one in groups for walker in one.walkers]
-    number, faced = np.array([walker.walker for walker in walkers]), np.array([walker.facing for walker in walkers])
-    velocity = 1e3 * np.concatenate([walk(one).velocity for one in groups])
-    error = 1e3 * np.concatenate([walk(one).standard_error for one in groups])
-    lines = []
-    for way, told in zip((1, -1), ways(uphill=groups[0].case.goes_uphill), strict=True):
+def velocity_panel(case: Case, walkers: Columns) -> Panel:
+    """The velocity of each walker, of the table of the walkers, with the standard error of its fit."""
+    velocity, error, lines = 1e3 * walkers["velocity"], 1e3 * walkers["standard_error"], []
+    for way, told in zip((1, -1), ways(uphill=case.goes_uphill), strict=True):
         label, colour, marker = f"started facing {told}", int(way < 0), "o" if way > 0 else "s"
-        these = faced == way
-        lines.append(Line(number[these], velocity[these], label, colour, marker, width=0.0, error=error[these]))
+        these = walkers["facing"] == way
+        number = walkers["walker"][these]
+        lines.append(Line(number, velocity[these], label, colour, marker, width=0.0, error=error[these]))
     return Panel("Velocity of each walker, standard error of its fit", "number of the walker", "velocity (mm/s)", lines)
 
 

@@ -29,7 +29,7 @@ from walkers.postprocess.clusters import (
     follow,
     held_clusters,
 )
-from walkers.postprocess.dump import BoolArray, FloatArray
+from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import Bridges, Motion, read_bridges
 from walkers.postprocess.tables import Columns, columns_of, columns_of_rows
 from walkers.runner.directory import case_of
@@ -241,17 +241,13 @@ class Pile(Analysis):
 
     def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
         """Cluster and track of each bead, the liquid in its bridges (m³), and whether it climbs."""
-        tables = tables_of(motion.directory)
-        members, climbed, count = tables["members"], tables["clusters"]["climbed"], len(motion.radius)
+        track, climber = tracks_of(motion)
 
         def of_frame(bridges: Bridges) -> Columns:
-            track, climber = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
-            now = members["time"] == motion.time[bridges.frame]
-            beads, tracks = members["bead"][now], members["track"][now]
-            track[beads], climber[beads] = tracks, climbed[tracks]
             liquid = liquid_of_beads(motion.radius, motion.case.liquid.volume_fraction, bridges)
-            component = connected(count, bridges.beads)
-            return {"component": component, "liquid": liquid, "track": track, "is_climber": climber}
+            component = connected(len(motion.radius), bridges.beads)
+            own = {"track": track[bridges.frame], "is_climber": climber[bridges.frame].astype(np.int64)}
+            return {"component": component, "liquid": liquid, **own}
 
         return of_frame
 
@@ -297,15 +293,15 @@ def _told_climb(climb: Climb) -> dict[str, Any]:
     return {**told, "walls": climb.wall_names.split(), "out_of_pile": climb.out_of_pile}
 
 
-def climbing_beads(motion: Motion) -> Callable[[int], set[int]]:
-    """What gives, for a frame of a pile's motion, the beads of the clusters that climb and are free and held then."""
+def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
+    """Which cluster, free and held, each bead of a pile is in, -1 for none, and whether that climbs; shape (F, N)."""
     tables = tables_of(motion.directory)
-    members = tables["members"]
-    climbing = tables["clusters"]["climbed"][members["track"]]
-    beads: dict[float, set[int]] = {}
-    for time, bead in zip(members["time"][climbing].tolist(), members["bead"][climbing].tolist(), strict=True):
-        beads.setdefault(time, set()).add(bead)
-    return lambda frame: beads.get(float(motion.time[frame]), set())
+    members, climbed = tables["members"], tables["clusters"]["climbed"]
+    track = np.full(motion.position.shape[:2], -1, dtype=np.int64)
+    frame = np.searchsorted(motion.time, members["time"]).clip(max=len(motion.time) - 1)
+    there = motion.time[frame] == members["time"]  # a motion need not have all frames
+    track[frame[there], members["bead"][there]] = members["track"][there]
+    return track, np.append(climbed, False)[track]
 
 
 def climbs_by(tables: Mapping[str, Columns], definition: ClimbCriteria) -> list[Climb]:

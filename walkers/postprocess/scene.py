@@ -19,7 +19,7 @@ import numpy.typing as npt
 from walkers.inputs.boundary import Flat
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, boundary_motion
-from walkers.postprocess.piles import Pile, climbing_beads
+from walkers.postprocess.piles import Pile, tracks_of
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -138,11 +138,7 @@ class Scene:
         """Which beads are coloured in a frame: those of walkers, and of clusters that climb; shape (F, N)."""
         motion = self.motion
         chosen = np.tile(motion.walker_of >= 0, (len(motion.time), 1))
-        if Pile().applies(motion.case):
-            climbing = climbing_beads(motion)
-            for frame, beads in enumerate(chosen):
-                beads[list(climbing(frame))] = True
-        return chosen
+        return chosen | tracks_of(motion)[1] if Pile().applies(motion.case) else chosen
 
     def colours(self, chosen: npt.NDArray[np.bool_]) -> FloatArray:
         """Red, green, blue (to 255) of beads, some chosen ones in ruby, and of their paler lunes, shape (2, N, 3)."""

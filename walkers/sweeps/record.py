@@ -107,11 +107,11 @@ def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Pat
     names = analyses_of_all(cases)
     if sweep.descent is not None and "velocity" not in result_columns(names):
         raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
-    derived = []
+    columns, derived = derived_columns(names), []
     for case in cases:
         known = {key: value for one in analyses_of(case) for key, value in one.derived_of(case).items()}
         known |= {key: getattr(case.drive, key) for key in _DRIVE}
-        derived.append({key: known.get(key, nan) for key in derived_columns(names)})
+        derived.append({key: known.get(key, nan) for key in columns})
     return SweepRecord(
         directory=out / sweep.name,
         name=sweep.name,

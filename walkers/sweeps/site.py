@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from walkers.inputs.errors import InputError, Problem, refused
-from walkers.inputs.library import suggestion
+from walkers.inputs.library import expected_of, suggestion
 from walkers.inputs.messages import quoted, validated
 from walkers.inputs.reading import read_toml
 from walkers.inputs.schema import Whole
@@ -136,8 +136,7 @@ def _problems(file: SiteFile, document: Mapping[str, Any]) -> list[Problem]:
 
     provider = _provider(file.scheduler)
     if provider is None:
-        expected = f"expected one of {', '.join(_SCHEDULERS)}{suggestion(file.scheduler, _SCHEDULERS)}"
-        refuse(["scheduler"], f"{expected}, or a provider of Parsl's")
+        refuse(["scheduler"], f"{expected_of(file.scheduler, _SCHEDULERS)}, or a provider of Parsl's")
         return found
     taken = _parameters("parsl.providers", provider)
     for key, names in _OURS.items():

@@ -76,9 +76,13 @@ def load(directory: str | Path) -> pd.DataFrame:
         # A key with several numbers, such as the radii, has a column for each.
         parts = max((len(values[place]) for values in record.values if isinstance(values[place], list)), default=0)
         varied |= dict.fromkeys([f"{key}[{part}]" for part in range(parts)] or [key], (unit or "", _VARIED))
-    described = {"point": ("", "number of the point"), **varied}
-    described |= {**derived_columns(record.analyses), **result_columns(record.analyses), **STATE}
-    rows = [_row(record, number, state) for number, state in enumerate(states(record)) if state.status != "not needed"]
+    found = {**derived_columns(record.analyses), **result_columns(record.analyses)}
+    described = {"point": ("", "number of the point"), **varied, **found, **STATE}
+    rows = [
+        dict.fromkeys(found, nan) | _row(record, number, state)
+        for number, state in enumerate(states(record))
+        if state.status != "not needed"
+    ]
     frame = _with_units(pd.DataFrame(rows, columns=list(described)), described)
     frame.attrs |= {"sweep": record.name, "title": record.title or record.name, "axes": record.axes}
     return frame
@@ -91,11 +95,11 @@ def _with_units(frame: pd.DataFrame, described: Mapping[str, tuple[str, str]]) -
 
 
 def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
+    """What is known of a point."""
     row: dict[str, Any] = {"point": number}
     for key, value in zip(record.units, record.values[number], strict=True):
         row |= {f"{key}[{part}]": one for part, one in enumerate(value)} if isinstance(value, list) else {key: value}
-    row |= {key: record.derived[number].get(key, nan) for key in derived_columns(record.analyses)}
-    row |= dict.fromkeys(result_columns(record.analyses), nan)
+    row |= record.derived[number]
     row |= {"status": state.status, "lost": state.lost, "reason": state.reason or ""}
     row["run"] = os.path.relpath(state.directory) if state.directory else ""
     if state.status != "finished" or state.directory is None:

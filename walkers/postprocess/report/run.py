@@ -11,7 +11,7 @@ from walkers.inputs.changes import dotted
 from walkers.inputs.origins import Origin, text_of
 from walkers.postprocess.analysis import analyses_in, analyses_of, current_result, quantities_of, tables_of, warnings_of
 from walkers.postprocess.figures import Panel, gait_panels, pile_panels, velocity_panel, walk_panels
-from walkers.postprocess.motion import read_motion
+from walkers.postprocess.motion import Motion, read_motion
 from walkers.postprocess.report.page import NAME, check_report, drawn, fill, packed_plots, write_page
 from walkers.postprocess.report.player import MOST_PLACES, player_of
 from walkers.runner.directory import case_of
@@ -33,25 +33,27 @@ class RunReport:
     ) -> None:
         from bokeh.layouts import column
 
-        case = case_of(directory)
+        motion = read_motion(directory)
+        case = motion.case
         self.id, self.name, self.title = section, directory.resolve().name, case.title or case.name
-        self.shown = shown_of(directory, current_result(directory), origins)
+        self.shown = shown_of(case, current_result(directory), origins)
         self.manifest = read_json(directory / MANIFEST_NAME)
-        self.player = player_of(directory, places=places)
+        self.player = player_of(motion, places=places)
         self.carried = {f"player-{section}": base64.b64encode(self.player.plot.get_binary_snapshot(9)).decode()}
-        if panels := _panels(directory):
+        if panels := _panels(motion):
             plots = column(*map(drawn, panels), sizing_mode="stretch_width")
             self.carried[f"plots-{section}"] = packed_plots(plots)
 
 
-def _panels(directory: Path) -> list[Panel]:
+def _panels(motion: Motion) -> list[Panel]:
     """What is plotted of a run."""
-    names = {one.name for one in analyses_of(case_of(directory))}
+    case, tables = motion.case, tables_of(motion.directory)
+    names = {one.name for one in analyses_of(case)}
     panels: list[Panel] = []
     if "walking" in names:
-        groups = read_motion(directory).groups
-        panels += [*walk_panels(groups), velocity_panel(groups), *gait_panels(groups[0])]
-    return [*panels, *(pile_panels(tables_of(directory)) if "pile" in names else [])]
+        groups = motion.groups
+        panels += [*walk_panels(groups), velocity_panel(case, tables["walkers"]), *gait_panels(groups[0])]
+    return [*panels, *(pile_panels(tables) if "pile" in names else [])]
 
 
 def report_run(directory: Path, to: Path | None = None, origins: Origins = None) -> Path:
@@ -88,12 +90,11 @@ def summary_of(case: Case) -> str:
     return f"{', '.join(bodies)} {boundary} of {case.boundary.material}{liquid}; {case.drive.described()}."
 
 
-def shown_of(directory: Path, result: dict[str, Any], origins: Origins = None) -> dict[str, Any]:
-    """Of a result the warnings and quantities; of its case a summary, the parameters, and those that are guessed.
+def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dict[str, Any]:
+    """Of a result the warnings and quantities; of a case a summary, the parameters, and those that are guessed.
 
     Of runs that did not keep where their values come from, the parameters are in SI units.
     """
-    case = case_of(directory)
     parameters = [
         vars(one) | {"range": " … ".join(map(text_of, one.range or ())), "guessed": one.guessed}
         for one in (case.origins if origins is None else origins)
@@ -112,4 +113,5 @@ def shown_of(directory: Path, result: dict[str, Any], origins: Origins = None) -
 def result_html(directory: Path, result: dict[str, Any], origins: Origins = None) -> str:
     """A result as a piece of HTML: a table with errors and units, warnings, and the parameters folded in."""
     headline = next((line for one in analyses_in(result) for line in one.lines(result)), result["case"])
-    return fill("result.html.j2", headline=headline, shown=shown_of(directory, result, origins), run=directory.name)
+    shown = shown_of(case_of(directory), result, origins)
+    return fill("result.html.j2", headline=headline, shown=shown, run=directory.name)
