@@ -27,6 +27,7 @@ from walkers.inputs.axes import (
     is_axis,
     listed,
     number_of,
+    one_at_a_time,
     sampled,
     unit_of,
     written,
@@ -83,6 +84,7 @@ class SweepFile(Table):
     set: dict[str, Any] = Field({})
     axes: dict[str, Any] = Field({})
     zip: list[dict[str, Any]] = Field([])
+    one_at_a_time: dict[str, Any] = Field({})
     sample: list[SampleTable] = Field([])
     descend: DescendTable | None = None
 
@@ -90,6 +92,7 @@ class SweepFile(Table):
         """In the order in which they run, the last one fastest: that of a descent."""
         axes = [listed(key, given) for key, given in flatten(self.axes, is_axis).items()]
         axes += [zipped(table) for table in self.zip]
+        axes += [one_at_a_time(self.one_at_a_time)] if self.one_at_a_time else []
         axes += [sampled(table.method, table.points, table.seed, table.ranges) for table in self.sample]
         return axes + ([Axis.of({self.descend.key: self.descend.values()})] if self.descend else [])
 
