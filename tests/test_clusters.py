@@ -13,6 +13,7 @@ from walkers.postprocess.clusters import (
     Climb,
     ClimbCriteria,
     Track,
+    assembly_of,
     bulk_of,
     classify,
     connected,
@@ -61,7 +62,7 @@ class Scene:
             labels = connected(24, bridges.beads)
             bulks.append(bulk_of(labels, bridges))
             clusters.append(list(held_clusters(labels, bridges, bulks[-1])))
-        beads = Beads(TIME, self.height, self.large, np.zeros(FRAMES), bulks, 0, NAMES)
+        beads = self.seen = Beads(TIME, self.height, self.large, np.zeros(FRAMES), bulks, 0, NAMES)
         tracks = follow(TIME, clusters, rule)
         climbs = [classify(number, track, beads, rule) for number, track in enumerate(tracks)]
         self.events = [(event.event, event.track, event.other) for event in events_of(tracks, climbs, beads, rule)]
@@ -218,7 +219,25 @@ def test_how_a_cluster_begins_and_ends(freed: int, let_go: range, fallen: range,
         del scene.walls[number][20]
     _, (climb,) = scene.climbs()
     assert scene.events == [(event, 0, -1) for event in events]
-    assert climb.out_of_pile == (freed > 0)
+    assert climb.out_of_pile == (freed > 4)  # a tenth of a second
+
+
+def test_where_the_beads_of_a_climb_came_from() -> None:
+    """Two on a wall; a third leaves the pile and joins them at 1 s; they climb from 2 s on."""
+    scene, joins = Scene(), np.searchsorted(TIME, 1.0)
+    scene.pairs = [[(20, 21), (21, 22) if now >= 1.0 else (22, 19), (23, 19)] for now in TIME]
+    scene.height[:, 20:23] += 3e-3 * np.clip(TIME[:, None] - 2.0, 0.0, None)
+    tracks, climbs = scene.climbs()
+    at_wall = np.arange(24) == 20
+    joined = [(np.array([*pairwise(BULK), *pairs], dtype=np.int32), at_wall) for pairs in scene.pairs]
+    rows = assembly_of(tracks, climbs, scene.seen, joined)
+    assert max(row.time for row in rows) == climbs[0].qualified > 2.0
+    of_third = [row for row in rows if row.bead == 22]
+    assert [row.in_bulk for row in of_third] == [number < joins for number in range(len(of_third))]
+    assert all(row.joined != row.in_bulk for row in of_third)
+    assert {row.bead for row in rows} == {20, 21, 22}
+    assert {row.bead for row in rows if row.at_wall} == {20}
+    assert [row.neighbours for row in rows[-3:]] == [1, 2, 1]
 
 
 def test_what_comes_later_does_not_change_when_a_climb_qualified() -> None:

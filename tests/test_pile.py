@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 import pytest
 
 import walkers
@@ -34,7 +35,7 @@ from walkers.postprocess.tables import described
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
 from walkers.runner.failures import EngineError, EngineKilled, RunBusy
-from walkers.sweeps.climbing import describe_climbs, piles_in, summarise_climbs, survival
+from walkers.sweeps.climbing import conditions_in, describe_climbs, leaders, summarise_climbs, survival
 from walkers.sweeps.run import plan_sweep, run_sweep
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import Site, SiteFile
@@ -444,11 +445,19 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     assert (frame["beads"] == 60).all()
     assert (frame["climbs"] == 0).all()
     assert frame["surface_end"].between(1e-3, 9e-3).all()
-    ((label, runs),) = piles_in(record.directory).items()
-    found = summarise_climbs(runs)
-    assert (label, found["runs"], found["climbed"], found["climbs"]) == ("", 2, 0, 0)
+    (condition,) = conditions_in([record.directory])
+    found = summarise_climbs(condition.runs)
+    assert (condition.label, found["runs"], found["climbed"], found["climbs"]) == ("", 2, 0, 0)
     assert found["interval"] == pytest.approx([0.0, 1.0 - 0.025**0.5])  # none of two, Clopper and Pearson
-    assert call("climb", str(out), check=True).stdout.count("0 of 2 runs climbed") == 1
+    upper = 3.6889 / found["seconds"]  # of no event (Garwood 1936)
+    assert found["rate_interval"] == pytest.approx([0.0, upper], rel=1e-4)
+    printed = call("climb", record.name, "--null", str(out), "--out", str(out), check=True).stdout
+    assert printed.count(f"0 of 2 runs, 0: 0 per start and second (0 to {upper:.3g} with 95% confidence)") == 16
+    written = tmp_path / "climbs.csv"
+    assert call("climb", str(out), "--to", str(written), check=True).stdout.count("0 of 2 runs climbed") == 1
+    assert pd.read_csv(written)["rate_high"].to_list() == pytest.approx([upper] * 3, rel=1e-4)
+    call("climb", str(out), "--to", str(written.with_suffix(".svg")), check=True)
+    assert "share that has climbed" in written.with_suffix(".svg").read_text()
     down = {"from": "3 g", "to": "1 g", "step": "1 g", "until_below": "1 mm/s"}
     descend = {"case": "base.toml", "descend": {"key": "drive.peak_acceleration", **down}}
     with pytest.raises(InputError, match="descend"):
@@ -457,9 +466,12 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
 
 def as_results(first: FloatArray, driven: FloatArray, takes: float) -> dict[Path, dict[str, Any]]:
     """Results of runs whose first climbs began so and take so long to gain enough, where the run shows that, s."""
-    climb = {"speed": 2e-3, "size": 2, "leader_large": True, "walls": ["+x"], "out_of_pile": True}
+    climb = {"speed": 2e-3, "size": 2, "large": 1, "leader": 0, "leader_large": True, "walls": ["+x"], "height": 0.01}
+    climb["out_of_pile"] = True
     return {
         Path(str(number)): {
+            "beads": 20,
+            "large": 3,
             "driven": float(end),
             "climbs": [climb | {"begin": begin, "onset": begin, "qualified": begin + takes}]
             if begin + takes <= end
@@ -532,10 +544,20 @@ def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch
         cases[tmp_path / name] = SimpleNamespace(directory=tmp_path / name, case=case, manifest=manifest)
     monkeypatch.setattr("walkers.sweeps.climbing.finished_run", cases.get)
     monkeypatch.setattr(Pile, "applies", lambda self, case: True)
-    assert piles_in(tmp_path) == {
-        "deck version = 7": [tmp_path / "b-2", tmp_path / "c-3"],
-        "deck version = 6": [tmp_path / "e-5"],
-    }
+    usual, other = conditions_in([tmp_path])
+    assert (usual.label, usual.runs) == ("", [tmp_path / "b-2", tmp_path / "c-3"])
+    assert (other.label, other.runs) == ("deck version = 6", [tmp_path / "e-5"])
+
+
+def test_leaders_by_chance() -> None:
+    """Of 10 beads 3 are large: so are two leaders with 3/10 × 2/9, one that leads twice with 3/10."""
+    climb = {"leader": 0, "leader_large": True, "large": 1, "size": 4}
+    two = leaders([(10, 3, [climb, climb | {"leader": 1}])])
+    one = leaders([(10, 3, [climb, climb]), (30, 1, [])])
+    assert two["p_among_beads"] == pytest.approx(3.0 / 10.0 * 2.0 / 9.0, abs=0.01)
+    assert one["p_among_beads"] == pytest.approx(3.0 / 10.0, abs=0.02)
+    assert two["p_among_own"] == pytest.approx(1.0 / 16.0, abs=0.01)
+    assert one["share_of_large"] == 0.1
 
 
 def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tmp_path: Path) -> None:

@@ -44,6 +44,8 @@ _RUNS = "Runs and sweeps: names in --out, or directories."
 _REPORTED = "One of them: its directory, its name in --out, or a case."
 _ANY, _SWEEPS = offering("case", "run", "sweep"), offering("sweep")
 _THRESHOLDS = "Instead: how many climbs there are with other thresholds of what is one."
+_PILES = "Sweeps of piles, folders of runs, or runs (or their cases)."
+_NULL = "Runs in which nothing can climb: print their false climbs at each threshold beside; repeatable."
 
 
 def show(case: Case, settings: Set = None, as_json: Json = False) -> None:
@@ -252,30 +254,41 @@ def table(
 
 
 def climb(
-    directory: str = Argument(metavar="DIR", help="A sweep of piles, a folder of runs, or one run (or its case)."),
+    what: list[str] = Argument(metavar="WHAT…", help=_PILES, autocompletion=_ANY),
     out: Out = DEFAULT_OUT,
     within: float | None = Option(None, min=0.0, help=_WITHIN),
     thresholds: bool = Option(False, "--sensitivity", help=_THRESHOLDS),
+    null: list[str] | None = Option(None, help=_NULL),
+    to: Path | None = Option(None, help="Write the figure (.png, .svg, .pdf) or the table (.csv) into this file."),
     as_json: Json = False,
 ) -> None:
-    """Print how often piles climbed, how soon, how fast, and led by whom."""
+    """Print how often piles climbed, how soon, how fast, and led by whom: rates with exact intervals, by conditions."""
     from walkers.pipeline import locate
-    from walkers.sweeps.climbing import describe_climbs, describe_sensitivity, piles_in, sensitivity, summarise_climbs
+    from walkers.postprocess.drawing import FORMATS, check_place
+    from walkers.sweeps import climbing
+    from walkers.sweeps.climbing_figure import write_climbs
 
-    groups = piles_in(locate(directory, out).path)
-    if thresholds:
-        refuse("--within", within is not None, "has no meaning with --sensitivity")
-        tried = {label: sensitivity(runs) for label, runs in groups.items()}
-        lines = [line for label, rows in tried.items() for line in (label, describe_sensitivity(rows)) if line]
+    if to is not None:
+        check_place(to, *(f".{form}" for form in FORMATS), ".csv")
+    conditions = climbing.conditions_in([locate(one, out).path for one in what])
+    if thresholds or null:
+        for option, given in {"--within": within, "--to": to}.items():
+            refuse(option, given is not None, "has no meaning with --sensitivity or --null")
+        nulls = climbing.conditions_in([locate(one, out).path for one in null]) if null else []
+        tried = {one.label: climbing.sensitivity(one.runs) for one in conditions}
+        tried |= {f"null: {one.label}": climbing.sensitivity(one.runs) for one in nulls}
+        lines = [line for label, rows in tried.items() for line in (label, climbing.describe_sensitivity(rows)) if line]
         print_as(as_json, lambda: tried, lambda: "\n".join(lines))
         return
-    found = {label: summarise_climbs(runs, within) for label, runs in groups.items()}
+    found = {one.label: climbing.summarise_climbs(one.runs, within) for one in conditions}
+    if to is not None:
+        write_climbs(conditions, list(found.values()), to)
     lines = []
-    for label, climbs in found.items():
-        lines += [*([label] if label else []), describe_climbs(climbs)]
-        if climbs["out_of_pile"]["climbs"] < climbs["climbs"]:
-            lines.append("of clusters that came out of the pile, and did not hang on a wall since the pouring:")
-            lines.append(describe_climbs(climbs["out_of_pile"]))
+    for one in conditions:
+        told = found[one.label]
+        told["assembly"] = climbing.summarise_origins(one.runs)
+        told_origins = climbing.describe_origins(told["assembly"])
+        lines += filter(None, [one.label, climbing.describe_climbs(told), told_origins])
     print_as(as_json, lambda: found, lambda: "\n".join(lines))
 
 

@@ -151,7 +151,7 @@ def zipped(table: Mapping[str, Any]) -> Axis:
 
 
 def one_at_a_time(table: Mapping[str, Any]) -> Axis:
-    """One point with the first value of every key; then each other value of a key, with the first ones of the others."""
+    """The first value of every key; then each other value of a key, with the first ones of the others."""
     columns = {key: listed(key, axis).rows for key, axis in flatten(table, is_axis).items()}
     usual = {key: rows[0][0] for key, rows in columns.items()}
     changes = [{}, *({key: value} for key, rows in columns.items() for (value,) in rows[1:])]

@@ -30,6 +30,9 @@ from walkers.postprocess.motion import FLOOR, Bridges
 Cluster = tuple[frozenset[int], frozenset[int]]
 """The beads of a cluster in a frame and the side walls that hold it."""
 
+Joined = tuple[IntArray, BoolArray]
+"""Of a frame the pairs of beads that bridges join, shape (K, 2), and which beads they join to a side wall, (N,)."""
+
 _FEWEST_BEADS = 2
 _FEWEST_FRAMES = 3
 _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
@@ -165,7 +168,7 @@ class Climb:
     begin: Annotated[float, "s", "of its greatest gain of height"]
     end: Annotated[float, "s", "of that gain"]
     out_of_pile: Annotated[
-        bool, "", "whether most of its first beads were in the bulk before; else it hung there from the start"
+        bool, "", "whether most of its first beads were in the bulk for a tenth of a second since the drive began"
     ]
     onset: Annotated[float, "s", "when the gain began by which it first counted as a climb; NaN if it never did"]
     qualified: Annotated[
@@ -200,15 +203,16 @@ def classify(number: int, track: Track, beads: Beads, definition: ClimbCriteria)
     leader = topmost.most_common(1)[0][0]
     speed, error = _speed(seconds[begin : end + 1], gained[begin : end + 1])
     last, members, walls, first = track.frames[end], track.members[end], sorted(track.walls[end]), track.members[0]
-    # What was not in the bulk has hung on a wall since the beads were poured.
-    before = beads.bulk[beads.first : track.frames[0]]
+    # What was in the bulk for less than a brush has hung on a wall since the beads were poured.
+    bulk = [one[list(first)].mean() >= definition.min_overlap for one in beads.bulk[beads.first : track.frames[0]]]
+    in_bulk = float(np.diff(time[beads.first : track.frames[0] + 1])[bulk].sum())
     return Climb(
         track=number,
         first=float(time[track.frames[0]]),
         last=float(time[track.frames[-1]]),
         begin=float(time[track.frames[begin]]),
         end=float(time[last]),
-        out_of_pile=any(bulk[list(first)].mean() >= definition.min_overlap for bulk in before),
+        out_of_pile=in_bulk >= definition.max_gap,
         onset=onset,
         qualified=qualified,
         gain=float(risen[end]),
@@ -270,6 +274,59 @@ def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
         return speed, np.nan
     speeds, shares = risen[there] / lasted[there], lasted[there] / lasted[there].sum()
     return speed, float(np.sqrt((shares**2 * (speeds - speed) ** 2).sum() * there.sum() / (there.sum() - 1)))
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """``assembly.parquet``: the past of each climb's beads, those it had when it qualified, from rest until then.
+
+    One row per climb, bead and frame.
+    """
+
+    time: Annotated[float, "s", "from the begin of the drive; the first frame is the last one before it"]
+    track: Annotated[int, "", "number of the cluster that climbed"]
+    bead: Annotated[int, "", "number of the bead, from 0"]
+    large: Annotated[bool, "", "whether it is of the large class"]
+    height: Annotated[float, "m", "of its centre"]
+    in_bulk: Annotated[bool, "", "whether it belongs to the pile's bulk"]
+    at_wall: Annotated[bool, "", "whether a bridge joins it to a side wall"]
+    neighbours: Annotated[int, "", "bridges that join it to other beads of the later climb"]
+    joined: Annotated[bool, "", "whether bridges between beads of the later climb lead from it to most of the others"]
+
+
+def assembly_of(
+    tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, bridges: Sequence[Joined]
+) -> list[Assembly]:
+    """Where the beads of each climb were, frame by frame, given what was joined in each frame of the motion."""
+    rows = []
+    rest = max(beads.first - 1, 0)
+    for climb in climbs:
+        if not climb.climbed:
+            continue
+        track = tracks[climb.track]
+        until = int(np.searchsorted(beads.time, climb.qualified))
+        own = sorted(track.members[track.frames.index(until)])
+        for frame in range(rest, until + 1):
+            pairs, walled = bridges[frame]
+            within = np.searchsorted(own, pairs[np.isin(pairs, own).all(axis=1)])
+            labels = connected(len(own), within)
+            most = np.bincount(labels).argmax()
+            neighbours = np.bincount(within.ravel(), minlength=len(own))
+            for place, bead in enumerate(own):
+                rows.append(
+                    Assembly(
+                        time=float(beads.time[frame]),
+                        track=climb.track,
+                        bead=bead,
+                        large=bool(beads.large[bead]),
+                        height=float(beads.height[frame, bead]),
+                        in_bulk=bool(beads.bulk[frame][bead]),
+                        at_wall=bool(walled[bead]),
+                        neighbours=int(neighbours[place]),
+                        joined=bool(labels[place] == most and neighbours[place]),
+                    )
+                )
+    return rows
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,15 @@ from walkers.inputs.case import Case
 from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
 from walkers.postprocess.analysis import Analysis, Described, Quantity, tables_of
 from walkers.postprocess.clusters import (
+    Assembly,
     Beads,
     Climb,
     ClimbCriteria,
     Cluster,
     Event,
+    Joined,
     Track,
+    assembly_of,
     bulk_of,
     classify,
     connected,
@@ -30,7 +33,7 @@ from walkers.postprocess.clusters import (
     held_clusters,
 )
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
-from walkers.postprocess.motion import Bridges, Motion, read_bridges
+from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
 from walkers.postprocess.tables import Columns, columns_of, columns_of_rows
 from walkers.runner.directory import case_of
 
@@ -65,6 +68,7 @@ class Bed:
     mean_force: Annotated[float, "N", "normal force of the bridges between beads, positive: pulling together"]
     liquid_in_bridges: Annotated[float, "m^3", "sum of the volumes of all bridges, those to walls too"]
     bulk: Annotated[int, "", "beads in the bulk"]
+    at_wall: Annotated[int, "", "beads that a bridge joins to a side wall"]
     clusters: Annotated[int, "", "clusters that are free of the bulk and held to a side wall"]
     highest: Annotated[float, "m", "height of the topmost bead of these; the surface where there is none"]
 
@@ -95,13 +99,14 @@ class Pile(Analysis):
     """What loose beads in a container do: the bed, and the clusters that climb."""
 
     name = "pile"
-    version = 6
+    version = 8
     tables: ClassVar[Mapping[str, type]] = {
         "bed": Bed,
         "clusters": Climb,
         "events": Event,
         "profile": Profile,
         "members": Member,
+        "assembly": Assembly,
     }
     headlines = ("climbs", "highest", "speed")
     derived: ClassVar[Described] = {
@@ -117,7 +122,7 @@ class Pile(Analysis):
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """The bed, the clusters, what happened to them, and the packing."""
         case, first, definition = motion.case, motion.first_driven, ClimbCriteria()
-        rows, wet, bulks, held = [], [], [], []
+        rows, wet, bulks, held, joined = [], [], [], [], []
         inner: dict[str, float | None] = {}
         for bridges in read_bridges(motion):
             labels = connected(len(motion.radius), bridges.beads)
@@ -126,7 +131,8 @@ class Pile(Analysis):
             # While the pile falls and settles, most of it is free of the rest.
             driven = motion.time[bridges.frame] >= 0.0
             held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
-            rows.append(_bed(motion, bridges, bulks[-1], wet[-1], held[-1]))
+            joined.append(_joined(bridges, len(motion.radius)))
+            rows.append(_bed(motion, bridges, joined[-1], bulks[-1], wet[-1], held[-1]))
             if motion.time[bridges.frame] <= 0.0 or not inner:
                 inner = coordination_of_inner(bridges, len(motion.radius))
         bed, names = columns_of_rows(Bed, rows), [wall.name for wall in case.boundary.walls]
@@ -143,6 +149,7 @@ class Pile(Analysis):
             "events": columns_of_rows(Event, events),
             "profile": columns_of(profile),
             "members": columns_of_rows(Member, _members(tracks, beads)),
+            "assembly": columns_of_rows(Assembly, assembly_of(tracks, climbs, beads, joined)),
         }
         return tables, {
             **_bed_result(motion, bed, inner),
@@ -290,7 +297,7 @@ def _told_climb(climb: Climb) -> dict[str, Any]:
     names = ("begin", "end", "onset", "qualified", "gain", "speed", "standard_error", "leader_large", "height")
     known = {name: getattr(climb, name) for name in (*names, "size", "large")}
     told = {name: value if np.isfinite(value) else None for name, value in known.items()}
-    return {**told, "walls": climb.wall_names.split(), "out_of_pile": climb.out_of_pile}
+    return {**told, "leader": climb.leader, "walls": climb.wall_names.split(), "out_of_pile": climb.out_of_pile}
 
 
 def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
@@ -343,7 +350,16 @@ def _leader(climb: Mapping[str, Any]) -> str:
     return "large" if climb["leader_large"] else "small"
 
 
-def _bed(motion: Motion, bridges: Bridges, bulk: BoolArray, liquid: FloatArray, held: Sequence[Cluster]) -> Bed:
+def _joined(bridges: Bridges, count: int) -> Joined:
+    """What the bridges of a frame join, of so many beads."""
+    at_wall = np.zeros(count, dtype=np.bool_)
+    at_wall[bridges.wall_beads[bridges.walls != FLOOR]] = True
+    return bridges.beads.astype(np.int32), at_wall
+
+
+def _bed(
+    motion: Motion, bridges: Bridges, joined: Joined, bulk: BoolArray, liquid: FloatArray, held: Sequence[Cluster]
+) -> Bed:
     """The state of a pile in a frame, given its bulk, the liquid of each bead and the clusters that are held."""
     frame = bridges.frame
     position, radius, large = motion.position[frame], motion.radius, motion.large
@@ -367,6 +383,7 @@ def _bed(motion: Motion, bridges: Bridges, bulk: BoolArray, liquid: FloatArray, 
         mean_force=float(bridges.force.mean()) if len(bridges.force) else 0.0,
         liquid_in_bridges=float(liquid.sum()),
         bulk=int(bulk.sum()),
+        at_wall=int(joined[1].sum()),
         clusters=len(held),
         highest=max([middle, *(float(position[bead, 2]) for members, _ in held for bead in members)]),
     )

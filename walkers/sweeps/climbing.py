@@ -9,8 +9,9 @@ the time would be one in a run that is long enough to show what became of it, an
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -32,22 +33,62 @@ FloatArray = npt.NDArray[np.float64]
 _CONFIDENCE = 0.95
 _NO_CONDITION = ("name", "title", "seed", "run.cycles", "run.cycles_per_segment")
 """Keys of a case that are none of a condition under which a pile is shaken: how long it was, is none."""
+_DRAWS = 10_000
 _ALIKE = 1e-6  # lengths of runs that differ by less, relatively, are the same
 
 
-def piles_in(directory: Path) -> dict[str, list[Path]]:
-    """The finished runs of piles of a sweep, or in a folder, or the run itself, by what distinguishes them.
+@dataclass(frozen=True)
+class Condition:
+    """Finished runs of piles that differ by their seeds and lengths alone.
 
-    Seeds and lengths do not. Each run is there once, whatever names it has, and of those that begin alike and were
-    shaken for different times the longest alone: it shows what the others show. `InputError` if there is none.
+    ``source`` is the sweep or folder, where there are several; ``usual`` has the value of each key that most conditions
+    of it have, ``differs`` those of this one that are others.
     """
+
+    source: str
+    usual: Mapping[str, str]
+    differs: Mapping[str, str]
+    runs: Sequence[Path]
+
+    @property
+    def label(self) -> str:
+        """What tells it from the others; empty where nothing does."""
+        return ", ".join([self.source] * bool(self.source) + [f"{key} = {told}" for key, told in self.differs.items()])
+
+
+def conditions_in(directories: Sequence[Path]) -> list[Condition]:
+    """The conditions of the finished runs of piles in sweeps, in folders, or of runs themselves, in their order.
+
+    Each run is there once, whatever names it has, and of those that begin alike and were shaken for different times
+    the longest alone: it shows what the others show. `InputError` if there is none in one of them.
+    """
+    found = []
+    for directory in directories:
+        groups = _groups(directory)
+        known = [values for values, _ in groups]
+        keys = list(dict.fromkeys(key for values in known for key in values))
+        usual = {key: Counter(values.get(key, "") for values in known).most_common(1)[0][0] for key in keys}
+        source = directory.name if len(directories) > 1 else ""
+        for values, runs in groups:
+            differs = {key: values[key] for key in keys if key in values and values[key] != usual[key]}
+            found.append(Condition(source, usual, differs, runs))
+    return found
+
+
+def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
+    """What the runs of one condition in a directory have for each key that varies, as text; and these runs."""
+    varied: dict[Path, dict[str, str]] = {}
     if (directory / RECORD_NAME).exists():
-        found = [state.directory for state in states(read_record(directory)) if state.directory is not None]
-    elif (directory / CASE_NAME).exists():
-        found = [directory]
+        record = read_record(directory)
+        for values, state in zip(record.values, states(record), strict=True):
+            named = zip(record.units.items(), values, strict=True)
+            told = {key: f"{value_text(value)} {unit or ''}".strip() for (key, unit), value in named}
+            if state.status == "finished" and state.directory is not None:
+                varied[state.directory] = {key: text for key, text in told.items() if key not in _NO_CONDITION}
     else:
-        found = list(finished_places(directory).values())
-    runs = [run for path in found if (run := finished_run(path)) is not None]
+        places = [directory] if (directory / CASE_NAME).exists() else finished_places(directory).values()
+        varied = {place: {} for place in places}
+    runs = [run for path in varied if (run := finished_run(path)) is not None]
     try:
         piles = {run.directory.name.rpartition("-")[2]: run for run in runs if Pile().applies(run.case)}
         cases = {run.directory: _determinants(run) for run in piles.values()}
@@ -57,11 +98,15 @@ def piles_in(directory: Path) -> dict[str, list[Path]]:
         raise refused(directory, "expected a finished run of a pile, or a folder or sweep")
     keys = dict.fromkeys(key for case in cases.values() for key in case if key not in _NO_CONDITION)
     differ = [key for key in keys if len({str(case.get(key)) for case in cases.values()}) > 1]
-    groups: dict[str, dict[Any, Path]] = {}
+    groups: dict[str, tuple[dict[str, str], dict[Any, Path]]] = {}
     for path, case in sorted(cases.items(), key=lambda one: -one[1].get("run.cycles", 0)):
-        label = ", ".join(f"{key} = {value_text(case.get(key))}" for key in differ)
-        groups.setdefault(label, {}).setdefault(case.get("seed"), path)
-    return {label: list(starts.values()) for label, starts in groups.items()}
+        own = {key: value_text(case.get(key)) for key in differ}
+        made_by = {key: own[key] for key in ("deck version", "engine") if key in own}
+        _, starts = groups.setdefault(str(own), ((varied[path] | made_by) if varied[path] else own, {}))
+        starts.setdefault(case.get("seed"), path)
+    order = {path: number for number, path in enumerate(varied)}
+    sets = [(values, sorted(starts.values(), key=order.__getitem__)) for values, starts in groups.values()]
+    return sorted(sets, key=lambda one: order[one[1][0]])
 
 
 def _determinants(run: FinishedRun) -> dict[str, Any]:
@@ -85,42 +130,189 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
     Returns
     -------
     dict
-        ``within`` (s) and ``runs``; ``climbed`` (runs that had climbed by then), ``ended`` (runs that ended before and
-        had not), ``probability`` of having climbed by then with its ``interval`` (95 %), both None where no run is so
-        long; ``median`` (s, the time by which half have climbed, None where that is not reached), ``censored`` (runs
-        that ended, or were cut off at a given ``within``, without a climb).
+        ``within`` (s), ``runs`` and ``seconds`` (of drive, of all runs up to a given ``within``); of the first climbs
+        what `survival` says, and ``first_rate`` with its ``first_rate_interval`` (1/s, first climbs over the seconds
+        until then: were waiting times exponential, the rate of their distribution).
 
-        Of the climbs that had qualified by ``within``: ``climbs``, ``times`` (s, when the first climb of each run
-        qualified), ``onsets`` (s, when it had begun), ``speeds`` (m/s), ``sizes``, ``led_by_large``, ``in_corners``.
+        Of all climbs that qualified in these seconds: ``climbs``; ``rate`` (1/s, of one start) with the exact Poisson
+        ``rate_interval``; ``dispersion``, the variance over the mean of the climbs of a run (1 where they do not depend
+        on each other; None where runs are of different lengths); ``times`` and ``onsets`` (s, when the first climb of
+        each run qualified and had begun), ``speeds`` (m/s), ``heights`` (m, of the leaders at last), ``sizes``; and of
+        who led what `leaders` says.
 
-        And all of this in ``out_of_pile``, without the clusters that have hung on a wall since the pouring.
+        And all of this of a part of the climbs alone: ``on_plain_walls``, ``in_corners``, and ``out_of_pile``, without
+        clusters that have hung on a wall since the pouring.
     """
     results = [result_in(run) for run in runs]
+    parts: dict[str, Callable[[Mapping[str, Any]], bool]] = {
+        "on_plain_walls": lambda climb: len(climb["walls"]) == 1,
+        "in_corners": lambda climb: len(climb["walls"]) > 1,
+        "out_of_pile": lambda climb: climb["out_of_pile"],
+    }
+    found = _summary(results, within)
+    for name, belongs in parts.items():
+        some = [{**result, "climbs": list(filter(belongs, result["climbs"]))} for result in results]
+        found[name] = _summary(some, within)
+    return found
+
+
+def _summary(results: Sequence[Mapping[str, Any]], within: float | None) -> dict[str, Any]:
+    """`summarise_climbs` of results."""
     driven = np.array([result["driven"] for result in results])
-    every = [result["climbs"] for result in results]
-    freed = [[climb for climb in climbs if climb["out_of_pile"]] for climbs in every]
-    return {**_summary(driven, every, within), "out_of_pile": _summary(driven, freed, within)}
-
-
-def _summary(driven: FloatArray, told: Sequence[Sequence[dict[str, Any]]], within: float | None) -> dict[str, Any]:
-    """`summarise_climbs` of runs of such lengths (s) and their climbs."""
-    first = np.array([min((climb["qualified"] for climb in climbs), default=np.inf) for climbs in told])
     at, cut = (float(driven.min()), np.inf) if within is None else (within, within)
-    counted = [[climb for climb in climbs if climb["qualified"] <= at] for climbs in told]
+    watched = np.minimum(driven, cut)
+    counted = [[climb for climb in result["climbs"] if climb["qualified"] <= cut] for result in results]
     firsts = [min(climbs, key=lambda climb: climb["qualified"]) for climbs in counted if climbs]
+    first = np.array([min((climb["qualified"] for climb in climbs), default=np.inf) for climbs in counted])
     every = [climb for climbs in counted for climb in climbs]
+    numbers, seconds = [len(climbs) for climbs in counted], float(watched.sum())
+    alike = np.ptp(watched) <= _ALIKE * watched.max() and len(numbers) > 1 and every
     return {
         "within": at,
-        "runs": len(told),
-        **survival(first, np.minimum(driven, cut), at),
+        "runs": len(results),
+        "seconds": seconds,
+        **survival(first, watched, at),
+        **_rate("first_rate", len(firsts), float(np.minimum(first, watched).sum())),
         "climbs": len(every),
+        **_rate("rate", len(every), seconds),
+        "curve": survival_curve(first, watched),
+        "dispersion": float(np.var(numbers, ddof=1) / np.mean(numbers)) if alike else None,
         "times": [climb["qualified"] for climb in firsts],
         "onsets": [climb["onset"] for climb in firsts],
         "speeds": [climb["speed"] for climb in every if climb["speed"] is not None],
-        "in_corners": sum(len(climb["walls"]) > 1 for climb in every),
+        "heights": [climb["height"] for climb in every],
         "sizes": [climb["size"] for climb in every],
-        "led_by_large": sum(climb["leader_large"] for climb in every),
+        **leaders(
+            [(result["beads"], result["large"], climbs) for result, climbs in zip(results, counted, strict=True)]
+        ),
     }
+
+
+def _rate(name: str, events: int, seconds: float) -> dict[str, Any]:
+    """A number of events over time, 1/s, and its exact 95 % interval (Garwood 1936); None where there was no time."""
+    from scipy.stats import chi2
+
+    if seconds <= 0.0:
+        return {name: None, f"{name}_interval": None}
+    tail = (1.0 - _CONFIDENCE) / 2.0
+    low = float(chi2.ppf(tail, 2 * events) / 2.0) if events else 0.0
+    high = float(chi2.ppf(1.0 - tail, 2 * events + 2) / 2.0)
+    return {name: events / seconds, f"{name}_interval": [low / seconds, high / seconds]}
+
+
+def origins(run: Path) -> list[dict[str, Any]]:
+    """Where the beads of each climb of a run came from, from the run's tables.
+
+    Returns
+    -------
+    list of dict
+        A row a climb: ``size`` and ``out_of_pile``; at rest, before the drive: ``bridges_at_rest`` between its beads,
+        ``leader_at_wall_at_rest`` and ``at_wall_at_rest`` (beads bridged to a side wall), ``share_at_wall`` of all
+        beads of the pile; ``bridges`` between its beads when it qualified; ``whole_before`` (s, how long before it came
+        free of the pile its last bead was joined to the others for good; negative where that was later).
+    """
+    import pandas as pd
+
+    tables = tables_of(run)
+    bed, clusters = tables["bed"], pd.DataFrame(tables["clusters"]).set_index("track")
+    rest = max(int(np.searchsorted(bed["time"], 0.0)) - 1, 0)
+    beads, rows = result_in(run)["beads"], []
+    for track, past in pd.DataFrame(tables["assembly"]).groupby("track"):
+        frames = past.groupby("time")
+        first, last = (frames.get_group(time) for time in (past["time"].min(), past["time"].max()))
+        apart = past.loc[~past["joined"], "time"].max()
+        whole = past["time"].min() if np.isnan(apart) else apart
+        rows.append(
+            {
+                "size": len(first),
+                "out_of_pile": bool(clusters["out_of_pile"][track]),
+                "bridges_at_rest": int(first["neighbours"].sum() // 2),
+                "bridges": int(last["neighbours"].sum() // 2),
+                "leader_at_wall_at_rest": bool(first.set_index("bead")["at_wall"][clusters["leader"][track]]),
+                "at_wall_at_rest": int(first["at_wall"].sum()),
+                "share_at_wall": float(bed["at_wall"][rest] / beads),
+                "whole_before": float(clusters["first"][track] - whole),
+            }
+        )
+    return rows
+
+
+def summarise_origins(runs: Sequence[Path]) -> dict[str, Any]:
+    """Whether climbers assemble while the pile is shaken: `origins` over several runs.
+
+    Returns
+    -------
+    dict
+        ``climbs``; ``strangers`` (climbs no two of whose beads were neighbours at rest), ``share_of_bridges`` (of those
+        that the climbers had when they qualified, how many were there at rest), ``leaders_at_wall`` (at rest),
+        ``share_at_wall`` (of all beads at rest) with ``p_at_wall``, the probability of so many leaders at a wall by
+        chance, if leaders did not depend on each other; ``whole_before`` (s, median).
+    """
+    rows = [row for run in runs for row in origins(run)]
+    if not rows:
+        return {"climbs": 0}
+    chances = np.array([row["share_at_wall"] for row in rows])
+    at_wall = sum(row["leader_at_wall_at_rest"] for row in rows)
+    drawn = (np.random.default_rng(0).random((_DRAWS, len(rows))) < chances).sum(axis=1)
+    return {
+        "climbs": len(rows),
+        "strangers": sum(row["bridges_at_rest"] == 0 for row in rows),
+        "share_of_bridges": sum(row["bridges_at_rest"] for row in rows) / sum(row["bridges"] for row in rows),
+        "leaders_at_wall": at_wall,
+        "share_at_wall": float(chances.mean()),
+        "p_at_wall": float((1 + (drawn >= at_wall).sum()) / (1 + _DRAWS)),
+        "whole_before": median(row["whole_before"] for row in rows),
+    }
+
+
+def describe_origins(found: Mapping[str, Any]) -> str:
+    """`summarise_origins` as text; empty where nothing climbed."""
+    if not found["climbs"]:
+        return ""
+    return (
+        f"  assembly   no two beads of {found['strangers']} of {found['climbs']} climbers were neighbours at rest; "
+        f"{found['share_of_bridges']:.0%} of their bridges were there then\n"
+        f"             their last beads joined {found['whole_before']:.2f} s before they came free (median)\n"
+        f"             leaders of {found['leaders_at_wall']} were at a wall at rest (by chance: p = "
+        f"{found['p_at_wall']:.2g}; {found['share_at_wall']:.0%} of all beads were)"
+    )
+
+
+def leaders(climbs: Sequence[tuple[int, int, Sequence[Mapping[str, Any]]]]) -> dict[str, Any]:
+    """Whether climbs are led by large beads more often than by chance.
+
+    Parameters
+    ----------
+    climbs
+        Of each run its beads, its large beads, and its climbs as results tell them.
+
+    Returns
+    -------
+    dict
+        ``led_by_large`` climbs; ``share_of_large``, of the beads of all runs; ``p_among_beads``, the probability that
+        so many are led by a large bead if within each run the names "large" and "small" are dealt out anew (a bead that
+        leads twice counts twice: climbs of one run are not taken to be independent); ``p_among_own``, if in each climb
+        any of its own beads led. Both from 10,000 draws, one-sided; None where there is no climb.
+    """
+    draw = np.random.default_rng(0)
+    led = sum(climb["leader_large"] for _, _, told in climbs for climb in told)
+    beads, large = sum(one[0] for one in climbs), sum(one[1] for one in climbs)
+    found = {"led_by_large": led, "share_of_large": large / beads, "p_among_beads": None, "p_among_own": None}
+    if not any(told for _, _, told in climbs):
+        return found
+    dealt, own = np.zeros(_DRAWS), np.zeros(_DRAWS)
+    for number, some, told in climbs:
+        _, times = np.unique([climb["leader"] for climb in told], return_counts=True)
+        if len(times):  # the leaders are the first of the beads, in an order that is shuffled
+            order = draw.permuted(np.tile(np.arange(number) < some, (_DRAWS, 1)), axis=1)
+            dealt += order[:, : len(times)] @ times
+        for climb in told:
+            own += draw.random(_DRAWS) < climb["large"] / climb["size"]
+    p_values = {
+        name: float((1 + (drawn >= led).sum()) / (1 + _DRAWS))
+        for name, drawn in (("p_among_beads", dealt), ("p_among_own", own))
+    }
+    return found | p_values
 
 
 def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any]:
@@ -138,23 +330,24 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
     Returns
     -------
     dict
-        ``climbed``, ``ended``, ``censored``, ``probability``, ``interval`` and ``median`` of `summarise_climbs`. The
-        interval is that of Greenwood's variance of log(-log) of the survival, where it exists; where none or all have
-        climbed, the binomial one (Clopper and Pearson 1934) of the records that are so long.
+        ``climbed`` (records in which it had by then), ``ended`` (that ended before and in which it had not);
+        ``probability`` of its having happened by then with its ``interval`` (95 %), both None where no record is so
+        long; ``median`` (s, the time by which it has in half, None where that is not reached), ``censored`` (records
+        that ended without it).
+
+        The interval is that of Greenwood's variance of log(-log) of the survival, where it exists; where none or all
+        have climbed, the binomial one (Clopper and Pearson 1934) of the records that are so long.
     """
-    from scipy.stats import CensoredData, binomtest, ecdf
+    from scipy.stats import binomtest
 
     censored = first > watched
     longest = watched >= at * (1.0 - _ALIKE)
-    share = ecdf(CensoredData.right_censored(np.minimum(first, watched), censored)).cdf
+    share = _share(first, watched)
     half = np.flatnonzero(share.probabilities >= 0.5)
     probability = float(share.evaluate(at)) if longest.any() else None
     interval = None
     if probability is not None and 0.0 < probability < 1.0:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
-            ends = share.confidence_interval(_CONFIDENCE, method="log-log")
-        interval = [float(ends.low.evaluate(at)), float(ends.high.evaluate(at))]
+        interval = [float(end.evaluate(at)) for end in _ends(share)]
     elif probability is not None:
         followed = int(longest.sum())
         exact = binomtest(round(probability) * followed, followed).proportion_ci(_CONFIDENCE)
@@ -166,6 +359,33 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
         "probability": probability,
         "interval": interval,
         "median": float(share.quantiles[half[0]]) if len(half) else None,
+    }
+
+
+def _share(first: FloatArray, watched: FloatArray) -> Any:
+    """Kaplan and Meier's estimate of the share in which something has happened, of scipy."""
+    from scipy.stats import CensoredData, ecdf
+
+    return ecdf(CensoredData.right_censored(np.minimum(first, watched), first > watched)).cdf
+
+
+def _ends(share: Any) -> tuple[Any, Any]:
+    """The lower and the upper end of its interval, as functions of time; NaN before the first event."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
+        found = share.confidence_interval(_CONFIDENCE, method="log-log")
+    return found.low, found.high
+
+
+def survival_curve(first: FloatArray, watched: FloatArray) -> dict[str, list[float]]:
+    """The share of `survival` at every time (s) at which it changes: ``time``, ``probability``, ``low``, ``high``."""
+    share = _share(first, watched)
+    time = np.array([0.0, *np.unique(share.quantiles)])
+    low, high = (end.evaluate(time) for end in _ends(share))
+    # There is no variance where none or all have climbed.
+    sides = {"low": np.fmax.accumulate(np.nan_to_num(low)), "high": np.where(time > 0.0, np.fmin(high, 1.0), 0.0)}
+    return {"time": time.tolist(), "probability": share.evaluate(time).tolist()} | {
+        name: side.tolist() for name, side in sides.items()
     }
 
 
@@ -184,7 +404,8 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
     -------
     list of dict
         One row per definition, the usual one first: ``threshold`` and ``value`` (empty and None for the usual one),
-        ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s).
+        ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s);
+        ``rate`` (climbs per start and second) with its exact ``rate_interval``.
     """
     usual = ClimbCriteria()
     tried: list[tuple[str, float | None]] = [("", None)]
@@ -193,8 +414,10 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = [
         {"threshold": name, "value": value, "runs": len(runs), **counts, "median_speed": []} for name, value in tried
     ]
+    seconds = 0.0
     for run in runs:
         tables = tables_of(run)
+        seconds += max(float(tables["bed"]["time"][-1]), 0.0)
         for row in rows:
             definition = replace(usual, **{row["threshold"]: row["value"]}) if row["threshold"] else usual
             climbs = climbs_by(tables, definition)
@@ -202,7 +425,14 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
             row["climbs"] += len(climbs)
             row["led_by_large"] += sum(climb.leader_large for climb in climbs)
             row["median_speed"] += [climb.speed for climb in climbs]
-    return [{**row, "median_speed": median(row["median_speed"]) if row["climbs"] else None} for row in rows]
+    return [
+        {
+            **row,
+            "median_speed": median(row["median_speed"]) if row["climbs"] else None,
+            **_rate("rate", row["climbs"], seconds),
+        }
+        for row in rows
+    ]
 
 
 def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:
@@ -212,36 +442,49 @@ def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:
         told = "as defined" if row["value"] is None else f"{row['threshold']} = {row['value']:g}"
         speed = "-" if row["median_speed"] is None else f"{row['median_speed'] * 1e3:.2f} mm/s"
         lines.append(
-            f"  {told:20} {row['climbed']} of {row['runs']} runs, {row['climbs']} climbs, {row['led_by_large']} led by "
+            f"  {told:20} {row['climbed']} of {row['runs']} runs, {_told_rate(row)}, {row['led_by_large']} led by "
             f"a large bead, median {speed}"
         )
     return "\n".join(lines)
 
 
-def describe_climbs(found: dict[str, Any]) -> str:
-    """`summarise_climbs` as text; s, mm/s."""
+def describe_climbs(found: Mapping[str, Any]) -> str:
+    """`summarise_climbs` as text; s, mm, mm/s."""
     if found["probability"] is None:
         return f"no run is as long as {found['within']:g} s"
-    low, high = found["interval"]
     half = "not reached" if found["median"] is None else f"{found['median']:.2f} s"
+    told = {name: _told_rate(found[name]) for name in ("on_plain_walls", "in_corners", "out_of_pile")}
     lines = [
         f"{found['climbed']} of {found['runs']} runs climbed within {found['within']:.3g} s"
         + (f", {found['ended']} ended before and had not" if found["ended"] else "")
-        + f": probability {found['probability']:.2f} ({low:.2f} to {high:.2f} with {_CONFIDENCE:.0%} confidence)",
+        + f": probability {found['probability']:.2f}{_interval(found['interval'], '.2f')}",
         f"  to climb   median {half}; {found['censored']} of {found['runs']} runs ended without a climb",
+        f"  climbs     {_told_rate(found)}"
+        + ("" if found["dispersion"] is None else f"; they scatter {found['dispersion']:.1f} times as Poisson's"),
     ]
     if found["climbs"]:
         sizes = ", ".join(f"{size}: {found['sizes'].count(size)}" for size in sorted(set(found["sizes"])))
         lines += [
-            f"  climbs     {found['climbs']}, led by a large bead {found['led_by_large']}, "
-            f"in a corner {found['in_corners']}",
+            *(f"    {name.replace('_', ' '):15} {text}" for name, text in told.items()),
+            f"  leader     large in {found['led_by_large']} of {found['climbs']} climbs (by chance: p = "
+            f"{found['p_among_beads']:.2g} among all beads, {found['share_of_large']:.0%} of which are large; p = "
+            f"{found['p_among_own']:.2g} among a climb's own)",
             f"  first one  counted after {_range(found['times'])} s, begun after {_range(found['onsets'])} s",
-            f"  clusters   beads: how many   {sizes}",
+            f"  beads      {sizes}",
+            f"  height     {_range(np.array(found['heights']) * 1e3)} mm",
         ]
     if found["speeds"]:
         speeds = np.array(found["speeds"]) * 1e3
         lines.append(f"  speed      {_range(speeds)} mm/s, median {np.median(speeds):.2f} mm/s")
     return "\n".join(lines)
+
+
+def _told_rate(found: Mapping[str, Any]) -> str:
+    return f"{found['climbs']}: {found['rate']:.3g} per start and second{_interval(found['rate_interval'])}"
+
+
+def _interval(ends: Sequence[float] | None, digits: str = ".3g") -> str:
+    return "" if ends is None else f" ({ends[0]:{digits}} to {ends[1]:{digits}} with {_CONFIDENCE:.0%} confidence)"
 
 
 def _range(values: Sequence[float] | FloatArray) -> str:

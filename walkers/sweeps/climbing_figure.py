@@ -1,0 +1,133 @@
+"""The figure of `walkers climb`: when piles climb, what climbs, and how that changes with the conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, save_figure, styled
+from walkers.runner.files import write_bytes
+from walkers.sweeps.climbing import Condition
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_ACROSS = 3
+_ROW = 2.1  # inches
+_KINDS = (("all", "", "ko"), ("plain walls", "on_plain_walls", "C1s"), ("corners", "in_corners", "C2^"))
+"""Of all climbs and of parts of them: label, key in what `summarise_climbs` gives, colour and marker."""
+
+
+@styled
+def climbs_figure(conditions: Sequence[Condition], found: Sequence[Mapping[str, Any]]) -> Figure:
+    """Draw what `walkers.sweeps.climbing.summarise_climbs` found under each condition.
+
+    The first row is of the first condition that differs by nothing, else of the first one: the share of piles that have
+    climbed by a time (Kaplan and Meier's estimate), speeds against sizes, rates. Below is a panel for each key that
+    varies: the rates against its values, of conditions that differ by nothing else.
+    """
+    usual = next((number for number, one in enumerate(conditions) if not one.differs), 0)
+    keys = list(dict.fromkeys(key for one in conditions for key in one.differs))
+    panels = [(name, *_at(conditions, name)) for name in keys]
+    rows = 1 + ceil(len(panels) / _ACROSS)
+    figure, axes = new_figure(TWO_COLUMNS, _ROW * rows, nrows=rows, ncols=_ACROSS, squeeze=False)
+    shown = axes.ravel()
+    _draw_survival(shown[0], found[usual])
+    _draw_climbs(shown[1], found[usual])
+    _draw_rates(shown[2], [""], [found[usual]])
+    shown[2].legend()
+    for panel, (name, labels, numbers) in zip(shown[_ACROSS:], panels, strict=False):
+        _draw_rates(panel, labels, [found[number] for number in numbers])
+        panel.set_xlabel(plain_text(name))
+    for panel in shown[_ACROSS + len(panels) :]:
+        panel.remove()
+    letter_panels(shown[: _ACROSS + len(panels)])
+    return figure
+
+
+def _at(conditions: Sequence[Condition], key: str) -> tuple[list[str], list[int]]:
+    """The values of a key in the conditions in which nothing else differs, and their numbers; numbers ascend."""
+    alone = {
+        one.differs.get(key, one.usual.get(key, "")): number
+        for number, one in enumerate(conditions)
+        if not set(one.differs) - {key}
+    }
+
+    def size(text: str) -> tuple[float, str]:
+        try:
+            return float(text.partition(" ")[0].partition("/")[0]), text
+        except ValueError:
+            return float("inf"), text
+
+    labels = sorted(alone, key=size)
+    return labels, [alone[label] for label in labels]
+
+
+def _draw_survival(panel: Axes, found: Mapping[str, Any]) -> None:
+    curve = found["curve"]
+    panel.step(curve["time"], curve["probability"], "k", where="post")
+    panel.fill_between(curve["time"], curve["low"], curve["high"], step="post", color="0.85")
+    panel.set(xlabel="time of drive (s)", ylabel="share that has climbed", ylim=(0.0, 1.02), xlim=(0.0, None))
+
+
+def _draw_climbs(panel: Axes, found: Mapping[str, Any]) -> None:
+    for label, key, look in _KINDS[1:]:
+        sizes, speeds = found[key]["sizes"], found[key]["speeds"]
+        if len(sizes) == len(speeds):
+            panel.plot(sizes, np.array(speeds) * 1e3, look, markerfacecolor="none", label=label)
+    panel.set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
+
+
+def _draw_rates(panel: Axes, labels: Sequence[str], found: Sequence[Mapping[str, Any]]) -> None:
+    """Rates with their exact intervals, side by side."""
+    for place, (label, key, look) in enumerate(_KINDS):
+        some = [one[key] if key else one for one in found]
+        rates, ends = np.array([one["rate"] for one in some]), np.array([one["rate_interval"] for one in some])
+        at = np.arange(len(found)) + 0.15 * (place - 1)
+        panel.errorbar(at, rates, np.abs(ends.T - rates), fmt=look, label=label, linestyle="none", markersize=3.0)
+    panel.set_xticks(
+        np.arange(len(labels)), [plain_text(label) for label in labels], rotation=30 if len(labels) > 4 else 0
+    )
+    panel.set(ylabel="climbs per start and second", ylim=(0.0, None), xlim=(-0.5, len(labels) - 0.5))
+
+
+_COLUMNS = (
+    *("runs", "seconds", "within", "climbed", "probability", "probability_low", "probability_high", "median", "climbs"),
+    *("rate", "rate_low", "rate_high", "dispersion", "led_by_large", "share_of_large", "p_among_beads", "p_among_own"),
+)
+
+
+def write_climbs(conditions: Sequence[Condition], found: Sequence[Mapping[str, Any]], to: Path) -> None:
+    """Write what was found under each condition as a table, a row a condition and part of the climbs, or as the figure.
+
+    Parameters
+    ----------
+    conditions, found
+        What `walkers.sweeps.climbing.summarise_climbs` found under each condition.
+    to
+        A .csv file for the table (SI units), else the figure's, of `walkers.postprocess.drawing.FORMATS`.
+    """
+    if to.suffix != ".csv":
+        runs = [run.name for one in conditions for run in one.runs]
+        save_figure(climbs_figure(conditions, found), to, runs, [to.suffix[1:]], "How often piles climb")
+        return
+    import pandas as pd
+
+    rows = []
+    for one, all_of_it in zip(conditions, found, strict=True):
+        for label, key, _ in _KINDS:
+            told = all_of_it[key] if key else all_of_it
+            ends = {"probability": told["interval"], "rate": told["rate_interval"]}
+            sides = {
+                f"{name}_{side}": (pair or (None, None))[at]
+                for name, pair in ends.items()
+                for at, side in enumerate(("low", "high"))
+            }
+            of_it = {name: value for name, value in {**told, **sides}.items() if name in _COLUMNS}
+            rows.append({"condition": one.label, "where": label, **{name: of_it[name] for name in _COLUMNS}})
+    write_bytes(to, pd.DataFrame(rows).to_csv(index=False).encode())
