@@ -59,6 +59,12 @@ def test_linspace_and_geomspace_are_numpys(make: Make) -> None:
     assert whole.rows == [(seed, cycles) for seed in (1, 2, 3, 4) for cycles in (10, 20, 40)]
 
 
+def test_one_key_at_a_time(make: Make) -> None:
+    sweep = make(one_at_a_time={"run.seed": [3, 4], "drive": {"frequency": ["60 Hz", "90 Hz", "70 Hz"]}})
+    assert sweep.keys == ("run.seed", "drive.frequency")
+    assert sweep.rows == [(3, "60 Hz"), (4, "60 Hz"), (3, "90 Hz"), (3, "70 Hz")]
+
+
 def test_zipped_keys_go_together(make: Make) -> None:
     pairs = [["0.3 mm", "0.2 mm"], ["0.4 mm", "0.2 mm"]]
     sweep = make(zip=[{"dimers.radii": pairs, "run": {"seed": [3, 4]}}], axes={"drive.frequency": ["60 Hz", "90 Hz"]})
