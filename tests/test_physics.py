@@ -147,10 +147,6 @@ def test_bead_on_a_still_substrate_stays_where_it_is(trajectory: Moved) -> None:
     assert first[0, 2] < moved.radii[0]
 
 
-def test_shaking_along_y_is_shaking_along_x_turned(walked: Walked) -> None:
-    assert walked(drive={"axis": "y"}).velocity[0] == pytest.approx(walked().velocity[0], rel=1e-3)
-
-
 def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(trajectory: Moved) -> None:
     contact = {
         "friction": {"bead_bead": 0.2, "bead_wall": 0.2},

@@ -243,6 +243,23 @@ def test_an_interrupted_pile_goes_on_bit_for_bit(killed: Killed, tmp_path: Path)
     assert kept == [False, False, True, True]
 
 
+def test_both_frames_shake_alike(tmp_path: Path) -> None:
+    """Until chaotic trajectories part; in the laboratory the container's motion is taken off at any phase."""
+    run = {"duration": "0.03 s", "frames_per_second": 680.0, **QUICK}
+    cases = [small(drive={"frame": frame}, run=run) for frame in ("container", "lab")]
+    amplitude = cases[1].drive.amplitude
+    motions = [walkers.run(case, tmp_path).motion for case in cases]
+    here, there = ([array[motion.first_driven :] for array in (motion.position, motion.velocity)] for motion in motions)
+    assert cases[1].run.samples_per_cycle == 4
+    apart = np.sqrt(((here[0] - there[0]) ** 2).sum(axis=2).mean(axis=1))
+    assert apart[:12].max() < 0.05 * amplitude
+    agitation = [float((velocity**2).sum(axis=2).mean()) for _, velocity in (here, there)]
+    assert agitation[0] == pytest.approx(agitation[1], rel=0.1)
+    # The lowest beads lie on the floor throughout the cycle.
+    lowest = (motions[1].position[..., 2] - motions[1].radius).min(axis=1)
+    assert np.abs(lowest).max() < 0.2 * amplitude
+
+
 def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
     def broken(name: str) -> Path:
         place = tmp_path / f"{name}-{run.name}"
@@ -367,7 +384,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
         edges = picture.point_data.active_scalars.reshape(up, across, -1)[..., :3]
         assert all((edge == 255).all() for edge in (edges[0], edges[-1], edges[:, 0], edges[:, -1]))  # nothing is cut
     told("film", str(run), "--to", "one.gif", "--fps", "10", "--size", "64x64", "--until", "8 ms")  # within a frame
-    film = told("film", str(run), "--to", "here/box.mp4", "--fps", "10", "--size", "360p", "--slowdown", "5")
+    film = told("film", str(run), "--to", "here/box.mp4", "--fps", "10", "--size", "160x120", "--slowdown", "5")
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(film)
     assert frames == int(50.0 * motion.time[-1]) + 1
     assert seconds == pytest.approx(5.0 * motion.time[-1], abs=0.1)
@@ -482,7 +499,7 @@ def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch
 
 
 def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tmp_path: Path) -> None:
-    """The same dimer as `tests.test_climber`'s, by the other way: a box, the pile's recording, clusters, climbs.
+    """The same dimer as that of `tests.test_bodies`, by the other way: a box, the pile's recording, clusters, climbs.
 
     On the wall across from it is one led by its small bead.
     """
