@@ -52,8 +52,9 @@ test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test fir
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	.venv/bin/lint-imports
-	.venv/bin/pytest -q -m smoke
-	@$(WALKERS) theory fig1b > /dev/null # compiles the integrator once; each worker would by itself
+	.venv/bin/pytest -q -m smoke tests/test_program.py
+	@# Compiles both integrators once; each worker would by itself.
+	@$(WALKERS) theory fig1b > /dev/null & .venv/bin/pytest -q tests/test_crosscheck.py -k momentum > /dev/null & wait
 	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"
 
 .PHONY: test-browser

@@ -23,13 +23,15 @@ from platformdirs import user_cache_path
 from tomli_w import dumps as to_toml
 
 from walkers import run as run_case
+from walkers.archive.writing import write_archive
 from walkers.inputs import resolve_case
 from walkers.inputs.axes import is_axis
 from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
-from walkers.inputs.reading import read_toml
+from walkers.inputs.reading import read_toml, shipped_cases
 from walkers.inputs.sweep import expand, shipped_sweeps
 from walkers.main import main
+from walkers.postprocess import series
 from walkers.postprocess.gait import Walk, walk
 from walkers.postprocess.motion import Group, read_motion
 from walkers.runner.binary import Engine
@@ -63,18 +65,29 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 # MPI processes that wait for each other give way to others meanwhile: on a busy machine they are ten times as fast so.
 os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112
-# The user's cache is not ours to read or write, for audits of the engine are kept there; but for solutions of an
-# equation, which are named by all that they depend on and take half a second each.
-_SOLVED = user_cache_path("granular-walkers") / "young-laplace"
-_SOLVED.mkdir(parents=True, exist_ok=True)
+# The user's cache is not ours to read or write, for audits of the engine are kept there; but for what is named by all
+# that it depends on: solutions of an equation, half a second each, and the compiled contact model, which takes four.
+_KEPT = user_cache_path("granular-walkers", ensure_exists=True)
+(_KEPT / "young-laplace").mkdir(exist_ok=True)
 os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="walkers-tests-")
-user_cache_path("granular-walkers", ensure_exists=True).joinpath("young-laplace").symlink_to(_SOLVED)
+for _kept in (_KEPT / "young-laplace", *_KEPT.glob("bridge-*.so")):
+    user_cache_path("granular-walkers", ensure_exists=True).joinpath(_kept.name).symlink_to(_kept)
 
 T = TypeVar("T")
 PROGRAM = str(Path(sys.executable).with_name("walkers"))
 SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
 BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cycle": 2}
 LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
+
+
+LONGEST = ("known_parameters", "notebook", "audit.py", "pilots", "browser.py", "printed", "stopped", "slurm", "failed")
+"""In the names of tests that take seconds."""
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Those first, so that no worker is left alone with one of them at the end."""
+    items.sort(key=lambda item: not any(name in item.nodeid for name in LONGEST))
 
 
 def document(**changes: Any) -> dict[str, Any]:
@@ -200,6 +213,35 @@ def looked_through(once: Callable[[str, Callable[[Path], object]], Path]) -> Pat
             assert not failures
 
     return once("looked-through", fill) / "runs"
+
+
+HALF = {"duration": "0.1 s", "segment": "0.05 s"}
+"""Of the shipped pile: half as long as it ships, in as many segments."""
+
+
+@pytest.fixture(scope="session")
+def pile_run(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+    """The shipped pile of 60 beads."""
+
+    def make(out: Path) -> None:
+        tables = read_toml(shipped_cases()["pile-ci"])
+        tables["run"] |= HALF
+        assert not run_case(resolve_case(tables, name="pile-ci"), out).cached
+
+    (directory,) = once("piles", make).glob("pile-ci-*")
+    return directory
+
+
+@pytest.fixture(scope="session")
+def archive(run_directory: Callable[..., Path], once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+    """The archive of a run, to be copied and damaged."""
+    return once("archived-run", lambda folder: write_archive(run_directory(run=SHORT), folder / "run.zip")) / "run.zip"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def small_pictures() -> None:
+    """Views of a quarter of the width and height: a processor takes long to draw them."""
+    series._TALL, series._TALLEST, series._WIDEST = 250, 400, 475  # type: ignore[misc]
 
 
 @pytest.fixture

@@ -22,12 +22,14 @@ def notebooks() -> list[Path]:
     return sorted((Path(__file__).parents[1] / "docs" / "tutorial").glob("*.ipynb"))
 
 
-def executed(path: Path, folder: Path) -> Any:
-    """A notebook, executed in a folder; the first error ends it."""
+def executed(path: Path, folder: Path, before: str = "") -> Any:
+    """A notebook, executed in a folder after other code; the first error ends it."""
     notebook = nbformat.read(path, as_version=4)
+    notebook.cells.insert(0, nbformat.v4.new_code_cell(before))
     how = {"timeout": SECONDS, "startup_timeout": SECONDS, "kernel_name": "python3"}
     # The state of widgets holds all of K3D.
     NotebookClient(notebook, resources={"metadata": {"path": str(folder)}}, store_widget_state=False, **how).execute()
+    del notebook.cells[0]
     return notebook
 
 

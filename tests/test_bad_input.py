@@ -1,14 +1,17 @@
 """Bad input: one message that names file, key, value and what was expected; exit status 2; no traceback."""
 
+import shlex
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.conftest import call, document, make_case, to_toml
-from walkers.inputs import InputError, resolve_case
+from walkers.inputs import InputError, library, resolve_case, units
+from walkers.inputs.units import parse_quantity
 from walkers.templates import render_deck
 
 GLASS = {"material": "glass"}
@@ -122,6 +125,112 @@ def test_bad_values(changes: dict[str, Any], told: str) -> None:
     assert message.count("\n") == 0, "one problem, one line"
 
 
+READING = ("result", "plot", "vtk", "render", "film", "paraview")
+REFUSED: list[tuple[str, str]] = [
+    # What is of another kind, with the command for it
+    ("run fig2", "fig2: is a sweep: walkers sweep fig2"),
+    ("show {file}", "is a sweep: walkers sweep "),
+    ("deck {sweep}", "is a sweep's directory: walkers table"),
+    ("run {run}", "is a run's directory: walkers result "),
+    ("sweep fig1b", "fig1b: is a case: walkers run fig1b"),
+    ("sweep {case}", "is a case: walkers run "),
+    ("sweep {sweep}", "is a sweep's directory"),
+    ("theory ruby", "ruby: is a calibration: walkers calibrate ruby"),
+    ("theory pile-ci", ""),
+    ("calibrate fig2", "fig2: is a sweep"),
+    ("result {sweep}", "a sweep's directory: walkers plot, table and status take it"),
+    ("result {archive}", "an archive: unpack it"),
+    ("table {archive}", "not a sweep: expected a folder"),
+    ("status {archive}", "neither a sweep's"),
+    ("compare {sweep} {run}", "is a sweep, to be compared with another sweep"),
+    ("compare {sweep} fig1b", "is a sweep, to be compared"),
+    ("compare {sweep} {other}", "vary the same keys"),
+    ("climb {sweep}", "expected a finished run of a pile"),
+    ("archive .", "expected a run directory"),
+    ("verify .", "expected a run directory"),
+    ("report . --to report.html", "not a finished run"),
+    ("plot {run} --hue frequency", "--hue: is for sweeps"),
+    *((f"{command} {folder}", "") for command in ("status", "table") for folder in ("empty", "{broken}")),
+    # What is not there, cannot be read or makes no sense
+    *((f"{command} fig1b", "no finished run in runs; first do: walkers run fig1b") for command in READING),
+    *((f"{command} .", "not a finished run") for command in READING),
+    *((f"{command} {{folder}}", "manifest.json cannot be read") for command in READING),
+    *((f"sweep {what}", "") for what in ("{bad}", "nosuch", "fig2 --site nosite.toml", "fig2 --out {case}")),
+    *((f"{command} fig1b --set 'drive.frequency=70 mm'", 'fig1b: drive.frequency = "70 mm": expected a frequency')
+      for command in ("show", "run", "deck", "theory")),
+    ("sweep fig4 --set 'liquid.name=Si AK5'", 'liquid.name = "Si AK5": varies in this sweep: it cannot be set as well'),
+    ("run fig1b --points 2", ""),
+    # Options
+    ("audit --engine no-such-engine", ""),
+    ("audit --only nothing", ""),
+    ("validate benchmark", "did you mean"),
+    ("crosscheck fig1b --without magic", "--without magic: expected one of"),
+    ("crosscheck fig1b --cycles 1", "expected at least 3"),
+    ("crosscheck fig1b --seeds 2", "--seeds: is for piles"),
+    ("figures --only fig9", "fig9"),
+    ("figures --only fig4 --format jpeg", "jpeg"),
+    ("figures --only fig4 --to {case}", "base.toml"),
+    ("list --out {runs} --older-than soon", "expected an age with its unit"),
+    ("list --out {runs} --where frequency", "expected KEY=VALUE"),
+    ("list --out {runs} --where frequenzy=2", "no run has such a key"),
+    ("clean nonsense --yes --out {runs}", "no run or sweep"),
+    ("plot {sweep} --y velocitty", 'did you mean "velocity"?'),
+    ("plot {sweep} --y reason", '"reason" has no number'),
+    ("plot {sweep} --x bead_wall", '"bead_wall": expected one of'),
+    ("plot {sweep} --to figure.jpg", "ends in .png, .svg, .pdf"),
+    *((f"report {{run}} --to {place}", "--to: ") for place in ("a.txt", "{folder}", "nowhere/a.html")),
+    ("export {run} --to walk.dcd", "expected the name of a .xyz, .extxyz or .lammpstrj file"),
+    ("paraview {run} --to vtk --colour beauty", "expected one of bead, large, omega, radius, speed, velocity, walker"),
+    ("archive {run} --to run.tar", "--to: expected the name of a .zip file"),
+    ("archive {run} --to nowhere/run.zip", "No such file"),
+    ("archive {run} --licence MINE", "--licence: expected one of CC-BY-4.0"),
+    ("archive {run} --author=", "--author: expected a name"),
+    ("archive {run} --orcid 0000-0002-1825-0097", "--orcid: expected an --author for each"),
+    ("archive {run} --author N --orcid 0000-0002-1825-0098", "--orcid: expected an ORCID"),
+    ("film {run} --to walk.avi", "expected the name of a .mp4 or .gif file"),
+    ("film {run} --to walk.gif --fps 30", "expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF"),
+    ("film {run} --size 333x201", "expected even numbers for an MP4"),
+    ("film {run} --size wide", "expected 360p, 480p, 720p, 1080p"),
+    ("film {run} --walker 2", "expected less than 2"),
+    ("film {run} --from soon", 'expected a time such as "0.1 s"'),
+    ("film {run} --from '0.2 s'", "expected times within the drive, 0 to 0.1 s"),
+    ("film {run} --from '0.05 s' --until '0.05 s'", "expected times within the drive, 0 to 0.1 s"),
+    *((f"render {{pile}} --interval {apart}", "") for apart in ("'3 s'", "soon", "T/4")),  # frames are cycles apart
+    *((f"{what} {{pile}} --walker 0", "") for what in ("render", "film")),
+    ("film {pile} --to box.png", ""),
+    ("render {pile} --to box.jpg", ""),
+    *((f"{what} {{pile}} --as-placed", "") for what in ("vtk", "paraview")),
+]  # fmt: skip
+"""Commands, and a part of the line that they are refused with."""
+
+
+@pytest.fixture
+def there(
+    looked_through: Path, run_directory: Callable[..., Path], pile_run: Path, archive: Path, tmp_path: Path
+) -> dict[str, Path]:
+    """What the commands of `REFUSED` are given."""
+    run = run_directory(dimers={"replicates": 2}, run={"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 20})
+    names = {"broken": "broken", "folder": "folder.html", "file": "mine.toml", "bad": "bad.toml"}
+    found = {name: tmp_path / place for name, place in names.items()}
+    for folder, file in (("broken", "sweep.json"), ("folder", "manifest.json")):
+        found[folder].mkdir()
+        (found[folder] / file).write_text("{")
+    for file, values in (("file", '"60 Hz"'), ("bad", '"60 Hz", "0 Hz"')):
+        found[file].write_text(f'case = "fig1b"\naxes.drive.frequency = [{values}]\n')
+    found |= {"runs": looked_through, "sweep": looked_through / "grid", "other": looked_through / "three"}
+    return {**found, "run": run, "pile": pile_run, "archive": archive, "case": looked_through.parent / "base.toml"}
+
+
+@pytest.mark.parametrize(("command", "told"), REFUSED)
+def test_commands_that_are_refused(command: str, told: str, there: dict[str, Path], tmp_path: Path) -> None:
+    """In a line, before anything is written."""
+    before = {path: sorted(path.rglob("*")) for path in (tmp_path, there["run"])}
+    done = call(*shlex.split(command.format(**there)), folder=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr
+    assert told in done.stderr
+    assert before == {path: sorted(path.rglob("*")) for path in before}
+
+
 def _message(*arguments: str) -> str:
     done = call(*arguments)
     assert done.returncode == 2
@@ -184,15 +293,6 @@ def test_files_that_are_no_cases_or_not_there(tmp_path: Path) -> None:
         assert told in _message("show", name)
 
 
-@pytest.mark.parametrize("command", ["result", "plot", "vtk", "render", "film", "paraview"])
-def test_runs_that_are_not_there(command: str, in_folder: Path) -> None:
-    assert "no finished run in runs; first do: walkers run fig1b" in _message(command, "fig1b")
-    (in_folder / "empty").mkdir()
-    assert "not a finished run" in _message(command, "empty")
-    (in_folder / "empty" / "manifest.json").write_text("{")
-    assert "manifest.json cannot be read" in _message(command, "empty")
-
-
 def test_misuse_of_the_program() -> None:
     for arguments in (
         ["shw", "fig1b"],
@@ -220,3 +320,76 @@ def test_long_values_and_those_of_several_lines_are_quoted_on_one(in_folder: Pat
         assert message.rstrip("\n").isprintable()
         assert any(part in message for part in ("xxx", "one two", "no finished run"))
         assert len(message) < 1500
+
+
+# --- quantities, in the units of the field ----------------------------------------------------------------------------
+
+
+READ = {
+    units.LENGTH: {"0.3 mm": 3e-4, "300 µm": 3e-4, "300um": 3e-4, "3e-4 m": 3e-4},
+    units.FREQUENCY: {"80 Hz": 80.0, "0.08 kHz": 80.0, "80 s^-1": 80.0},
+    # "1 g = 9.8 m/s²", the paper's Fig. 1
+    units.ACCELERATION: {"1 g": 9.8, "4g": 39.2, "39.2 m/s^2": 39.2, "39.2 m/s²": 39.2, "1 gravity": 9.80665},
+    units.SURFACE_TENSION: {"19.2 mN/m": 0.0192, "19.2 dyn/cm": 0.0192},
+    units.KINEMATIC_VISCOSITY: {"5 mm^2/s": 5e-6, "5 cSt": 5e-6},
+    units.DYNAMIC_VISCOSITY: {"4.6 mPa*s": 4.6e-3, "4.6 cP": 4.6e-3},
+    units.DENSITY: {"4.0 g/cm^3": 4000.0, "1 g/cm^3": 1e3},
+    units.MODULUS: {"50 MPa": 5e7},
+    units.TIME: {"2 us": 2e-6},
+    units.ANGLE: {"180 deg": 3.14159265358979, "10 mrad": 0.01},
+}
+NOT_READ = {
+    units.ACCELERATION: ["4 kg", "4 mg", "4 g/s"],
+    units.DENSITY: ["4 g"],
+    units.FREQUENCY: ["500 rad/s", "4800 rpm"],
+    units.ANGLE: ["0.5", "30 percent"],
+    units.LENGTH: ["4 g", "0,3 mm", "0.3 mm 0.2 mm", "__import__('os')", "nan mm", ""],
+}
+
+
+def test_quantities_in_si() -> None:
+    for kind, texts in READ.items():
+        assert {text: parse_quantity(text, kind) for text in texts} == pytest.approx(texts, rel=1e-14)
+
+
+@pytest.mark.parametrize(("kind", "text"), [(kind, text) for kind, texts in NOT_READ.items() for text in texts])
+def test_what_is_no_such_quantity(text: str, kind: units.Kind) -> None:
+    with pytest.raises(ValueError, match=f"expected an? {kind.name} with its unit"):
+        parse_quantity(text, kind)
+
+
+KINDS = [kind for kind in vars(units).values() if isinstance(kind, units.Kind)]
+
+
+@pytest.mark.parametrize("symbol", units._USUAL)
+def test_usual_units_are_read_as_pint_reads_them(symbol: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last digit, and refused with the same words."""
+    texts = [f"{number} {symbol}" for number in ("1", "0.3", "4.0", "19.2", "-7.125e-2", "123456789.012", "1e-5")]
+
+    def read(text: str, kind: units.Kind) -> float | str:
+        try:
+            return parse_quantity(text, kind)
+        except ValueError as error:
+            return str(error)
+
+    usual = [read(text, kind) for text in texts for kind in KINDS]
+    assert any(isinstance(value, float) for value in usual)
+    monkeypatch.setattr(units, "_USUAL", {})
+    assert usual == [read(text, kind) for text in texts for kind in KINDS]
+
+
+def test_shipped_cases_do_not_wait_for_pint() -> None:
+    script = """
+import sys
+from walkers.inputs import load_case, shipped_cases
+print([load_case(name).name for name in shipped_cases()] and "pint" in sys.modules)
+"""
+    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == "False"
+
+
+def test_every_number_of_the_library_has_a_source() -> None:
+    materials, liquids = map(library.material, library.materials()), map(library.liquid, library.liquids())
+    known = [number for numbers in (*materials, *liquids) for number in numbers.values()]
+    assert len(known) >= 20
+    assert all(number.value > 0 and len(number.source) > 8 for number in known)

@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from functools import partial
 from math import inf, log, pi, sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.sparse import diags, identity, kron
-from scipy.sparse.linalg import spsolve
 
+from tests.conftest import make_case
 from walkers.check.bridges import willett_simple
+from walkers.inputs import load_case
+from walkers.inputs.loads import dimer_of
+from walkers.inputs.run_tables import limits_of
 from walkers.physics import rabinovich, reynolds, van_der_waals, willett, young_laplace
 from walkers.physics import soulie as soulie_law
-from walkers.physics.bridge import FloatArray, Surfaces
+from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 from walkers.physics.capillary import (
     bridge_volume_at_wall,
-    bridge_volume_between_beads,
-    capillary_force_limit_at_wall,
 )
 from walkers.physics.capillary import rupture_distance as rupture_of_lian
 from walkers.physics.laplace import force_curve, rupture_distance
-from walkers.physics.laws import by_name
+from walkers.physics.laws import LAWS, by_name
 from walkers.physics.matter import Liquid
+from walkers.physics.time_step import AUTO_FRACTIONS, LONGEST_WALKER_STEP, WALKER_FRACTIONS
+from walkers.templates.bridge_tables import TOLERANCE, UnusableLawError, tabulated
 
 PAIRS = [(1.0, inf), (1.0, 1.0), (0.5, 1.0), (0.2, 1.0)]
-N = np.array([0.0, 0.0, 1.0])
 
 
 def surfaces(
@@ -115,97 +117,6 @@ def test_limits_between_spheres(ratio: float) -> None:
     assert on_2 == pytest.approx(pi * whole**3 * 4.0 * ratio**2 / (5.0 * whole**4), rel=1e-6)
 
 
-def moved(pair: tuple[float, float], gap: float, v: FloatArray, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """s and q of two bodies by the interface's definition; v and omega of shape (2, 3)."""
-    arms = np.array(pair)[:, None] + 0.5 * gap
-    relative = v[0] - v[1]
-    sliding = relative - (relative @ N) * N + np.cross(N, (arms * omega).sum(axis=0))
-    return sliding, np.cross(N, omega[0] - omega[1])
-
-
-def solved(pair: tuple[float, float], gap: float, edge: float, v: FloatArray, omega: FloatArray) -> FloatArray:
-    """Forces on both bodies and torques about their centres, (4, 3), of given motions, by finite volumes in r and θ.
-
-    Nothing of the law is in it: the flux is that of walls that move as their bodies do at each place of them.
-    """
-    rings, rays = 200, 64
-    dr, dt = edge / rings, 2.0 * pi / rays
-    r, t = np.meshgrid((np.arange(rings) + 0.5) * dr, (np.arange(rays) + 0.5) * dt, indexing="ij")
-    centres = np.array([(pair[0] + 0.5 * gap) * N, -(pair[1] + 0.5 * gap) * N])
-
-    def wall(body: int, r: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Places of a body's surface and its velocity there."""
-        rise = (0.5 * gap + r**2 / (2.0 * pair[body])) * (1.0 - 2.0 * body)
-        place = np.stack([r * np.cos(t), r * np.sin(t), rise], axis=-1)
-        return place, v[body] + np.cross(omega[body], place - centres[body])
-
-    def drawn(r: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The gap, and its height times the mean velocity of the walls."""
-        (one, u), (other, w) = wall(0, r, t), wall(1, r, t)
-        height = one[..., 2] - other[..., 2]
-        return height, 0.5 * height[..., None] * (u + w)
-
-    # Faces across r, the innermost without length; p = 0 half a cell beyond the outermost.
-    faces, at = np.meshgrid(np.arange(1, rings + 1) * dr, t[0], indexing="ij")
-    height, flux = drawn(faces, at)
-    through = (flux[..., 0] * np.cos(at) + flux[..., 1] * np.sin(at)) * faces * dt
-    source = through - np.vstack([np.zeros(rays), through[:-1]])
-    weight = (height**3 / 12.0 * faces * dt / dr)[:, 0]
-    inward, outward = np.append(0.0, weight[:-1]), np.append(weight[:-1], 2.0 * weight[-1])
-    across = diags([weight[:-1], -inward - outward, weight[:-1]], [-1, 0, 1])
-    # Faces across θ.
-    turned = t + 0.5 * dt
-    height, flux = drawn(r, turned)
-    through = (-flux[..., 0] * np.sin(turned) + flux[..., 1] * np.cos(turned)) * dr
-    source += through - np.roll(through, 1, axis=1)
-    around = diags([1.0, 1.0, -2.0, 1.0, 1.0], [1 - rays, -1, 0, 1, rays - 1], shape=(rays, rays))
-    system = kron(across, identity(rays)) + kron(diags((height**3 / 12.0 * dr / (r * dt))[:, 0]), around)
-    # The walls part, less what their slopes carry away.
-    (one, u), (other, w) = wall(0, r, t), wall(1, r, t)
-    slopes = [np.stack([-one[..., 0] / pair[0], -one[..., 1] / pair[0], np.ones_like(r)], axis=-1)]
-    slopes.append(np.stack([other[..., 0] / pair[1], other[..., 1] / pair[1], np.ones_like(r)], axis=-1))
-    area = r * dr * dt
-    source += ((u * slopes[0]).sum(-1) - (w * slopes[1]).sum(-1)) * area
-    p = spsolve(system.tocsr(), source.ravel()).reshape(rings, rays)
-
-    dp_dr = np.gradient(np.vstack([np.roll(p[:1], rays // 2, axis=1), p, -p[-1:]]), dr, axis=0)[1:-1]
-    dp_dt = (np.roll(p, -1, axis=1) - np.roll(p, 1, axis=1)) / (2.0 * dt * r)
-    slope = np.stack(
-        [dp_dr * np.cos(t) - dp_dt * np.sin(t), dp_dr * np.sin(t) + dp_dt * np.cos(t), np.zeros_like(p)], axis=-1
-    )
-    height = (one - other)[..., 2, None]
-    sheared = (u - w) / height * [1.0, 1.0, 0.0]
-    found = []
-    for sign, normal, place, centre in zip((1.0, -1.0), slopes, (one, other), centres, strict=True):
-        traction = sign * p[..., None] * normal - 0.5 * height * slope - sign * sheared
-        found.append((traction * area[..., None]).sum(axis=(0, 1)))
-        found.append((np.cross(place - centre, traction) * area[..., None]).sum(axis=(0, 1)))
-    return np.array(found)
-
-
-@pytest.mark.parametrize("pair", [(1.0, 1.0), (1.0, 3.0), (1.0, 1e4)])
-def test_the_matrix_by_finite_volumes(pair: tuple[float, float]) -> None:
-    """Forces and torques on both bodies in any motion, signs included: the interface's, with this S, C, Q."""
-    gap, reduced = 1e-6, 1.0 / (1.0 / pair[0] + 1.0 / pair[1])
-    edge = sqrt(2.0 * reduced * 4.0 * gap)  # H_w = 5 h
-    volume = pi * reduced * ((5.0 * gap) ** 2 - gap**2)
-    given = surfaces(*pair, volume=volume, closest=0.0)
-    s, c, q = matrix(given, gap)
-    for seed, still in ((1, False), (2, True)):
-        v, omega = np.random.default_rng(seed).normal(size=(2, 2, 3)) * [1.0, 1.0, 0.0]
-        omega[1] /= pair[1]
-        if still:  # only rolling: sliding surfaces would hide it
-            v[0] = v[1] - np.cross(N, ((np.array(pair) + 0.5 * gap)[:, None] * omega).sum(axis=0))
-        sliding, rolling = moved(pair, gap, v, omega)
-        force, couple = -(s * sliding + c * rolling), -(c * sliding + q * rolling)
-        lever, turning = np.cross(N, force), np.cross(N, couple)
-        found = solved(pair, gap, edge, v, omega)
-        expected = [force, -pair[0] * lever - turning, -force, -pair[1] * lever + turning]
-        size = float(np.max(np.abs([force, couple])))
-        for one, other, lever_arm in zip(found, expected, (1.0, pair[0], 1.0, pair[1]), strict=True):
-            assert one[:2] == pytest.approx(other[:2], abs=0.015 * lever_arm * size)
-
-
 @pytest.mark.parametrize("pair", PAIRS)
 @pytest.mark.parametrize("volume", [1e-6, 1e-3, 0.1])
 def test_resistances_take_energy(pair: tuple[float, float], volume: float) -> None:
@@ -271,18 +182,6 @@ def test_soulie(other: float) -> None:
     assert not np.any([found.coupling, found.rolling])
 
 
-def test_soulie_of_little_liquid() -> None:
-    """One per cent of a bead at a wall: twice 1.74 πγR, below 4πγR; of equal spheres near 2πγR; it falls to rupture."""
-    force = soulie_law.pull(1.0, inf, bridge_volume_at_wall(1.0, 0.01), 0.0, np.zeros(1))[0]
-    assert force / pi == pytest.approx(3.48, abs=0.005)
-    assert force < capillary_force_limit_at_wall(1.0, 1.0)
-    assert soulie_law.pull(1.0, 1.0, 1e-4, 0.0, np.zeros(1))[0] == pytest.approx(2.0 * pi, rel=0.12)
-    volume = bridge_volume_between_beads(3e-4, 2e-4, 0.01)
-    gaps = rupture_of_lian(volume, 0.0) * np.array([0.0, 0.5, 1.0])
-    touching, half, last = soulie_law.pull(3e-4, 2e-4, volume, 0.0, gaps)
-    assert touching > half > last > 0.0
-
-
 # --- The others, and names ------------------------------------------------------------------------------------------
 
 
@@ -323,3 +222,122 @@ def test_a_law_of_ones_own(tmp_path: Path) -> None:
 def test_names_that_are_no_laws(name: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         by_name(name)
+
+
+# --- tables that the engine reads -------------------------------------------------------------------------------------
+
+
+CASE = make_case(liquid={"contact_angle": "20 deg"})
+AT_WALL = Surfaces.of(3e-4, inf, CASE.liquid, CASE.contact.minimum_separation_ratio)
+BETWEEN = Surfaces.of(3e-4, 2e-4, CASE.liquid, CASE.contact.minimum_separation_ratio)
+
+
+@pytest.mark.parametrize("given", [AT_WALL, BETWEEN], ids=["wall", "beads"])
+@pytest.mark.parametrize("name", [name for name in LAWS if name != "van-der-waals"])
+def test_the_engine_reads_the_law_out_of_its_table(name: str, given: Surfaces) -> None:
+    law = by_name(name)
+    table = tabulated(law, given)
+    gaps = table.curve.rupture * np.random.default_rng(1).random(200) ** 3
+    expected = law(given).forces(gaps).columns()
+    scale = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max(axis=0))
+    np.testing.assert_array_less(np.abs(interpolated(table.text(), gaps) - expected), 10 * TOLERANCE * scale + 1e-30)
+
+
+def interpolated(text: str, gaps: FloatArray) -> FloatArray:
+    """Pull and resistances, shape (n, 5), at gaps (m), of a table after its first line.
+
+    It is what walkers/engine/table.h makes of it, written down once more from the format alone.
+    """
+    head, *lines = text.splitlines()
+    rupture, scale = (float(word) for word in head.split()[2:4])
+    octaves, cells = (int(word) for word in head.split()[4:])
+    rows = np.array([[float(word) for word in line.split()] for line in lines])
+    middle = scale * (2.0**octaves - 1.0)
+    mantissa, exponent = np.frexp(1.0 + gaps / scale)
+    near = cells * ((exponent - 1) + 2.0 * mantissa - 1.0)
+    far = cells * (octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle))))
+    place = np.where(gaps < middle, near, far)
+    cell = np.minimum(place.astype(int), (len(rows) - 1) // 3 - 1)
+    fours = [rows[3 * number : 3 * number + 4, 1:] for number in cell]
+    cubics = [np.polynomial.polynomial.polyfit(np.arange(4) / 3.0, four, 3) for four in fours]
+    return np.array([(at ** np.arange(4)) @ cubic for at, cubic in zip(place - cell, cubics, strict=True)])
+
+
+def _law(**changes: object) -> Curve:
+    def forces(gaps: FloatArray) -> Forces:
+        one = np.ones_like(gaps)
+        made = Forces(pull=1e-5 * one, normal=one, sliding=one, coupling=0.0 * one, rolling=one)
+        return replace(made, **{key: value(gaps) for key, value in changes.items() if callable(value)})
+
+    sizes = {key: value for key, value in changes.items() if isinstance(value, float)}
+    return Curve(forces, **{"rupture": 1e-4, **sizes})
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"pull": lambda gaps: np.log(gaps - 1e-5)}, "the pull is no number at a gap of 0 m"),
+        ({"normal": lambda gaps: 1.0 - gaps / 5e-5}, "the normal resistance is negative"),
+        ({"coupling": lambda gaps: 2.0 + gaps}, "sliding and rolling together give energy"),
+        (
+            {"pull": lambda gaps: np.where(gaps < 3.3e-5, 1.0, 0.0)},
+            "the finest table, of 256 cells an octave",
+        ),
+        ({"rupture": 0.0}, "the bridge breaks at a gap of 0 m"),
+        ({"rupture": inf}, "the bridge breaks at a gap of inf m"),
+        ({"formation": 2e-4}, "the bridge forms at a gap of 0.0002 m; expected 0 to its rupture"),
+    ],
+)
+def test_a_law_that_cannot_be_used_is_refused(changes: dict[str, object], told: str) -> None:
+    with pytest.raises(UnusableLawError, match=told):
+        tabulated(lambda _: _law(**changes), AT_WALL)
+
+
+# --- limits of the time step, numbers of the paper --------------------------------------------------------------------
+
+
+def test_published_gamma0() -> None:
+    """Of the walker of Fig. 2 at 2 to 6 g, and of those of Fig. 4."""
+    for acceleration, gamma0 in ((2, 0.191), (3, 0.286), (4, 0.381), (5, 0.476), (6, 0.572)):
+        case = make_case(drive={"peak_acceleration": f"{acceleration} g"})
+        assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(gamma0, abs=6e-4)
+    for name, gamma0 in (("fig4a", 0.74), ("fig4b", 3.5)):
+        case = load_case(name)
+        assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(gamma0, rel=0.01)
+
+
+def test_time_step_limits_of_the_walker() -> None:
+    """By hand for R 0.2 mm, ρ 4000, E 50 MPa, ν 0.3: π R √(ρ/G)/(0.1631 ν + 0.8766) = 9.79 µs."""
+    case = make_case()
+    limits = limits_of(case)
+    assert limits.rayleigh == pytest.approx(9.79e-6, rel=1e-3)
+    assert limits.rayleigh < limits.hertz < limits.viscous
+
+
+def test_viscous_limit_rules_in_glycerol() -> None:
+    """The glycerol climber is wrong at 6 µs and converged at 2 µs: the limit lies between, auto below 2.1 µs."""
+    case = make_case(
+        beads={"material": "glass"},
+        dimers={"radii": ["0.545 mm", "0.3075 mm"]},
+        liquid={"name": "glycerol 87 %"},
+        drive={"frequency": "170 Hz", "peak_acceleration": "16.2 g"},
+    )
+    limits = limits_of(case)
+    assert 2e-6 < limits.viscous < 6e-6
+    assert limits.exceeded_by(6e-6) == ["viscous"]
+    assert case.run.time_step < 2.1e-6
+
+
+@pytest.mark.parametrize("name", ["fig1b", "fig4a", "symmetric", "pile-small"])
+def test_auto_respects_every_limit_with_margin(name: str) -> None:
+    """And is no shorter than that asks for: loose beads by their own shares, walkers at most 4 µs."""
+    case = load_case(name)
+    limits = limits_of(case).as_dict()
+    shares = AUTO_FRACTIONS if case.loose else WALKER_FRACTIONS
+    assert shares.keys() == limits.keys()
+    assert all(0.0 < share <= 0.5 for share in shares.values())
+    allowed = min(share * limits[limit] for limit, share in shares.items())
+    longest = allowed if case.loose else min(allowed, LONGEST_WALKER_STEP)
+    assert LONGEST_WALKER_STEP == 4e-6
+    # A cycle is so many whole samples of whole steps: a little less than what is allowed.
+    assert 0.97 * longest < case.run.time_step <= longest

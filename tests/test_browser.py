@@ -12,9 +12,9 @@ import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from tests.conftest import PATIENCE, wait_for
-from tests.test_report import HOSTILE, pile_report, pile_run, swept, swept_report, walked_report, walked_run
+from tests.test_report import HOSTILE, pile_report, swept, swept_report, walked_report, walked_run
 
-__all__ = ["pile_report", "pile_run", "swept", "swept_report", "walked_report", "walked_run"]  # fixtures
+__all__ = ["pile_report", "swept", "swept_report", "walked_report", "walked_run"]  # fixtures
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: make test-browser installs it")

@@ -105,16 +105,6 @@ def test_emulators_know_their_error(known: Emulators) -> None:
         assert emulator.explained > 0.9
 
 
-def test_errors_are_judged_by_the_later_sets() -> None:
-    """A function with a kink where the later sets are: there the error is larger than over the whole range."""
-    later = np.array([0.5, 0.5]) + np.random.default_rng(3).uniform(-0.1, 0.1, (24, 2))
-    unit = np.concatenate([SPACE.design(64, 1), later])
-    kink = np.sign(unit.sum(axis=1) - 1.0) * (np.abs(unit - 0.5).max(axis=1) < 0.12)
-    outcome = (unit[:, 0] + 0.3 * kink)[:, None]
-    found = [emulated(unit, outcome, 0.5, deviation=0.05, filling=of).each[0].error_inflation for of in (0, 64)]
-    assert found[1] > 1.2 * found[0]
-
-
 def test_later_waves_look_around_the_best_sets(tmp_path: Path) -> None:
     found = small(tmp_path)
     unit = next_wave(found, np.zeros((0, 2)), np.zeros((0, 4)), 12, 0)
@@ -231,16 +221,6 @@ def test_few_feasible_sets_and_few_others_can_be_had(made: int) -> None:
     assert low > high - 0.02
     if made in {0, 63, 64}:
         assert (low > 0.8) == (made > 0)
-
-
-def test_errors_of_observations_that_share_runs_go_together() -> None:
-    rng, design = np.random.default_rng(4), SPACE.design(64, 1)
-    noise = 0.1 * rng.standard_normal((64, 2))[:, [0, 0, 1]]
-    noise[:20, 2] = np.nan
-    correlation = emulated(design, design[:, [0, 0, 1]] + noise, 0.5, 0.5, 0.5).correlation
-    assert correlation[0, 1] > 0.6
-    assert abs(correlation[0, 2]) < 0.4
-    assert np.linalg.eigvalsh(correlation).min() > 0.0
 
 
 def test_few_points_are_not_believed_and_more_are_drawn_where_they_weigh(known: Emulators) -> None:

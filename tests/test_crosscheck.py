@@ -3,31 +3,51 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
-from math import inf, sqrt
+from math import cos, inf, pi, sin, sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.conftest import call
+from tests.conftest import call, to_toml
 from walkers import run
 from walkers.check import kernels
 from walkers.check.crosscheck import compare, full_cases, shortened, simulate
 from walkers.check.engine import TERMS, SecondEngine
-from walkers.check.scenes import SCENES, bench_case, full_case, second_engine, standing
+from walkers.check.scenes import (
+    DRY,
+    FLOOR,
+    SCENES,
+    Bench,
+    bench_case,
+    full_case,
+    over,
+    prescribed,
+    recording,
+    second_engine,
+    standing,
+)
 from walkers.inputs import resolve_case
-from walkers.inputs.boundary import BOTTOM, Round, Wall
+from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.reading import load_case, read_toml, shipped_cases
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.laws import law_of
-from walkers.postprocess.motion import Motion
+from walkers.postprocess.dump import FloatArray, local_frames
+from walkers.postprocess.motion import Motion, read_motion
+from walkers.runner.binary import find_engine
+from walkers.runner.failures import EngineError
+from walkers.templates.deck import Checkpoint, Plan, compose
+from walkers.templates.layout import WALL_BRIDGES
+from walkers.templates.scene import Bead
 
 RADIUS, STILL = 3e-4, (0.0, 0.0, 0.0)
-DRY = ("capillary", "lubrication")
+NO_BRIDGES = ("capillary", "lubrication")
 DEPTH = hertz_overlap(4.0 / 3.0 * np.pi * RADIUS**3 * 4000.0 * 9.81, RADIUS, reduced_modulus(5e7, 0.3))
 """Overlap of a bead that lies on a floor."""
 
@@ -45,16 +65,23 @@ def one_bead(
     velocity: Vector = STILL,
     spin: Vector = STILL,
     wall: Wall = BOTTOM,
-    without: tuple[str, ...] = DRY,
+    without: tuple[str, ...] = NO_BRIDGES,
 ) -> SecondEngine:
     """A bead at a wall."""
     return SecondEngine(case, np.array([RADIUS]), np.array([[*place, *velocity, *spin]]), walls=[wall], without=without)
 
 
+def pile(count: int) -> dict[str, Any]:
+    """The tables of the shipped pile, with fewer beads."""
+    tables: dict[str, Any] = read_toml(shipped_cases()["pile-ci"])
+    tables["mixture"] |= {"count": count}
+    return tables
+
+
 @pytest.fixture(scope="module")
-def fig1b(tmp_path_factory: pytest.TempPathFactory) -> Motion:
+def fig1b(run_directory: Callable[..., Path]) -> Motion:
     """Fig. 1b for nine cycles, by LIGGGHTS."""
-    return run(shortened(load_case("fig1b"), 9), tmp_path_factory.mktemp("runs")).motion
+    return read_motion(run_directory(shortened(load_case("fig1b"), 9)))
 
 
 def test_an_elastic_bounce_keeps_its_energy_to_the_order_of_the_step() -> None:
@@ -159,9 +186,7 @@ def test_other_kinds_of_cases_agree(name: str, tmp_path: Path) -> None:
 
 def test_a_restart_keeps_what_is_between_beads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A settling pile follows LIGGGHTS through a restart; it would not if springs between beads were forgotten."""
-    document = read_toml(shipped_cases()["pile-ci"])
-    document["mixture"] |= {"count": 24}
-    motion = run(shortened(resolve_case(document, name="pile"), 9), tmp_path).motion
+    motion = run(shortened(resolve_case(pile(24), name="pile"), 9), tmp_path).motion
     settling = replace(
         motion, **{name: getattr(motion, name)[:7] for name in ("time", "position", "velocity", "spin", "frames")}
     )
@@ -182,7 +207,8 @@ def test_a_restart_keeps_what_is_between_beads(tmp_path: Path, monkeypatch: pyte
 
 
 def test_piles_agree_until_they_are_chaotic(in_folder: Path) -> None:
-    done = call("crosscheck", "pile-ci", "--cycles", "9", "--seeds", "2", "--json", check=True)
+    (in_folder / "pile.toml").write_text(to_toml(pile(16)))
+    done = call("crosscheck", "pile.toml", "--cycles", "9", "--seeds", "2", "--json", check=True)
     (told,) = json.loads(done.stdout)["checks"]
     *means, first, second = [line["what"] for line in told["lines"]]
     seed = load_case("pile-ci").seed
@@ -202,17 +228,84 @@ def test_command(in_folder: Path) -> None:
     assert "velocity" in [line["what"] for line in told["checks"][0]["lines"] if line["verdict"] == "FAIL"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["fig1b", "--without", "magic"], "--without magic: expected one of"),
-        (["fig1b", "--cycles", "1"], "expected at least 3"),
-        (["fig1b", "--seeds", "2"], "--seeds: is for piles"),
-    ],
-)
-def test_bad_input_is_told_once(in_folder: Path, arguments: list[str], told: str) -> None:
-    """One line, exit 2."""
-    done = call("crosscheck", *arguments)
-    assert done.returncode == 2
-    assert told in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+# --- walls of the contact model ---------------------------------------------------------------------------------------
+
+
+GRAVITY = 9.81
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(find_engine(), tmp_path)
+
+
+def _rows(bench: Bench, plan: Plan) -> tuple[FloatArray, FloatArray]:
+    """Contacts of the last step, all columns, and the beads' places then."""
+    plan = replace(plan, recording=replace(plan.recording, wall_bridge_columns=WALL_BRIDGES))
+    series = bench.run(plan)
+    *_, (_, rows) = local_frames(series.directory / "bridges.walls.txt", WALL_BRIDGES)
+    return rows, series.frames[-1, :, :3]
+
+
+def test_a_bead_at_rest_in_a_cylinder_presses_with_its_weight(bench: Bench) -> None:
+    """The cylinder lies on its side: the overlap is Hertz's, the nearest point on the lowest line."""
+    case = bench_case(
+        liquid=DRY, contact={"restitution": 0.3}, environment={"gravity": f"{GRAVITY} m/s^2"},
+        boundary={"tilt": "90 deg", "uphill": "90 deg"},
+    )  # fmt: skip
+    wall, weight = Round(3e-3), 4.0 / 3.0 * pi * RADIUS**3 * case.density * GRAVITY
+    overlap = hertz_overlap(weight, RADIUS, reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio))
+    bead = Bead(0, (0.0, -(wall.radius - RADIUS + overlap), 5e-3), RADIUS)
+    (row,), _ = _rows(bench, Plan(case, standing([bead], [FLOOR, wall]), recording(20_000, 20_000)))
+    told = dict(zip(WALL_BRIDGES, row.tolist(), strict=True))
+    assert told["overlap"] == pytest.approx(overlap, rel=1e-4)
+    assert (told["fx"], told["fy"], told["fz"]) == pytest.approx((0.0, weight, 0.0), rel=1e-4, abs=1e-6 * weight)
+    assert (told["x"], told["y"], told["z"]) == pytest.approx((0.0, -wall.radius, 5e-3), abs=1e-12)
+    assert (told["wall"], told["id"]) == (1, 1)
+
+
+def test_walls_are_as_far_as_the_boundary_says(bench: Bench) -> None:
+    """Planes in any direction and a cylinder: overlaps and nearest points are those of `walkers.inputs.boundary`."""
+    walls: list[Wall] = [Flat((1e-4, 2e-4, -3e-4), (0.48, -0.36, 0.8), "leaning"), Round(2.5e-3)]
+    turn, out = 2.0, 2.5e-3 - RADIUS + 1e-6
+    beads = [over(walls[0], -1e-6, RADIUS), Bead(0, (out * cos(turn), out * sin(turn), 4e-3), RADIUS)]  # type: ignore[arg-type]
+    rows, places = _rows(bench, prescribed(bench_case(), standing(beads, walls), 3))
+    assert rows[:, WALL_BRIDGES.index("wall")].tolist() == [0, 1]
+    for wall, row, place in zip(walls, rows, places, strict=True):
+        distance, normal = float(wall.distances(place)), wall.normals(place)
+        np.testing.assert_allclose(row[:3], place - distance * normal, atol=1e-12)
+        np.testing.assert_allclose(row[3:6], place, atol=1e-12)
+        assert row[-1] == pytest.approx(RADIUS - distance, abs=1e-13)
+
+
+REFUSED_WALLS = {
+    "plane 0 0 0 0 0 1": "expected a type",
+    "type 3 plane 0 0 0 0 0 1": "expected a type",
+    "type 2": "expected a plane or a cylinder",
+    "type 2 plane 0 0 0 0 0 0": "a normal of no length",
+    "type 2 cylinder 0 0 -1": "a radius that is not above 0",
+    "type 2 cylinder 0 0": "ends early",
+    "type 2 wobble": "unknown keyword wobble",
+    "type 2 plane 0 0 0 0 0 1 frame moon": "expected lab or walls, not moon",
+    "type 2 plane 0 0 0 0 0 1 loads missing.txt": "missing.txt has no loads",
+    "type 2 plane 0 0 0 0 0 1 loads bridges.txt": "bridges.txt has no loads",
+}
+
+
+@pytest.mark.parametrize("command", REFUSED_WALLS)
+def test_commands_that_are_refused(bench: Bench, command: str) -> None:
+    deck = compose(prescribed(bench_case(), standing([over(FLOOR, 0.0, RADIUS)]), 3))
+    lines = deck.text.replace("&\n", " ").splitlines()
+    changed = [f"fix walls all wall/bridge {command}" if "wall/bridge" in line else line for line in lines]
+    with pytest.raises(EngineError, match=REFUSED_WALLS[command]):
+        bench.run(replace(deck, text="\n".join([*changed, ""])))
+
+
+def test_a_restart_with_other_walls_is_refused(bench: Bench) -> None:
+    case, beads = bench_case(), [over(FLOOR, -1e-6, RADIUS)]
+    first = prescribed(case, standing(beads), 10, checkpoint=Checkpoint(write="half.restart"))
+    carry = bench.run(first).directory / "half.restart"
+    scene = standing(beads, [FLOOR, Round(2.5e-3)])
+    second = replace(first, recording=replace(recording(20), begin=10), checkpoint=Checkpoint(read="half.restart"))
+    with pytest.raises(EngineError, match="another number of walls"):
+        bench.run(replace(second, scene=scene), carry)

@@ -8,12 +8,16 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+
+# --- what the engine takes --------------------------------------------------------------------------------------------
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import walkers
 from tests.conftest import PROGRAM, SHORT, call, document, fill, make_case, mounted, to_toml
 from tests.test_calibration import reduced
 from walkers import run as run_case
@@ -21,11 +25,13 @@ from walkers.calibration.calibrate import _determinants, _kept, calibrate
 from walkers.inputs import InputError, load_case
 from walkers.inputs.calibration import read_calibration
 from walkers.inputs.reading import read_toml
-from walkers.inputs.sweep import expand
+from walkers.physics.bridge import Surfaces
+from walkers.physics.laws import law_of
 from walkers.postprocess import read_result, tabulate
 from walkers.postprocess.analysis import current_result
-from walkers.postprocess.dump import DumpError, local_frames
+from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
 from walkers.postprocess.motion import read_bridges, read_motion
+from walkers.runner import finished_run
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, write_deck
 from walkers.runner.failures import DiskFull, EngineError
@@ -34,8 +40,7 @@ from walkers.runner.manifest import FileChanged, forget_tables
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import load as load_table
 from walkers.templates import render_deck
-
-# --- what the engine takes --------------------------------------------------------------------------------------------
+from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
 
 
 def test_limits_of_restitution_and_modulus_are_the_engines(tmp_path: Path) -> None:
@@ -267,24 +272,6 @@ def test_a_result_whose_making_was_killed_is_made_anew(short_run: Path) -> None:
     assert json.loads((run / "manifest.json").read_text())["sha256"].keys() >= set(names)
 
 
-@pytest.mark.parametrize(
-    ("axes", "told"),
-    [
-        ({"axes": {"drive.frequency": ["80 Hz", "80.0 Hz"]}}, r'"80\.0 Hz": expected different'),
-        ({"axes": {"drive.frequency": {"linspace": ["80 Hz", "80 Hz", 3]}}}, "expected different values"),
-        (
-            {"sample": [{"points": 4, "ranges": {"contact.restitution": {"uniform": [0.3, 0.2]}}}]},
-            r"contact\.restitution = .*uniform.*: expected the smaller value first",
-        ),
-        ({"axes": {"run.silence": ["1 s", "2 s"]}}, r"run\.silence: does not vary"),
-        ({"axes": {"title": ["a", "b"]}}, "title: does not vary"),
-    ],
-)
-def test_axes_that_would_make_the_same_point_twice_are_refused(axes: dict[str, Any], told: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=told):
-        expand({"case": "fig1b", **axes}, source="test", name="test", folder=tmp_path)
-
-
 def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(short_case: Path, tmp_path: Path) -> None:
     call("sweep", "sweep.toml", check=True)
     commands = {
@@ -372,3 +359,79 @@ def test_calibrations_that_make_no_sense_are_refused_before_anything_is_written(
     with pytest.raises(InputError, match=r"bad\.toml: parameters\.drag\.range = \[0\.01, 0\.9\]: contact\.restitution"):
         calibrate(found, tmp_path / "runs", Options(1))
     assert not (tmp_path / "runs").exists()
+
+
+# --- readers of dumps -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def directory(run_directory: Callable[..., Path]) -> Path:
+    return run_directory(dimers={"replicates": 2}, run=SHORT)
+
+
+COLUMNS = (*BEAD_COLUMNS, *MEAN_SPIN_COLUMNS)
+
+
+@pytest.fixture(scope="module")
+def beads(directory: Path) -> Path:
+    """The engine's dump of the beads."""
+    return directory / FIRST_SEGMENT / "beads.bin"
+
+
+def test_all_frames_are_read(directory: Path, beads: Path) -> None:
+    run = finished_run(directory)
+    assert run is not None
+    dump = BinaryDump(beads, COLUMNS)
+    assert len(dump) == run.layout.frames == 61
+    assert not dump.truncated
+    np.testing.assert_array_equal(np.diff(dump.steps), run.layout.sample_every)
+    frames = dump.stack()
+    assert frames.shape == (61, 4, len(COLUMNS))
+    np.testing.assert_array_equal(frames[:, :, dump.column("id")], np.tile(np.arange(1, 5), (61, 1)))
+    np.testing.assert_allclose(frames[0, :, dump.column("radius")], [3e-4, 2e-4, 3e-4, 2e-4], rtol=1e-15)
+    assert beads.stat().st_size == run.layout.bead_dump_bytes
+
+
+@pytest.mark.parametrize("cut", [1, 8, 200, 470, 550])  # of a frame of 704 bytes, 104 of them its head
+def test_a_truncated_last_frame_is_left_out_and_told(beads: Path, tmp_path: Path, cut: int) -> None:
+    whole = beads.read_bytes()
+    short = tmp_path / "short.bin"
+    short.write_bytes(whole[:-cut])
+    dump = BinaryDump(short, COLUMNS)
+    assert dump.truncated
+    assert len(dump) == 60
+    np.testing.assert_array_equal(dump.stack(), BinaryDump(beads, COLUMNS).stack()[:60])
+    short.write_bytes(b"")
+    empty = BinaryDump(short, COLUMNS)
+    assert (len(empty), empty.truncated) == (0, False)
+
+
+@pytest.mark.parametrize("contents", [b"no dump at all, but text that is long enough for a header" * 5, b"\xff" * 500])
+def test_what_is_no_dump_or_has_other_columns_is_refused(contents: bytes, beads: Path, tmp_path: Path) -> None:
+    with pytest.raises(DumpError, match="2 columns"):
+        BinaryDump(beads, ("id", "x"))
+    (tmp_path / "other.bin").write_bytes(contents)
+    with pytest.raises(DumpError, match=r"other\.bin"):
+        BinaryDump(tmp_path / "other.bin", BEAD_COLUMNS)
+    with pytest.raises(DumpError, match=r"other\.bin"):
+        list(local_frames(tmp_path / "other.bin", ("x",)))
+
+
+def test_an_open_bridge_pulls_with_the_capillary_force(tmp_path: Path) -> None:
+    """Shaken vertically beyond what bridges hold, contacts open: the force is the law's at the gap."""
+    case = make_case(
+        drive={"axis": "z", "peak_acceleration": "20 g"},
+        liquid={"dynamic_viscosity": "1e-9 mPa*s"},
+        run={"cycles": 10, "settling_cycles": 2, "bridge_samples_per_cycle": 20},
+    )
+    bridges = walkers.run(case, tmp_path).table("bridges")
+    # Until the beads first part, 5 ms on: then their bridge's liquid is shared out anew and the volumes change.
+    opened = bridges[~bridges["touching"] & (bridges["time"] < 5e-3)]
+    assert set(opened["contact"]) >= {1, 3}  # a bead on the substrate and bead on bead
+    large, small = case.walkers[0].radii
+    ends = {1: (large, inf), 2: (small, inf), 3: (small, large)}
+    for contact, gap, found in opened[["contact", "gap", "normal_force"]].itertuples(index=False):
+        surfaces = Surfaces.of(*ends[contact], case.liquid, case.contact.minimum_separation_ratio)
+        curve = law_of(case.liquid)(surfaces)
+        assert gap < curve.rupture
+        assert found == pytest.approx(curve.forces(np.array([gap])).pull[0], rel=1e-6)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import sin
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,9 @@ from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import law_of
 from walkers.postprocess.gait import Walk, gait, settled_samples, walk
 from walkers.postprocess.motion import Group
+from walkers.runner import find_engine, launch
+from walkers.runner.directory import write_deck
+from walkers.templates import render_deck
 
 Walked = Callable[..., Walk]
 Moved = Callable[..., Group]
@@ -143,16 +147,6 @@ def test_bead_on_a_still_substrate_stays_where_it_is(trajectory: Moved) -> None:
     assert first[0, 2] < moved.radii[0]
 
 
-def test_shaking_along_y_is_shaking_along_x_turned(walked: Walked) -> None:
-    assert walked(drive={"axis": "y"}).velocity[0] == pytest.approx(walked().velocity[0], rel=1e-3)
-
-
-def test_weight_is_neglectable_beside_the_capillary_forces(walked: Walked) -> None:
-    """The paper's model leaves gravity out; without it the walker still walks, at nearly the same speed."""
-    weightless = walked(environment={"gravity": "0 m/s^2"}).velocity[0]
-    assert weightless == pytest.approx(walked().velocity[0], rel=0.1)
-
-
 def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(trajectory: Moved) -> None:
     contact = {
         "friction": {"bead_bead": 0.2, "bead_wall": 0.2},
@@ -165,3 +159,50 @@ def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(
     symmetric = trajectory(dimers={"radii": ["0.25 mm", "0.25 mm"], "angle": "5 deg"}, **common).orientation[-1, 0]
     assert abs(sin(asymmetric)) < 0.5 * sin(np.radians(5.0))
     assert abs(sin(symmetric)) > 2.0 * sin(np.radians(5.0))
+
+
+# --- replicates -------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def ensemble() -> Case:
+    """The shipped walker of Fig. 1b, six replicates, ten cycles."""
+    case = load_case("fig1b")
+    return replace(case, run=replace(case.run, cycles=10, settling_cycles=4, until_steady=False))
+
+
+def test_replicates_are_perturbed_and_keep_their_distance(trajectory: Callable[..., Group], ensemble: Case) -> None:
+    moved = trajectory(ensemble)
+    assert [walker.facing for walker in moved.walkers] == [1, -1, 1, -1, 1, -1]
+    angles = [walker.start_angle for walker in moved.walkers]
+    assert len(set(angles)) == 6
+    assert max(map(abs, angles)) <= np.radians(1.0)
+    np.testing.assert_allclose(moved.orientation[0], angles, atol=1e-12)
+    overlaps = moved.radii[0] - moved.position[0, :, 0, 2]
+    assert len(set(overlaps)) == 6
+    assert np.all(overlaps > 0.0)
+    centre = moved.mass_centre[..., :2]
+    first, second = np.triu_indices(6, 1)
+    assert np.linalg.norm(centre[:, first] - centre[:, second], axis=-1).min() > 0.5 * ensemble.walkers[0].spacing
+    other = {walker.start_angle for walker in render_deck(replace(ensemble, seed=2)).layout.walkers}
+    assert not other & set(angles)
+
+
+def test_reporting_bridges_does_not_disturb_the_walkers(tmp_path: Path, ensemble: Case) -> None:
+    """The engine evaluates contacts once more to report them; that must leave no trace in the motion."""
+    deck = render_deck(ensemble)
+    reports = ("compute pair_bridges", "dump pairs", "dump walls", "dump_modify pairs", "dump_modify walls")
+    silent = [line for line in deck.text.splitlines() if not " ".join(line.split()).startswith(reports)]
+    assert len(silent) == len(deck.text.splitlines()) - len(reports)
+    dumps = []
+    for name, text in (("reporting", deck.text), ("silent", "\n".join(silent) + "\n")):
+        directory = tmp_path / name
+        directory.mkdir()
+        frames = deck.layout.bridge_frames if name == "reporting" else 0
+        changed = replace(deck, text=text, layout=replace(deck.layout, bridge_frames=frames))
+        write_deck(changed, directory)
+        launch(changed, directory, find_engine())
+        dumps.append((directory / "beads.bin").read_bytes())
+    assert (tmp_path / "reporting" / "bridges.pairs.txt").exists()
+    assert not (tmp_path / "silent" / "bridges.pairs.txt").exists()
+    assert dumps[0] == dumps[1]

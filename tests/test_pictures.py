@@ -1,26 +1,34 @@
-"""Figures, renderings and files for ParaView, read back."""
+"""Figures, renderings, films, files for ParaView and other programs, read back."""
 
 import re
+import shutil
+import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import imageio_ffmpeg
 import meshio
 import numpy as np
 import pytest
 import pyvista as pv
-from matplotlib import rcParams
-from matplotlib.colors import to_rgb
+from ase.io import read
 from PIL import Image
 
+from tests.conftest import call
 from tests.printed import letters, spoilt
 from walkers.inputs import InputError
-from walkers.postprocess import Group, read_motion, read_table
+from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Plane
+from walkers.postprocess import Group, Motion, read_motion, read_table
 from walkers.postprocess.analysis import plot_run
 from walkers.postprocess.drawing import series_look, styled
 from walkers.postprocess.figures import walk_figures
+from walkers.postprocess.films import FilmOptions, film_times
 from walkers.postprocess.paraview import write_paraview, write_vtk
+from walkers.postprocess.scene import Scene, Window, camera_axes, mesh_of, walls_of
 from walkers.postprocess.series import render_series
+from walkers.postprocess.trajectory_files import box_of
 
 
 @pytest.fixture(scope="module")
@@ -140,20 +148,9 @@ def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
 
 
 def test_a_dozen_walkers_are_told_apart() -> None:
-    """By dashes or marker; and neighbours by colour too, also by those who see no red or no green.
-
-    Simulation of colour vision deficiency: Machado, Oliveira and Fernandes, doi.org/10.1109/TVCG.2009.113, severity 1.
-    """
+    """By dashes or marker."""
     looks = styled(lambda: [series_look(number) for number in range(12)])()
     assert len({(look["linestyle"], look["marker"]) for look in looks}) == 12
-    colours = np.array([to_rgb(colour) for colour in styled(lambda: rcParams["axes.prop_cycle"].by_key()["color"])()])
-    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
-    protanopia = [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
-    deuteranopia = [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
-    for seen in (np.eye(3), np.array(protanopia), np.array(deuteranopia)):
-        shown = np.clip(linear @ seen.T, 0.0, 1.0) ** (1.0 / 2.4)
-        apart = np.linalg.norm(shown[:, None] - shown, axis=-1)
-        assert apart[np.triu_indices(len(shown), 1)].min() > 0.1
 
 
 @pytest.mark.parametrize("apart", [None, 0.025])
@@ -165,3 +162,176 @@ def test_rendering_shows_ruby_beads_on_a_grey_floor_and_cuts_nothing(
     assert 0.02 < np.mean((pixels[..., 0] > 1.8 * pixels[..., 1]) & (pixels[..., 0] > 60)) < 0.5
     assert np.mean(np.ptp(pixels, axis=-1) < 25) > 0.4
     assert all((edge == 255).all() for edge in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]))
+
+
+# --- films ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def filmed(run_directory: Callable[..., Path]) -> Path:
+    return run_directory(dimers={"replicates": 2}, run={"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 20})
+
+
+@pytest.fixture(scope="module")
+def motion(filmed: Path) -> Motion:
+    return read_motion(filmed).driven
+
+
+def test_places_between_frames_lie_on_the_motion(motion: Motion) -> None:
+    """Each second frame, predicted from its neighbours, to a hundredth of what it moves meanwhile."""
+    between = motion.select(slice(None, None, 2)).between(0.5).position
+    errors = np.abs(between - motion.position[1::2]).max(axis=(1, 2))[20:60]
+    moved = np.abs(np.diff(motion.position, axis=0)).max()
+    assert errors.max() < 0.1 * moved
+    assert np.median(errors) < 0.01 * moved
+
+
+def test_pictures_are_as_far_apart_as_the_slow_motion_says(motion: Motion) -> None:
+    times = film_times(motion, FilmOptions(slowdown=20.0))
+    np.testing.assert_allclose(np.diff(times.time), 1.0 / 500.0, atol=1e-12)
+    assert not times.stroboscopic
+    np.testing.assert_allclose(times.frame * np.median(np.diff(motion.time)), times.time, atol=1e-12)
+    assert film_times(motion, FilmOptions()).slowdown == 100.0  # 0.1 s in ten seconds
+    strobed = film_times(motion, FilmOptions(slowdown=1.0))
+    cycles = strobed.time * motion.case.drive.frequency
+    assert strobed.stroboscopic
+    np.testing.assert_allclose(cycles, np.round(cycles), atol=1e-9)
+    part = film_times(motion, FilmOptions(slowdown=20.0, begin=0.02, end=0.05))
+    assert (part.time[0], len(part.time)) == (pytest.approx(0.02), 16)
+
+
+def test_a_scale_bar_is_as_long_as_beads_say(motion: Motion) -> None:
+    """The red of one bead, seen without perspective, is as wide and as high as its diameter in pixels."""
+    single = motion.of_walkers(motion.walkers[:1]).select(slice(1))
+    single = replace(single.select(beads=np.array([0])), walkers=(replace(single.walkers[0], beads=(0,)),))
+    window = Window(Scene.around(single, camera_axes(single), 1.2, shaken=False), (400, 300))
+    picture = window.picture(0).astype(int)
+    window.close()
+    diameter = 2e3 * motion.radius[0] * window.pixels_per_mm
+    for places in np.nonzero(picture[..., 0] > 1.3 * picture[..., 1]):
+        assert np.ptp(places) + 1 == pytest.approx(diameter, abs=2.5)
+
+
+def test_up_in_the_picture_is_up_against_gravity(motion: Motion) -> None:
+    for degrees in (0.0, 10.0, 90.0):
+        boundary = replace(motion.case.boundary, tilt=np.radians(degrees))
+        tilted = replace(motion, case=replace(motion.case, boundary=boundary))
+        right, up, toward = axes = camera_axes(tilted)
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+        gravity = np.array(tilted.case.gravity_vector)
+        assert right @ gravity == pytest.approx(0.0, abs=1e-9)
+        assert up @ gravity < 0.0
+        assert toward[2] > 0.5  # nobody looks from below
+
+
+def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(filmed: Path, tmp_path: Path) -> None:
+    path = tmp_path / "here" / "walk.mp4"
+    done = call("film", str(filmed), "--to", str(path), "--size", "360p", "--fps", "10", "--slowdown", "10")
+    assert (done.returncode, done.stdout.strip()) == (0, str(path))
+    about, *read = imageio_ffmpeg.read_frames(str(path))
+    assert (about["size"], about["fps"], len(read)) == ((640, 360), 10.0, 11)
+    pictures = [np.frombuffer(each, np.uint8).reshape(360, 640, 3).astype(int) for each in read]
+    ruby = [(one[..., 0] > 2.0 * one[..., 1]) & (one[..., 0] > 60) for one in pictures]
+    assert all(0.02 < one.mean() < 0.4 for one in ruby)
+    assert (ruby[0] != ruby[-1]).mean() > 0.01
+    options = ["--size", "160x90", "--fps", "20", "--slowdown", "10", "--until", "0.05 s", "--walker", "1"]
+    call("film", str(filmed), "--to", str(tmp_path / "walk.gif"), *options, check=True)
+    film = Image.open(tmp_path / "walk.gif")
+    assert (film.size, film.n_frames, film.info["duration"], film.info["loop"]) == ((160, 90), 11, 50, 0)
+
+
+@pytest.mark.parametrize(
+    ("boundary", "faces", "edges"),
+    [
+        (Plane(material="glass"), 1, 4),
+        (Channel(material="glass", width=2e-3), 3, 8),
+        (Box(material="glass", width=2e-3, height=4e-3), 5, 4),
+        (Cylinder(material="glass", width=2e-3, height=4e-3), 65, 64),
+    ],
+)
+def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Boundary, faces: int, edges: int) -> None:
+    """Beads high above the floor of a container, or far from the middle of what has no end; seams are at the ends."""
+    away = [0.0, 0.0, 2e-3] if boundary.closed else [5e-2, 0.0, 0.0]
+    beads = motion.position - motion.position.mean(axis=(0, 1)) + away
+    moved = replace(motion, position=0.1 * (beads - away) + away, case=replace(motion.case, boundary=boundary))
+    walls = mesh_of(walls_of(moved)).clean(tolerance=1e-9, absolute=True)
+    assert (walls.n_cells, walls.bounds[4]) == (faces, pytest.approx(0.0, abs=1e-12))
+    assert walls.n_open_edges == edges
+
+
+# --- trajectories for other programs ----------------------------------------------------------------------------------
+
+
+def test_ase_reads_the_extended_xyz(filmed: Path, motion: Motion, tmp_path: Path) -> None:
+    path = tmp_path / "here" / "walk.xyz"
+    done = call("export", str(filmed), "--to", str(path), "--every", "4", check=True)
+    assert done.stdout.strip() == str(path)
+    frames = read(path, ":")
+    assert len(frames) == 41
+    for number, one in enumerate(frames):
+        frame = 4 * number
+        np.testing.assert_allclose(one.positions, 1e3 * motion.position[frame], rtol=0.0, atol=6e-9)
+        np.testing.assert_allclose(one.arrays["velo"], 1e3 * motion.velocity[frame], rtol=0.0, atol=6e-9)
+        np.testing.assert_allclose(one.arrays["omega"], motion.spin[frame], rtol=0.0, atol=6e-9)
+        assert one.info["Time"] == pytest.approx(motion.time[frame], abs=1e-12)
+        assert not one.pbc.any()
+    np.testing.assert_array_equal(frames[0].arrays["radius"], [0.3, 0.2, 0.3, 0.2])
+    np.testing.assert_array_equal(frames[0].arrays["walker"], [0, 0, 1, 1])
+    np.testing.assert_array_equal(frames[0].arrays["large"], [1, 0, 1, 0])
+    np.testing.assert_array_equal(frames[0].arrays["id"], [1, 2, 3, 4])
+    low, high = box_of(motion.select(slice(None, None, 4)))
+    np.testing.assert_allclose(frames[0].cell.lengths(), high - low)
+    np.testing.assert_allclose(frames[0].info["Origin"], low)
+
+
+def test_ase_reads_the_lammps_dump(filmed: Path, motion: Motion, tmp_path: Path) -> None:
+    path = tmp_path / "walk.lammpstrj"
+    call("export", str(filmed), "--to", str(path), check=True)
+    frames = read(path, ":", format="lammps-dump-text", units="si")  # ASE makes Å of m, and of the numbers as well
+    assert len(frames) == len(motion.time)
+    for frame in (0, 7, 160):
+        np.testing.assert_allclose(1e-10 * frames[frame].positions, 1e3 * motion.position[frame], rtol=1e-9, atol=1e-12)
+    header, *rows = path.read_text().split("ITEM: ATOMS ")[8].splitlines()
+    columns = header.split()
+    table = np.array([row.split() for row in rows[: len(motion.radius)]], dtype=np.float64)
+    for first, values in (("radius", 1e3 * motion.radius[:, None]), ("vx", 1e3 * motion.velocity[7])):
+        begin = columns.index(first)
+        np.testing.assert_allclose(table[:, begin : begin + values.shape[1]], values, rtol=1e-9)
+    begin = columns.index("omegax")
+    np.testing.assert_allclose(table[:, begin : begin + 3], motion.spin[7], rtol=1e-9)
+    np.testing.assert_array_equal(table[:, :3], [[1, 1, 1], [2, 2, 1], [3, 1, 2], [4, 2, 2]])
+    steps = [int(text.split()[0]) for text in path.read_text().split("ITEM: TIMESTEP\n")[1:]]
+    np.testing.assert_allclose(np.array(steps) * motion.case.run.time_step, motion.time, atol=1e-12)
+
+
+def test_the_script_for_paraview_is_beside_its_files(filmed: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "vtk"
+    for _ in range(2):  # a folder that it wrote may be written again
+        done = call("paraview", str(filmed), "--to", str(folder), check=True)
+    script = Path(done.stdout.strip())
+    assert (script.parent, (folder / "walkers.pvd").is_file()) == (folder, True)
+    compile(script.read_text(), script, "exec")
+
+
+def test_pvpython_shows_spheres_bridges_and_floor(filmed: Path, tmp_path: Path) -> None:
+    program, screen = shutil.which("pvpython"), shutil.which("xvfb-run")
+    if program is None or screen is None:
+        pytest.skip("pvpython (Debian: paraview, python3-paraview) and xvfb-run (xvfb) are not both installed")
+    script = Path(call("paraview", str(filmed), "--to", str(tmp_path / "vtk"), check=True).stdout.strip())
+    script = script.parent.rename(tmp_path / "moved") / script.name  # the files are found beside it
+    picture = tmp_path / "walkers.png"
+    command = [screen, "-a", program, str(script), str(picture), "0.05"]
+    for _ in range(3):  # under load it may not wait long enough for its screen
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path)
+        if picture.exists():
+            break
+    assert picture.exists(), done.stderr[-2000:]
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    assert pixels.shape == (720, 1280, 3)
+    red, blue = (
+        (pixels[..., first] > 1.5 * pixels[..., last]) & (pixels[..., first] > 60) for first, last in ((0, 2), (2, 0))
+    )
+    assert 0.005 < red.mean() < 0.5  # one walker
+    assert 0.005 < blue.mean() < 0.5  # the other
+    assert (np.ptp(pixels - [199, 209, 217], axis=-1) < 12).mean() > 0.1  # the floor
+    assert (pixels[:60, :200].max(axis=-1) < 80).sum() > 50  # the time

@@ -22,7 +22,7 @@ import pandas as pd
 import pytest
 
 import walkers
-from tests.conftest import PROGRAM, call, engines_in, open_run, to_toml, wait_for
+from tests.conftest import HALF, PROGRAM, call, engines_in, open_run, to_toml, wait_for
 from tests.printed import spoilt
 from walkers.inputs import Case, InputError, load_case, resolve_case, shipped_cases
 from walkers.inputs.sweep import expand
@@ -35,7 +35,7 @@ from walkers.postprocess.tables import described
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
 from walkers.runner.failures import EngineError, EngineKilled, RunBusy
-from walkers.sweeps.climbing import conditions_in, describe_climbs, leaders, summarise_climbs, survival
+from walkers.sweeps.climbing import conditions_in, describe_climbs, leaders, summarise_climbs
 from walkers.sweeps.run import plan_sweep, run_sweep
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import Site, SiteFile
@@ -56,23 +56,15 @@ def small(**changes: dict[str, Any]) -> Case:
 
 FloatArray = npt.NDArray[np.float64]
 Once = Callable[[str, Callable[[Path], object]], Path]
-# Half as long as it ships, in as many segments.
-HALF = {"duration": "0.1 s", "segment": "0.05 s"}
 # Two thirds of the steps of "auto"; the beads are shaken as soon as they have come down.
 QUICK = {"time_step": "3 us", "longest_settling": "0.05 s"}
 # Three segments of the drive, each as short as it can be and still have frames.
 BRIEF = {"duration": "0.045 s", "segment": "0.015 s", **QUICK}
 
 
-@pytest.fixture(scope="session")
-def run(once: Once) -> Path:
-    """The shipped pile of 60 beads."""
-
-    def make(out: Path) -> None:
-        assert not walkers.run(small(run=HALF), out).cached
-
-    (directory,) = once("piles", make).glob("pile-ci-*")
-    return directory
+@pytest.fixture
+def run(pile_run: Path) -> Path:
+    return pile_run
 
 
 def brief() -> Case:
@@ -252,14 +244,6 @@ def test_an_interrupted_pile_goes_on_bit_for_bit(killed: Killed, tmp_path: Path)
     assert kept == [False, False, True, True]
 
 
-@pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
-def test_two_ranks_make_the_same_kind_of_pile(run: Path, tmp_path: Path) -> None:
-    finished = walkers.run(small(run={"ranks": 2, "duration": "0.015 s", **QUICK}), tmp_path)
-    one, two = current_result(run), finished.result
-    assert two["surface"]["start"] == pytest.approx(one["surface"]["start"], rel=0.15)  # another packing
-    assert two["beads"] == one["beads"]
-
-
 def test_both_frames_shake_alike(tmp_path: Path) -> None:
     """Until chaotic trajectories part; in the laboratory the container's motion is taken off at any phase."""
     run = {"duration": "0.03 s", "frames_per_second": 680.0, **QUICK}
@@ -401,7 +385,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
         edges = picture.point_data.active_scalars.reshape(up, across, -1)[..., :3]
         assert all((edge == 255).all() for edge in (edges[0], edges[-1], edges[:, 0], edges[:, -1]))  # nothing is cut
     told("film", str(run), "--to", "one.gif", "--fps", "10", "--size", "64x64", "--until", "8 ms")  # within a frame
-    film = told("film", str(run), "--to", "here/box.mp4", "--fps", "10", "--size", "360p", "--slowdown", "5")
+    film = told("film", str(run), "--to", "here/box.mp4", "--fps", "10", "--size", "160x120", "--slowdown", "5")
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(film)
     assert frames == int(50.0 * motion.time[-1]) + 1
     assert seconds == pytest.approx(5.0 * motion.time[-1], abs=0.1)
@@ -417,20 +401,6 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     (in_folder / "pile-ci.toml").write_text(to_toml(document(run=HALF)))
     assert "60 beads" in told("run", "pile-ci.toml", "--out", str(run.parent))
     assert "Not yet" in told("deck", "pile-ci")
-    refusals = [
-        ["render", "--interval", "3 s"],
-        ["render", "--interval", "soon"],
-        ["render", "--interval", "T/4"],  # frames are whole cycles apart
-        ["render", "--walker", "1"],
-        ["film", "--walker", "0"],
-        ["film", "--to", "box.png"],
-        ["render", "--to", "box.jpg"],
-        ["vtk", "--as-placed"],
-        ["paraview", "--as-placed"],
-    ]
-    for command in (["theory", "pile-ci"], *([name, str(run), *options] for name, *options in refusals)):
-        refused = call(*command)
-        assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
 
 
 def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
@@ -521,16 +491,6 @@ def test_runs_of_different_lengths_tell_one_probability(monkeypatch: pytest.Monk
     assert summed_up(monkeypatch, results, within=7.0)["probability"] is None
 
 
-def test_none_or_all_that_climbed_have_an_interval_too() -> None:
-    """Of the runs that are long enough, by Clopper and Pearson."""
-    watched = np.array([0.5, 0.5, *[4.0] * 6])
-    none, every = (survival(np.full(8, first), watched, 4.0) for first in (np.inf, 1.0))
-    assert (none["probability"], none["ended"], none["censored"]) == (0.0, 2, 8)
-    assert none["interval"] == pytest.approx([0.0, 1.0 - 0.025 ** (1.0 / 6.0)])
-    assert (every["probability"], every["climbed"], every["median"]) == (1.0, 6, 1.0)
-    assert every["interval"] == pytest.approx([0.025 ** (1.0 / 6.0), 1.0])
-
-
 def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Unless another engine, or another version of the decks, made them."""
     cases = {}
@@ -561,7 +521,7 @@ def test_leaders_by_chance() -> None:
 
 
 def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tmp_path: Path) -> None:
-    """The same dimer as `tests.test_climber`'s, by the other way: a box, the pile's recording, clusters, climbs.
+    """The same dimer as that of `tests.test_bodies`, by the other way: a box, the pile's recording, clusters, climbs.
 
     On the wall across from it is one led by its small bead.
     """

@@ -160,29 +160,6 @@ def test_shells_complete_commands_names_runs_and_sweeps(
 # --- what a word names ------------------------------------------------------------------------------------------------
 
 
-def test_an_input_of_another_kind_is_told_with_its_command(looked_through: Path, tmp_path: Path) -> None:
-    sweep, case, grid = tmp_path / "mine.toml", looked_through.parent / "base.toml", str(looked_through / "grid")
-    sweep.write_text('case = "fig1b"\n[axes]\ndrive.frequency = ["60 Hz"]\n')
-    run = str(Path(walkers.load(grid)["run"][0]).resolve())
-    for arguments, told in (
-        (("run", "fig2"), "fig2: is a sweep: walkers sweep fig2"),
-        (("show", str(sweep)), f"is a sweep: walkers sweep {sweep}"),
-        (("deck", grid), "is a sweep's directory: walkers table"),
-        (("run", run), f"is a run's directory: walkers result {run}"),
-        (("sweep", "fig1b"), "fig1b: is a case: walkers run fig1b"),
-        (("sweep", str(case)), f"is a case: walkers run {case}"),
-        (("sweep", grid), "is a sweep's directory"),
-        (("theory", "ruby"), "ruby: is a calibration: walkers calibrate ruby"),
-        (("calibrate", "fig2"), "fig2: is a sweep"),
-        (("result", grid), "a sweep's directory: walkers plot, table and status take it"),
-        (("compare", grid, run), f"{grid}: is a sweep, to be compared with another sweep"),
-        (("climb", grid), f"{grid}: expected a finished run of a pile"),
-    ):
-        done = call(*arguments)
-        assert done.returncode == 2
-        assert told in done.stderr
-
-
 def test_a_folder_does_not_shadow_the_run_of_the_case_that_it_is_named_like(in_folder: Path) -> None:
     call("deck", "fig1b", "--to", "fig1b", check=True)
     place = run_case(load_case("fig1b", {"run.cycles": 6, "run.settling_cycles": 2}), in_folder / "short").directory

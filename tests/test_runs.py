@@ -286,7 +286,7 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(
         pass
 
 
-@pytest.mark.parametrize("kills", [6, pytest.param(50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [4, pytest.param(50, marks=pytest.mark.slow)])
 def test_after_each_kill_the_next_call_runs(tmp_path: Path, kills: int) -> None:
     """The launcher is killed before, at and after the birth of its engine; whoever calls then gets the run."""
     draw = random.Random(14)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.conftest import document, make_case
+from tests.conftest import document
 from walkers import run as run_case
 from walkers.inputs import load_case, resolve_case
 from walkers.inputs.case import Case
@@ -172,16 +172,3 @@ def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
         dumps.append([(path / "beads.bin").read_bytes() for path in run.segments])
     assert len(dumps[0]) == 1
     assert dumps[0] == dumps[1]
-
-
-def test_several_drives_have_a_force_each_in_one_deck(tmp_path: Path) -> None:
-    """Of one gravity and drive a deck is as anybody would write it; of several it reads loads bead by bead."""
-    first = make_case(dimers={"spacing": "80 mm"})
-    second = replace(first, drive=first.drive.with_peak(20.0))
-    engine = find_engine()
-    single = next(iter(make_runs([first], tmp_path / "single", engine).runs.values())).directory / FIRST_SEGMENT
-    assert "fix             gravity" in (single / "walker.lig").read_text()
-    shared = next(iter(make_runs([first, second], tmp_path / "shared", engine).runs.values())).directory
-    loads = np.loadtxt(shared / "shared_deck" / "loads.txt")
-    drives = [first.drive.peak_acceleration] * 2 + [20.0] * 2
-    np.testing.assert_allclose(loads, [(number, 0, 0, -9.81, a, 0, 0) for number, a in enumerate(drives, 1)])

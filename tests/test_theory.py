@@ -131,13 +131,6 @@ def test_many_walkers_are_what_each_is_alone() -> None:
     np.testing.assert_array_equal(walk(walker, friction, 80.0, accelerations, cycles=6).velocity, alone)
 
 
-def test_the_threshold_of_coulomb_friction_does_not_depend_on_the_frequency() -> None:
-    contact = {"friction": {"bead_bead": 0.1, "bead_wall": 0.1}}
-    found = [threshold(make_case(contact=contact, drive={"frequency": f}), viscous=False) for f in ("60 Hz", "90 Hz")]
-    assert found[0] == pytest.approx(found[1], rel=0.01)  # moving is a speed, and speeds go as 1/f
-    assert 0.05 < found[0] < 0.15
-
-
 @pytest.mark.parametrize("friction", [0.05, 0.3])
 def test_theory_and_engine_agree_on_the_threshold(tmp_path: Path, friction: float) -> None:
     """The engine's walkers are lowered in steps of a tenth of the predicted threshold."""
