@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from tests.conftest import call
-from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Plane
+from walkers.inputs.boundary import Boundary
 from walkers.postprocess import read_motion
 from walkers.postprocess.films import FilmOptions, film_times
 from walkers.postprocess.motion import Motion
@@ -113,10 +113,10 @@ def test_what_cannot_be_filmed_is_told_in_a_line(directory: Path, options: list[
 @pytest.mark.parametrize(
     ("boundary", "faces", "edges"),
     [
-        (Plane(material="glass"), 1, 4),
-        (Channel(material="glass", width=2e-3), 3, 8),
-        (Box(material="glass", width=2e-3, height=4e-3), 5, 4),
-        (Cylinder(material="glass", width=2e-3, height=4e-3), 65, 64),
+        (Boundary(material="glass"), 1, 4),
+        (Boundary(shape="channel", material="glass", width=2e-3), 3, 8),
+        (Boundary(shape="box", material="glass", width=2e-3, height=4e-3), 5, 4),
+        (Boundary(shape="cylinder", material="glass", width=2e-3, height=4e-3), 65, 64),
     ],
 )
 def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Boundary, faces: int, edges: int) -> None:

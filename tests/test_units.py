@@ -5,8 +5,9 @@ import sys
 
 import pytest
 
-from walkers.inputs import library, units
-from walkers.inputs.units import parse_quantity
+from walkers.inputs import library
+from walkers.physics import units
+from walkers.physics.units import parse_quantity
 
 READ = {
     units.LENGTH: {"0.3 mm": 3e-4, "300 µm": 3e-4, "300um": 3e-4, "3e-4 m": 3e-4},

@@ -33,8 +33,8 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.inputs.messages import validated
 from walkers.inputs.reading import find_input, read_toml
-from walkers.inputs.schema import Number, Table, Whole
-from walkers.inputs.units import ANGLE, SPEED, Kind, parse_quantity
+from walkers.inputs.schema import Table
+from walkers.physics.units import ANGLE, SPEED, Kind, Number, Whole, parse_quantity
 
 _MOST = 10_000
 Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3"]
