@@ -84,7 +84,7 @@ def validated(model: type[File], document: Mapping[str, Any], source: str, whole
     Raises `InputError` with all that pydantic finds wrong.
     """
     try:
-        return model.model_validate(document, extra="forbid", by_alias=True, by_name=False, context=WRITTEN)
+        return model.model_validate(document, extra="forbid", context=WRITTEN)
     except ValidationError as error:
         problems = dict.fromkeys(_problem_of(one, document, model, whole) for one in error.errors())
         raise InputError(source, list(problems)) from error
