@@ -15,7 +15,7 @@ import pytest
 import walkers
 from tests.conftest import REFERENCE, document, make_case
 from walkers.inputs import InputError, load_case, resolve_case
-from walkers.inputs.boundary import Plane
+from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive, Harmonic, common_frequency
 from walkers.inputs.loads import contact_loads
@@ -322,7 +322,7 @@ def test_two_tones_move_a_symmetric_dimer_and_their_phase_says_which_way(run_dir
 
 @pytest.mark.parametrize(("tilt", "uphill"), [(0.0, 0.0), (30.0, 0.0), (90.0, 0.0), (30.0, 90.0), (90.0, 180.0)])
 def test_gravity_on_a_plane(tilt: float, uphill: float) -> None:
-    plane = Plane(material="glass", tilt=radians(tilt), uphill=radians(uphill))
+    plane = Boundary(material="glass", tilt=radians(tilt), uphill=radians(uphill))
     found = plane.gravity(9.81)
     way = (cos(radians(uphill)), sin(radians(uphill)))
     down = 9.81 * sin(radians(tilt))
@@ -333,7 +333,7 @@ def test_gravity_on_a_plane(tilt: float, uphill: float) -> None:
 
 def test_a_walker_walks_up_a_slope_until_it_is_too_steep(run_directory: Callable[..., Path]) -> None:
     """As measured: its speed falls with the tilt and changes sign between 10° and 20°."""
-    slopes = [Plane(material="chromium-coated glass", tilt=radians(tilt)) for tilt in (5.0, 20.0)]
+    slopes = [Boundary(material="chromium-coated glass", tilt=radians(tilt)) for tilt in (5.0, 20.0)]
     gentle, steep = (read_result(run_directory(shipped(boundary=slope))) for slope in slopes)
     assert gentle["velocity"]["mean"] == pytest.approx(0.605e-3, rel=0.03)
     assert steep["axial_velocity"]["right_facing"] < 0.0

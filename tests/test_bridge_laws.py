@@ -32,11 +32,17 @@ from walkers.templates.bridge_tables import TOLERANCE, UnusableLawError, tabulat
 PAIRS = [(1.0, inf), (1.0, 1.0), (0.5, 1.0), (0.2, 1.0)]
 
 
+def _liquid(surface_tension: float, viscosity: float, angle: float) -> Liquid:
+    return Liquid(
+        surface_tension=surface_tension, dynamic_viscosity=viscosity, volume_fraction=0.01, contact_angle=angle
+    )
+
+
 def surfaces(
     radius: float = 1.0, other: float = inf, volume: float = 0.02, angle: float = 0.0, closest: float = 1e-3
 ) -> Surfaces:
     """Of viscosity and surface tension 1."""
-    return Surfaces(radius, other, volume, Liquid(1.0, 1.0, None, 0.01, angle, None), closest)
+    return Surfaces(radius, other, volume, _liquid(1.0, 1.0, angle), closest)
 
 
 def matrix(pair: Surfaces, gap: float) -> tuple[float, float, float]:
@@ -49,7 +55,7 @@ def matrix(pair: Surfaces, gap: float) -> tuple[float, float, float]:
 
 def test_published_numbers() -> None:
     """YADE's example, beads of 2.381 mm, 20.6 mN/m, 74.2 nl, by Willett et al.'s Eq. 12 and by Soulié et al."""
-    pair = Surfaces(2.381e-3, 2.381e-3, 74.2e-9 * 1e-3, Liquid(20.6e-3, 1e-3, None, 0.01, 0.0, None), 0.01)
+    pair = Surfaces(2.381e-3, 2.381e-3, 74.2e-9 * 1e-3, _liquid(20.6e-3, 1e-3, 0.0), 0.01)
     gaps = 1e-3 * np.array([0.0, 0.1, 0.2, 0.4])
     tension, radius = pair.liquid.surface_tension, pair.radius
     simple = tension * willett_simple(radius, radius, pair.volume, 0.0, gaps)

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from walkers.inputs.boundary import Box
+from walkers.inputs.boundary import Boundary
 from walkers.physics.capillary import bridge_volume_between_beads
 from walkers.postprocess.clusters import (
     Beads,
@@ -277,7 +277,10 @@ def test_the_bulk_is_what_is_on_the_floor_and_the_component_of_most_beads() -> N
 def test_the_packing_profile_holds_all_of_the_beads() -> None:
     draw = np.random.default_rng(1)
     radius, position = draw.uniform(3e-4, 6e-4, 50), draw.uniform(1e-3, 9e-3, (3, 50, 3))
-    container, liquid = Box(material="glass", width=5e-3, height=20e-3), draw.uniform(1e-12, 2e-12, (3, 50))
+    container, liquid = (
+        Boundary(shape="box", material="glass", width=5e-3, height=20e-3),
+        draw.uniform(1e-12, 2e-12, (3, 50)),
+    )
     found = packing_profile(position, radius, liquid, container, 2e-4)
     room = container.cross_section * 2e-4
     assert float(found.packing_fraction.sum() * room) == pytest.approx(float((4.0 / 3.0 * np.pi * radius**3).sum()))

@@ -8,7 +8,7 @@ import pytest
 
 from tests.conftest import document, make_case
 from walkers.inputs import load_case, resolve_case, shipped_cases
-from walkers.inputs.boundary import Cylinder
+from walkers.inputs.boundary import Boundary
 from walkers.templates import render_deck
 from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_shared_deck, settling_steps
 from walkers.templates.scene import place
@@ -69,7 +69,7 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
     decks += [render_shared_deck(shared[:2]), render_shared_deck(shared)]
     piles = [load_case("pile-ci"), load_case("cluster")]
     square = piles[0].boundary
-    round_one = Cylinder(material=square.material, width=square.width, height=square.height)
+    round_one = Boundary(shape="cylinder", material=square.material, width=square.width, height=square.height)
     piles += [replace(piles[0], run=replace(piles[0].run, ranks=2)), replace(piles[0], boundary=round_one)]
     for case in piles:
         settled = settling_steps(case)

@@ -19,7 +19,7 @@ from PIL import Image
 from tests.conftest import call
 from tests.printed import letters, spoilt
 from walkers.inputs import InputError
-from walkers.inputs.boundary import Boundary, Box, Channel, Cylinder, Plane
+from walkers.inputs.boundary import Boundary
 from walkers.postprocess import Group, Motion, read_motion, read_table
 from walkers.postprocess.analysis import plot_run
 from walkers.postprocess.drawing import series_look, styled
@@ -243,10 +243,10 @@ def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(fil
 @pytest.mark.parametrize(
     ("boundary", "faces", "edges"),
     [
-        (Plane(material="glass"), 1, 4),
-        (Channel(material="glass", width=2e-3), 3, 8),
-        (Box(material="glass", width=2e-3, height=4e-3), 5, 4),
-        (Cylinder(material="glass", width=2e-3, height=4e-3), 65, 64),
+        (Boundary(material="glass"), 1, 4),
+        (Boundary(shape="channel", material="glass", width=2e-3), 3, 8),
+        (Boundary(shape="box", material="glass", width=2e-3, height=4e-3), 5, 4),
+        (Boundary(shape="cylinder", material="glass", width=2e-3, height=4e-3), 65, 64),
     ],
 )
 def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Boundary, faces: int, edges: int) -> None:

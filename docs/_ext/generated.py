@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from pydantic import BaseModel, BeforeValidator
+from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 from sphinx.application import Sphinx
@@ -19,9 +19,9 @@ from sphinx.config import Config
 import walkers.inputs
 from walkers.inputs.reading import read_toml
 from walkers.inputs.resolving import SUPPLIED
-from walkers.inputs.schema import AUTO, CaseFile
-from walkers.inputs.units import Kind
+from walkers.inputs.schema import CaseFile, fields_of
 from walkers.main import _program
+from walkers.physics.units import ABSENT, AUTO, AUTO_FAR, Kind
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.tables import described
 from walkers.sweeps.record import derived_columns, result_columns
@@ -57,8 +57,8 @@ def _parts(hint: Any) -> Iterator[Any]:
         yield from _parts(part)
 
 
-def _tables_in(hint: Any) -> list[type[BaseModel]]:
-    return [part for part in _parts(hint) if inspect.isclass(part) and issubclass(part, BaseModel)]
+def _tables_in(hint: Any) -> list[type]:
+    return [part for part in _parts(hint) if inspect.isclass(part) and fields_of(part)]
 
 
 def _expected(hint: Any) -> str:
@@ -76,14 +76,14 @@ def _expected(hint: Any) -> str:
             (_refusal(note) for note in notes if isinstance(note, (BeforeValidator, Kind)) and note != AUTO), None
         )
         told = told or _expected(inner)
-        told += ', or `"auto"`' if AUTO in notes else ""
+        told += ', or `"auto"`' if AUTO in notes or AUTO_FAR in notes else ""
         return f"{told}; {bounds}" if bounds else told
     if get_origin(hint) is Literal:
         return "one of " + ", ".join(f'`"{one}"`' for one in get_args(hint))
     if get_origin(hint) in (Union, types.UnionType):
         return " or ".join(_expected(one) for one in get_args(hint) if one is not types.NoneType)
     if get_origin(hint) in (list, tuple):
-        parts = list(dict.fromkeys(_expected(one) for one in get_args(hint)))
+        parts = list(dict.fromkeys(_expected(one) for one in get_args(hint) if one is not ...))
         return f"a list, each {' or '.join(parts)}"
     words = {str: "text", bool: "true or false", int: "a whole number", float: "a plain number without a unit"}
     return words.get(hint, getattr(hint, "__name__", str(hint)))
@@ -103,7 +103,7 @@ def _refusal(validator: BeforeValidator | Kind) -> str | None:
 def _default(field: FieldInfo) -> str:
     if field.default is PydanticUndefined:
         return "required" if field.is_required() else ""
-    if field.default is None or isinstance(field.default, BaseModel) or field.default in ([], ""):
+    if field.default is None or fields_of(type(field.default)) or field.default in ABSENT:
         return ""
     return f"`{json.dumps(field.default)}`"
 
@@ -112,21 +112,22 @@ def _keys() -> str:
     """Every key of a case file with what it expects, read off the models that check it."""
     text = ["# Keys, as the program checks them\n\nWhat each means is in [](../cases.md). Defaults are in SI units.\n"]
 
-    def add(model: type[BaseModel], name: str) -> None:
+    def add(model: type, name: str) -> None:
         hints = get_type_hints(model, include_extras=True)
-        own = {key: field for key, field in model.model_fields.items() if not _tables_in(hints[key])}
+        fields = {key: (hints[name], field) for key, (name, field) in fields_of(model).items()}
+        own = {key: (hint, field) for key, (hint, field) in fields.items() if not _tables_in(hint)}
         if own:
             text.append(f"\n## {name or 'at the top'}\n\n{inspect.getdoc(model)}\n".replace("``", "`"))
             supplied = {key for key in own if f"{name.strip('[]')}.{key}" in SUPPLIED}
             rows = (
-                (f"`{key}`", _expected(hints[key]), "the library's" if key in supplied else _default(field))
-                for key, field in own.items()
+                (f"`{key}`", _expected(hint), "the library's" if key in supplied else _default(field))
+                for key, (hint, field) in own.items()
             )
             text.append(_table(["key", "expects", "default"], rows))
-        for key in model.model_fields:
-            for inner in _tables_in(hints[key])[:1]:
+        for key, (hint, _) in fields.items():
+            for inner in _tables_in(hint)[:1]:
                 path = f"{name.strip('[]')}.{key}".strip(".")
-                add(inner, f"[[{path}]]" if list in map(get_origin, _parts(hints[key])) else f"[{path}]")
+                add(inner, f"[[{path}]]" if list in map(get_origin, _parts(hint)) else f"[{path}]")
 
     add(CaseFile, "")
     return "\n".join(text)

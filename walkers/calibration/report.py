@@ -13,7 +13,7 @@ from walkers.calibration.emulator import FloatArray, Space, transformed
 from walkers.calibration.posterior import LEAST_SAMPLES, Posterior
 from walkers.inputs.calibration import QUANTITIES, Parameter
 from walkers.inputs.text import rendered
-from walkers.inputs.units import SPEED
+from walkers.physics.units import SPEED
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, save_figure, styled
 from walkers.runner.files import write_bytes, write_json, write_text
 

@@ -63,7 +63,15 @@ class Sphere(NamedTuple):
     def engine(self, start: FloatArray, step: float, restitution: float, friction: float, *, on_plane: bool) -> Any:
         """The second engine with such spheres; a modulus twice theirs is a rigid plane's other side."""
         modulus = (2.0 if on_plane else 1.0) * self.youngs_modulus
-        contact = Contact(modulus, self.poissons_ratio, restitution, friction, friction, 0.0, 0.01)
+        contact = Contact(
+            friction_bead_bead=friction,
+            friction_bead_wall=friction,
+            rolling_friction=0.0,
+            restitution=restitution,
+            youngs_modulus=modulus,
+            poissons_ratio=self.poissons_ratio,
+            minimum_separation_ratio=0.01,
+        )
         case = replace(bench_case(liquid=DRY), density=self.density, contact=contact)
         case = replace(case, run=replace(case.run, time_step=step, steps_per_cycle=0))
         return SecondEngine(case, np.full(len(start), self.radius), start, walls=[FLOOR])

@@ -27,11 +27,11 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
-from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics import capillary, rabinovich, soulie, willett, young_laplace
 from walkers.physics.bridge import FloatArray, Surfaces
 from walkers.physics.capillary import derjaguin_radius
 from walkers.physics.laplace import force_curve
+from walkers.physics.units import ACCELERATION_OF_ONE_G
 from walkers.pipeline import run
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, series_look, styled
 

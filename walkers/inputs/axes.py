@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.changes import Value, flatten
 from walkers.inputs.errors import unusable
-from walkers.inputs.units import split_quantity
+from walkers.physics.units import split_quantity
 
 if TYPE_CHECKING:
     import numpy as np

@@ -13,10 +13,13 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import combinations
 from math import acos, asin, atan2, cos, dist, hypot, inf, pi, sin, sqrt
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field
 
 from walkers.inputs.boundary import LOOSE, Boundary
 from walkers.inputs.loads import contact_loads
+from walkers.physics import units
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
@@ -25,7 +28,7 @@ Apart = Callable[[int, int], float]
 """Distance of two touching beads seen from above, m, by their numbers."""
 Places = list[tuple[float, float]]
 Pairs = tuple[tuple[int, int], ...]
-Facing = Literal["both", "right", "left"]
+_Place = tuple[units.SignedLength, units.SignedLength]
 _LEAST_LEVER = 0.1
 """Of a cluster's extent: large and small beads whose centroids are nearer than that give no heading."""
 _TOUCHING = 0.02
@@ -160,33 +163,32 @@ class Standing:
     walks: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Walkers:
-    """Walkers of one make: dimers, or clusters of more beads; m and rad.
+    """``[dimers]`` or one of ``[[clusters]]``: walkers of one make, how many there are and how each begins.
 
-    Attributes
-    ----------
-    radii, arrangement, places
-        Of the beads of each; how they stand (`ARRANGEMENTS`), or ``given``: at places.
-    replicates, spacing, meet
-        How many, how far from one to the next; whether they are meant to meet, or are replicates that must not.
-    facing, angle, angle_spread
-        Along the drive axis (right), against it (left), or every other one (both); how far off, and each at random.
-    gap, gap_spread
-        Of all contacts at the start (negative: touching; None: where forces balance), and its relative spread.
+    ``meet = true`` says that they may stand and come as near as they like; without it they are replicates. They face
+    along the drive axis (right, up a slope), against it (left, down), or every other one (both), but for an ``angle``.
+    The ``gap`` is that of all contacts at the start (negative: touching), where forces balance unless it is given.
+
+    Radii are those of the beads, first the one that leads (the large one, as in the paper). Those of dimers may be
+    given by their mean and the asymmetry parameter sin δ = (R1 - R2)/(R1 + R2). The beads of clusters stand in an
+    ``arrangement``, or ``at`` a place for each, ahead and to the left, in the direction that the walker faces.
     """
 
-    radii: tuple[float, ...]
-    replicates: int
-    facing: Facing
-    angle: float
-    angle_spread: float
-    gap: float | None
-    gap_spread: float
-    spacing: float
+    replicates: Annotated[units.Whole, Field(ge=1, le=1000)] = 6
+    facing: Literal["both", "right", "left", "up", "down"] = "both"
+    angle: units.Angle = 0.0
+    angle_spread: units.NonNegativeAngle = pi / 180.0
+    gap: Annotated[units.SignedLength | None, units.AUTO] = None
+    gap_spread: Annotated[units.Number, Field(ge=0, lt=1)] = 0.2
+    spacing: Annotated[units.Length, units.AUTO_FAR] = inf
     meet: bool = False
-    arrangement: str = "chain"
-    places: tuple[tuple[float, float], ...] = ()
+    radii: tuple[units.Radius, ...] = ()
+    mean_radius: Annotated[units.Radius | None, Field(exclude=True)] = None
+    sin_delta: Annotated[units.Number | None, Field(gt=-0.9, lt=0.9, exclude=True)] = None
+    arrangement: str = ""
+    places: Annotated[tuple[_Place, ...], Field(max_length=100, alias="at")] = ()
 
     @property
     def count(self) -> int:

@@ -33,8 +33,8 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.library import suggestion
 from walkers.inputs.messages import validated
 from walkers.inputs.reading import find_input, read_toml
-from walkers.inputs.schema import Number, Table, Whole
-from walkers.inputs.units import ANGLE, SPEED, Kind, parse_quantity
+from walkers.inputs.schema import Table
+from walkers.physics.units import ANGLE, SPEED, WRITTEN, Kind, Number, Whole, parse_quantity
 
 _MOST = 10_000
 Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3"]
@@ -83,7 +83,7 @@ class Observation(Table):
     """``[[observations]]``: a mean over experiments, or its ratio to the mean over others.
 
     One that is ``derived`` follows from others: it is told of, but does not weigh in the posterior a second time.
-    ``value`` and ``deviation`` are in SI units, angles in degrees.
+    ``value`` and ``deviation`` are in SI units, angles in degrees; a file has them with their unit, but of a ratio.
     """
 
     name: str
@@ -96,13 +96,11 @@ class Observation(Table):
     deviation: Annotated[Number, Field(gt=0)]
     derived: bool = False
 
-
-class ObservationTable(Observation):
-    """An observation as a file has it: numbers with their unit, but of a ratio, which has none."""
-
     @field_validator("value", "deviation", mode="before")
     @classmethod
     def _number(cls, value: Any, info: ValidationInfo) -> Any:
+        if info.context != WRITTEN:
+            return value
         if info.data.get("over"):
             if isinstance(value, str):
                 raise ValueError("expected a plain number: a ratio has no unit")
@@ -150,7 +148,7 @@ class CalibrationFile(Table):
     set: dict[str, Any] = Field({})
     parameters: Annotated[dict[str, ParameterTable], Field(min_length=1)]
     experiments: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
-    observations: Annotated[list[ObservationTable], Field(min_length=1)]
+    observations: Annotated[list[Observation], Field(min_length=1)]
     shared_errors: dict[str, SharedError] = Field({})
     guesses: list[dict[str, Number]] = Field([])
     bands: list[Band] = Field([])

@@ -9,13 +9,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from math import cos, hypot, inf, isclose, sin
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 from pydantic_core import to_jsonable_python
 
 from walkers.inputs.bodies import Body, Mixture, Placed, Standing, Walkers
-from walkers.inputs.boundary import Shape
+from walkers.inputs.boundary import Boundary
 from walkers.inputs.drive import AXES, Drive, Vector
 from walkers.inputs.origins import Origin
 from walkers.physics.laws import LAWS
@@ -144,7 +144,7 @@ class Case:
     walkers: tuple[Walkers, ...]
     mixture: Mixture | None
     placed: Placed | None
-    boundary: Annotated[Shape, Field(discriminator="shape")]
+    boundary: Boundary
     drive: Drive
     gravity: float
     material: str | None
@@ -304,7 +304,7 @@ class Case:
     def from_dict(cls, values: dict[str, Any]) -> Case:
         """Rebuild a case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
         try:
-            case = _adapter().validate_python(values)
+            case = _adapter().validate_python(values, by_alias=False, by_name=True)
             told = values.get("document", {}), values.get("origins", ())
             document, origins = _told_adapter().validate_python(told)
             return case.read_from(document, partial(tuple, origins))

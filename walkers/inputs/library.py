@@ -10,7 +10,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from walkers.inputs import units
+from walkers.physics import units
 
 _KINDS = {
     "density": units.DENSITY,

@@ -15,7 +15,8 @@ from pydantic_core import ErrorDetails
 from walkers.inputs.changes import MISSING, joined, parts_of, value_at
 from walkers.inputs.errors import InputError, Problem, shown, unusable
 from walkers.inputs.library import suggestion, surface_pairs
-from walkers.inputs.schema import CaseFile
+from walkers.inputs.schema import CaseFile, fields_of
+from walkers.physics.units import WRITTEN
 
 File = TypeVar("File", bound=BaseModel)
 
@@ -83,7 +84,7 @@ def validated(model: type[File], document: Mapping[str, Any], source: str, whole
     Raises `InputError` with all that pydantic finds wrong.
     """
     try:
-        return model.model_validate(document)
+        return model.model_validate(document, extra="forbid", context=WRITTEN)
     except ValidationError as error:
         problems = dict.fromkeys(_problem_of(one, document, model, whole) for one in error.errors())
         raise InputError(source, list(problems)) from error
@@ -108,20 +109,20 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         told = f"too long; expected {example or ('two numbers' if most == 2 else f'at most {most} entries')}"
     elif kind == "value_error":
         told = str(context["error"])
-    elif kind == "extra_forbidden":
+    elif kind in ("extra_forbidden", "unexpected_keyword_argument"):
         told = _unknown_key([str(part) for part in location if isinstance(part, str)], file, whole)
     elif kind == "literal_error":
         told += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
-    elif kind in ("model_type", "dict_type", "model_attributes_type"):
+    elif kind in ("model_type", "dict_type", "model_attributes_type", "dataclass_type"):
         told = f"expected a table [{key}]"
     elif example:
         told = f"{told}, {example}" if told.startswith("expected") else f"expected {example}"
     return Problem(key, quoted(document, parts_of(key)), told)
 
 
-def _table_in(annotation: Any) -> tuple[type[BaseModel] | None, str]:
+def _table_in(annotation: Any) -> tuple[type | None, str]:
     """The model that a field holds, alone or in a list, or by names of the user's (then with ``.*``), or None."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+    if isinstance(annotation, type) and fields_of(annotation):
         return annotation, ""
     for inner in get_args(annotation):
         table, named = _table_in(inner)
@@ -131,10 +132,10 @@ def _table_in(annotation: Any) -> tuple[type[BaseModel] | None, str]:
 
 
 @cache
-def keys_of(file: type[BaseModel]) -> Mapping[str, type[BaseModel] | None]:
+def keys_of(file: type) -> Mapping[str, type | None]:
     """All dotted keys of a kind of file; those of tables with the table's model."""
-    found: dict[str, type[BaseModel] | None] = {"": file}
-    for name, field in file.model_fields.items():
+    found: dict[str, type | None] = {"": file}
+    for name, (_, field) in fields_of(file).items():
         table, named = _table_in(field.annotation)
         found[name] = None if named else table
         below = keys_of(table) if table else {}
@@ -160,8 +161,8 @@ def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
         below = f"{place}.{part}".lstrip(".")
         place = below if below in known or f"{below}.*" in known else f"{place}.*"
     table = known.get(place)
-    siblings = [field.alias or name for name, field in table.model_fields.items()] if table else []
-    hint = suggestion(word, siblings)
+    siblings = list(fields_of(table)) if table else []
+    hint = suggestion(word, siblings) if siblings else suggestion(".".join(location), known)
     elsewhere = [key for key, inner in known.items() if inner is None and "*" not in key and key.split(".")[-1] == word]
     if not hint and elsewhere:
         hint = f'; did you mean "{elsewhere[0]}"?'

@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from walkers.inputs.changes import MISSING, parts_of, value_at
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-
     from walkers.inputs.schema import CaseFile
-    from walkers.inputs.units import Kind
+    from walkers.physics.units import Kind
 
 Whence = Literal["given", "library", "calibrated", "default", "derived"]
 _LEFT_OUT = ("title", "uncertain", "placed")
@@ -83,13 +81,15 @@ def origins_of(file: CaseFile, document: Mapping[str, Any], notes: Mapping[str, 
     notes
         On what it leaves out and has no default of its own.
     """
+    from walkers.physics.units import ABSENT
+
     found: dict[str, Origin] = {}
     for key, raw, value, kind in _leaves(file, document):
         if raw is not None and not (isinstance(raw, str) and raw.strip().lower() == "auto"):
             found[key] = Origin(key, text_of(raw), "given", value=value)
         elif one := notes.get(key):
             found[key] = replace(one, key=key, text=one.text or text_of(one.value, kind))
-        elif value is not None:
+        elif value not in ABSENT:
             found[key] = Origin(key, text_of(value, kind), "default", value=value)
     for key, given in file.uncertain.items():
         ((distribution, (low, high)),) = given.items()
@@ -100,24 +100,22 @@ def origins_of(file: CaseFile, document: Mapping[str, Any], notes: Mapping[str, 
     return tuple(found.values())
 
 
-def _leaves(
-    table: BaseModel, document: Mapping[str, Any], prefix: str = ""
-) -> Iterator[tuple[str, Any, Any, Kind | None]]:
+def _leaves(table: Any, document: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any, Any, Kind | None]]:
     """Keys of a table: each with what the document says (None: nothing), its value, and of which kind it is."""
-    from pydantic import BaseModel
+    from walkers.inputs.schema import fields_of
+    from walkers.physics.units import kind_in
 
-    from walkers.inputs.units import kind_in
-
-    for name, about in type(table).model_fields.items():
-        value, raw, key = getattr(table, name), document.get(name), f"{prefix}{name}"
+    for name, (attribute, about) in fields_of(type(table)).items():
+        value, raw, key = getattr(table, attribute), value_at(document, parts_of(name)), f"{prefix}{name}"
+        raw = None if raw is MISSING else raw
         if key in _LEFT_OUT:
             continue
-        if isinstance(value, BaseModel):
+        if fields_of(type(value)):
             yield from _leaves(value, raw or {}, f"{key}.")
-        elif isinstance(value, list) and value and isinstance(value[0], BaseModel):
+        elif isinstance(value, list) and value and fields_of(type(value[0])):
             for number, (one, said) in enumerate(zip(value, raw or [], strict=True)):
                 yield from _leaves(one, said, f"{key}[{number}].")
-        elif raw is not None or not isinstance(value, list):
+        else:
             yield key, raw, value, kind_in([*about.metadata, about.annotation])
 
 
@@ -129,7 +127,7 @@ def text_of(value: Any, kind: Kind | None = None) -> str:
             f"({text})" if isinstance(one, (list, tuple)) else text for one, text in zip(value, texts, strict=True)
         )
     if kind is not None and not isinstance(value, str):
-        from walkers.inputs.units import quantity_text
+        from walkers.physics.units import quantity_text
 
         return quantity_text(value, kind)
     if isinstance(value, bool):

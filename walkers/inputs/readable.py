@@ -8,10 +8,10 @@ from functools import cache
 from math import isclose, pi
 from typing import Any
 
-from walkers.inputs import units
 from walkers.inputs.case import BOUNDS
 from walkers.inputs.changes import dotted
-from walkers.inputs.units import Kind
+from walkers.physics import units
+from walkers.physics.units import Kind
 
 READABLE_UNITS: Mapping[str, tuple[str, float]] = {
     "m": ("mm", 1e-3),
@@ -72,10 +72,10 @@ def readable_unit(unit: str) -> tuple[str, float]:
 def _kinds() -> Mapping[str, Kind]:
     """What the numbers of a case are, by the last part of their keys; the others are pure numbers."""
     from walkers.inputs.messages import keys_of
-    from walkers.inputs.schema import CaseFile
+    from walkers.inputs.schema import CaseFile, fields_of
 
     tables = filter(None, keys_of(CaseFile).values())
-    fields = [(name, field) for table in tables for name, field in table.model_fields.items()]
+    fields = [(name, field) for table in tables for name, (_, field) in fields_of(table).items()]
     kinds = {name: units.kind_in([*field.metadata, field.annotation]) for name, field in fields}
     return {name: kind for name, kind in kinds.items() if kind is not None}
 

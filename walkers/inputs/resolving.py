@@ -7,15 +7,15 @@ beside each other.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cache, partial
 from itertools import islice
-from math import atan2, dist, pi
+from math import atan2, dist, isinf, isnan, pi
 from typing import Any, Literal
 
 from walkers.inputs import library
 from walkers.inputs.bodies import ARRANGEMENTS, Mixture, Placed, Standing, Walkers, touching
-from walkers.inputs.boundary import SHAPES, Boundary, Shape
+from walkers.inputs.boundary import SIZES, Boundary
 from walkers.inputs.case import Case, Run
 from walkers.inputs.changes import MISSING, changed, parts_of, value_at
 from walkers.inputs.errors import unusable
@@ -25,28 +25,21 @@ from walkers.inputs.origins import Notes, Origin, origins_of
 from walkers.inputs.run_tables import resolve_drive, resolve_run
 from walkers.inputs.schema import (
     MOST_BEADS,
-    BoundaryTable,
     CaseFile,
-    ClusterTable,
-    DimersTable,
-    LiquidTable,
     MixtureTable,
-    WalkersTable,
 )
 from walkers.physics.dimer import Dimer
 from walkers.physics.laws import LAWS, by_name
-from walkers.physics.matter import DEFAULT_LAW, Contact, Liquid
+from walkers.physics.matter import DEFAULT_LAW, Liquid
+from walkers.physics.units import ABSENT
 
 _EXAMPLES = {"opening": "120 deg", "width": "5.3 mm", "height": "5.3 mm"}
 _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the count that fills a height."""
 _OVERLAP = 0.01
 """Radii by which beads that are given places may overlap with each other and the walls."""
-_WAYS: dict[str, Literal["both", "right", "left"]] = {
-    **{"both": "both", "right": "right", "left": "left"},
-    **{"up": "right", "down": "left"},
-}
-"""What ``facing`` says; up and down are a climber's words."""
+_WAYS: Mapping[str, Literal["right", "left"]] = {"up": "right", "down": "left"}
+"""What a climber's words mean."""
 _FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction")
 _OF_SURFACES = (
     *("liquid.viscosity_ratio", "liquid.volume_fraction", "liquid.contact_angle"),
@@ -86,7 +79,7 @@ def supplied(document: Mapping[str, Any], notes: Notes) -> dict[str, Any]:
         if there and key in known and not (key in given or instead):
             settings[key] = known[key].written
             notes[key] = _origin_of(key, known[key], calibrated)
-    return changed({"contact": {"friction": {}}, **document}, settings)
+    return changed({"contact": {}, **document}, settings)
 
 
 @cache
@@ -120,8 +113,9 @@ def resolve(file: CaseFile, name: str, document: Mapping[str, Any], notes: Notes
 
     Raises `InputError` if something is missing that the library does not know, or keys contradict each other.
     """
-    boundary = _boundary(file.boundary)
-    walkers = tuple(_walkers_of(key, table, file.boundary, notes) for key, table in file.walkers.items())
+    boundary = file.boundary
+    _check_sizes(boundary)
+    walkers = tuple(_walkers_of(key, table, boundary, notes) for key, table in file.walkers.items())
     mixture = _mixture_of(file.mixture, boundary) if file.mixture else None
     placed = Placed(tuple((*bead.at, bead.radius) for bead in file.placed)) if file.placed else None
     if not (walkers or mixture or placed):
@@ -141,41 +135,37 @@ def resolve(file: CaseFile, name: str, document: Mapping[str, Any], notes: Notes
         material=file.beads.material,
         density=density,
         liquid=liquid,
-        contact=Contact(
-            **{f"friction_{pair}": coefficient for pair, coefficient in file.contact.friction},
-            **file.contact.model_dump(exclude={"friction"}),
-        ),
+        contact=file.contact,
         seed=file.run.seed,
         run=Run(0.0, 1, 1, 0, False, 1, 1, 1, 1, 0.0, 0.0, 1),  # its step follows from the rest
     )
     case = replace(case, run=resolve_run(file.run, case, notes))
-    if boundary.tilt:
-        along, across, _ = case.drive_axis
-        case = replace(case, boundary=replace(boundary, uphill=atan2(across, along) + file.boundary.uphill))
+    along, across, _ = case.drive_axis
+    uphill = atan2(across, along) + boundary.uphill if boundary.tilt else 0.0
+    case = replace(case, boundary=replace(boundary, uphill=uphill))
     made = zip(file.walkers, case.walkers, strict=True)
     case = replace(case, walkers=tuple(_spaced(case, key, one, notes) for key, one in made))
     _check_bodies(case, file)
-    if boundary.tilt and file.boundary.uphill == 0.0:
+    if boundary.tilt and boundary.uphill == 0.0:
         notes.default("boundary.uphill", 0.0, "the direction of the drive")
     # Not in g: the paper's, 9.8 m/s², is not the case's gravity.
     notes["environment.gravity"] = Origin("", f"{case.gravity:g} m/s^2", "default", value=case.gravity)
     return case.read_from(document, partial(origins_of, file, document, notes))
 
 
-def _boundary(table: BoundaryTable) -> Shape:
-    made = SHAPES[table.shape]
-    needed = {field.name for field in fields(made)} & _EXAMPLES.keys()
+def _check_sizes(boundary: Boundary) -> None:
+    """Refuse a boundary that lacks a size of its shape, or has another's."""
     for key, example in _EXAMPLES.items():
-        if (getattr(table, key) is None) == (key in needed):
+        lacking, needed = getattr(boundary, key) == getattr(Boundary, key), key in SIZES[boundary.shape]
+        if lacking == needed:
             missing = f'missing; expected such as "{example}"'
-            raise unusable(f"boundary.{key}", missing if key in needed else f"expected none of a {table.shape}")
-    return made(material=table.material, tilt=table.tilt, **{key: getattr(table, key) for key in needed})
+            raise unusable(f"boundary.{key}", missing if needed else f"expected none of a {boundary.shape}")
 
 
-def _liquid_of(table: LiquidTable, notes: Notes) -> Liquid:
+def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
     """The liquid of the bridges and their law; raises `InputError` if its viscosity is missing or said twice."""
     dynamic, kinematic = table.dynamic_viscosity, table.kinematic_viscosity
-    if dynamic is not None and kinematic is not None:
+    if not isnan(dynamic) and kinematic is not None:
         told = "expected either kinematic_viscosity or dynamic_viscosity, not both"
         raise unusable("liquid.dynamic_viscosity", told)
     if kinematic is not None:
@@ -183,7 +173,7 @@ def _liquid_of(table: LiquidTable, notes: Notes) -> Liquid:
             raise unusable("liquid.density", "missing; a kinematic_viscosity needs the liquid's density")
         dynamic = float(f"{kinematic * table.density:.15g}")
         notes.derived("liquid.dynamic_viscosity", dynamic, "from kinematic_viscosity and density")
-    if dynamic is None:
+    if isnan(dynamic):
         told = "missing; expected a liquid of the library by name, or this number"
         raise unusable("liquid.dynamic_viscosity", told)
     if table.law not in LAWS:
@@ -191,40 +181,38 @@ def _liquid_of(table: LiquidTable, notes: Notes) -> Liquid:
             by_name(table.law)
         except ValueError as error:
             raise unusable("liquid.law", str(error)) from error
-    return Liquid(
-        surface_tension=table.surface_tension,
-        dynamic_viscosity=float(f"{dynamic * table.viscosity_ratio:.15g}"),
-        density=table.density,
-        volume_fraction=table.volume_fraction,
-        contact_angle=table.contact_angle,
-        name=table.name,
-        law=table.law,
-    )
+    of_bridges = float(f"{dynamic * table.viscosity_ratio:.15g}")
+    return replace(table, kinematic_viscosity=None, dynamic_viscosity=of_bridges, viscosity_ratio=1.0)
 
 
-def _walkers_of(key: str, table: DimersTable | ClusterTable, boundary: BoundaryTable, notes: Notes) -> Walkers:
+def _walkers_of(key: str, table: Walkers, boundary: Boundary, notes: Notes) -> Walkers:
     """The walkers of a table, which stands under a key."""
     if table.facing in ("up", "down") and (not boundary.tilt or boundary.uphill):
         told = "on a plane that is tilted along the drive alone walkers face up or down"
         raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {told}')
     if table.gap is None:
         notes.derived(f"{key}.gap", "auto", "where the forces at rest balance")
-    said = {name: getattr(table, name) for name in WalkersTable.model_fields}
-    said |= {"facing": _WAYS[table.facing], "spacing": table.spacing or 0.0}
-    walkers = Walkers(radii=_radii(table, notes) if isinstance(table, DimersTable) else tuple(table.radii), **said)
-    if isinstance(table, DimersTable):
-        return walkers
-    if (table.arrangement is None) == (table.at is None):
+    of_others = ("arrangement", "places") if key == "dimers" else ("mean_radius", "sin_delta")
+    for name in of_others:
+        if getattr(table, name) not in ABSENT:
+            raise unusable(f"{key}.{name}".replace("places", "at"), "expected none of " + key.partition("[")[0])
+    walkers = replace(table, facing=_WAYS.get(table.facing, table.facing))
+    if key == "dimers":
+        radii = _radii(table, notes)
+        return replace(walkers, radii=radii, mean_radius=None, sin_delta=None, arrangement="chain")
+    if not 2 <= len(table.radii) <= 100:
+        raise unusable(f"{key}.radii", "expected radii of 2 to 100 beads")
+    if bool(table.arrangement) == bool(table.places):
         told = f"expected either an arrangement ({', '.join(ARRANGEMENTS)}) or places (at)"
         raise unusable(f"{key}.arrangement", told)
-    if table.arrangement is not None:
-        return _arranged(walkers, key, table.arrangement)
-    return _at_places(walkers, key, tuple(table.at or ()))
+    return _arranged(walkers, key) if table.arrangement else _at_places(walkers, key)
 
 
-def _radii(table: DimersTable, notes: Notes) -> tuple[float, float]:
+def _radii(table: Walkers, notes: Notes) -> tuple[float, ...]:
     given = {name: getattr(table, name) for name in ("mean_radius", "sin_delta") if getattr(table, name) is not None}
-    if table.radii is not None:
+    if table.radii:
+        if len(table.radii) != 2:
+            raise unusable("dimers.radii", 'expected two radii, such as ["0.3 mm", "0.2 mm"]')
         if given:
             told = "expected either the radii or mean_radius and sin_delta, not both"
             raise unusable(f"dimers.{next(iter(given))}", told)
@@ -238,8 +226,9 @@ def _radii(table: DimersTable, notes: Notes) -> tuple[float, float]:
     return first, second
 
 
-def _arranged(walkers: Walkers, key: str, name: str) -> Walkers:
+def _arranged(walkers: Walkers, key: str) -> Walkers:
     """A cluster in an arrangement."""
+    name = walkers.arrangement
     known = ARRANGEMENTS.get(name)
     if known is None:
         raise unusable(f"{key}.arrangement", expected_of(name, ARRANGEMENTS))
@@ -247,7 +236,6 @@ def _arranged(walkers: Walkers, key: str, name: str) -> Walkers:
     if not known.fewest <= len(walkers.radii) <= known.most:
         bound = f"at least {known.fewest}" if known.fewest < known.most else str(known.most)
         raise unusable(key, f"expected {bound} beads in a {name}")
-    walkers = replace(walkers, arrangement=name)
     try:
         overlapping = touching(walkers.design, walkers.radii, -_OVERLAP)
     except ValueError as error:
@@ -257,12 +245,12 @@ def _arranged(walkers: Walkers, key: str, name: str) -> Walkers:
     return walkers
 
 
-def _at_places(walkers: Walkers, key: str, places: tuple[tuple[float, float], ...]) -> Walkers:
+def _at_places(walkers: Walkers, key: str) -> Walkers:
     """A cluster whose beads are given places: they touch, do not overlap, and have a heading."""
-    key, everyone = f"{key}.at", set(range(len(walkers.radii)))
+    key, everyone, places = f"{key}.at", set(range(len(walkers.radii))), walkers.places
     if len(places) != len(everyone):
         raise unusable(key, f"expected a place for each of the {len(everyone)} beads")
-    walkers = replace(walkers, arrangement="given", places=places)
+    walkers = replace(walkers, arrangement="given")
     if overlapping := touching(places, walkers.radii, -_OVERLAP):
         raise unusable(f"{key}[{overlapping[0][1]}]", f"overlaps with {key}[{overlapping[0][0]}]")
     if not any(walkers.front):
@@ -316,7 +304,7 @@ def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
     if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
         blamed = f"{key}.gap" if gap is not None else "contact.youngs_modulus"
         raise unusable(blamed, "the beads overlap by more than 2 % of the smallest radius")
-    if not walkers.spacing:
+    if isinf(walkers.spacing):
         spacing = 2.0 * (walkers.length if walkers.meet else reach(case))
         notes.derived(f"{key}.spacing", spacing, "so that walkers do not meet")
         return replace(walkers, spacing=spacing)
@@ -343,12 +331,12 @@ def _check_bodies(case: Case, file: CaseFile) -> None:
 
 def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
     largest = max(mixture.large)
-    if boundary.inner_width < 4.0 * largest:
+    if boundary.width < 4.0 * largest:
         raise unusable("boundary.width", "expected at least two of the large beads side by side")
-    if boundary.layer(largest).tight and boundary.inner_width < 8.0 * largest:
+    if boundary.layer(largest).tight and boundary.width < 8.0 * largest:
         raise unusable("boundary.width", "expected at least four of the large beads side by side")
     level = floor + mixture.level(boundary)
-    if level > 2.0 * boundary.top:  # walls and simulation go on to there
+    if level > 2.0 * boundary.height:  # walls and simulation go on to there
         needed = f"{level / 2.0 * 1e3:.3g} mm"
         raise unusable("boundary.height", f"too low for {mixture.count} beads; expected {needed} or more")
 
@@ -363,7 +351,7 @@ def _check_places(case: Case, keys: list[str]) -> None:
         standing.extend(one for _, one in islice(case.standing(), len(keys)))
     except ValueError as error:
         raise unusable(f"{keys[len(standing)]}.radii", str(error)) from error
-    if boundary.inner_width < 2.0 * (1.0 - _OVERLAP) * max((max(one.radii) for one in case.walkers), default=0.0):
+    if boundary.width < 2.0 * (1.0 - _OVERLAP) * max((max(one.radii) for one in case.walkers), default=0.0):
         raise unusable("boundary.width", "expected more than a bead's diameter")
     grid = boundary.grid(len(keys), max(one.spacing for one in case.walkers)) if keys else []
     of_walkers = zip(keys, grid, standing, strict=True)
@@ -380,9 +368,9 @@ def _check_places(case: Case, keys: list[str]) -> None:
         if number < walking and beside:
             told = f"so many walkers, or such, do not fit between the walls of the {boundary.shape}"
             raise unusable(f"{key}.replicates", told)
-        if number < walking and z + radius > boundary.top:
+        if number < walking and z + radius > boundary.height:
             raise unusable("boundary.height", f"too low for the walkers of {key}")
-        if number >= walking and (beside or z < least or z + radius > boundary.top):
+        if number >= walking and (beside or z < least or z + radius > boundary.height):
             raise unusable(f"{key}.at", "expected a bead within the boundary")
     if not placed:
         return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import ceil, inf
 
-from walkers.inputs.boundary import Shape
+from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case, Run, settling_of
 from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector, waveform
 from walkers.inputs.errors import unusable
@@ -25,7 +25,7 @@ _SETTLED_BELOW = 5e-3
 _FRAMES_PER_SECOND = 60.0
 
 
-def resolve_drive(table: DriveTable, boundary: Shape, dimer: Dimer | None, notes: Notes) -> Drive:
+def resolve_drive(table: DriveTable, boundary: Boundary, dimer: Dimer | None, notes: Notes) -> Drive:
     """A drive of one harmonic or of several; ``dimer`` is whose Γ0 it may be given by, None where there is none.
 
     Raises `InputError` if something is missing, said twice or contradictory.
@@ -55,7 +55,7 @@ def resolve_drive(table: DriveTable, boundary: Shape, dimer: Dimer | None, notes
     return drive
 
 
-def _harmonic(table: HarmonicTable, key: str, boundary: Shape, dimer: Dimer | None) -> Harmonic:
+def _harmonic(table: HarmonicTable, key: str, boundary: Boundary, dimer: Dimer | None) -> Harmonic:
     acceleration, gamma0 = table.peak_acceleration, table.gamma0
     if table.frequency is None:
         raise unusable(f"{key}.frequency", 'missing; expected such as "80 Hz"')

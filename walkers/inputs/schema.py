@@ -1,4 +1,4 @@
-"""What a case file may say: keys, types, defaults and bounds, as pydantic models.
+"""What a case file may say: keys, types, defaults and bounds, as models of pydantic's and as classes of the case.
 
 A quantity is written as a string with its unit and held here as a number in SI units. What the library of materials
 and liquids supplies (`walkers.inputs.resolving.SUPPLIED`) has been filled in before.
@@ -7,22 +7,32 @@ and liquids supplies (`walkers.inputs.resolving.SUPPLIED`) has been filled in be
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from math import isfinite, radians
-from typing import Annotated, Any, Literal
+from dataclasses import MISSING, fields, is_dataclass
+from math import isfinite
+from typing import Annotated, Any, Literal, get_type_hints
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
 
-from walkers.inputs import units
 from walkers.inputs.axes import ends_of, is_axis
+from walkers.inputs.bodies import Walkers
+from walkers.inputs.boundary import Boundary
 from walkers.inputs.changes import flatten
-from walkers.inputs.errors import InputError
-from walkers.inputs.units import Angle, Duration, Length, NonNegativeAngle, Radius, SignedLength
-from walkers.physics.matter import DEFAULT_LAW
-
-
-def _auto(value: object) -> object:
-    return None if isinstance(value, str) and value.strip().lower() == "auto" else value
+from walkers.inputs.errors import InputError, unusable
+from walkers.physics import units
+from walkers.physics.matter import Contact, Liquid
+from walkers.physics.units import (
+    AUTO,
+    Angle,
+    Coefficient,
+    Duration,
+    Length,
+    Number,
+    Radius,
+    SignedLength,
+    Whole,
+)
 
 
 def _axis(value: object) -> object:
@@ -50,6 +60,17 @@ def _ranges(value: object) -> object:
     return ranges
 
 
+def _friction(contact: object) -> object:
+    """Its table of friction written as dotted keys."""
+    if not isinstance(contact, dict):
+        return contact
+    friction = contact.get("friction", {})
+    if not isinstance(friction, dict):
+        raise unusable("contact.friction", "expected a table [contact.friction]")
+    others = {key: value for key, value in contact.items() if key != "friction"}
+    return others | {f"friction.{pair}": coefficient for pair, coefficient in friction.items()}
+
+
 _SAME: Sequence[Sequence[tuple[str, ...]]] = (
     (("drive.peak_acceleration",), ("drive.gamma0",)),
     (("liquid.kinematic_viscosity",), ("liquid.dynamic_viscosity",)),
@@ -67,13 +88,6 @@ ALTERNATIVES: Mapping[str, tuple[str, ...]] = {
 """Keys that say the same in other words: a change of one puts the others out of force."""
 
 MOST_BEADS = 20_000
-AUTO = BeforeValidator(_auto)
-"""Reads "auto" as None."""
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-"""TOML's integers and floats only: neither "0.3" nor true is a coefficient."""
-Whole = Annotated[int, Field(strict=True)]
-UpToRightAngle = Annotated[float, replace(units.ANGLE, largest=1.5708, sign=units.NOT_NEGATIVE)]
-Coefficient = Annotated[Number, Field(ge=0, le=1e3)]
 Axis = Annotated[Any, BeforeValidator(_axis)]
 """The name of an axis, or a direction: its components, in any length."""
 Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
@@ -86,49 +100,25 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+def fields_of(table: type) -> dict[str, tuple[str, FieldInfo]]:
+    """What a table takes, by its keys, and the attribute that holds it: nothing of what is no table.
+
+    A table is a model of pydantic's, or a dataclass if a resolved case has it as well.
+    """
+    found = dict(table.model_fields) if issubclass(table, BaseModel) else {}
+    if is_dataclass(table):
+        hints = get_type_hints(table, include_extras=True)
+        for one in fields(table):
+            default = PydanticUndefined if one.default is MISSING else one.default
+            found[one.name] = FieldInfo.from_annotated_attribute(hints[one.name], default)
+    return {field.alias or name: (name, field) for name, field in found.items()}
+
+
 class BeadsTable(Table):
     """``[beads]``: what all beads are made of."""
 
     material: str | None = None
     density: units.Density
-
-
-class WalkersTable(Table):
-    """What ``[dimers]`` and ``[[clusters]]`` have in common: how many walkers there are and how each begins.
-
-    ``meet = true`` says that they may stand and come as near as they like; without it they are replicates.
-    """
-
-    replicates: Annotated[Whole, Field(ge=1, le=1000)] = 6
-    facing: Literal["both", "right", "left", "up", "down"] = "both"
-    angle: Angle = 0.0
-    angle_spread: NonNegativeAngle = radians(1.0)
-    gap: Annotated[SignedLength | None, AUTO] = None
-    gap_spread: Annotated[Number, Field(ge=0, lt=1)] = 0.2
-    spacing: Annotated[Length | None, AUTO] = None
-    meet: bool = False
-
-
-class DimersTable(WalkersTable):
-    """``[dimers]``: the radii, first the bead that leads (the large one, as in the paper).
-
-    The radii may also be given by their mean and the asymmetry parameter sin δ = (R1 - R2)/(R1 + R2).
-    """
-
-    radii: tuple[Radius, Radius] | None = None
-    mean_radius: Radius | None = None
-    sin_delta: Annotated[Number, Field(gt=-0.9, lt=0.9)] | None = None
-
-
-class ClusterTable(WalkersTable):
-    """One of ``[[clusters]]``: walkers of several beads, in an arrangement, or at places beside each other.
-
-    ``at`` has a place for each bead, ahead and to the left, in the direction that the walker faces.
-    """
-
-    radii: Annotated[list[Radius], Field(min_length=2, max_length=100)]
-    arrangement: str | None = None
-    at: Annotated[list[tuple[SignedLength, SignedLength]], Field(max_length=100)] | None = None
 
 
 class MixtureTable(Table):
@@ -148,63 +138,6 @@ class PlacedTable(Table):
 
     radius: Radius
     at: tuple[SignedLength, SignedLength, SignedLength]
-
-
-class LiquidTable(Table):
-    """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
-
-    ``viscosity_ratio`` is the viscosity of the bridges over that of the liquid: how strongly they drag. ``law`` is that
-    of the bridges, one of `walkers.physics.laws` or a function of yours, ``file.py:function``.
-    """
-
-    name: str | None = None
-    surface_tension: units.SurfaceTension
-    density: units.Density | None = None
-    kinematic_viscosity: units.KinematicViscosity | None = None
-    dynamic_viscosity: units.DynamicViscosity | None = None
-    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)]
-    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)]
-    contact_angle: UpToRightAngle
-    law: str = DEFAULT_LAW
-
-
-class BoundaryTable(Table):
-    """``[boundary]``: what the beads stand on and lie in.
-
-    A plane, a channel (two walls and a floor, of a ``width``), a groove (two walls at an
-    angle, its ``opening``), or a container open above (of a ``width`` and a
-    ``height``). It leans by ``tilt``: 0° is level, a plane at 90° a wall. ``uphill`` is the direction of the steepest
-    way up, from that of the drive within the floor.
-    """
-
-    shape: Literal["plane", "channel", "groove", "box", "cylinder", "octagon"] = "plane"
-    material: str
-    opening: Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)] | None = None
-    width: Length | None = None
-    height: Length | None = None
-    tilt: UpToRightAngle = 0.0
-    uphill: Angle = 0.0
-
-
-class FrictionTable(Table):
-    """``[contact.friction]``: Coulomb coefficients."""
-
-    bead_bead: Coefficient
-    bead_wall: Coefficient
-
-
-class ContactTable(Table):
-    """``[contact]``: the model of the contacts.
-
-    The engine takes no restitution of 0.05 or less and no modulus above 1 GPa; contacts below 5 MPa change speeds.
-    """
-
-    friction: FrictionTable
-    rolling_friction: Coefficient
-    restitution: Annotated[Number, Field(gt=0.05, le=1)]
-    youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=1e9)] = 5e7
-    poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = 0.3
-    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)]
 
 
 class HarmonicTable(Table):
@@ -274,20 +207,20 @@ class CaseFile(Table):
 
     title: str = ""
     beads: BeadsTable
-    dimers: DimersTable | None = None
-    clusters: Annotated[list[ClusterTable], Field(max_length=100)] = []
+    dimers: Walkers | None = None
+    clusters: Annotated[list[Walkers], Field(max_length=100)] = []
     mixture: MixtureTable | None = None
     placed: Annotated[list[PlacedTable], Field(max_length=MOST_BEADS)] = []
-    boundary: BoundaryTable
+    boundary: Boundary
     drive: DriveTable
-    liquid: LiquidTable
-    contact: ContactTable
+    liquid: Liquid
+    contact: Annotated[Contact, BeforeValidator(_friction)]
     run: RunTable = RunTable()
     environment: EnvironmentTable = EnvironmentTable()
     uncertain: Ranges = {}
 
     @property
-    def walkers(self) -> dict[str, DimersTable | ClusterTable]:
+    def walkers(self) -> dict[str, Walkers]:
         """The tables of walkers by their keys, dimers first."""
         dimers = {} if self.dimers is None else {"dimers": self.dimers}
         return {**dimers, **{f"clusters[{number}]": table for number, table in enumerate(self.clusters)}}

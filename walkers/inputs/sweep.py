@@ -38,8 +38,8 @@ from walkers.inputs.changes import Value, changed, flatten
 from walkers.inputs.errors import InputError, Problem, refused, unusable
 from walkers.inputs.messages import blaming, check_key, validated
 from walkers.inputs.reading import find_input, read_toml, resolve_case, shipped
-from walkers.inputs.schema import Table, Whole
-from walkers.inputs.units import Speed
+from walkers.inputs.schema import Table
+from walkers.physics.units import Speed, Whole
 
 _LONGEST_NAME = 120
 _SAME_RUN = ("title", *(f"run.{bound}" for bound in BOUNDS))

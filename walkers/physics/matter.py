@@ -2,36 +2,49 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import nan
+from typing import Annotated
+
+from pydantic import Field
+
+from walkers.physics import units
+from walkers.physics.units import Coefficient, Number
 
 DEFAULT_LAW = "young-laplace"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Liquid:
-    """Surface tension (N/m), dynamic viscosity (Pa s), density (kg/m³), effective contact angle (rad).
+    """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
 
-    The viscosity is that of the bridges: the liquid's, times the case's ``viscosity_ratio``. ``volume_fraction`` is the
-    liquid on a bead over the bead's volume. ``law`` names the law of the bridges (`walkers.physics.laws`).
+    ``volume_fraction`` is the liquid on a bead over the bead's volume, ``viscosity_ratio`` the viscosity of the bridges
+    over that of the liquid: how strongly they drag. Resolved, ``dynamic_viscosity`` is the bridges'.
+    ``law`` is that of the bridges, one of `walkers.physics.laws` or a function of yours, ``file.py:function``.
     """
 
-    surface_tension: float
-    dynamic_viscosity: float
-    density: float | None
-    volume_fraction: float
-    contact_angle: float
-    name: str | None
+    name: str | None = None
+    surface_tension: units.SurfaceTension
+    density: units.Density | None = None
+    kinematic_viscosity: Annotated[units.KinematicViscosity | None, Field(exclude=True)] = None
+    dynamic_viscosity: units.DynamicViscosity = nan
+    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)]
+    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4, exclude=True)] = 1.0
+    contact_angle: units.UpToRightAngle
     law: str = DEFAULT_LAW
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Contact:
-    """Contact model: Young's modulus (Pa) of the softened beads and walls; the rest is dimensionless."""
+    """``[contact]``: the model of the contacts; the Young's modulus is that of the softened beads and walls.
 
-    youngs_modulus: float
-    poissons_ratio: float
-    restitution: float
-    friction_bead_bead: float
-    friction_bead_wall: float
-    rolling_friction: float
-    minimum_separation_ratio: float
+    The engine takes no restitution of 0.05 or less and no modulus above 1 GPa; contacts below 5 MPa change speeds.
+    """
+
+    friction_bead_bead: Annotated[Coefficient, Field(alias="friction.bead_bead")]
+    friction_bead_wall: Annotated[Coefficient, Field(alias="friction.bead_wall")]
+    rolling_friction: Coefficient
+    restitution: Annotated[Number, Field(gt=0.05, le=1)]
+    youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=1e9)] = 5e7
+    poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = 0.3
+    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walkers.inputs.errors import WalkersError, refused
-from walkers.inputs.units import DURATION, parse_quantity
+from walkers.physics.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion

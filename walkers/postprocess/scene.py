@@ -113,7 +113,7 @@ class Scene:
         seen, radius = 1e3 * seen @ axes.T, 1e3 * motion.radius[:, None]
         low, high = (seen - radius).min(axis=(0, 1)), (seen + radius).max(axis=(0, 1))
         if motion.case.boundary.closed:
-            half = 1e3 * motion.case.boundary.inner_width / 2.0
+            half = 1e3 * motion.case.boundary.width / 2.0
             low[:2], high[0] = np.minimum(low[:2], [-half, 0.0]), max(high[0], half)
         wider = (share - 1.0) / 2.0 * (high - low)
         return cls(motion, axes, low - wider, high + wider, **options)
@@ -194,9 +194,9 @@ def walls_of(motion: Motion) -> list[FloatArray]:
     boundary, margin, inside = motion.case.boundary, 4.0 * float(motion.radius.max()), motion.position[0, 0]
     low, high = motion.position.min(axis=(0, 1)) - margin, motion.position.max(axis=(0, 1)) + margin
     if boundary.closed:
-        wide = 1.01 * boundary.inner_width / 2.0  # edges of the prism lie beyond the round wall
-        low, high = np.full(3, -wide), np.array([wide, wide, boundary.top])
-        inside = np.array([0.0, 0.0, boundary.top / 2.0])
+        wide = 1.01 * boundary.width / 2.0  # edges of the prism lie beyond the round wall
+        low, high = np.full(3, -wide), np.array([wide, wide, boundary.height])
+        inside = np.array([0.0, 0.0, boundary.height / 2.0])
     planes: list[tuple[Any, Any]] = []
     for wall in boundary.walls:
         if isinstance(wall, Flat):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from walkers.inputs.errors import refused
-from walkers.inputs.units import DURATION, parse_quantity
+from walkers.physics.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place, new_figure, save_figure, styled
 from walkers.postprocess.motion import Group, Motion, gathered, read_motion
 from walkers.postprocess.scene import Picture, Scene, Window, axes_toward

@@ -53,7 +53,7 @@ def box_of(motion: Motion) -> FloatArray:
     radius = motion.radius[:, None]
     low, high = (motion.position - radius).min(axis=(0, 1)), (motion.position + radius).max(axis=(0, 1))
     if motion.case.boundary.closed:
-        half = motion.case.boundary.inner_width / 2.0
+        half = motion.case.boundary.width / 2.0
         low[:2], high[:2] = np.minimum(low[:2], -half), np.maximum(high[:2], half)
     low[2] = min(low[2], 0.0)
     return _MM * np.array([low, high])

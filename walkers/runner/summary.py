@@ -11,9 +11,9 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import printable
-from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics.capillary import capillary_force_limit_at_wall
 from walkers.physics.time_step import auto_fractions
+from walkers.physics.units import ACCELERATION_OF_ONE_G
 from walkers.runner.cost import predicted_seconds
 
 

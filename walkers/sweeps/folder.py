@@ -22,7 +22,7 @@ from typing import Any, Literal
 
 from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, differing, flattened, has_key, readable
-from walkers.inputs.units import Kind, parse_quantity
+from walkers.physics.units import Kind, parse_quantity
 from walkers.runner.directory import CASE_NAME, REPLACED, UNFINISHED, holds_unfinished, is_run_name, recover
 from walkers.runner.files import read_json
 from walkers.runner.locks import is_locked, locked

@@ -30,7 +30,7 @@ from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.library import expected_of, suggestion
 from walkers.inputs.messages import quoted, validated
 from walkers.inputs.reading import read_toml
-from walkers.inputs.schema import Whole
+from walkers.physics.units import Whole
 
 if TYPE_CHECKING:
     from parsl.config import Config

@@ -8,15 +8,15 @@ numbers, so that "500 rad/s" would pass for 500 Hz.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from math import pi
+from math import inf, nan, pi
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from pydantic import GetCoreSchemaHandler
+from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, ValidationInfo, WrapValidator
 from pydantic_core import CoreSchema
-from pydantic_core.core_schema import no_info_before_validator_function
+from pydantic_core.core_schema import with_info_before_validator_function
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -68,11 +68,13 @@ class Kind:
         return f'expected {article} {self.name} with its unit, such as "{self.example}"'
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return no_info_before_validator_function(self._read, handler(source))
+        return with_info_before_validator_function(self._read, handler(source))
 
-    def _read(self, value: object) -> float:
+    def _read(self, value: object, info: ValidationInfo) -> object:
         if not isinstance(value, str):
-            raise ValueError(self.expectation)
+            if info.context == WRITTEN:
+                raise ValueError(self.expectation)
+            return value
         number = parse_quantity(value, self)
         if (self.sign and number < 0.0) or (number == 0.0 and self.sign == POSITIVE):
             raise ValueError(f"{self.expectation}; it must be {self.sign}")
@@ -157,6 +159,8 @@ def kind_in(annotations: Iterable[Any]) -> Kind | None:
 
 
 POSITIVE, NOT_NEGATIVE = "more than zero", "zero or more"
+WRITTEN = "written"
+"""Context of the validation of what a user wrote, where a quantity without its unit is refused."""
 
 LENGTH = Kind("length", "m", "0.3 mm", 1.0, 1e-9, POSITIVE)
 FREQUENCY = Kind("frequency", "Hz", "80 Hz", 1e6, 1e-2, POSITIVE)
@@ -183,8 +187,25 @@ Duration = Annotated[float, DURATION]
 NonNegativeDuration = Annotated[float, replace(DURATION, sign=NOT_NEGATIVE)]
 Angle = Annotated[float, ANGLE]
 NonNegativeAngle = Annotated[float, replace(ANGLE, sign=NOT_NEGATIVE)]
+UpToRightAngle = Annotated[float, replace(ANGLE, largest=1.5708, sign=NOT_NEGATIVE)]
 Density = Annotated[float, DENSITY]
 SurfaceTension = Annotated[float, SURFACE_TENSION]
 KinematicViscosity = Annotated[float, KINEMATIC_VISCOSITY]
 DynamicViscosity = Annotated[float, DYNAMIC_VISCOSITY]
 FileSize = Annotated[float, FILE_SIZE]
+
+
+def _is_auto(value: object) -> bool:
+    return isinstance(value, str) and value.strip().lower() == "auto"
+
+
+AUTO = BeforeValidator(lambda value: None if _is_auto(value) else value)
+"""Reads "auto" as None …"""
+AUTO_FAR = WrapValidator(lambda value, read: inf if _is_auto(value) else read(value))
+"""… and as infinity."""
+ABSENT: Sequence[Any] = (None, "", [], (), inf, pi, nan)
+"""Defaults that stand for what is not there."""
+Whole = Annotated[int, Field(strict=True)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+"""TOML's integers and floats only: neither "0.3" nor true is a coefficient."""
+Coefficient = Annotated[Number, Field(ge=0, le=1e3)]
