@@ -18,7 +18,7 @@ from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import finished_places, run_place
-from walkers.sweeps.shared_deck import make_runs
+from walkers.sweeps.making import make_runs
 from walkers.theory.prediction import motion_of, predict
 
 FRICTIONS = {0.1: -9.57e-3, 0.2: -3.33e-3, 0.3: 4.77e-3}

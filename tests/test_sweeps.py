@@ -38,9 +38,8 @@ from walkers.runner import find_engine, finished_run
 from walkers.runner.directory import FIRST_SEGMENT
 from walkers.runner.failures import WalkersMet
 from walkers.runner.locks import locked
-from walkers.sweeps.run import plan_sweep, run_sweep
-from walkers.sweeps.scheduler import Options
-from walkers.sweeps.shared_deck import make_runs, work
+from walkers.sweeps.making import make_runs
+from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep, work
 from walkers.sweeps.table import load, thresholds
 
 TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
@@ -384,8 +383,8 @@ def test_two_sweeps_of_one_process_do_not_stop_each_other(sweep_file: Callable[.
 
 def test_a_worker_of_another_version_refuses(tmp_path: Path) -> None:
     engine, names, cases = find_engine(), ["test-0123456789ab"], [make_case(run=TINY)]
-    assert work("", names, cases, tmp_path, engine, None).failure == "ProgramDiffers"
-    assert work("", names, cases, tmp_path, replace(engine, sha256="0" * 64), None).failure == "EngineDiffers"
+    assert work(None, names, cases, tmp_path, engine, None).failure == "ProgramDiffers"
+    assert work(None, names, cases, tmp_path, replace(engine, sha256="0" * 64), None).failure == "EngineDiffers"
     assert not list(tmp_path.iterdir())
 
 

@@ -29,8 +29,7 @@ from walkers.postprocess.gait import steady_walkers, together
 from walkers.postprocess.tables import read_table
 from walkers.runner.failures import BeadsLost, BlowUp
 from walkers.runner.files import read_json, write_json
-from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Failure, Options
+from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
@@ -104,7 +103,7 @@ def wave_sweep(
 
 
 def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path, options: Options, **how: Any) -> Wave:
-    """Run what is missing of the sweep of a wave (P, D); the rest is as for `walkers.sweeps.run.run_sweep`."""
+    """Run what is missing of the sweep of a wave (P, D); the rest is as for `walkers.sweeps.scheduler.run_sweep`."""
     record, failures = run_sweep(sweep, out, options, **how)
     table, labels = load(record.directory), list(calibration.experiments)
     seen = _seen(table, len(labels))
@@ -161,7 +160,7 @@ def calibrate(
     Parameters
     ----------
     calibration, options, how
-        From `walkers.inputs.calibration.load_calibration`; as for `walkers.sweeps.run.run_sweep`.
+        From `walkers.inputs.calibration.load_calibration`; as for `walkers.sweeps.scheduler.run_sweep`.
     out
         Folder of the run directories; each wave is a sweep there, and its design is kept in a folder of the
         calibration's name.

@@ -17,8 +17,7 @@ from walkers.paper.sensitivity import fig_sensitivity
 from walkers.paper.sources import NothingFinishedError, ProgressOf, Sources
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.runner.files import write_text
-from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Failure, Options
+from walkers.sweeps.scheduler import Failure, Options, run_sweep
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,7 +81,7 @@ def make_figures(  # noqa: PLR0913
     out, to
         Folders of the run directories and of the figures.
     options, engine, allow_failed_audit
-        As for `walkers.sweeps.run.run_sweep`.
+        As for `walkers.sweeps.scheduler.run_sweep`.
     only
         Names of `FIGURES`, or ``comparison``; if empty, all but those that are drawn only if asked for.
     formats

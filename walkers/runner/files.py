@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -54,6 +55,14 @@ def write_bytes(path: Path, contents: bytes, *, at_once: bool = True) -> None:
         if at_once:
             file.flush()
             os.fsync(file.fileno())
+
+
+def link_or_copy(source: str | Path, to: str | Path) -> None:
+    """The same file in two places; a copy where the file system has no links."""
+    try:
+        os.link(source, to)
+    except OSError:
+        shutil.copyfile(source, to)
 
 
 @contextmanager
