@@ -21,8 +21,7 @@ from walkers.runner.files import read_json, write_json
 from walkers.runner.locks import locked
 from walkers.sweeps.comparison import _matched
 from walkers.sweeps.folder import bytes_text
-from walkers.sweeps.record import SweepRecord, write_record
-from walkers.sweeps.table import varied_columns
+from walkers.sweeps.table import SweepRecord, varied_columns, write_record
 
 OTHER, FASTER = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}
 SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}

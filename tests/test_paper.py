@@ -26,13 +26,12 @@ from walkers.paper.figures import theory_of_cycles
 from walkers.paper.make import FIGURES, make_figures
 from walkers.paper.maps import MODES, POSTURES, classify, climber, paper_drives, postures, sliding_share
 from walkers.paper.model_terms import ALWAYS, FITTED, KAPPA, NOTHING_ELSE, TERMS, fit, values_of
-from walkers.paper.published import OBSERVATIONS
+from walkers.paper.published import OBSERVATIONS, NothingFinishedError, Sources
 from walkers.paper.sensitivity import OBSERVED, PARAMETERS, sensitivities
-from walkers.paper.sources import NothingFinishedError, Sources
 from walkers.postprocess.drawing import save_figure
 from walkers.postprocess.gait import gait, steady_walkers
-from walkers.sweeps.record import read_record
 from walkers.sweeps.scheduler import Options
+from walkers.sweeps.table import read_record
 from walkers.theory.mathieu import turning
 from walkers.theory.prediction import alignment_of, motion_of, pendulum_of
 from walkers.theory.quasistatic import mean_velocity

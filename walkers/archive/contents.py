@@ -12,7 +12,7 @@ from walkers.inputs.errors import refused
 from walkers.runner.directory import CASE_NAME, FinishedRun, name_of
 from walkers.runner.files import json_bytes
 from walkers.runner.manifest import MANIFEST_NAME, checksum
-from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_record, states
+from walkers.sweeps.table import RECORD_NAME, SweepRecord, read_record, states
 
 RUNS = "runs"
 """Folder of the run directories in an archive: there, the program finds them as it does elsewhere."""

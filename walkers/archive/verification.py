@@ -20,7 +20,7 @@ from walkers.inputs.text import printable
 from walkers.runner.directory import CASE_NAME, SEGMENTS
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
-from walkers.sweeps.record import PARSL, RECORD_NAME, read_record, states
+from walkers.sweeps.table import PARSL, RECORD_NAME, read_record, states
 
 SUMS_NAME = "sha256sums.txt"
 """In an archive: as ``sha256sum -c`` reads it."""

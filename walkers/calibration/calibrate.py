@@ -24,7 +24,7 @@ from walkers.inputs.errors import InputError, Problem, WalkersError, refused
 from walkers.inputs.schema import ALTERNATIVES
 from walkers.inputs.sweep import Sweep, expand
 from walkers.paper.comparison import misalignment
-from walkers.paper.sources import ProgressOf
+from walkers.paper.published import ProgressOf
 from walkers.postprocess.gait import steady_walkers, together
 from walkers.postprocess.tables import read_table
 from walkers.runner.failures import BeadsLost, BlowUp
@@ -165,7 +165,7 @@ def calibrate(
         Folder of the run directories; each wave is a sweep there, and its design is kept in a folder of the
         calibration's name.
     progress_of
-        As `walkers.paper.sources.ProgressOf`.
+        As `walkers.paper.published.ProgressOf`.
 
     Raises
     ------

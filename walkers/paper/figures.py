@@ -8,8 +8,7 @@ import numpy as np
 
 from walkers.inputs.loads import dimer_of
 from walkers.paper import published
-from walkers.paper.published import GRAVITY, OBSERVATIONS, described, driven, of_asymmetry, of_radii, shipped
-from walkers.paper.sources import Sources
+from walkers.paper.published import GRAVITY, OBSERVATIONS, Sources, described, driven, of_asymmetry, of_radii, shipped
 from walkers.postprocess.drawing import ONE_COLUMN, TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 from walkers.postprocess.gait import gait
 from walkers.postprocess.series import top_view

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from walkers.paper.comparison import evaluate
-from walkers.paper.published import OBSERVATIONS
-from walkers.paper.sources import Sources
+from walkers.paper.published import OBSERVATIONS, Sources
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, styled
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from walkers.runner.directory import CASE_NAME, REPLACED, UNFINISHED, holds_unfi
 from walkers.runner.files import read_json
 from walkers.runner.locks import is_locked, locked
 from walkers.runner.manifest import MANIFEST_NAME
-from walkers.sweeps.record import (
+from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
     derived_columns,

@@ -33,12 +33,13 @@ from walkers.inputs.errors import Stopped, WalkersError, check_utf8, refused
 from walkers.inputs.sweep import Sweep
 from walkers.postprocess.analysis import current_result
 from walkers.runner.binary import Engine, find_engine
-from walkers.runner.cost import pairs_of_beads, predicted_seconds
 from walkers.runner.directory import run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
 from walkers.runner.locks import is_locked
+from walkers.runner.summary import pairs_of_beads, predicted_seconds
 from walkers.sweeps.making import check_audit, make_runs
-from walkers.sweeps.record import (
+from walkers.sweeps.site import Site, check_path, pilots, threads
+from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
     SweepRecord,
@@ -46,10 +47,9 @@ from walkers.sweeps.record import (
     states,
     velocity_in,
     velocity_of,
+    with_unit,
     write_record,
 )
-from walkers.sweeps.site import Site, check_path, pilots, threads
-from walkers.sweeps.table import with_unit
 from walkers.templates.scene import sharing_key
 
 if TYPE_CHECKING:

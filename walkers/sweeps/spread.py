@@ -20,9 +20,8 @@ from walkers.postprocess.analysis import analyses, analyses_of
 from walkers.postprocess.gait import SEPARATED
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_name
-from walkers.sweeps.record import row_of
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
-from walkers.sweeps.table import load
+from walkers.sweeps.table import load, row_of
 
 if TYPE_CHECKING:
     import pandas as pd
