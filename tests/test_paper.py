@@ -22,12 +22,11 @@ from walkers.inputs.reading import read_toml
 from walkers.inputs.sweep import shipped_sweeps
 from walkers.paper import model_terms, published
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
-from walkers.paper.figures import theory_of_cycles
+from walkers.paper.figures import OBSERVED, PARAMETERS, sensitivities, theory_of_cycles
 from walkers.paper.make import FIGURES, make_figures
 from walkers.paper.maps import MODES, POSTURES, classify, climber, paper_drives, postures, sliding_share
 from walkers.paper.model_terms import ALWAYS, FITTED, KAPPA, NOTHING_ELSE, TERMS, fit, values_of
 from walkers.paper.published import OBSERVATIONS, NothingFinishedError, Sources
-from walkers.paper.sensitivity import OBSERVED, PARAMETERS, sensitivities
 from walkers.postprocess.drawing import save_figure
 from walkers.postprocess.gait import gait, steady_walkers
 from walkers.sweeps.scheduler import Options

@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from walkers.archive.contents import Contents, Item, PackedRun
 from walkers.runner.provenance import PROJECT
 
 if TYPE_CHECKING:
     from rocrate.model.entity import Entity
+
+    from walkers.archive.writing import Contents, Item, PackedRun
 
 METADATA_NAME = "ro-crate-metadata.json"
 PREVIEW_NAME = "ro-crate-preview.html"

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
-from walkers.paper.figures import fig1b, fig2, fig3, fig4
+from walkers.paper.figures import fig1b, fig2, fig3, fig4, fig_sensitivity
 from walkers.paper.maps import fig_alignment, fig_climbing, fig_modes, fig_zoo
 from walkers.paper.published import NothingFinishedError, ProgressOf, Sources
-from walkers.paper.sensitivity import fig_sensitivity
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.runner.files import write_text
 from walkers.sweeps.scheduler import Failure, Options, run_sweep

@@ -17,7 +17,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -121,7 +121,6 @@ def make_runs(
     """
     out.mkdir(parents=True, exist_ok=True)
     places = {run_place(case, engine, out): case for case in cases}
-    watched: dict[str, Any] = {"on_progress": on_progress, "time_limit": time_limit}
     with locked(places) as ours:
         for place in ours:
             recover(place)
@@ -133,14 +132,14 @@ def make_runs(
         if len(missing) == 1:
             ((place, case),) = missing.items()
             with open_locked(case, engine, place, locks, anew=force) as opened:
-                opened.make(**watched)
+                opened.make(on_progress=on_progress, time_limit=time_limit)
                 tabulate(opened.directory)
                 runs[place.name] = opened.finish()
         elif missing:
             left = {place.name: case for place, case in missing.items()}
             for cycles in next(iter(left.values())).run.attempts:
                 if left:
-                    runs |= _make_together(left, cycles, out, engine, locks, **watched)
+                    runs |= _make_together(left, cycles, out, engine, locks, on_progress, time_limit)
                 left = {name: case for name, case in left.items() if name not in runs}
     return Made(runs, found, busy)
 
@@ -176,14 +175,9 @@ class OpenRun:
         time_limit: float | None = None,
         render: Callable[[Case, Segment], Deck] = render_deck,
     ) -> None:
-        """Make the segments that are missing; if the engine fails, those before stay.
+        """Make the segments that are missing, by decks that ``render`` makes; if the engine fails, those before stay.
 
-        Parameters
-        ----------
-        on_progress, time_limit
-            Of each segment, as in `walkers.runner.launch.launch`.
-        render
-            What makes their decks.
+        The time limit, s, is of each.
         """
         begun, made = time.perf_counter(), 0
         look_ahead()
@@ -194,7 +188,7 @@ class OpenRun:
                     shutil.rmtree(directory)
                 self.done.clear()
             while (segment := self._next_segment(case)) is not None:
-                tell = _teller(case, segment, on_progress, begun, made) if on_progress else None
+                tell = _teller(case, segment, on_progress, made, begun) if on_progress else None
                 self._make(segment, render(case, segment), tell, time_limit)
                 made += segment.end - segment.begin
             if cycles < self.case.run.cycles and _are_steady(self.directory):
@@ -220,7 +214,7 @@ class OpenRun:
                 return int(segment["end"])
         return None
 
-    def _make(self, segment: Segment, deck: Deck, tell: _Tell | None, time_limit: float | None) -> None:
+    def _make(self, segment: Segment, deck: Deck, tell: Callable[[int], None] | None, time_limit: float | None) -> None:
         folder, number = self.directory / SEGMENTS, len(self.done)
         new, before = folder / f"{number:04d}.new", folder / f"{number - 1:04d}"
         shutil.rmtree(new, ignore_errors=True)
@@ -229,7 +223,7 @@ class OpenRun:
             write_deck(deck, new, before if number else None)
             if segment.begin:
                 shutil.copyfile(before / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
-            report = launch(deck, new, self.engine, on_progress=tell, time_limit=time_limit, keep_open=self.locks)
+            report = launch(deck, new, self.engine, on_step=tell, time_limit=time_limit, keep_open=self.locks)
             (new / PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
             restart = new / RESTART_NAME
             size = restart.stat().st_size if restart.exists() else 0
@@ -266,22 +260,17 @@ def _write_manifest(
     write_json(made / MANIFEST_NAME, {**said, **more}, at_once=False)
 
 
-def _teller(case: Case, segment: Segment, tell: _Tell, begun: float, made: int) -> _Tell:
-    """What turns the progress of a segment into that of its run."""
+def _teller(
+    case: Case, segment: Segment, tell: _Tell, made: int = 0, begun: float | None = None
+) -> Callable[[int], None]:
+    """What makes of a segment's step the progress of its run."""
+    since = time.perf_counter() if begun is None else begun
 
-    def advance(progress: Progress) -> None:
-        step, start = max(progress.step, segment.begin), segment.drive_from
-        tell(
-            replace(
-                progress,
-                step=0 if start is None else step - start,
-                steps=case.run.steps,
-                made=made + step - segment.begin,
-                simulated=step * case.run.time_step,
-                elapsed=time.perf_counter() - begun,
-                resting=start is None,
-            )
-        )
+    def advance(step: int) -> None:
+        step, start = max(step, segment.begin), segment.drive_from
+        done, seconds = 0 if start is None else step - start, time.perf_counter() - since
+        simulated = step * case.run.time_step
+        tell(Progress(done, case.run.steps, simulated, seconds, made + step - segment.begin, start is None))
 
     return advance
 
@@ -290,27 +279,9 @@ def _teller(case: Case, segment: Segment, tell: _Tell, begun: float, made: int) 
 def open_locked(
     case: Case, engine: Engine, place: Path, locks: Sequence[int], *, anew: bool = False
 ) -> Iterator[OpenRun]:
-    """Make a run, whose place its caller has locked, in a directory of its own, or go on with it.
+    """Make a run, whose place its caller has locked, in a directory of its own, or go on with it, unless ``anew``.
 
-    Parameters
-    ----------
-    case, engine
-        What determines the run.
-    place, locks
-        Where it belongs, and the descriptors of its locks, which the engine inherits.
-    anew
-        Whether what there is of an earlier call goes first.
-
-    Yields
-    ------
-    OpenRun
-        Call its `OpenRun.make` and `OpenRun.finish`. Left without the latter, the directory stays as ``….incomplete``,
-        with a ``failure.json`` if something failed.
-
-    Raises
-    ------
-    DiskFull
-        If there is no room even for the deck.
+    Left without `OpenRun.finish` the directory stays as ``….incomplete``, with a ``failure.json`` if something failed.
     """
     directory = unfinished(place)
     recover(place)
@@ -350,7 +321,13 @@ def _read_segment(directory: Path) -> dict[str, Any]:
 
 
 def _make_together(
-    cases: Mapping[str, Case], cycles: int, out: Path, engine: Engine, locks: Sequence[int], **watched: Any
+    cases: Mapping[str, Case],
+    cycles: int,
+    out: Path,
+    engine: Engine,
+    locks: Sequence[int],
+    on_progress: _Tell | None,
+    time_limit: float | None,
 ) -> dict[str, FinishedRun]:
     """Make runs of so many cycles by one deck; those finished whose walkers are steady, or that take no more cycles.
 
@@ -371,7 +348,9 @@ def _make_together(
                 (incomplete / name).mkdir(exist_ok=True)
                 write_json(incomplete / name / CASE_NAME, case.as_dict(), at_once=False)
             look_ahead()
-            report = launch(deck, incomplete / DECK_FOLDER, engine, keep_open=locks, **watched)
+            tell = _teller(tried[first], first_segment(tried[first]), on_progress) if on_progress else None
+            folder = incomplete / DECK_FOLDER
+            report = launch(deck, folder, engine, on_step=tell, time_limit=time_limit, keep_open=locks)
             _part(incomplete, tried, deck, report)
             done = [name for name in cases if cycles >= cases[name].run.cycles or _are_steady(incomplete / name)]
             shared = {"first": first, "runs": len(done), "walkers": len(deck.layout.walkers)}
