@@ -33,9 +33,8 @@ from walkers.main import main
 from walkers.postprocess.gait import Walk, walk
 from walkers.postprocess.motion import Group, read_motion
 from walkers.runner.binary import Engine
-from walkers.runner.directory import run_place
+from walkers.runner.directory import locked, run_place
 from walkers.runner.failures import RunBusy
-from walkers.runner.locks import locked
 from walkers.sweeps.making import OpenRun, open_locked
 from walkers.sweeps.scheduler import Options, run_sweep
 

@@ -16,9 +16,8 @@ import pytest
 import walkers
 from tests.conftest import call, document, mounted, to_toml
 from walkers.inputs.readable import differing, flattened
-from walkers.runner.directory import MANIFEST_NAME, finished_places
+from walkers.runner.directory import MANIFEST_NAME, finished_places, locked
 from walkers.runner.files import read_json, write_json
-from walkers.runner.locks import locked
 from walkers.sweeps.comparison import _matched
 from walkers.sweeps.folder import bytes_text
 from walkers.sweeps.table import SweepRecord, varied_columns, write_record

@@ -35,9 +35,8 @@ from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess import read_motion, read_table
 from walkers.runner import find_engine, finished_run
-from walkers.runner.directory import FIRST_SEGMENT
+from walkers.runner.directory import FIRST_SEGMENT, locked
 from walkers.runner.failures import WalkersMet
-from walkers.runner.locks import locked
 from walkers.sweeps.making import make_runs
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep, work
 from walkers.sweeps.table import load, thresholds
@@ -278,7 +277,7 @@ def test_interrupts_leave_no_engine_and_the_next_call_goes_on(
 def test_what_somebody_else_is_making_is_waited_for(
     sweep_file: Callable[..., str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 0.2)
+    monkeypatch.setattr("walkers.runner.directory._PATIENCE_SECONDS", 0.2)
     sweep, out = load_sweep(sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g"]')), in_folder / "runs"
     out.mkdir()
     (place,) = plan_sweep(sweep, out, Options(2)).record.runs

@@ -4,17 +4,24 @@ A run is made in ``<name>-<hash>.incomplete`` and renamed to ``<name>-<hash>`` w
 a directory without a manifest is not a run, and a run that is made anew replaces the old one only when it has finished.
 What the engine was given and wrote is in ``segments/0000``, ``segments/0001``, …; walkers have one unless their case
 asks for more.
-While it is made, the file ``<name>-<hash>.lock`` is locked, also by the engine itself (see `walkers.runner.locks`).
+
+While it is made, the file ``<name>-<hash>.lock`` is locked. The lock is the kernel's (``flock``): it ends with the last
+process that has the file open, however that ends. Engines inherit it, so that one which outlives its launcher keeps
+others away from the directory that it writes into. It does so for moments only, for the kernel ends it with its
+launcher: whoever meets a lock waits that long.
 """
 
 from __future__ import annotations
 
 import errno
+import fcntl
 import hashlib
 import json
+import os
 import re
 import shutil
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +45,9 @@ SEGMENT_NAME = "segment.json"
 UNFINISHED = ".incomplete"
 REPLACED = ".replaced"
 _LONGEST_NAME = 80
+_LOOK_SECONDS = 0.01
+_PATIENCE_SECONDS = 2.0
+"""Before locks are taken for another's: engines whose launcher was killed end within a fraction of a second."""
 
 
 # --- names ------------------------------------------------------------------------------------------------------------
@@ -181,13 +191,6 @@ def write_segment_record(
     return record
 
 
-def record_failure(incomplete: Path, failure: Exception) -> None:
-    """Leave word of a failure in the directory of an unfinished run."""
-    said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
-    with suppress(OSError):  # a full disk: the message reaches the user all the same
-        write_json(incomplete / FAILURE_NAME, said)
-
-
 @contextmanager
 def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
     """Turn the system's word for a full disk, to which so many bytes are still to be written, into a `DiskFull`.
@@ -222,3 +225,67 @@ def recover(place: Path) -> None:
         replaced.rename(place)
     elif replaced.exists():
         shutil.rmtree(replaced)
+
+
+# --- locks ------------------------------------------------------------------------------------------------------------
+
+
+def _lock_file(place: Path) -> Path:
+    return place.with_name(f"{place.name}.lock")
+
+
+@contextmanager
+def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
+    """Lock those of the places that nobody else has locked, two seconds later at the latest.
+
+    Parameters
+    ----------
+    places
+        Final places of run directories, in folders that exist.
+
+    Yields
+    ------
+    Mapping
+        From the places that are ours until the end of the block to the descriptors of their lock files.
+    """
+    ours: dict[Path, int] = {}
+    end = time.monotonic() + _PATIENCE_SECONDS
+    try:
+        # In the order of their names, so that of two who want the same places one gets them rather than each a half.
+        for place in sorted(set(places)):
+            if (descriptor := _lock(_lock_file(place), end)) is not None:
+                ours[place] = descriptor
+        yield ours
+    finally:
+        for place, descriptor in ours.items():
+            _lock_file(place).unlink(missing_ok=True)
+            os.close(descriptor)
+
+
+def _lock(file: Path, end: float) -> int | None:
+    """Lock a file that others may be removing at this moment: the lock counts only on the file that has the name."""
+    while True:
+        descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(descriptor), file.stat()):
+                    return descriptor
+        except BlockingIOError:
+            if time.monotonic() > end:
+                os.close(descriptor)
+                return None
+            time.sleep(_LOOK_SECONDS)
+        os.close(descriptor)
+
+
+def is_locked(place: Path) -> bool:
+    """Whether somebody is making the run whose place this is."""
+    try:
+        with _lock_file(place).open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except BlockingIOError:
+        return True
+    return False

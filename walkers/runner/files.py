@@ -19,17 +19,13 @@ def read_json(path: Path) -> dict[str, Any]:
     OSError, ValueError
         If the file cannot be read, or holds something else.
     """
-    return json_object(path.read_bytes(), str(path))
-
-
-def json_object(contents: bytes, name: str) -> dict[str, Any]:
-    """The JSON object that the contents of a file are; ``name`` is the file's, for the message of a ValueError."""
+    contents = path.read_bytes()
     try:
         found = json.loads(contents)
     except (ValueError, RecursionError) as error:
-        raise ValueError(f"{name}: no JSON ({error})") from error
+        raise ValueError(f"{path}: no JSON ({error})") from error
     if not isinstance(found, dict):
-        raise ValueError(f"{name}: expected a JSON object")
+        raise ValueError(f"{path}: expected a JSON object")
     return found
 
 

@@ -23,9 +23,17 @@ from typing import Any, Literal
 from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, differing, flattened, has_key, readable
 from walkers.inputs.units import Kind, parse_quantity
-from walkers.runner.directory import CASE_NAME, REPLACED, UNFINISHED, holds_unfinished, is_run_name, recover
+from walkers.runner.directory import (
+    CASE_NAME,
+    REPLACED,
+    UNFINISHED,
+    holds_unfinished,
+    is_locked,
+    is_run_name,
+    locked,
+    recover,
+)
 from walkers.runner.files import read_json
-from walkers.runner.locks import is_locked, locked
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.table import (
     PARSL,

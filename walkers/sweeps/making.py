@@ -16,7 +16,7 @@ import shutil
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,13 +27,14 @@ from walkers.postprocess.analysis import tabulate
 from walkers.runner.binary import Engine, read_audit
 from walkers.runner.directory import (
     CASE_NAME,
+    FAILURE_NAME,
     FIRST_SEGMENT,
     SEGMENT_NAME,
     SEGMENTS,
     FinishedRun,
     finished_run,
+    locked,
     move_into_place,
-    record_failure,
     recover,
     room_on_disk,
     run_place,
@@ -45,7 +46,6 @@ from walkers.runner.directory import (
 from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
 from walkers.runner.files import fsync_path, link_or_copy, read_json, settle, write_json
 from walkers.runner.launch import EngineReport, Progress, check_room, launch
-from walkers.runner.locks import locked
 from walkers.runner.manifest import MANIFEST_NAME, manifest
 from walkers.runner.provenance import look_ahead
 from walkers.templates.deck import (
@@ -302,7 +302,9 @@ def open_locked(
     except Stopped:
         raise
     except (WalkersError, OSError) as failure:
-        record_failure(directory, failure)
+        said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
+        with suppress(OSError):  # a full disk: the message reaches the user all the same
+            write_json(directory / FAILURE_NAME, said)
         raise
 
 

@@ -33,9 +33,8 @@ from walkers.inputs.errors import Stopped, WalkersError, check_utf8, refused
 from walkers.inputs.sweep import Sweep
 from walkers.postprocess.analysis import current_result
 from walkers.runner.binary import Engine, find_engine
-from walkers.runner.directory import run_place, unfinished
+from walkers.runner.directory import is_locked, run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
-from walkers.runner.locks import is_locked
 from walkers.runner.summary import pairs_of_beads, predicted_seconds
 from walkers.sweeps.making import check_audit, make_runs
 from walkers.sweeps.site import Site, check_path, pilots, threads
@@ -146,10 +145,6 @@ class PlannedDeck:
 
     points: tuple[int, ...]
     seconds: float
-
-    def part(self, points: Sequence[int]) -> PlannedDeck:
-        """A deck of some of its points."""
-        return PlannedDeck(tuple(points), self.seconds * len(points) / len(self.points))
 
 
 def pack(cases: Mapping[int, Case], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
@@ -308,25 +303,18 @@ def run_sweep(
 
     Parameters
     ----------
-    sweep
-        From `walkers.inputs.sweep.load_sweep`.
-    out
-        Folder of the run directories.
-    options
-        How it is to be run.
-    engine
-        Name or path of the binary; see `walkers.runner.find_engine`.
-    allow_failed_audit
-        Run on an engine that failed its audit.
+    sweep, out, options
+        From `walkers.inputs.sweep.load_sweep`; folder of the run directories; how it is to be run.
+    engine, allow_failed_audit
+        As of `walkers.run`.
     on_progress
         Called a few times a second.
 
     Returns
     -------
-    record
-        The sweep; `walkers.sweeps.table.load` reads the table from ``record.directory``.
-    failures
-        The points that failed; all others are finished or, below the end of a descent, not needed.
+    record, failures
+        The sweep (`walkers.sweeps.table.load` reads the table from ``record.directory``), and the points that failed;
+        all others are finished or, below the end of a descent, not needed.
 
     Raises
     ------
@@ -556,7 +544,7 @@ class _Scheduler:
             self.seconds_done += deck.seconds
         elif left:
             for part in _parts(left, 2) if report.failure else [left]:
-                self._hand_out(deck.part(part), group)
+                self._hand_out(PlannedDeck(tuple(part), deck.seconds * len(part) / len(deck.points)), group)
 
     def _progress(self) -> SweepProgress:
         first = list(self.groups_of)[: 4 * self.plan.options.decks_at_once]  # the others wait

@@ -28,9 +28,8 @@ from walkers.inputs.errors import InputError, Problem, WalkersError, refused
 from walkers.inputs.library import suggestion
 from walkers.postprocess.analysis import RESULT_NAME, Described, analyses, analyses_in, analyses_of, current_result
 from walkers.runner.binary import Engine
-from walkers.runner.directory import FAILURE_NAME, finished_run, run_place, unfinished
+from walkers.runner.directory import FAILURE_NAME, finished_run, is_locked, run_place, unfinished
 from walkers.runner.files import read_json, write_bytes, write_json
-from walkers.runner.locks import is_locked
 from walkers.runner.manifest import check_unchanged
 
 if TYPE_CHECKING:
@@ -125,12 +124,6 @@ def result_columns(names: Sequence[str]) -> Described:
     return {key: told for one in analyses() if one.name in names for key, told in one.columns.items()}
 
 
-def analyses_of_all(cases: Iterable[Case]) -> list[str]:
-    """Names of the analyses that mean something for any of several cases."""
-    found = {one.name for case in cases for one in analyses_of(case)}
-    return [one.name for one in analyses() if one.name in found]
-
-
 def row_of(result: Mapping[str, Any]) -> dict[str, Any]:
     """The columns `result_columns` of a result."""
     return {key: value for one in analyses_in(result) for key, value in one.row(result).items()}
@@ -138,7 +131,8 @@ def row_of(result: Mapping[str, Any]) -> dict[str, Any]:
 
 def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Path) -> SweepRecord:
     """The record of a sweep whose points have been resolved; `InputError` if piles are to descend."""
-    names = analyses_of_all(cases)
+    found = {one.name for case in cases for one in analyses_of(case)}
+    names = [one.name for one in analyses() if one.name in found]
     if sweep.descent is not None and "velocity" not in result_columns(names):
         raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
     columns, derived = derived_columns(names), []
