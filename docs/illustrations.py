@@ -26,7 +26,7 @@ from typing import Any
 from walkers import load_case, run
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.report import write_outcome
-from walkers.check.validate import validate
+from walkers.check.report import validate
 from walkers.inputs.calibration import load_calibration
 from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten

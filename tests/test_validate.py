@@ -15,9 +15,8 @@ from tests.printed import spoilt
 from walkers.check import benchmarks, bridges
 from walkers.check.benchmarks import ALLOY, GLASS, OXIDE, STEEL, Speeds, farthest_point, onto_plane, published
 from walkers.check.bridges import LAWS, SOULIE, Law, deviation
-from walkers.check.report import Chapter, Verdict
+from walkers.check.report import CHAPTERS, PAGE, Chapter, Verdict, validate
 from walkers.check.scenes import DRY, bench_case, recording, standing
-from walkers.check.validate import CHAPTERS, PAGE, validate
 from walkers.inputs.reading import load_case
 from walkers.physics.bridge import Surfaces
 from walkers.physics.capillary import derjaguin_radius

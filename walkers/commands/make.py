@@ -300,8 +300,7 @@ def validate(
     as_json: Json = False,
 ) -> int:
     """Check the decks against published benchmarks, exact solutions and a second engine, and write a page of it."""
-    from walkers.check.report import as_dict
-    from walkers.check.validate import validate
+    from walkers.check.report import as_dict, validate
 
     check_folder("--out", out)
     folder, cores = to or out / "validation", on_cores(jobs).workers

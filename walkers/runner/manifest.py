@@ -26,18 +26,18 @@ _SMALL_BYTES = 8 << 20
 _MOST_THREADS = 4
 
 
-def manifest(
-    case: Case, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path
-) -> dict[str, Any]:
-    """What the manifest of a run says, all of whose files are in its directory but this one.
+def write_manifest(
+    case: Case, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path, **more: Any
+) -> None:
+    """Write the manifest of a run, all of whose files are in its directory but this one.
 
-    The run was ``started`` so many seconds after the epoch, and took the engine what its report says.
+    The run was ``started`` so many seconds after the epoch, and took the engine, in all calls, what its report says.
     """
     finished = time.time()
     audit, plugin = read_audit(engine.sha256), plugin_of(engine)
     paths = [path for path in sorted(directory.rglob("*")) if path.is_file()]
     files = {path.relative_to(directory).as_posix(): path.stat().st_size for path in paths}
-    return {
+    contents = {
         "format": FORMAT,
         "status": "finished",
         "name": case.name,
@@ -56,7 +56,7 @@ def manifest(
         "started": _iso(started),
         "finished": _iso(finished),
         "seconds": {
-            "total": finished - started,
+            "total": max(finished - started, report.wall_seconds),
             "engine": report.wall_seconds,
             "engine_loop": report.loop_seconds,
         },
@@ -64,7 +64,9 @@ def manifest(
         "steps_per_second": report.steps / report.loop_seconds if report.loop_seconds else None,
         "files": files,
         "sha256": checksums(directory, files),
+        **more,
     }
+    write_json(directory / MANIFEST_NAME, contents, at_once=False)
 
 
 def _made_by() -> dict[str, Any]:

@@ -12,10 +12,11 @@ import os
 import shutil
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from math import inf, isfinite, nan
+from operator import attrgetter
 from pathlib import Path
 from stat import S_ISDIR
 from typing import Any, Literal
@@ -223,13 +224,11 @@ def select(
 
 def ordered(entries: Sequence[Entry], order: Order, *, reverse: bool = False) -> list[Entry]:
     """Entries in an order: the fastest, the youngest and the largest first; what has no velocity last."""
-
-    def key(entry: Entry) -> Any:
-        if order == "velocity":
-            return inf if entry.velocity is None else -entry.velocity
-        return -entry.size if order == "size" else getattr(entry, order)
-
-    return sorted(entries, key=key, reverse=reverse)
+    keys: dict[str, Callable[[Entry], Any]] = {
+        "velocity": lambda entry: inf if entry.velocity is None else -entry.velocity,
+        "size": lambda entry: -entry.size,
+    }
+    return sorted(entries, key=keys.get(order, attrgetter(order)), reverse=reverse)
 
 
 def _varied(runs: Sequence[Entry]) -> Iterator[tuple[str, list[Entry], list[str]]]:

@@ -46,7 +46,7 @@ from walkers.runner.directory import (
 from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
 from walkers.runner.files import fsync_path, link_or_copy, read_json, settle, write_json
 from walkers.runner.launch import EngineReport, Progress, check_room, launch
-from walkers.runner.manifest import MANIFEST_NAME, manifest
+from walkers.runner.manifest import write_manifest
 from walkers.runner.provenance import look_ahead
 from walkers.templates.deck import (
     OUTPUT_NAME,
@@ -246,18 +246,11 @@ class OpenRun:
         start = self._drive_from() or 0
         rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
         settling = {"drive_from": start, "settled": rest[-1] if rest else None, "segments": len(self.done)}
-        _write_manifest(self.case, self.place, self.engine, report, self.started, self.directory, settling)
+        about: dict[str, Any] = {"started": self.started, "directory": self.directory, **settling}
+        write_manifest(self.case, self.place.name, self.engine, report, **about)
         settle()
         move_into_place(self.directory, self.place)
         return FinishedRun(self.place)
-
-
-def _write_manifest(
-    case: Case, place: Path, engine: Engine, report: EngineReport, started: float, made: Path, more: Mapping[str, Any]
-) -> None:
-    said = manifest(case, place.name, engine, report, started=started, directory=made)
-    said["seconds"]["total"] = max(said["seconds"]["total"], report.wall_seconds)  # of all calls that it took
-    write_json(made / MANIFEST_NAME, {**said, **more}, at_once=False)
 
 
 def _teller(
@@ -356,10 +349,10 @@ def _make_together(
             _part(incomplete, tried, deck, report)
             done = [name for name in cases if cycles >= cases[name].run.cycles or _are_steady(incomplete / name)]
             shared = {"first": first, "runs": len(done), "walkers": len(deck.layout.walkers)}
-            own = {"drive_from": 0, "segments": 1, "shared_deck": shared}
+            own: dict[str, Any] = {"started": started, "drive_from": 0, "segments": 1, "shared_deck": shared}
             for name in done:
                 tabulate(incomplete / name)
-                _write_manifest(cases[name], out / name, engine, report, started, incomplete / name, own)
+                write_manifest(cases[name], name, engine, report, directory=incomplete / name, **own)
             settle()
             for name in done:
                 move_into_place(incomplete / name, out / name)

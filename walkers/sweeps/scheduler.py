@@ -95,11 +95,6 @@ class Options:
             raise refused("cores", told)
         return replace(self, workers=max(1, self.workers // ranks), site=site)
 
-    @property
-    def longest_seconds(self) -> float:
-        """Predicted time that no shared deck may exceed: well below the limit, for a point by itself could be."""
-        return min(LONGEST_SECONDS, 0.5 * self.time_limit) if self.time_limit else LONGEST_SECONDS
-
 
 @dataclass(frozen=True)
 class Failure:
@@ -225,7 +220,9 @@ def _missing_decks(
 ) -> list[PlannedDeck]:
     """The decks of some points of which anything is missing, as they are whatever is finished."""
     numbered = {point: cases[point] for point in points}
-    packed = pack(numbered, options.decks_at_once, options.longest_seconds) if numbered else []
+    # A shared deck stays well below the limit, for a point by itself could be near it.
+    longest = min(LONGEST_SECONDS, 0.5 * options.time_limit) if options.time_limit else LONGEST_SECONDS
+    packed = pack(numbered, options.decks_at_once, longest) if numbered else []
     return [part for deck in packed for part in unfinished_parts(deck.points, numbered, is_settled)]
 
 
@@ -345,10 +342,6 @@ def run_sweep(
 # --- workers ----------------------------------------------------------------------------------------------------------
 
 
-class SweepStopped(Stopped):
-    """Somebody stopped the sweep while an engine ran."""
-
-
 @dataclass(frozen=True)
 class Report:
     """What became of a deck: velocities (m/s) of its finished runs (others are busy elsewhere), or its failure.
@@ -378,7 +371,7 @@ def work(
 
     def look(_: object = None) -> None:
         if stop is not None and stop.is_set():
-            raise SweepStopped("stopped")
+            raise Stopped("stopped")
 
     try:
         look()
@@ -390,7 +383,7 @@ def work(
         made = make_runs(cases, out, own, on_progress=look, time_limit=time_limit)
         return Report({name: velocity_in(current_result(run.directory)) for name, run in made.runs.items()})
     except (OSError, WalkersError) as error:
-        if retries and not isinstance(error, SweepStopped):
+        if retries and not isinstance(error, Stopped):
             return work(stop, runs, cases, out, engine, time_limit, retries - 1)
         reason, message, directory = type(error).__name__, str(error), None
         if isinstance(error, EngineFailure):
