@@ -64,21 +64,9 @@ class Author:
 
 
 def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) -> dict[str, Any]:
-    """The metadata of an archive.
+    """The metadata of an archive, JSON-LD, under one of `LICENCES`.
 
-    Parameters
-    ----------
-    contents
-        What it holds.
-    authors
-        Of the runs.
-    licence
-        Key of `LICENCES`.
-
-    Returns
-    -------
-    dict
-        JSON-LD. Dated by the last of the runs, not by the day: the same runs give the same archive.
+    Dated by the last of the runs, not by the day: the same runs give the same archive.
     """
     made = _Crate(authors)
     for one in contents.sweep:

@@ -67,27 +67,15 @@ class Verification:
 
 
 def verify(path: Path) -> list[Verification]:
-    """Compare files with what manifests, or the checksums of an archive, say of them.
+    """Compare a run, a sweep, or an archive (.zip, or unpacked) with what manifests or its checksums say of it.
 
     All that is listed must be there and unchanged, and nothing else be there. What was made from finished runs since,
     and is read by nobody, is named and no failure: pictures, films, pages, files for ParaView, exports and hidden
     files, but in a zip file, which is written whole. A sweep's directory is held to the same rule; its record has a
     checksum in archives only.
 
-    Parameters
-    ----------
-    path
-        A run directory, a sweep's directory, an archive (.zip), or a folder that one was unpacked into.
-
-    Returns
-    -------
-    list of Verification
-        One a run or archive; of a sweep that of its points and those of its finished runs.
-
-    Raises
-    ------
-    InputError
-        If it is none of these, cannot be read, or unpacks to far more than it has bytes.
+    Of a run or an archive there is one verification, of a sweep that of its points and those of its finished runs.
+    `InputError` if it is none of these, cannot be read, or unpacks to far more than it has bytes.
     """
     if (path / RECORD_NAME).is_file():
         return _verify_sweep(path)

@@ -75,19 +75,7 @@ class ArchiveOptions:
 def write_archive(directory: str | Path, to: Path | None = None, options: ArchiveOptions | None = None) -> Path:
     """Pack a finished run, or a sweep all of whose runs are finished, into an RO-Crate.
 
-    Parameters
-    ----------
-    directory
-        A run directory, or a sweep's.
-    to
-        The zip to write; ``NAME.zip`` in the current directory if left out. An older one is replaced at the end.
-    options
-        How.
-
-    Returns
-    -------
-    Path
-        The zip.
+    The zip is ``NAME.zip`` in the current directory if no other is named; an older one is replaced at the end.
 
     Raises
     ------

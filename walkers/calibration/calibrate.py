@@ -68,12 +68,7 @@ def wave_sweep(
 ) -> Sweep:
     """The sweep of a wave: every parameter set (P, D) with every experiment, set by set.
 
-    Experiments may have ``extra`` keys in these runs alone.
-
-    Raises
-    ------
-    InputError
-        If a key of the calibration is none of a case.
+    Experiments may have ``extra`` keys in these runs alone. `InputError` if a key of the calibration is none of a case.
     """
     points = []
     for row in values:

@@ -126,25 +126,13 @@ class FinishedRun:
 
 
 def case_of(directory: Path) -> Case:
-    """The resolved case of a run directory.
-
-    Raises
-    ------
-    OSError, ValueError
-        If its ``case.json`` cannot be read, or of a finished run is not what it was.
-    """
+    """The resolved case of a run directory; `OSError`, `ValueError` if it cannot be read, or was changed since."""
     check_unchanged(directory, [CASE_NAME])
     return Case.from_dict(read_json(directory / CASE_NAME))
 
 
 def layout_of(segment: Path) -> Layout:
-    """What the dumps of a segment hold.
-
-    Raises
-    ------
-    OSError, ValueError, KeyError, TypeError
-        If its ``layout.json`` cannot be read.
-    """
+    """What the dumps of a segment hold; `OSError`, `ValueError`, `KeyError`, `TypeError` if it cannot be read."""
     return Layout.from_dict(read_json(segment / LAYOUT_NAME))
 
 
@@ -236,17 +224,9 @@ def _lock_file(place: Path) -> Path:
 
 @contextmanager
 def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
-    """Lock those of the places that nobody else has locked, two seconds later at the latest.
+    """Lock those of the final places of runs that nobody else has locked, two seconds later at the latest.
 
-    Parameters
-    ----------
-    places
-        Final places of run directories, in folders that exist.
-
-    Yields
-    ------
-    Mapping
-        From the places that are ours until the end of the block to the descriptors of their lock files.
+    Yields those that are ours until the end of the block, with the descriptors of their lock files.
     """
     ours: dict[Path, int] = {}
     end = time.monotonic() + _PATIENCE_SECONDS

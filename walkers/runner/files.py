@@ -12,13 +12,7 @@ from typing import Any
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object.
-
-    Raises
-    ------
-    OSError, ValueError
-        If the file cannot be read, or holds something else.
-    """
+    """Read a JSON object; `OSError`, `ValueError` if the file cannot be read, or holds something else."""
     contents = path.read_bytes()
     try:
         found = json.loads(contents)

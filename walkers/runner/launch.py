@@ -88,7 +88,7 @@ def launch(
     Parameters
     ----------
     deck, directory, engine
-        The deck, whose files are in the directory already; where the engine works and writes its log; the binary.
+        The deck; where its files are already, and the engine works; the binary.
     on_step
         Called a few times a second with the step that the engine is at; what it raises ends the engine.
     time_limit

@@ -80,13 +80,7 @@ def _iso(seconds: float) -> str:
 
 
 def checksums(directory: Path, names: Iterable[str]) -> dict[str, str]:
-    """SHA-256 of files of a directory, in threads where there is much to read.
-
-    Raises
-    ------
-    OSError
-        If one cannot be read.
-    """
+    """SHA-256 of files of a directory, in threads where there is much to read; `OSError` if one cannot be read."""
     paths = {name: directory / name for name in names}
     if sum(path.stat().st_size for path in paths.values()) < _SMALL_BYTES:
         return {name: checksum(path) for name, path in paths.items()}
@@ -107,17 +101,8 @@ class FileChanged(WalkersError, ValueError):
 def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     """Refuse files of a finished run that are not what its manifest says; of an unfinished run nothing is said.
 
-    Returns
-    -------
-    bool
-        Whether the manifest says something of all of them.
-
-    Raises
-    ------
-    FileChanged
-        If one differs.
-    OSError, ValueError
-        If the manifest, or a file, cannot be read.
+    Whether the manifest says something of all of them; `FileChanged` if one differs, `OSError` or `ValueError` if the
+    manifest, or a file, cannot be read.
     """
     try:
         sums = _sums(read_json(directory / MANIFEST_NAME), directory)

@@ -128,10 +128,7 @@ _WORST_FIRST = (
     "",  # what is not in this list
     *("BlowUp", "BeadsLost", "WalkersMet", "TimeLimitExceeded", "RunBusy"),
 )
-
-
-def _severity(failure: Failure) -> int:
-    return _WORST_FIRST.index(failure.reason if failure.reason in _WORST_FIRST else "")
+_SEVERITY = {name: rank for rank, name in enumerate(_WORST_FIRST)}
 
 
 @dataclass(frozen=True)
@@ -552,5 +549,5 @@ class _Scheduler:
             running=sum(len(deck.points) for deck in made),
             elapsed=elapsed,
             left=waiting / self.seconds_done * elapsed if self.seconds_done else None,
-            worst_failure=min(self.failures, key=_severity, default=None),
+            worst_failure=min(self.failures, key=lambda one: _SEVERITY.get(one.reason, _SEVERITY[""]), default=None),
         )
