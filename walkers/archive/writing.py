@@ -76,13 +76,8 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
     """Pack a finished run, or a sweep all of whose runs are finished, into an RO-Crate.
 
     The zip is ``NAME.zip`` in the current directory if no other is named; an older one is replaced at the end.
-
-    Raises
-    ------
-    InputError
-        If it is no run or sweep, or not finished, or an option makes no sense.
-    ArchiveRefused
-        If files are not what the manifests say.
+    `InputError` if it is no run or sweep, or not finished, or an option makes no sense; `ArchiveRefused` if files are
+    not what the manifests say.
     """
     directory, options = Path(directory), options or ArchiveOptions()
     _check(options)
@@ -259,10 +254,7 @@ class Contents:
 def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
     """What the archive of a finished run or of a sweep holds; with ``dumps`` false not what tables were made from.
 
-    Raises
-    ------
-    InputError
-        If points of a sweep are not finished.
+    `InputError` if points of a sweep are not finished.
     """
     from walkers.sweeps.table import encoded, load
 

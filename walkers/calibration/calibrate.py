@@ -57,7 +57,6 @@ class Wave:
     """P parameter sets and what the engine made of them."""
 
     unit: FloatArray  # the sets, in the unit cube, shape (P, D)
-    seen: dict[str, FloatArray]  # by quantity, shape (P, number of experiments), SI units and degrees
     outcome: FloatArray  # each observation, shape (P, K); NaN where there is none
     table: pd.DataFrame  # the sweep's, P times the number of experiments long
     failures: list[Failure]  # of its points
@@ -113,7 +112,7 @@ def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path
             below = mean(one.quantity, one.over)
             value = value / np.where(np.abs(below) > _LEAST_SPEED, below, np.nan)
         columns.append(value)
-    return Wave(unit, seen, np.stack(columns, axis=1), table, failures)
+    return Wave(unit, np.stack(columns, axis=1), table, failures)
 
 
 def _seen(table: pd.DataFrame, experiments: int) -> dict[str, FloatArray]:

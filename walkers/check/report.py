@@ -180,16 +180,11 @@ def validate(
     out, to
         Folders of the run directories and of the page; pictures go into ``figures`` in it.
     only
-        Names of `CHAPTERS`; if empty, all. A page of some has their names in its own.
+        Names of `CHAPTERS`; if empty, all. A page of some has their names in its own. `InputError` for other names.
     quick
         The part of each that takes seconds; of chapters that take no longer, all.
     on_done
         Called with each chapter as it is done.
-
-    Raises
-    ------
-    InputError
-        If there is no such chapter.
     """
     from joblib import Parallel, delayed
 
