@@ -90,10 +90,6 @@ docs: engine .venv/ready-docs ## Build the documentation into build/site, to be 
 bench: setup ## Measure what docs/explanation/performance.md states
 	.venv/bin/python tests/benchmark.py
 
-.PHONY: bench-accuracy
-bench-accuracy: setup ## The comparison's numbers against decks of one point, 2 µs and 60 cycles (a quarter of an hour)
-	.venv/bin/python -m tests.benchmark_accuracy $(OUT)
-
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/api docs/reference/generated

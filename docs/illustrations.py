@@ -26,14 +26,14 @@ from typing import Any
 from walkers import load_case, run
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.report import write_outcome
-from walkers.check.validate import validate
+from walkers.check.report import validate
 from walkers.inputs.calibration import load_calibration
 from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
-from walkers.paper.model_terms import try_model_terms, write_model_terms
+from walkers.paper.model_terms import try_model_terms
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.films import FilmOptions
 from walkers.postprocess.series import render_series
@@ -46,7 +46,7 @@ RECORD = Path("figures") / "made-from.json"
 _BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)")
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
-_OF_CALIBRATION = ("bands", "corner", "predictions")
+_OF_CALIBRATION = ("corner", "predictions")
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def _of_run(
 
 
 def _make_model_terms(_: Path, docs: Path) -> None:
-    write_model_terms(try_model_terms(), docs / "figures")
+    try_model_terms(docs / "figures")
 
 
 def _make_validation(out: Path, docs: Path) -> None:
@@ -123,9 +123,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "pile": _of_run("pile", "pile-small", {"run.duration": "10 s"}, apart=2.0),
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
-    "model-terms": Illustration(
-        ("figures/model_terms.md", "figures/model_terms.json"), _shipped("fig1b", "fig4a"), _make_model_terms
-    ),
+    "model-terms": Illustration(("figures/model_terms.md",), _shipped("fig1b", "fig4a"), _make_model_terms),
     "validation": Illustration(
         ("explanation/validation.md",),
         _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci"),

@@ -35,12 +35,10 @@ from walkers.postprocess import series
 from walkers.postprocess.gait import Walk, walk
 from walkers.postprocess.motion import Group, read_motion
 from walkers.runner.binary import Engine
-from walkers.runner.directory import run_place
+from walkers.runner.directory import locked, run_place
 from walkers.runner.failures import RunBusy
-from walkers.runner.locks import locked
-from walkers.runner.segments import OpenRun, open_locked
-from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Options
+from walkers.sweeps.making import OpenRun, open_locked
+from walkers.sweeps.scheduler import Options, run_sweep
 
 # The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, no rolling friction, one walker that starts on the
 # axis in equilibrium.

@@ -26,7 +26,7 @@ from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import finished_places, run_place
-from walkers.sweeps.shared_deck import make_runs
+from walkers.sweeps.making import make_runs
 from walkers.templates.scene import place
 from walkers.theory.prediction import motion_of, predict
 

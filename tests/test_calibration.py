@@ -286,7 +286,6 @@ REDUCED: dict[str, Any] = {
         "strong": {"drive.frequency": "90 Hz", "drive.peak_acceleration": "6 g"},
     },
     "held_out": {"ratio": ["r"]},
-    "bands": [{"title": "60 and 90 Hz", "of": ["slow", "strong"], "against": "gamma0"}],
     "design": {"waves": [12, 6, 4], "predictive": 2, "points": 3000, "seed": 2},
 }
 
@@ -321,7 +320,7 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     file = tmp_path / "reduced.toml"
     file.write_text(to_toml(document))
     told = call("calibrate", str(file), "--out", str(out), "--to", str(tmp_path / "here"), check=True).stdout
-    names = "posterior.parquet calibration.json calibration.md corner.png predictions.png bands.png"
+    names = "posterior.parquet calibration.json calibration.md corner.png predictions.png"
     assert [Path(line).name for line in told.splitlines()] == names.split()
     said = json.loads((tmp_path / "here" / "calibration.json").read_text())
     assert said["sets"] == 22
@@ -362,7 +361,6 @@ def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
         experiments={"strong": {"drive.peak_acceleration": "10 g"}},
         observations=reduced(dict.fromkeys(REDUCED["experiments"], 1e-3))["observations"][2:3],
         held_out={},
-        bands=[],
         set=few | wet,
     )
     wave = run_sets(found, [[0.1, 0.5], [0.2, 9.9]], tmp_path / "runs", Options(2))
@@ -448,7 +446,6 @@ _BOTH = {"observations": ["slow", "fast"], "share": 0.5}
         ("experiments/fast/dimers.angle", "3 deg", r"experiments\.fast"),
         ("guesses", [{"friction": 0.1}], r"guesses\[0\]\.drag.*missing"),
         ("guesses", [{"friction": 0.1, "drag": 11.0}], r"guesses\[0\]\.drag.*0\.4 to 10"),
-        ("bands", [{"of": ["slo"], "against": "gamma0"}], r"bands\[0\]\.of.*slow"),
         ("held_out", {"x": ["v"]}, r"held_out\.x"),  # all but what is derived
         ("shared_errors", {"x": _BOTH | {"observations": ["slow", "fats"]}}, r'errors\.x\.observations.*"fats".*fast'),
         ("shared_errors", {"x": _BOTH | {"observations": ["slow", "slow"]}}, r"errors\.x\.observations.*once"),

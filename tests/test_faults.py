@@ -310,7 +310,7 @@ def test_a_disk_that_is_full_when_the_tables_are_written_is_a_failure_of_the_run
             fill(place)
             return tabulate(directory)
 
-        monkeypatch.setattr("walkers.sweeps.shared_deck.tabulate", tabulate_without_room)
+        monkeypatch.setattr("walkers.sweeps.making.tabulate", tabulate_without_room)
         with pytest.raises(DiskFull, match="disk full"):
             run_case(case, place / "runs")
         assert not list(place.glob("runs/*/manifest.json"))

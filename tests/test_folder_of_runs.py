@@ -15,9 +15,8 @@ import pytest
 import walkers
 from tests.conftest import call, document, mounted, to_toml
 from walkers.inputs.readable import differing, flattened
-from walkers.runner.directory import MANIFEST_NAME, finished_places
+from walkers.runner.directory import MANIFEST_NAME, finished_places, locked
 from walkers.runner.files import read_json, write_json
-from walkers.runner.locks import locked
 from walkers.sweeps.folder import bytes_text
 
 OTHER, FASTER = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}

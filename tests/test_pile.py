@@ -36,8 +36,7 @@ from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
 from walkers.runner.failures import EngineError, EngineKilled, RunBusy
 from walkers.sweeps.climbing import conditions_in, describe_climbs, leaders, summarise_climbs
-from walkers.sweeps.run import plan_sweep, run_sweep
-from walkers.sweeps.scheduler import Options
+from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
 from walkers.sweeps.site import Site, SiteFile
 from walkers.sweeps.table import load
 from walkers.templates.deck import Deck, Segment, render_deck

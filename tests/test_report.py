@@ -25,8 +25,7 @@ from walkers.postprocess.report.run import report_run, summary_of
 from walkers.postprocess.scene import camera_axes
 from walkers.runner.provenance import software
 from walkers.sweeps.report import report_sweep
-from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Options
+from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import load
 
 Once = Callable[[str, Callable[[Path], object]], Path]

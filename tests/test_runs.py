@@ -34,12 +34,11 @@ from walkers import find_run
 from walkers import run as run_case
 from walkers.inputs import InputError
 from walkers.runner import FinishedRun, Progress, find_engine, finished_run, run_name
-from walkers.runner.directory import FIRST_SEGMENT, finished_places
+from walkers.runner.directory import FIRST_SEGMENT, finished_places, is_locked, locked
 from walkers.runner.failures import RunBusy
-from walkers.runner.locks import is_locked, locked
 from walkers.templates import render_deck
 
-PATIENCE_OF_LOCKS = "walkers.runner.locks._PATIENCE_SECONDS"
+PATIENCE_OF_LOCKS = "walkers.runner.directory._PATIENCE_SECONDS"
 
 
 def _toml(folder: Path, **run: object) -> str:

@@ -22,7 +22,7 @@ from walkers.postprocess.tables import read_table
 from walkers.runner import find_engine
 from walkers.runner.directory import FIRST_SEGMENT
 from walkers.runner.launch import Progress
-from walkers.sweeps.shared_deck import make_runs
+from walkers.sweeps.making import make_runs
 from walkers.templates.scene import sharing_key
 
 

@@ -35,12 +35,10 @@ from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess import read_motion, read_table
 from walkers.runner import find_engine, finished_run
-from walkers.runner.directory import FIRST_SEGMENT
+from walkers.runner.directory import FIRST_SEGMENT, locked
 from walkers.runner.failures import WalkersMet
-from walkers.runner.locks import locked
-from walkers.sweeps.run import plan_sweep, run_sweep
-from walkers.sweeps.scheduler import Options
-from walkers.sweeps.shared_deck import make_runs, work
+from walkers.sweeps.making import make_runs
+from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep, work
 from walkers.sweeps.table import load, thresholds
 
 TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
@@ -279,7 +277,7 @@ def test_interrupts_leave_no_engine_and_the_next_call_goes_on(
 def test_what_somebody_else_is_making_is_waited_for(
     sweep_file: Callable[..., str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("walkers.runner.locks._PATIENCE_SECONDS", 0.2)
+    monkeypatch.setattr("walkers.runner.directory._PATIENCE_SECONDS", 0.2)
     sweep, out = load_sweep(sweep_file(text='[axes]\ndrive.peak_acceleration = ["2 g"]')), in_folder / "runs"
     out.mkdir()
     (place,) = plan_sweep(sweep, out, Options(2)).record.runs
@@ -384,8 +382,8 @@ def test_two_sweeps_of_one_process_do_not_stop_each_other(sweep_file: Callable[.
 
 def test_a_worker_of_another_version_refuses(tmp_path: Path) -> None:
     engine, names, cases = find_engine(), ["test-0123456789ab"], [make_case(run=TINY)]
-    assert work("", names, cases, tmp_path, engine, None).failure == "ProgramDiffers"
-    assert work("", names, cases, tmp_path, replace(engine, sha256="0" * 64), None).failure == "EngineDiffers"
+    assert work(None, names, cases, tmp_path, engine, None).failure == "ProgramDiffers"
+    assert work(None, names, cases, tmp_path, replace(engine, sha256="0" * 64), None).failure == "EngineDiffers"
     assert not list(tmp_path.iterdir())
 
 

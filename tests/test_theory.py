@@ -20,8 +20,7 @@ from walkers.postprocess import read_table
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.gait import gait
 from walkers.postprocess.motion import Group
-from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Options
+from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import thresholds
 from walkers.theory.mathieu import Alignment, alignment, is_stable, largest_stable_v, time_to_turn
 from walkers.theory.motion import Friction, Walker, walk

@@ -16,8 +16,7 @@ from tests.printed import spoilt
 from walkers.check import benchmarks, bridges
 from walkers.check.benchmarks import GLASS, OXIDE, STEEL, Speeds, farthest_point, onto_plane, published
 from walkers.check.bridges import LAWS, Law
-from walkers.check.report import Chapter, Verdict
-from walkers.check.validate import CHAPTERS, PAGE
+from walkers.check.report import CHAPTERS, PAGE, Chapter, Verdict
 from walkers.physics.capillary import derjaguin_radius
 from walkers.runner.failures import EngineFailure
 

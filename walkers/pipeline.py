@@ -238,7 +238,7 @@ def run(
     {'facing': [1, -1], 'steady': [True, True]}
     """
     from walkers.inputs.run_tables import limits_of
-    from walkers.sweeps.shared_deck import check_audit, make_runs
+    from walkers.sweeps.making import check_audit, make_runs
 
     case = load_case(case) if isinstance(case, (str, Path)) else case
     for one in (Path(out).absolute(), case.name):
@@ -307,8 +307,7 @@ def sweep(
     {'liquid.name': ['Si AK5', 'Si AK10'], 'status': ['finished', 'finished']}
     """
     from walkers.inputs.sweep import load_sweep
-    from walkers.sweeps.run import run_sweep
-    from walkers.sweeps.scheduler import Options
+    from walkers.sweeps.scheduler import Options, run_sweep
     from walkers.sweeps.site import cores_here
     from walkers.sweeps.table import load
 

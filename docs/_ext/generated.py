@@ -24,8 +24,7 @@ from walkers.main import _program
 from walkers.physics.units import ABSENT, AUTO, AUTO_FAR, Kind
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.tables import described
-from walkers.sweeps.record import derived_columns, result_columns
-from walkers.sweeps.table import STATE
+from walkers.sweeps.table import STATE, derived_columns, result_columns
 
 INPUTS = Path(walkers.inputs.__file__).parent
 program = _program()

@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from walkers.archive.contents import Contents, Item, PackedRun
 from walkers.runner.provenance import PROJECT
 
 if TYPE_CHECKING:
     from rocrate.model.entity import Entity
+
+    from walkers.archive.writing import Contents, Item, PackedRun
 
 METADATA_NAME = "ro-crate-metadata.json"
 PREVIEW_NAME = "ro-crate-preview.html"
@@ -63,21 +64,9 @@ class Author:
 
 
 def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) -> dict[str, Any]:
-    """The metadata of an archive.
+    """The metadata of an archive, JSON-LD, under one of `LICENCES`.
 
-    Parameters
-    ----------
-    contents
-        What it holds.
-    authors
-        Of the runs.
-    licence
-        Key of `LICENCES`.
-
-    Returns
-    -------
-    dict
-        JSON-LD. Dated by the last of the runs, not by the day: the same runs give the same archive.
+    Dated by the last of the runs, not by the day: the same runs give the same archive.
     """
     made = _Crate(authors)
     for one in contents.sweep:

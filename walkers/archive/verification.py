@@ -1,6 +1,6 @@
 """Whether a run, the runs of a sweep, or an archive are what they were.
 
-Archives come from strangers: none is unpacked to be verified, and no file of one is read whole but its lists.
+Archives come from strangers: none is unpacked to be verified, and no file of one is read whole but its list.
 """
 
 from __future__ import annotations
@@ -8,18 +8,19 @@ from __future__ import annotations
 import hashlib
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
 from typing import IO
-from urllib.parse import unquote
 
-from walkers.archive.crate import METADATA_NAME, PREVIEW_NAME
-from walkers.inputs.errors import refused
-from walkers.runner.directory import Verification, compare, files_below, made_since, verify_run
-from walkers.runner.files import json_object
-from walkers.runner.manifest import MANIFEST_NAME
-from walkers.sweeps.record import PARSL, RECORD_NAME, read_record, states
+from walkers.archive.crate import METADATA_NAME
+from walkers.inputs.errors import refused, shortened
+from walkers.inputs.text import printable
+from walkers.runner.directory import CASE_NAME, SEGMENTS
+from walkers.runner.files import read_json
+from walkers.runner.manifest import MANIFEST_NAME, checksums
+from walkers.sweeps.table import PARSL, RECORD_NAME, read_record, states
 
 SUMS_NAME = "sha256sums.txt"
 """In an archive: as ``sha256sum -c`` reads it."""
@@ -27,45 +28,85 @@ _MOST_TIMES = 100
 """A zip file that unpacks to more than this many times its size is refused; those of runs to some five times."""
 _MOST_ANYWAY = 1 << 28
 """Bytes: what unpacks to less is read in a second."""
+_SHOWN = (
+    *(".png", ".pdf", ".svg", ".gif", ".mp4", ".html", ".htm"),
+    *(".vtp", ".vtu", ".pvd", ".py", ".xyz", ".lammpstrj", ".csv"),
+)
+"""Suffixes of pictures, films, pages, files for ParaView (with their script) and exports: the program writes them on
+demand and never reads them again."""
+_LONGEST_SHOWN = 300
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What has become of the files of a run or an archive, or of the points of a sweep: how many are ``intact``.
+
+    ``told`` are names of the others: ``changed`` and ``missing`` ones; those ``not listed``; what is ``doubtful``, with
+    the reason in brackets; and what was ``made since`` from the run (`_made_since`): no result rests on it.
+    ``left_out`` is how many were left out of an archive on purpose.
+    """
+
+    name: str
+    intact: int
+    told: Mapping[str, Sequence[str]]
+    left_out: int = 0
+    of_points: bool = False
+
+    @property
+    def passed(self) -> bool:
+        """Whether all that is listed is what it was, and nothing else is there that a result could rest on."""
+        return not any(names for kind, names in self.told.items() if kind != "made since")
+
+    def describe(self) -> str:
+        """The outcome, and a line for each file that is not what it was, or is not listed."""
+        told = f"{self.name}: {self.intact} {'points have their run' if self.of_points else 'files are what they were'}"
+        lines = [f"{told}, {self.left_out} left out of the archive" if self.left_out else told]
+        for kind, names in self.told.items():  # which a stranger chose, and may have put escape sequences into
+            lines += [f"  {kind:<10} {printable(shortened(name, _LONGEST_SHOWN))}" for name in names]
+        return "\n".join(lines)
 
 
 def verify(path: Path) -> list[Verification]:
-    """Compare files with what manifests, or the checksums of an archive, say of them.
+    """Compare a run, a sweep, or an archive (.zip, or unpacked) with what manifests or its checksums say of it.
 
     All that is listed must be there and unchanged, and nothing else be there. What was made from finished runs since,
-    and is read by nobody, is named and no failure: pictures, films, pages, files for ParaView, exports and hidden files
-    (`walkers.runner.directory.made_since`), but in a zip file, which is written whole. The lists of an archive
-    (its checksums, its RO-Crate, the manifests of its runs) must agree. A sweep's directory is held to the same rule;
-    its record has a checksum in archives only.
+    and is read by nobody, is named and no failure: pictures, films, pages, files for ParaView, exports and hidden
+    files, but in a zip file, which is written whole. A sweep's directory is held to the same rule; its record has a
+    checksum in archives only.
 
-    Parameters
-    ----------
-    path
-        A run directory, a sweep's directory, an archive (.zip), or a folder that one was unpacked into.
-
-    Returns
-    -------
-    list of Verification
-        One a run or archive; of a sweep that of its points and those of its finished runs.
-
-    Raises
-    ------
-    InputError
-        If it is none of these, cannot be read, or unpacks to far more than it has bytes.
+    Of a run or an archive there is one verification, of a sweep that of its points and those of its finished runs.
+    `InputError` if it is none of these, cannot be read, or unpacks to far more than it has bytes.
     """
     if (path / RECORD_NAME).is_file():
         return _verify_sweep(path)
     if (path / SUMS_NAME).is_file():
         folder = path.resolve()
-        there = files_below(folder)
+        there = _files_below(folder)
         files = [name for name in there if (folder / name).is_file()]
-        return [_verify_archive(folder, there, files, lambda name: (folder / name).open("rb"), made_since)]
+        return [_verify_archive(folder, there, files, lambda name: (folder / name).open("rb"), _made_since)]
     if (path / MANIFEST_NAME).is_file():
-        return [verify_run(path)]
+        return [_verify_run(path)]
     if path.is_file():
         return [_verify_zip(path)]
     told = f"expected a run directory (with a {MANIFEST_NAME}), a sweep's ({RECORD_NAME}), or an archive ({SUMS_NAME})"
     raise refused(path, told)
+
+
+def _verify_run(directory: Path) -> Verification:
+    """Compare with its manifest; what has none that can be read does not pass."""
+    name = directory.resolve().name
+    try:
+        contents = read_json(directory / MANIFEST_NAME)
+        listed = {CASE_NAME: "", **contents["sha256"]}  # which every run has
+        beside, left_out = f"{contents['name']}.toml", set(contents.get("left_out", ()))  # of an archive
+        there = _files_below(directory)
+        now = checksums(directory, [one for one in there if one in listed and (directory / one).is_file()])
+    except FileNotFoundError:
+        return Verification(name, 0, {"missing": [MANIFEST_NAME]})
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        return Verification(name, 0, {"doubtful": [f"{MANIFEST_NAME} (it, or what it names, cannot be read: {error})"]})
+    there.remove(MANIFEST_NAME)
+    return _compared(name, listed, now, there, lambda one: _made_since(one) or one == beside, left_out)
 
 
 def _verify_sweep(directory: Path) -> list[Verification]:
@@ -77,11 +118,11 @@ def _verify_sweep(directory: Path) -> list[Verification]:
         if state.status not in ("finished", "not needed")
     ]
     runs = [state.directory for state in found if state.directory and state.status == "finished"]
-    there = [name for name in files_below(directory) if name != RECORD_NAME and not name.startswith(f"{PARSL}/")]
+    there = [name for name in _files_below(directory) if name != RECORD_NAME and not name.startswith(f"{PARSL}/")]
     beside = (f"{record.name}.toml", "table.parquet")  # of an archive: nothing is read from them
-    files = compare(record.name, {}, {}, there, added=lambda name: made_since(name) or name in beside)
+    files = _compared(record.name, {}, {}, there, lambda name: _made_since(name) or name in beside)
     points = replace(files, intact=len(runs), told={**files.told, "missing": lacking}, of_points=True)
-    return [points, *map(verify_run, dict.fromkeys(runs))]
+    return [points, *map(_verify_run, dict.fromkeys(runs))]
 
 
 def _verify_zip(path: Path) -> Verification:
@@ -106,29 +147,22 @@ def _verify_archive(
     opened: Callable[[str], IO[bytes]],
     added: Callable[[str], bool],
 ) -> Verification:
-    """Compare what is in an archive, of which some are files that can be opened, with its lists."""
+    """Compare what is in an archive, of which some are files that can be opened, with its checksums."""
     if SUMS_NAME not in files:
         raise refused(path, f"no archive of runs: it has no {SUMS_NAME}")
-    listed = _listed(path, opened)
+    with opened(SUMS_NAME) as file:
+        text = file.read().decode("utf-8", "replace")
+    listed: dict[str, str] = {}
+    for line in text.removesuffix("\n").split("\n"):
+        checksum, _, place = line.partition("  ")
+        if len(checksum) != hashlib.sha256().digest_size * 2 or not place or place in listed:
+            raise refused(path, f"{SUMS_NAME}: expected a checksum and a path, each path once, found {line[:80]!r}")
+        listed[place] = checksum
+    has_run = any(place.count("/") == 2 and place.endswith(f"/{MANIFEST_NAME}") for place in listed)
+    doubtful = [] if has_run else [f"{SUMS_NAME} (it lists no run)"]
     now = {place: _checksum(opened, place) for place in files if place in listed}
-    doubtful = [] if any(_is_manifest(place) for place in listed) else [f"{SUMS_NAME} (it lists no run)"]
-    by_run: dict[str, set[str]] = {}
-    for place in listed:
-        by_run.setdefault("/".join(place.split("/")[:2]), set()).add(place)
-    for place, checksum in now.items():
-        if checksum != listed[place] or not (place == METADATA_NAME or _is_manifest(place)):
-            continue
-        try:
-            with opened(place) as file:
-                said, beside = _said(place, file.read())
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            doubtful.append(f"{place} (cannot be read: {error})")
-            continue
-        own = set(listed) if place == METADATA_NAME else by_run[place.removesuffix(f"/{MANIFEST_NAME}")]
-        odd = [one for one in own.union(said).difference(beside) if said.get(one) != listed.get(one)]
-        doubtful += [f"{one} ({SUMS_NAME} and {place} disagree)" for one in sorted(odd)]
     listed.setdefault(METADATA_NAME, "")  # which every archive has
-    return compare(path.name, listed, now, set(there) - {SUMS_NAME}, added=added, doubtful=doubtful)
+    return _compared(path.name, listed, now, set(there) - {SUMS_NAME}, added, doubtful=doubtful)
 
 
 def _checksum(opened: Callable[[str], IO[bytes]], place: str) -> str:
@@ -140,29 +174,56 @@ def _checksum(opened: Callable[[str], IO[bytes]], place: str) -> str:
         return ""
 
 
-def _is_manifest(place: str) -> bool:
-    return place.count("/") == 2 and place.endswith(f"/{MANIFEST_NAME}")
+def _compared(
+    name: str,
+    listed: Mapping[str, str],
+    now: Mapping[str, str],
+    there: Iterable[str],
+    added: Callable[[str], bool],
+    left_out: Collection[str] = (),
+    doubtful: Sequence[str] = (),
+) -> Verification:
+    """Compare the SHA-256 of files as a list has them, and as they are ``now``, of those that can be read.
+
+    Of all that is ``there``, what is not listed may have been ``added`` since; ``left_out`` need not be there.
+    """
+    changed = [one for one, checksum in now.items() if checksum != listed[one]]
+    others = sorted(set(there).difference(listed))
+    since = {one: one.rpartition("/")[0] for one in others if added(one)}
+    count = Counter(since.values())
+    # Files of the same folder as one, but those of the topmost: ``vtk`` holds one a frame.
+    made = (
+        f"{folder}/ ({count[folder]} files)" if folder and count[folder] > 1 else one for one, folder in since.items()
+    )
+    told = {
+        "changed": changed,
+        "missing": [one for one in listed if one not in now and one not in left_out],
+        "not listed": [one for one in others if one not in since],
+        "doubtful": doubtful,
+        "made since": list(dict.fromkeys(made)),
+    }
+    absent = sum(one in listed and one not in now for one in left_out)
+    return Verification(name, len(now) - len(changed), told, left_out=absent)
 
 
-def _said(place: str, contents: bytes) -> tuple[Mapping[str, str], tuple[str, str]]:
-    """Checksums that another list of an archive has, by places, and the places of which it says nothing."""
-    list_ = json_object(contents, place)
-    if place == METADATA_NAME:
-        files = [entity for entity in list_["@graph"] if entity.get("@type") == "File"]
-        return {unquote(one["@id"]): one.get("sha256") for one in files}, (METADATA_NAME, PREVIEW_NAME)
-    folder, left_out = place.removesuffix(MANIFEST_NAME), list_.get("left_out", ())
-    said = {f"{folder}{name}": one for name, one in list_["sha256"].items() if name not in left_out}
-    return said, (place, f"{folder}{list_['name']}.toml")
+def _made_since(name: str) -> bool:
+    """Whether what no list has counts as made from a run: by its relative path it is nothing that a result rests on.
+
+    These are what `_SHOWN` says and hidden files. Nothing in ``segments`` is among them: each folder there is taken for
+    a part of the run.
+    """
+    path = PurePosixPath(name)
+    hidden = any(part.startswith(".") and part != ".." for part in path.parts)
+    return SEGMENTS not in path.parts and (hidden or path.suffix.lower() in _SHOWN)
 
 
-def _listed(path: Path, opened: Callable[[str], IO[bytes]]) -> dict[str, str]:
-    """The checksums of an archive's list, by the places of the files."""
-    with opened(SUMS_NAME) as file:
-        text = file.read().decode("utf-8", "replace")
-    listed: dict[str, str] = {}
-    for line in text.removesuffix("\n").split("\n"):
-        checksum, _, place = line.partition("  ")
-        if len(checksum) != hashlib.sha256().digest_size * 2 or not place or place in listed:
-            raise refused(path, f"{SUMS_NAME}: expected a checksum and a path, each path once, found {line[:80]!r}")
-        listed[place] = checksum
-    return listed
+def _files_below(folder: Path) -> list[str]:
+    """Relative paths of all that is in a folder: files, folders that are empty (with a slash), links to folders."""
+    found = []
+    for path in folder.rglob("*"):
+        name = path.relative_to(folder).as_posix()
+        if path.is_symlink() or not path.is_dir():
+            found.append(name)
+        elif not any(path.iterdir()):
+            found.append(f"{name}/")
+    return sorted(found)

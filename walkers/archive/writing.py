@@ -1,4 +1,6 @@
-"""Write an archive: one zip with the files, their checksums, what they are for machines, and for people."""
+"""Write an archive: one zip with the files of a run or a sweep, their checksums, what they are for machines, and for
+people.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +13,47 @@ import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from walkers.archive.contents import Contents, Item, contents_of, item
 from walkers.archive.crate import LICENCES, METADATA_NAME, PAPER, PREVIEW_NAME, Author, describe_crate
 from walkers.archive.verification import SUMS_NAME, verify
 from walkers.inputs.errors import WalkersError, refused
 from walkers.postprocess.report.page import fill
+from walkers.runner.directory import CASE_NAME, FinishedRun, name_of
 from walkers.runner.files import beside, json_bytes
+from walkers.runner.manifest import MANIFEST_NAME, checksum
+from walkers.sweeps.table import RECORD_NAME, SweepRecord, read_record, states
 
 _STORED = ("/", ".parquet", ".png", ".mp4")
 """Ends of names that are not compressed: folders, and what is already."""
 _CHUNK_BYTES = 1 << 20
+RUNS = "runs"
+"""Folder of the run directories in an archive: there, the program finds them as it does elsewhere."""
+_MEANINGS = {
+    CASE_NAME: ("case", "the resolved case: every number that determines the run, SI units"),
+    MANIFEST_NAME: ("record", "what made the run, what that took, and what its files were when it was finished"),
+    RECORD_NAME: ("record", "the points of the sweep: what varied, what follows from it, the names of the runs"),
+    "result.json": ("result", "what the run gave, SI units"),
+    "walker.lig": ("deck", "the deck: what the engine was told"),
+    "bridges.txt": ("deck", "forces of each bridge against its gap, which the engine reads"),
+    "loads.txt": ("deck", "gravity and drive of each bead, where beads have their own"),
+    "run.sh": ("deck", "runs the deck by hand"),
+    "layout.json": ("deck", "columns of the dumps; which bead belongs to which walker"),
+    "engine.log": ("output", "what the engine said"),
+    "segment.json": ("output", "from which step to which the segment went, and what it took"),
+    "beads.bin": (
+        "dump",
+        "places, velocities and spins of the beads, in LIGGGHTS's binary format; columns in layout.json",
+    ),
+    "bridges.pairs.txt": ("dump", "bridges between beads, frame by frame, text"),
+    "bridges.walls.txt": ("dump", "bridges between beads and walls, frame by frame, text"),
+    "state.restart": ("dump", "where the next segment goes on, the engine's own format"),
+    "table.csv": ("table", "the table of the sweep, one row per point, units in the head"),
+    "table.parquet": ("table", "the table of the sweep, one row per point, units and meanings in the field metadata"),
+}
+_GIVEN = ("case", "the case as it was given, with the values that were put beside it")
+_SWEEP = ("record", "the sweep as it was given")
+_REST = ("output", "what else the engine wrote")
 
 
 class ArchiveRefused(WalkersError):
@@ -43,26 +75,9 @@ class ArchiveOptions:
 def write_archive(directory: str | Path, to: Path | None = None, options: ArchiveOptions | None = None) -> Path:
     """Pack a finished run, or a sweep all of whose runs are finished, into an RO-Crate.
 
-    Parameters
-    ----------
-    directory
-        A run directory, or a sweep's.
-    to
-        The zip to write; ``NAME.zip`` in the current directory if left out. An older one is replaced at the end.
-    options
-        How.
-
-    Returns
-    -------
-    Path
-        The zip.
-
-    Raises
-    ------
-    InputError
-        If it is no run or sweep, or not finished, or an option makes no sense.
-    ArchiveRefused
-        If files are not what the manifests say.
+    The zip is ``NAME.zip`` in the current directory if no other is named; an older one is replaced at the end.
+    `InputError` if it is no run or sweep, or not finished, or an option makes no sense; `ArchiveRefused` if files are
+    not what the manifests say.
     """
     directory, options = Path(directory), options or ArchiveOptions()
     _check(options)
@@ -159,3 +174,127 @@ def _preview(contents: Contents, options: ArchiveOptions) -> bytes:
         metadata_name=METADATA_NAME,
     )
     return text.encode("utf-8")
+
+
+# --- contents ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Item:
+    """A file of an archive: path there, source or contents, SHA-256, role (as in the crate's actions) and meaning."""
+
+    place: str
+    source: Path | bytes
+    sha256: str
+    role: str = ""
+    meaning: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its name without folders."""
+        return self.place.rpartition("/")[2]
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return len(self.source) if isinstance(self.source, bytes) else self.source.stat().st_size
+
+
+def item(place: str, source: Path | bytes, sha256: str | None = None, told: tuple[str, str] | None = None) -> Item:
+    """A file of an archive; its checksum, role and meaning (``told``) if left out by its contents and its name."""
+    name = place.rpartition("/")[2]
+    if name.endswith(".parquet"):
+        table = name.removesuffix(".parquet")
+        told = told or ("table", f"table {table}; units and meanings of its columns are in the field metadata")
+    if sha256 is None:
+        sha256 = hashlib.sha256(source).hexdigest() if isinstance(source, bytes) else checksum(source)
+    return Item(place, source, sha256, *_MEANINGS.get(name, told or _REST))
+
+
+@dataclass(frozen=True)
+class PackedRun:
+    """A run as it goes into an archive: from where, to which folder, the manifest as it is there, and the files."""
+
+    directory: Path
+    place: str
+    manifest: dict[str, Any]
+    items: Sequence[Item]
+
+    @property
+    def name(self) -> str:
+        """Of the run."""
+        return self.directory.name
+
+    def with_role(self, *roles: str) -> list[Item]:
+        """Its files that are any of these."""
+        return [item for item in self.items if item.role in roles]
+
+
+@dataclass(frozen=True)
+class Contents:
+    """All that goes into an archive: name and title, runs, and of a sweep its own files and its record."""
+
+    name: str
+    title: str
+    runs: Sequence[PackedRun]
+    sweep: Sequence[Item] = ()
+    record: SweepRecord | None = None
+
+    @property
+    def items(self) -> list[Item]:
+        """All files."""
+        return [*self.sweep, *(item for run in self.runs for item in run.items)]
+
+    @property
+    def finished(self) -> str:
+        """When the last of the runs was finished, ISO 8601."""
+        return max(str(run.manifest["finished"]) for run in self.runs)
+
+
+def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
+    """What the archive of a finished run or of a sweep holds; with ``dumps`` false not what tables were made from.
+
+    `InputError` if points of a sweep are not finished.
+    """
+    from walkers.sweeps.table import encoded, load
+
+    if not (directory / RECORD_NAME).is_file():
+        run = _packed(directory, dumps)
+        return Contents(run.name, FinishedRun(directory).case.title, [run])
+    record = read_record(directory)
+    found = states(record)
+    unfinished = sum(state.status not in ("finished", "not needed") for state in found)
+    if unfinished:
+        told = f"{unfinished} of {len(found)} points are not finished; see: walkers status {directory}"
+        raise refused(directory, told)
+    runs = list(dict.fromkeys(state.directory for state in found if state.directory is not None))
+    name = name_of(record.directory.name)
+    place, table = f"{RUNS}/{name}", load(record.directory)
+    table["run"] = [f"{RUNS}/{Path(one).name}" if one else "" for one in table["run"]]  # not where this machine has it
+    items = [item(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)]
+    items += [item(f"{place}/table.{form}", encoded(table, form)) for form in ("csv", "parquet")]
+    if record.file:
+        items.append(item(f"{place}/{name}.toml", _toml(record.file), told=_SWEEP))
+    return Contents(name, record.title, [_packed(run, dumps) for run in runs], items, record)
+
+
+def _packed(directory: Path, dumps: bool) -> PackedRun:
+    """The files that a manifest names, the manifest, and the case as it was given, if that is known."""
+    run = FinishedRun(directory)
+    manifest, case, place = run.manifest, run.case, f"{RUNS}/{directory.resolve().name}"
+    before, sums = set(manifest.get("left_out", ())), manifest["sha256"]
+    named = {name: item(f"{place}/{name}", directory / name, sums.get(name)) for name in manifest["files"]}
+    left_out = {name for name, one in named.items() if name in before or (one.role == "dump" and not dumps)}
+    said: Path | bytes = directory / MANIFEST_NAME
+    if left_out - before:
+        manifest["left_out"] = sorted(left_out)
+        said = json_bytes(manifest)
+    items = [item(f"{place}/{name_of(case.name)}.toml", _toml(case.document), told=_GIVEN)] if case.document else []
+    items += [item(f"{place}/{MANIFEST_NAME}", said), *(one for name, one in named.items() if name not in left_out)]
+    return PackedRun(directory.resolve(), place, manifest, items)
+
+
+def _toml(tables: Any) -> bytes:
+    import tomli_w
+
+    return tomli_w.dumps(tables).encode("utf-8")

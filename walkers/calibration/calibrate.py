@@ -24,13 +24,12 @@ from walkers.inputs.errors import InputError, Problem, WalkersError, refused
 from walkers.inputs.schema import ALTERNATIVES
 from walkers.inputs.sweep import Sweep, expand
 from walkers.paper.comparison import misalignment
-from walkers.paper.sources import ProgressOf
+from walkers.paper.published import ProgressOf
 from walkers.postprocess.gait import steady_walkers, together
 from walkers.postprocess.tables import read_table
 from walkers.runner.failures import BeadsLost, BlowUp
 from walkers.runner.files import read_json, write_json
-from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Failure, Options
+from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
@@ -58,7 +57,6 @@ class Wave:
     """P parameter sets and what the engine made of them."""
 
     unit: FloatArray  # the sets, in the unit cube, shape (P, D)
-    seen: dict[str, FloatArray]  # by quantity, shape (P, number of experiments), SI units and degrees
     outcome: FloatArray  # each observation, shape (P, K); NaN where there is none
     table: pd.DataFrame  # the sweep's, P times the number of experiments long
     failures: list[Failure]  # of its points
@@ -69,12 +67,7 @@ def wave_sweep(
 ) -> Sweep:
     """The sweep of a wave: every parameter set (P, D) with every experiment, set by set.
 
-    Experiments may have ``extra`` keys in these runs alone.
-
-    Raises
-    ------
-    InputError
-        If a key of the calibration is none of a case.
+    Experiments may have ``extra`` keys in these runs alone. `InputError` if a key of the calibration is none of a case.
     """
     points = []
     for row in values:
@@ -104,7 +97,7 @@ def wave_sweep(
 
 
 def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path, options: Options, **how: Any) -> Wave:
-    """Run what is missing of the sweep of a wave (P, D); the rest is as for `walkers.sweeps.run.run_sweep`."""
+    """Run what is missing of the sweep of a wave (P, D); the rest is as for `walkers.sweeps.scheduler.run_sweep`."""
     record, failures = run_sweep(sweep, out, options, **how)
     table, labels = load(record.directory), list(calibration.experiments)
     seen = _seen(table, len(labels))
@@ -119,7 +112,7 @@ def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path
             below = mean(one.quantity, one.over)
             value = value / np.where(np.abs(below) > _LEAST_SPEED, below, np.nan)
         columns.append(value)
-    return Wave(unit, seen, np.stack(columns, axis=1), table, failures)
+    return Wave(unit, np.stack(columns, axis=1), table, failures)
 
 
 def _seen(table: pd.DataFrame, experiments: int) -> dict[str, FloatArray]:
@@ -161,12 +154,12 @@ def calibrate(
     Parameters
     ----------
     calibration, options, how
-        From `walkers.inputs.calibration.load_calibration`; as for `walkers.sweeps.run.run_sweep`.
+        From `walkers.inputs.calibration.load_calibration`; as for `walkers.sweeps.scheduler.run_sweep`.
     out
         Folder of the run directories; each wave is a sweep there, and its design is kept in a folder of the
         calibration's name.
     progress_of
-        As `walkers.paper.sources.ProgressOf`.
+        As `walkers.paper.published.ProgressOf`.
 
     Raises
     ------

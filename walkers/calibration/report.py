@@ -14,25 +14,16 @@ from walkers.calibration.posterior import LEAST_SAMPLES, Posterior
 from walkers.inputs.calibration import QUANTITIES, Parameter
 from walkers.inputs.text import rendered
 from walkers.physics.units import SPEED
-from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, save_figure, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, new_figure, save_figure, styled
 from walkers.runner.files import write_bytes, write_json, write_text
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from walkers.inputs.calibration import Band
 
 RECORD_NAME = "calibration.json"
 _SIGMAS = 2.0
 _NARROW, _NARROWER = 1.0 / 3.0, 2.0 / 3.0
 """A parameter is identified if the posterior's interval is less than a third of the prior's and it has converged."""
-_AGAINST = {
-    "peak_acceleration": "peak acceleration (m/s²)",
-    "gamma0": r"dimensionless peak force $\Gamma_0$",
-    "frequency": "frequency (Hz)",
-    "sin_delta": r"asymmetry $\sin\,\delta$",
-}
 
 # --- tables -----------------------------------------------------------------------------------------------------------
 
@@ -175,10 +166,9 @@ def words_of(share: float, *, converged: bool) -> str:
 
 
 def figures_of(found: Outcome, rows: list[dict[str, Any]]) -> dict[str, Figure]:
-    """``corner``, ``predictions`` and, if the file has any, ``bands``; rows are the record's observations."""
+    """``corner`` and ``predictions``; rows are the record's observations."""
     corners = draw_corners(found.space, found.posterior.unit, found.checks["best"].unit[0])
-    figures = {"corner": corners, "predictions": _predictions(rows)}
-    return figures | ({"bands": _bands(found)} if found.calibration.file.bands else {})
+    return {"corner": corners, "predictions": _predictions(rows)}
 
 
 @styled
@@ -254,43 +244,3 @@ def _predictions(rows: list[dict[str, Any]]) -> Figure:
     axes.set_xscale("symlog", linthresh=3.0)
     figure.legend(loc="outside upper center", ncols=2)
     return figure
-
-
-@styled
-def _bands(found: Outcome) -> Figure:
-    """The engine over the posterior and at the best set, against what the experiments differ in."""
-    bands = found.calibration.file.bands
-    columns = min(len(bands), 3)
-    lines = -(-len(bands) // columns)
-    figure, axes = new_figure(TWO_COLUMNS, 2.3 * lines + 0.4, nrows=lines, ncols=columns, squeeze=False)
-    for place, band in zip(axes.flat, bands, strict=False):
-        _band(place, band, found)
-    for place in axes.flat[len(bands) :]:
-        place.set_visible(False)
-    letter_panels(axes.flat[: len(bands)])
-    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return figure
-
-
-def _band(axes: Axes, band: Band, found: Outcome) -> None:
-    labels, best = list(found.calibration.experiments), found.checks["best"]
-    chosen = [labels.index(one) for one in band.of]
-    where = best.table[band.against].to_numpy()[chosen]
-    order = np.argsort(where)
-    many, alone = (wave.seen[band.quantity][:, chosen] * 1e3 for wave in (found.predictive, best))
-    seen = order[np.isfinite(many[:, order]).any(axis=0)]
-    low, high = (of(many[:, seen], axis=0) for of in (np.nanmin, np.nanmax))
-    axes.fill_between(where[seen], low, high, color="C0", alpha=0.3, lw=0, label="engine over the posterior")
-    axes.plot(where[order], alone[0, order], "o-", ms=4, lw=1.0, color="C1", label="engine at the best set")
-    published = [
-        (where[band.of.index(of)], one.value * 1e3, one.deviation * 1e3)
-        for one in found.calibration.observations
-        if one.quantity == band.quantity and not one.over
-        for of in one.of
-        if of in band.of
-    ]
-    x, value, deviation = np.reshape(published, (-1, 3)).T
-    axes.errorbar(x, value, deviation, fmt="ks", ms=4, lw=1.0, label="published")
-    quantity, _, which = band.quantity.partition("_")
-    place = f" at contact {which}" if quantity == "sliding" else f" of bead {which}" if which else ""
-    axes.set(title=band.title, xlabel=_AGAINST[band.against], ylabel=f"{quantity}{place} (mm/s)")

@@ -42,13 +42,7 @@ class AuditReport:
 
 
 def selected(only: Collection[str] = (), *, quick: bool = False) -> tuple[str, ...]:
-    """Names of the checks to run: those given, or all, or all quick ones.
-
-    Raises
-    ------
-    InputError
-        If a name is not that of a check.
-    """
+    """Names of the checks to run: those given, or all, or all quick ones; `InputError` if one is that of none."""
     for name in only:
         if name not in CHECKS:
             raise refused("--only", f"no check {name!r}; {expected_of(name, CHECKS)}")

@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from walkers.check.report import Chapter, Line
-from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
@@ -31,15 +30,14 @@ from walkers.physics import capillary, rabinovich, soulie, willett, young_laplac
 from walkers.physics.bridge import FloatArray, Surfaces
 from walkers.physics.capillary import derjaguin_radius
 from walkers.physics.laplace import force_curve
-from walkers.physics.units import ACCELERATION_OF_ONE_G
 from walkers.pipeline import run
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, series_look, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-CASES, COMPARED = ("fig1b", "fig4a", "climber-dimer"), ("fig1b", "climber-dimer")
-"""Whose Bond numbers are told; with whose bridges, of the walkers' liquid and of the piles', laws are compared."""
+COMPARED = ("fig1b", "climber-dimer")
+"""With whose bridges, of the walkers' liquid and of the piles', laws are compared."""
 WALKED, WALKED_BY = ("fig1b", "fig4a"), ("young-laplace", "willett", "rabinovich", "soulie")
 """Cases and laws of the velocities."""
 _FRACTIONS, _ANGLES = (0.01, 0.05, 0.25), (0.0, radians(40.0))
@@ -182,8 +180,8 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
         angles=_ANGLES,
         walked=WALKED,
         velocities=velocities,
-        bond_numbers={name: _bond_numbers(load_case(name)) for name in CASES},
-        coverage=_coverage(CASES[0]),
+        coverage=_coverage(COMPARED[0]),
+        covered=COMPARED[0],
     )
     title = "Capillary bridges by the Young–Laplace equation"
     return Chapter("bridges", title, tuple(lines), text, {"bridges": figure(compared)})
@@ -191,17 +189,9 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
 
 def _walls() -> list[Surfaces]:
     """Bridges at a wall of little and much liquid that wets well and badly."""
-    case = load_case(CASES[0])
+    case = load_case(COMPARED[0])
     liquids = [replace(case.liquid, volume_fraction=part, contact_angle=one) for part in _FRACTIONS for one in _ANGLES]
     return [Surfaces.of(1.0, inf, liquid, case.contact.minimum_separation_ratio) for liquid in liquids]
-
-
-def _bond_numbers(case: Case) -> tuple[float, float]:
-    """ρgR²/γ of the largest bead, and what the drive's peak acceleration makes of it."""
-    liquid, radius = case.liquid, max(dimer_of(case).radii)
-    assert liquid.density is not None, case.name
-    at_rest = liquid.density * ACCELERATION_OF_ONE_G * radius**2 / liquid.surface_tension
-    return at_rest, at_rest * case.drive.peak_acceleration / ACCELERATION_OF_ONE_G
 
 
 def _coverage(name: str) -> dict[str, float]:

@@ -99,12 +99,8 @@ def crosscheck(
     """Compare a case's run, and of a pile those of so many ``seeds`` from its own on, with the second engine.
 
     ``out`` is the folder of the run directories, ``without`` terms that the second engine leaves out
-    (`walkers.check.engine.TERMS`), ``make`` makes the run of a case if it is missing.
-
-    Raises
-    ------
-    runner.EngineFailure
-        If the engine fails in one of the known ways.
+    (`walkers.check.engine.TERMS`), ``make`` makes the run of a case if it is missing. `EngineFailure` if the engine
+    fails in one of the known ways.
 
     Examples
     --------
@@ -130,10 +126,7 @@ def compare(motions: Sequence[Motion], without: Sequence[str] = ()) -> Compariso
 def shortened(case: Case, cycles: int) -> Case:
     """The case for so many cycles at a stretch, a third of them to settle.
 
-    Raises
-    ------
-    ValueError
-        If samples are taken more rarely, or there would be too few.
+    ``ValueError`` if samples are taken more rarely, or there would be too few.
     """
     rare = case.run.cycles_per_sample
     least = 3 * rare
@@ -248,13 +241,7 @@ def _touching(motion: Motion) -> float:
 
 
 def chapter(out: Path, *, quick: bool = False) -> Chapter:
-    """Run cases of all kinds in both engines, or only a short run of one walker.
-
-    Raises
-    ------
-    runner.EngineFailure
-        If the engine fails in one of the known ways.
-    """
+    """Run cases of all kinds in both engines, or only a short run of one walker; errors as of `crosscheck`."""
     cases = {"fig1b": shortened(load_case("fig1b"), 6)} if quick else full_cases()
     found = {name: crosscheck(case, out, seeds=FEWEST if case.mixture else 1) for name, case in cases.items()}
     lines = [replace(line, what=f"{name}: {line.what}") for name, one in found.items() for line in one.chapter().lines]

@@ -35,7 +35,7 @@ from walkers.postprocess.dump import BinaryDump
 from walkers.postprocess.motion import prescribed_motion
 from walkers.runner.binary import Engine
 from walkers.runner.directory import write_deck
-from walkers.runner.launch import Progress, launch
+from walkers.runner.launch import launch
 from walkers.templates.bridge_tables import tabulated
 from walkers.templates.deck import BRIDGES_NAME, Checkpoint, Deck, Plan, Recording, compose, plan_of
 from walkers.templates.layout import BEAD_COLUMNS, FORCE_COLUMNS
@@ -193,14 +193,14 @@ class Bench:
         write_deck(deck, directory)
         if carry is not None:
             shutil.copy(carry, directory)
-        self.version = launch(deck, directory, self.engine, on_progress=self._look).version
+        self.version = launch(deck, directory, self.engine, on_step=self._look).version
         dump = BinaryDump(directory / deck.layout.bead_dump, deck.layout.bead_columns)
         beads = dump.stack()
         vectors = [beads[:, :, dump.column(name) :][:, :, :3] for name in ("x", "vx", "omegax", "fx", "tqx")]
         time = dump.steps.astype(np.float64) * deck.layout.time_step
         return Measured(time, np.concatenate(vectors[:3], -1), np.concatenate(vectors[3:], -1), directory)
 
-    def _look(self, _: Progress) -> None:
+    def _look(self, _: int) -> None:
         if self.stop.is_set():
             raise Stopped("the audit was stopped")
 

@@ -138,7 +138,7 @@ def sweep(
     from walkers.inputs.sweep import load_sweep
     from walkers.postprocess.analysis import lines_of_rest, rests_on
     from walkers.progress import progress_of_sweep
-    from walkers.sweeps.run import plan_sweep, run_sweep
+    from walkers.sweeps.scheduler import plan_sweep, run_sweep
     from walkers.sweeps.site import load_site
     from walkers.sweeps.table import describe_status
 
@@ -213,18 +213,13 @@ def figures(
     return 1 if made.failures or made.left_out else 0
 
 
-def model_terms(
-    to: Path = Option(Path("figures"), help="Folder of the tables."),
-    generations: int = Option(120, min=1, help="Of each search."),
-) -> int:
+def model_terms(to: Path = Option(Path("figures"), help="Folder of the table.")) -> None:
     """Fit the theory to the published numbers with one term after the other; no engine is needed."""
-    from walkers.paper.model_terms import try_model_terms, write_model_terms
+    from walkers.paper.model_terms import PAGE_NAME, try_model_terms
 
     check_folder("--to", to)
-    fits = try_model_terms(generations=generations)
-    print_lines(f"misfit {one.misfit:5.1f}, {one.met:2d} met: {one.name}" for one in fits)
-    print_lines(write_model_terms(fits, to))
-    return 0
+    print_lines(f"misfit {one.misfit:5.1f}, {one.met:2d} met: {one.name}" for one in try_model_terms(to))
+    print(to / PAGE_NAME)
 
 
 def audit(
@@ -305,8 +300,7 @@ def validate(
     as_json: Json = False,
 ) -> int:
     """Check the decks against published benchmarks, exact solutions and a second engine, and write a page of it."""
-    from walkers.check.report import as_dict
-    from walkers.check.validate import validate
+    from walkers.check.report import as_dict, validate
 
     check_folder("--out", out)
     folder, cores = to or out / "validation", on_cores(jobs).workers

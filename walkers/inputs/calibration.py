@@ -122,15 +122,6 @@ class SharedError(Table):
     share: Annotated[Number, Field(gt=0, lt=1)]
 
 
-class Band(Table):
-    """``[[bands]]``: a picture of a quantity of some experiments against a column of their sweep's table."""
-
-    title: str = ""
-    of: Names
-    against: Literal["peak_acceleration", "gamma0", "frequency", "sin_delta"]
-    quantity: Speed = "velocity"
-
-
 class DesignTable(Table):
     """``[design]``: sizes of the waves and of the predictive check, and how many points of the prior are weighed."""
 
@@ -151,7 +142,6 @@ class CalibrationFile(Table):
     observations: Annotated[list[Observation], Field(min_length=1)]
     shared_errors: dict[str, SharedError] = Field({})
     guesses: list[dict[str, Number]] = Field([])
-    bands: list[Band] = Field([])
     held_out: dict[str, list[str]] = Field({})
     design: DesignTable = DesignTable()
 
@@ -243,8 +233,6 @@ def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
         named.append((f"shared_errors.{label}.observations", error.observations, observations, "an observation"))
     for number, guess in enumerate(file.guesses):
         named += [(f"guesses[{number}].{label}", [label], file.parameters, "a parameter") for label in guess]
-    for number, band in enumerate(file.bands):
-        named.append((f"bands[{number}].of", band.of, file.experiments, "an experiment"))
     for label, held in file.held_out.items():
         named.append((f"held_out.{label}", held, groups, "a group of observations"))
     for place, given, known, what in named:

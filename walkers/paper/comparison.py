@@ -13,8 +13,16 @@ import numpy as np
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.text import rendered
 from walkers.paper.maps import paper_drives
-from walkers.paper.published import GRAVITY, OBSERVATIONS, Observation, Point, driven, shipped
-from walkers.paper.sources import NothingFinishedError, Sources
+from walkers.paper.published import (
+    GRAVITY,
+    OBSERVATIONS,
+    NothingFinishedError,
+    Observation,
+    Point,
+    Sources,
+    driven,
+    shipped,
+)
 from walkers.postprocess.gait import on_axis, steady_walkers
 from walkers.postprocess.tables import read_table
 from walkers.sweeps.table import thresholds

@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
-from walkers.paper.figures import fig1b, fig2, fig3, fig4
+from walkers.paper.figures import fig1b, fig2, fig3, fig4, fig_sensitivity
 from walkers.paper.maps import fig_alignment, fig_climbing, fig_modes, fig_zoo
-from walkers.paper.sensitivity import fig_sensitivity
-from walkers.paper.sources import NothingFinishedError, ProgressOf, Sources
+from walkers.paper.published import NothingFinishedError, ProgressOf, Sources
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.runner.files import write_text
-from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Failure, Options
+from walkers.sweeps.scheduler import Failure, Options, run_sweep
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,7 +80,7 @@ def make_figures(  # noqa: PLR0913
     out, to
         Folders of the run directories and of the figures.
     options, engine, allow_failed_audit
-        As for `walkers.sweeps.run.run_sweep`.
+        As for `walkers.sweeps.scheduler.run_sweep`.
     only
         Names of `FIGURES`, or ``comparison``; if empty, all but those that are drawn only if asked for.
     formats

@@ -12,8 +12,7 @@ import numpy.typing as npt
 
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
-from walkers.paper.published import FIG3_FIT, GRAVITY, OBSERVATIONS, described, of_asymmetry, shipped
-from walkers.paper.sources import Sources
+from walkers.paper.published import FIG3_FIT, GRAVITY, OBSERVATIONS, Sources, described, of_asymmetry, shipped
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 from walkers.postprocess.gait import gait, settled_samples
 from walkers.theory.mathieu import Alignment, alignment, is_stable, turning

@@ -9,7 +9,7 @@ nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from math import inf, isfinite, nan
 from pathlib import Path
@@ -21,7 +21,7 @@ from walkers.inputs import library
 from walkers.inputs.case import Case
 from walkers.inputs.text import rendered
 from walkers.paper.published import OBSERVATIONS, Observation, Point
-from walkers.runner.files import write_json, write_text
+from walkers.runner.files import write_text
 from walkers.theory.motion import Friction, Walker, walk
 from walkers.theory.quasistatic import FloatArray, translation
 
@@ -60,6 +60,7 @@ FITTED = tuple(OBSERVATIONS[key] for key in _KEYS)
 _FREQUENCIES = (60.0, 90.0)
 _CYCLES = 40
 _HOPELESS = 30.0
+PAGE_NAME = "model_terms.md"
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,7 @@ def fit(
     *,
     fixed: Mapping[str, float] | None = None,
     begin: Mapping[str, float] | None = None,
-    generations: int = 80,
+    generations: int = 120,
 ) -> Fit:
     """The parameters with the least misfit (`scipy.optimize.differential_evolution`).
 
@@ -195,24 +196,15 @@ def fit(
     return Fit(name, parameters, told, len(wanted) - len(missed), missed, float(found.fun))
 
 
-def try_model_terms(*, generations: int = 80) -> list[Fit]:
-    """The fit without any, with each term, with all of them, and of the paper's law alone."""
-    bare = fit("Coulomb friction and the bridges' resistance", ALWAYS, generations=generations)
+def try_model_terms(to: Path) -> list[Fit]:
+    """Fit without any term, with each, with all of them, and the paper's law alone; write ``model_terms.md``."""
+    bare = fit("Coulomb friction and the bridges' resistance", ALWAYS)
     # From where the others end: what has more parameters must not come out worse for want of generations.
-    added = [
-        fit(name, {**ALWAYS, **ranges}, begin=bare.parameters, generations=generations)
-        for name, ranges in TERMS.items()
-    ]
+    added = [fit(name, {**ALWAYS, **ranges}, begin=bare.parameters) for name, ranges in TERMS.items()]
     best = min(added, key=lambda one: one.misfit)
     every = {**ALWAYS, **{key: ends for ranges in TERMS.values() for key, ends in ranges.items()}}
-    together = fit("all of these", every, begin=best.parameters, generations=generations)
-    alone = fit("the paper's law alone, integrated", KAPPA, fixed=NOTHING_ELSE, generations=generations)
-    return [bare, *added, together, alone]
-
-
-def write_model_terms(fits: Sequence[Fit], to: Path) -> list[Path]:
-    """Write ``model_terms.json`` and, as a table, ``model_terms.md``."""
+    together = fit("all of these", every, begin=best.parameters)
+    fits = [bare, *added, together, fit("the paper's law alone, integrated", KAPPA, fixed=NOTHING_ELSE)]
     to.mkdir(parents=True, exist_ok=True)
-    write_json(to / "model_terms.json", {"fits": [asdict(one) for one in fits]})
-    write_text(to / "model_terms.md", rendered("walkers.paper", "model_terms.md.j2", fits=fits, of=len(FITTED)))
-    return [to / "model_terms.json", to / "model_terms.md"]
+    write_text(to / PAGE_NAME, rendered("walkers.paper", "model_terms.md.j2", fits=fits, of=len(FITTED)))
+    return fits

@@ -1,13 +1,15 @@
 """What the paper publishes of walkers as numbers (``published.toml``), and of which walkers: rows of sweeps, and cases.
 
-`walkers.paper.comparison` evaluates each by the engine and by the theory.
+`walkers.paper.comparison` evaluates each by the engine, whose sweeps are read once (`Sources`), and by the theory.
 """
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,8 +17,12 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive, Harmonic
+from walkers.inputs.errors import WalkersError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
+from walkers.postprocess.motion import Group, read_motion
+from walkers.sweeps.scheduler import SweepProgress
+from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -169,3 +175,36 @@ def described(case: Case) -> str:
     radii = "/".join(f"{radius * 1e3:g}" for radius in case.walkers[0].radii)
     drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration / GRAVITY:.3g} g"
     return f"R = {radii} mm, {drive}, {case.liquid.name}"
+
+
+# --- the sweeps that figures are made from ----------------------------------------------------------------------------
+
+ProgressOf = Callable[[str], AbstractContextManager[Callable[[SweepProgress], None]]]
+"""Gives, for the name of a sweep, a context whose value is told of its progress."""
+
+
+class NothingFinishedError(WalkersError):
+    """A sweep of which nothing is there to be shown."""
+
+
+class Sources:
+    """Finished sweeps in a folder of run directories: ``table`` gives the table of one, by its name, ``trajectory`` the
+    motion of the (first) walkers of a run, by its directory.
+    """
+
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self.table: Callable[[str], pd.DataFrame] = lru_cache(maxsize=None)(lambda sweep: load(out / sweep))
+        self.trajectory: Callable[[str], Group] = lru_cache(maxsize=32)(lambda run: read_motion(run).groups[0])
+
+    def finished(self, sweep: str) -> pd.DataFrame:
+        """The points of a sweep that are finished; a `NothingFinishedError` if there is none."""
+        table = self.table(sweep)
+        done = table[table["status"] == "finished"]
+        if done.empty:
+            raise NothingFinishedError(f"no point of the sweep {sweep} is finished")
+        return done
+
+    def runs(self, *sweeps: str) -> list[str]:
+        """Names of the finished runs of sweeps."""
+        return [Path(run).name for sweep in sweeps for run in self.finished(sweep)["run"]]

@@ -54,17 +54,9 @@ class Engine:
 
 
 def find_engine(wanted: str | None = None) -> Engine:
-    """Find the engine.
+    """Find the engine: by a name or path, else by the environment variable ``WALKERS_ENGINE``, else ``liggghts``.
 
-    Parameters
-    ----------
-    wanted
-        A name or path; else the environment variable ``WALKERS_ENGINE``, else ``liggghts``.
-
-    Raises
-    ------
-    EngineMissing
-        If there is no such executable.
+    `EngineMissing` if there is no such executable.
     """
     name = wanted or os.environ.get(ENGINE_VARIABLE) or "liggghts"
     found = shutil.which(name)
@@ -101,12 +93,8 @@ def version_in(output: bytes) -> str | None:
 def plugin_of(engine: Engine) -> Path:
     """The contact model for an engine, compiled if it never was.
 
-    Raises
-    ------
-    OtherEngine
-        If the engine is another version than the one that the model was written for.
-    ContactModelMissing
-        If it cannot be compiled: what is missing, or what the compiler says.
+    `OtherEngine` if the engine is another version than the one that the model was written for, `ContactModelMissing` if
+    it cannot be compiled: what is missing, or what the compiler says.
     """
     fingerprint = hashlib.sha256("\0".join(_OPTIONS).encode())
     for name in _MODEL:
@@ -221,13 +209,7 @@ def read_audit(engine: str) -> AuditRecord | None:
 
 
 def write_audit(record: AuditRecord) -> None:
-    """Keep a record. A full audit replaces a quick one, for it holds all of its lines; a quick one stands beside it.
-
-    Raises
-    ------
-    OSError
-        If the user's cache cannot be written.
-    """
+    """Keep a record: a full audit's replaces a quick one's, whose lines it has; `OSError` if the cache refuses."""
     place = _record_of(record.engine, record.scope)
     place.parent.mkdir(parents=True, exist_ok=True)
     write_json(place, asdict(record))

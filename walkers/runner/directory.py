@@ -4,33 +4,36 @@ A run is made in ``<name>-<hash>.incomplete`` and renamed to ``<name>-<hash>`` w
 a directory without a manifest is not a run, and a run that is made anew replaces the old one only when it has finished.
 What the engine was given and wrote is in ``segments/0000``, ``segments/0001``, …; walkers have one unless their case
 asks for more.
-While it is made, the file ``<name>-<hash>.lock`` is locked, also by the engine itself (see `walkers.runner.locks`).
+
+While it is made, the file ``<name>-<hash>.lock`` is locked. The lock is the kernel's (``flock``): it ends with the last
+process that has the file open, however that ends. Engines inherit it, so that one which outlives its launcher keeps
+others away from the directory that it writes into. It does so for moments only, for the kernel ends it with its
+launcher: whoever meets a lock waits that long.
 """
 
 from __future__ import annotations
 
 import errno
+import fcntl
 import hashlib
 import json
 import os
 import re
 import shutil
-from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+import time
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 from walkers.inputs.case import Case
-from walkers.inputs.errors import shortened
-from walkers.inputs.text import printable
 from walkers.physics.laws import source_sha256
 from walkers.runner.binary import Engine
 from walkers.runner.failures import DiskFull, OutputGone
-from walkers.runner.files import fsync_path, read_json, write_json
+from walkers.runner.files import fsync_path, link_or_copy, read_json, write_json
 from walkers.runner.launch import EngineReport
-from walkers.runner.manifest import FORMAT, MANIFEST_NAME, check_unchanged, checksums
+from walkers.runner.manifest import FORMAT, MANIFEST_NAME, check_unchanged
 from walkers.templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck, Segment
 from walkers.templates.layout import Layout
 
@@ -42,13 +45,9 @@ SEGMENT_NAME = "segment.json"
 UNFINISHED = ".incomplete"
 REPLACED = ".replaced"
 _LONGEST_NAME = 80
-_SHOWN = (
-    *(".png", ".pdf", ".svg", ".gif", ".mp4", ".html", ".htm"),
-    *(".vtp", ".vtu", ".pvd", ".py", ".xyz", ".lammpstrj", ".csv"),
-)
-"""Suffixes of pictures, films, pages, files for ParaView (with their script) and exports: the program writes them on
-demand and never reads them again."""
-_LONGEST_SHOWN = 300
+_LOOK_SECONDS = 0.01
+_PATIENCE_SECONDS = 2.0
+"""Before locks are taken for another's: engines whose launcher was killed end within a fraction of a second."""
 
 
 # --- names ------------------------------------------------------------------------------------------------------------
@@ -127,25 +126,13 @@ class FinishedRun:
 
 
 def case_of(directory: Path) -> Case:
-    """The resolved case of a run directory.
-
-    Raises
-    ------
-    OSError, ValueError
-        If its ``case.json`` cannot be read, or of a finished run is not what it was.
-    """
+    """The resolved case of a run directory; `OSError`, `ValueError` if it cannot be read, or was changed since."""
     check_unchanged(directory, [CASE_NAME])
     return Case.from_dict(read_json(directory / CASE_NAME))
 
 
 def layout_of(segment: Path) -> Layout:
-    """What the dumps of a segment hold.
-
-    Raises
-    ------
-    OSError, ValueError, KeyError, TypeError
-        If its ``layout.json`` cannot be read.
-    """
+    """What the dumps of a segment hold; `OSError`, `ValueError`, `KeyError`, `TypeError` if it cannot be read."""
     return Layout.from_dict(read_json(segment / LAYOUT_NAME))
 
 
@@ -177,10 +164,9 @@ def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
     for name, text in {DECK_NAME: deck.text, **deck.files}.items():
         contents = text.encode("utf-8", "surrogateescape")
         if before is not None and (before / name).is_file() and (before / name).read_bytes() == contents:
-            with suppress(OSError):  # a file system without links
-                os.link(before / name, directory / name)
-                continue
-        (directory / name).write_bytes(contents)
+            link_or_copy(before / name, directory / name)
+        else:
+            (directory / name).write_bytes(contents)
     write_json(directory / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
 
 
@@ -191,13 +177,6 @@ def write_segment_record(
     record = {**vars(segment), **vars(report), "root_mean_square_velocity": rms_velocity}
     write_json(directory / SEGMENT_NAME, record, at_once=False)
     return record
-
-
-def record_failure(incomplete: Path, failure: Exception) -> None:
-    """Leave word of a failure in the directory of an unfinished run."""
-    said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
-    with suppress(OSError):  # a full disk: the message reaches the user all the same
-        write_json(incomplete / FAILURE_NAME, said)
 
 
 @contextmanager
@@ -236,124 +215,57 @@ def recover(place: Path) -> None:
         shutil.rmtree(replaced)
 
 
-# --- checking ---------------------------------------------------------------------------------------------------------
+# --- locks ------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Verification:
-    """What has become of the files of a run or an archive, or of the points of a sweep: how many are ``intact``.
+def _lock_file(place: Path) -> Path:
+    return place.with_name(f"{place.name}.lock")
 
-    ``told`` are names of the others: ``changed`` and ``missing`` ones; those ``not listed``; what is ``doubtful``, with
-    the reason in brackets; and what was ``made since`` from the run (`made_since`): no result rests on it.
-    ``left_out`` is how many were left out of an archive on purpose.
+
+@contextmanager
+def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
+    """Lock those of the final places of runs that nobody else has locked, two seconds later at the latest.
+
+    Yields those that are ours until the end of the block, with the descriptors of their lock files.
     """
-
-    name: str
-    intact: int
-    told: Mapping[str, Sequence[str]]
-    left_out: int = 0
-    of_points: bool = False
-
-    @property
-    def passed(self) -> bool:
-        """Whether all that is listed is what it was, and nothing else is there that a result could rest on."""
-        return not any(names for kind, names in self.told.items() if kind != "made since")
-
-    def describe(self) -> str:
-        """The outcome, and a line for each file that is not what it was, or is not listed."""
-        told = f"{self.name}: {self.intact} {'points have their run' if self.of_points else 'files are what they were'}"
-        left_out = f", {self.left_out} left out of the archive" if self.left_out else ""
-        # Whoever made an archive chose its names, and may have put escape sequences into them.
-        lines = [
-            f"  {kind:<10} {printable(shortened(name, _LONGEST_SHOWN))}"
-            for kind, names in self.told.items()
-            for name in names
-        ]
-        return "\n".join([told + left_out, *lines])
-
-
-def compare(
-    name: str,
-    listed: Mapping[str, str],
-    now: Mapping[str, str],
-    there: Iterable[str],
-    *,
-    added: Callable[[str], bool],
-    left_out: Collection[str] = (),
-    doubtful: Sequence[str] = (),
-) -> Verification:
-    """Compare the files of something with a list.
-
-    Parameters
-    ----------
-    name, there
-        Of what holds them, and of all that is there.
-    listed, now
-        SHA-256 of files, as the list has them and, of those of them that can be read, as they are.
-    added
-        Whether a name that is not listed may have been added since.
-    left_out, doubtful
-        Names on the list that need not be there; what else is wrong, each with its reason.
-    """
-    changed = [one for one, checksum in now.items() if checksum != listed[one]]
-    others = sorted(set(there).difference(listed))
-    told = {
-        "changed": changed,
-        "missing": [one for one in listed if one not in now and one not in left_out],
-        "not listed": [one for one in others if not added(one)],
-        "doubtful": doubtful,
-        "made since": _by_folder(one for one in others if added(one)),
-    }
-    absent = sum(one in listed and one not in now for one in left_out)
-    return Verification(name, len(now) - len(changed), told, left_out=absent)
-
-
-def _by_folder(names: Iterable[str]) -> list[str]:
-    """Files of the same folder as one, but those of the topmost: ``vtk`` holds one a frame."""
-    folders = {name: name.rpartition("/")[0] for name in names}
-    count = Counter(folders.values())
-    told = (f"{one}/ ({count[one]} files)" if one and count[one] > 1 else name for name, one in folders.items())
-    return list(dict.fromkeys(told))
-
-
-def made_since(name: str) -> bool:
-    """Whether what no list has counts as made from a run: by its relative path it is nothing that a result rests on.
-
-    These are pictures, films, pages, files for ParaView, exports (by their suffixes), and hidden files. Nothing in
-    ``segments`` is among them: each folder there is taken for a part of the run.
-    """
-    path = PurePosixPath(name)
-    hidden = any(part.startswith(".") and part != ".." for part in path.parts)
-    return SEGMENTS not in path.parts and (hidden or path.suffix.lower() in _SHOWN)
-
-
-def files_below(folder: Path) -> list[str]:
-    """Relative paths of all that is in a folder: files, folders that are empty (with a slash), links to folders."""
-    found = []
-    for path in folder.rglob("*"):
-        name = path.relative_to(folder).as_posix()
-        if path.is_symlink() or not path.is_dir():
-            found.append(name)
-        elif not any(path.iterdir()):
-            found.append(f"{name}/")
-    return sorted(found)
-
-
-def verify_run(directory: Path) -> Verification:
-    """Compare the files of a run directory with its manifest; what has none that can be read does not pass.
-
-    The case file that an archive puts beside it may be there too.
-    """
-    name = directory.resolve().name
+    ours: dict[Path, int] = {}
+    end = time.monotonic() + _PATIENCE_SECONDS
     try:
-        contents = read_json(directory / MANIFEST_NAME)
-        listed = {CASE_NAME: "", **contents["sha256"]}  # which every run has
-        beside, left_out = f"{contents['name']}.toml", set(contents.get("left_out", ()))
-        there = files_below(directory)
-        now = checksums(directory, [one for one in there if one in listed and (directory / one).is_file()])
+        # In the order of their names, so that of two who want the same places one gets them rather than each a half.
+        for place in sorted(set(places)):
+            if (descriptor := _lock(_lock_file(place), end)) is not None:
+                ours[place] = descriptor
+        yield ours
+    finally:
+        for place, descriptor in ours.items():
+            _lock_file(place).unlink(missing_ok=True)
+            os.close(descriptor)
+
+
+def _lock(file: Path, end: float) -> int | None:
+    """Lock a file that others may be removing at this moment: the lock counts only on the file that has the name."""
+    while True:
+        descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(descriptor), file.stat()):
+                    return descriptor
+        except BlockingIOError:
+            if time.monotonic() > end:
+                os.close(descriptor)
+                return None
+            time.sleep(_LOOK_SECONDS)
+        os.close(descriptor)
+
+
+def is_locked(place: Path) -> bool:
+    """Whether somebody is making the run whose place this is."""
+    try:
+        with _lock_file(place).open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except FileNotFoundError:
-        return Verification(name, 0, {"missing": [MANIFEST_NAME]})
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        return Verification(name, 0, {"doubtful": [f"{MANIFEST_NAME} (it, or what it names, cannot be read: {error})"]})
-    there.remove(MANIFEST_NAME)
-    return compare(name, listed, now, there, added=lambda one: made_since(one) or one == beside, left_out=left_out)
+        return False
+    except BlockingIOError:
+        return True
+    return False

@@ -15,16 +15,14 @@ from walkers.templates.engine import AUDITED_VERSION
 
 
 class EngineFailure(WalkersError):
-    """Root of the failures of a run; ``directory`` is where its remains are, ``lost`` the number of beads lost."""
+    """Root of the failures of a run, which ``failure.json`` tells by the names of their classes.
+
+    ``directory`` is where its remains are, ``lost`` the number of beads lost.
+    """
 
     def __init__(self, message: str, directory: Path | None = None, *, lost: int = 0) -> None:
         self.directory, self.lost = directory, lost
         super().__init__(f"{message} (see {directory})" if directory else message)
-
-    @property
-    def reason(self) -> str:
-        """Name of the failure, as stored in ``failure.json``."""
-        return type(self).__name__
 
 
 class EngineMissing(EngineFailure):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -11,24 +12,14 @@ from typing import Any
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object.
-
-    Raises
-    ------
-    OSError, ValueError
-        If the file cannot be read, or holds something else.
-    """
-    return json_object(path.read_bytes(), str(path))
-
-
-def json_object(contents: bytes, name: str) -> dict[str, Any]:
-    """The JSON object that the contents of a file are; ``name`` is the file's, for the message of a ValueError."""
+    """Read a JSON object; `OSError`, `ValueError` if the file cannot be read, or holds something else."""
+    contents = path.read_bytes()
     try:
         found = json.loads(contents)
     except (ValueError, RecursionError) as error:
-        raise ValueError(f"{name}: no JSON ({error})") from error
+        raise ValueError(f"{path}: no JSON ({error})") from error
     if not isinstance(found, dict):
-        raise ValueError(f"{name}: expected a JSON object")
+        raise ValueError(f"{path}: expected a JSON object")
     return found
 
 
@@ -54,6 +45,14 @@ def write_bytes(path: Path, contents: bytes, *, at_once: bool = True) -> None:
         if at_once:
             file.flush()
             os.fsync(file.fileno())
+
+
+def link_or_copy(source: str | Path, to: str | Path) -> None:
+    """The same file in two places; a copy where the file system has no links."""
+    try:
+        os.link(source, to)
+    except OSError:
+        shutil.copyfile(source, to)
 
 
 @contextmanager

@@ -78,7 +78,7 @@ def launch(
     directory: Path,
     engine: Engine,
     *,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_step: Callable[[int], None] | None = None,
     time_limit: float | None = None,
     keep_open: Sequence[int] = (),
     starts: int = 3,
@@ -88,9 +88,9 @@ def launch(
     Parameters
     ----------
     deck, directory, engine
-        The deck, whose files are in the directory already; where the engine works and writes its log; the binary.
-    on_progress
-        Called a few times a second.
+        The deck; where its files are already, and the engine works; the binary.
+    on_step
+        Called a few times a second with the step that the engine is at; what it raises ends the engine.
     time_limit
         Wall time in s after which the run is stopped.
     keep_open
@@ -113,7 +113,7 @@ def launch(
     while True:
         starts -= 1
         try:
-            return _watched(_Watch(deck, directory, engine.path), command, on_progress, time_limit, keep_open)
+            return _Watch(deck, directory, engine.path, time_limit).run(command, on_step or (lambda _: None), keep_open)
         except failures.EngineNeverStarted:
             if not starts:
                 raise
@@ -125,47 +125,6 @@ def check_room(folder: Path, needed: int) -> None:
     free = shutil.disk_usage(folder).free
     if free < needed + _SPARE_BYTES:
         raise failures.DiskFull(needed, free, folder)
-
-
-def _watched(
-    watch: _Watch,
-    command: Sequence[str],
-    on_progress: Callable[[Progress], None] | None,
-    time_limit: float | None,
-    keep_open: Sequence[int],
-) -> EngineReport:
-    """Start an engine and watch it to its end."""
-    # What a user has Open MPI do on a cluster, such as by which network to meet, may leave no way on one machine.
-    ours = {name: value for name, value in os.environ.items() if not name.startswith("OMPI_MCA_")}
-    environment = {**ours, **(RANKS if watch.layout.ranks > 1 else ALONE)}
-    for name in STEP_VARIABLES:
-        environment.pop(name, None)
-    process = None
-    try:
-        with postponed_interrupts(), (watch.directory / OUTPUT_NAME).open("wb") as output:
-            process = subprocess.Popen(
-                command,
-                cwd=watch.directory,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                pass_fds=tuple(keep_open),
-            )
-        while process.poll() is None:
-            try:
-                process.wait(_POLL_SECONDS)
-            except subprocess.TimeoutExpired:
-                watch.look()
-                watch.check(time_limit)
-                if on_progress:
-                    on_progress(watch.progress)
-    finally:
-        if process is not None:
-            _end(process)
-            watch.cut_log()
-    return watch.verdict(process.returncode)
 
 
 def _before(ranks: int) -> tuple[str, ...]:
@@ -227,8 +186,9 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 class _Watch:
     """Reads the engine's output as it grows, keeps of it what is asked for later, and raises what is wrong."""
 
-    def __init__(self, deck: Deck, directory: Path, engine: Path) -> None:
+    def __init__(self, deck: Deck, directory: Path, engine: Path, time_limit: float | None) -> None:
         self.deck, self.layout, self.directory, self.engine = deck, deck.layout, directory, engine
+        self.time_limit = math.inf if time_limit is None else time_limit
         self.begin = self.looked = time.perf_counter()
         self.log = directory / OUTPUT_NAME
         self.step = 0
@@ -245,14 +205,45 @@ class _Watch:
         return time.perf_counter() - self.begin
 
     @property
-    def progress(self) -> Progress:
-        return Progress(self.step, self.layout.steps, self.step * self.layout.time_step, self.elapsed, self.step)
-
-    @property
     def written(self) -> int:
         """Bytes of the beads' dump."""
         dump = self.directory / self.layout.bead_dump
         return dump.stat().st_size if dump.exists() else 0
+
+    def run(self, command: Sequence[str], on_step: Callable[[int], None], keep_open: Sequence[int]) -> EngineReport:
+        """Start an engine and watch it to its end."""
+        # What a user has Open MPI do on a cluster, such as by which network to meet, may leave no way on one machine.
+        ours = {name: value for name, value in os.environ.items() if not name.startswith("OMPI_MCA_")}
+        environment = {**ours, **(RANKS if self.layout.ranks > 1 else ALONE)}
+        for name in STEP_VARIABLES:
+            environment.pop(name, None)
+        process = None
+        try:
+            with postponed_interrupts(), self.log.open("wb") as output:
+                process = subprocess.Popen(
+                    command,
+                    cwd=self.directory,
+                    env=environment,
+                    stdin=subprocess.DEVNULL,
+                    stdout=output,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,
+                    pass_fds=tuple(keep_open),
+                )
+            while process.poll() is None:
+                try:
+                    process.wait(_POLL_SECONDS)
+                except subprocess.TimeoutExpired:
+                    self.look()
+                    self.check()
+                    on_step(self.step)
+        finally:
+            if process is not None:
+                _end(process)
+                with suppress(OSError):  # a folder that is gone
+                    if self.log.stat().st_size > self.deck.log_limit:  # before its engine had ended
+                        os.truncate(self.log, int(self.deck.log_limit))
+        return self.verdict(process.returncode)
 
     def look(self) -> None:
         """Take in what the engine has written since the last look, as far as its log may go, or how long it has not."""
@@ -266,12 +257,6 @@ class _Watch:
         now, grown = time.perf_counter(), self.read + self.written
         self.silent = 0.0 if grown != self.grown else self.silent + min(now - self.looked, _LONGEST_LOOK)
         self.looked, self.grown = now, grown
-
-    def cut_log(self) -> None:
-        """Cut a log that became too long before its engine had ended."""
-        with suppress(OSError):  # a folder that is gone
-            if self.log.stat().st_size > self.deck.log_limit:
-                os.truncate(self.log, int(self.deck.log_limit))
 
     def _take_in(self, lines: bytes) -> None:
         self.version = self.version or version_in(lines)
@@ -318,7 +303,7 @@ class _Watch:
             self.directory,
         )
 
-    def check(self, time_limit: float | None = None) -> None:
+    def check(self) -> None:
         """Raise the failure that shows while the engine runs, if any."""
         deck, after = self.deck, f"after step {self.step}"
         if self.version not in (None, AUDITED_VERSION):
@@ -331,8 +316,8 @@ class _Watch:
         if self.silent > deck.silence:
             told = f"the engine wrote nothing for {deck.silence:g} s (run.silence) {after} of {self.layout.steps}"
             raise failures.EngineSilent(f"{told}, and was ended", self.directory)
-        if time_limit is not None and self.elapsed > time_limit:
-            told = f"time limit of {time_limit:g} s reached at step {self.step} of {self.layout.steps}"
+        if self.elapsed > self.time_limit:
+            told = f"time limit of {self.time_limit:g} s reached at step {self.step} of {self.layout.steps}"
             raise failures.TimeLimitExceeded(told, self.directory)
         missing = self.layout.bead_dump_bytes - self.written
         free = shutil.disk_usage(self.directory).free
@@ -341,7 +326,7 @@ class _Watch:
 
     def verdict(self, status: int) -> EngineReport:
         """Judge a run that has ended: raise its failure or report what it took."""
-        wall_seconds, layout = self.elapsed, self.layout
+        wall_seconds, layout, self.time_limit = self.elapsed, self.layout, math.inf
         self.look()
         self._take_in(self.rest)  # the last line may lack its end
         self.check()

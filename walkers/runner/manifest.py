@@ -26,18 +26,18 @@ _SMALL_BYTES = 8 << 20
 _MOST_THREADS = 4
 
 
-def manifest(
-    case: Case, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path
-) -> dict[str, Any]:
-    """What the manifest of a run says, all of whose files are in its directory but this one.
+def write_manifest(
+    case: Case, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path, **more: Any
+) -> None:
+    """Write the manifest of a run, all of whose files are in its directory but this one.
 
-    The run was ``started`` so many seconds after the epoch, and took the engine what its report says.
+    The run was ``started`` so many seconds after the epoch, and took the engine, in all calls, what its report says.
     """
     finished = time.time()
     audit, plugin = read_audit(engine.sha256), plugin_of(engine)
     paths = [path for path in sorted(directory.rglob("*")) if path.is_file()]
     files = {path.relative_to(directory).as_posix(): path.stat().st_size for path in paths}
-    return {
+    contents = {
         "format": FORMAT,
         "status": "finished",
         "name": case.name,
@@ -56,7 +56,7 @@ def manifest(
         "started": _iso(started),
         "finished": _iso(finished),
         "seconds": {
-            "total": finished - started,
+            "total": max(finished - started, report.wall_seconds),
             "engine": report.wall_seconds,
             "engine_loop": report.loop_seconds,
         },
@@ -64,7 +64,9 @@ def manifest(
         "steps_per_second": report.steps / report.loop_seconds if report.loop_seconds else None,
         "files": files,
         "sha256": checksums(directory, files),
+        **more,
     }
+    write_json(directory / MANIFEST_NAME, contents, at_once=False)
 
 
 def _made_by() -> dict[str, Any]:
@@ -78,13 +80,7 @@ def _iso(seconds: float) -> str:
 
 
 def checksums(directory: Path, names: Iterable[str]) -> dict[str, str]:
-    """SHA-256 of files of a directory, in threads where there is much to read.
-
-    Raises
-    ------
-    OSError
-        If one cannot be read.
-    """
+    """SHA-256 of files of a directory, in threads where there is much to read; `OSError` if one cannot be read."""
     paths = {name: directory / name for name in names}
     if sum(path.stat().st_size for path in paths.values()) < _SMALL_BYTES:
         return {name: checksum(path) for name, path in paths.items()}
@@ -105,17 +101,8 @@ class FileChanged(WalkersError, ValueError):
 def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     """Refuse files of a finished run that are not what its manifest says; of an unfinished run nothing is said.
 
-    Returns
-    -------
-    bool
-        Whether the manifest says something of all of them.
-
-    Raises
-    ------
-    FileChanged
-        If one differs.
-    OSError, ValueError
-        If the manifest, or a file, cannot be read.
+    Whether the manifest says something of all of them; `FileChanged` if one differs, `OSError` or `ValueError` if the
+    manifest, or a file, cannot be read.
     """
     try:
         sums = _sums(read_json(directory / MANIFEST_NAME), directory)

@@ -25,8 +25,7 @@ from walkers.postprocess.analysis import tables_of
 from walkers.postprocess.clusters import ClimbCriteria
 from walkers.postprocess.piles import Pile, climbs_by
 from walkers.runner.directory import CASE_NAME, FinishedRun, finished_places, finished_run
-from walkers.sweeps.record import RECORD_NAME, read_record, result_in, states
-from walkers.sweeps.table import value_text
+from walkers.sweeps.table import RECORD_NAME, read_record, result_in, states, value_text
 
 FloatArray = npt.NDArray[np.float64]
 

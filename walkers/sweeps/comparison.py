@@ -12,8 +12,19 @@ from walkers.inputs.errors import refused
 from walkers.inputs.readable import differing, flattened, readable, readable_unit
 from walkers.runner.directory import case_of
 from walkers.sweeps.folder import aligned, with_error
-from walkers.sweeps.record import read_record, result_columns, result_in, row_of
-from walkers.sweeps.table import ERRORS, default_column, find_name, load, value_text, varied_columns, with_unit
+from walkers.sweeps.table import (
+    ERRORS,
+    default_column,
+    find_name,
+    load,
+    read_record,
+    result_columns,
+    result_in,
+    row_of,
+    value_text,
+    varied_columns,
+    with_unit,
+)
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -186,19 +186,8 @@ def layout_of(
     """What of a sweep goes where, as asked for or guessed.
 
     Guessed is: along x the numbers with the most values, in colours what has the most values of the rest, in panels
-    all else. Samples have a panel for each key.
-
-    Parameters
-    ----------
-    table, rows
-        The sweep's table (`walkers.sweeps.table.load`), and those of its rows that are drawn.
-    x, hue, panels
-        Keys that vary or columns of the table; ``none`` for neither colours nor panels.
-
-    Raises
-    ------
-    InputError
-        If there is no such key or column.
+    all else. Samples have a panel for each key. Of the sweep's table (`walkers.sweeps.table.load`) some rows are drawn;
+    asked for are keys that vary or columns, or ``none`` for neither colours nor panels. `InputError` if there is none.
     """
     places = table.index.get_indexer(rows.index).tolist()
     left = factors = [replace(one, values=[one.values[place] for place in places]) for one in factors_of(table)]

@@ -12,10 +12,11 @@ import os
 import shutil
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from math import inf, isfinite, nan
+from operator import attrgetter
 from pathlib import Path
 from stat import S_ISDIR
 from typing import Any, Literal
@@ -23,11 +24,19 @@ from typing import Any, Literal
 from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, differing, flattened, has_key, readable
 from walkers.physics.units import Kind, parse_quantity
-from walkers.runner.directory import CASE_NAME, REPLACED, UNFINISHED, holds_unfinished, is_run_name, recover
+from walkers.runner.directory import (
+    CASE_NAME,
+    REPLACED,
+    UNFINISHED,
+    holds_unfinished,
+    is_locked,
+    is_run_name,
+    locked,
+    recover,
+)
 from walkers.runner.files import read_json
-from walkers.runner.locks import is_locked, locked
 from walkers.runner.manifest import MANIFEST_NAME
-from walkers.sweeps.record import (
+from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
     derived_columns,
@@ -215,13 +224,11 @@ def select(
 
 def ordered(entries: Sequence[Entry], order: Order, *, reverse: bool = False) -> list[Entry]:
     """Entries in an order: the fastest, the youngest and the largest first; what has no velocity last."""
-
-    def key(entry: Entry) -> Any:
-        if order == "velocity":
-            return inf if entry.velocity is None else -entry.velocity
-        return -entry.size if order == "size" else getattr(entry, order)
-
-    return sorted(entries, key=key, reverse=reverse)
+    keys: dict[str, Callable[[Entry], Any]] = {
+        "velocity": lambda entry: inf if entry.velocity is None else -entry.velocity,
+        "size": lambda entry: -entry.size,
+    }
+    return sorted(entries, key=keys.get(order, attrgetter(order)), reverse=reverse)
 
 
 def _varied(runs: Sequence[Entry]) -> Iterator[tuple[str, list[Entry], list[str]]]:

@@ -1,4 +1,4 @@
-"""Schedule a sweep: points packed into decks, these handed to Parsl's workers, until every point is settled.
+"""Run a sweep: points packed into decks, these handed to Parsl's workers, until every point is settled.
 
 A deck costs a start-up and a share a step whoever is in it, so that fewer decks are cheaper; more of them fill the
 cores more evenly and give results sooner. They are packed by predicted cost, so that all cores finish together: the
@@ -11,6 +11,7 @@ deck means for its points is decided here: it is tried again in halves.
 
 from __future__ import annotations
 
+import errno
 import heapq
 import resource
 import shutil
@@ -19,23 +20,35 @@ import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from math import ceil
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
-from uuid import uuid4
 
 from walkers.inputs.case import Case
-from walkers.inputs.errors import WalkersError, refused
-from walkers.runner.binary import Engine
-from walkers.runner.cost import pairs_of_beads, predicted_seconds
-from walkers.runner.locks import is_locked
-from walkers.sweeps.record import PARSL, SweepRecord, velocity_of
-from walkers.sweeps.shared_deck import STOPS, Report, work
-from walkers.sweeps.site import Site, pilots, threads
-from walkers.sweeps.table import with_unit
+from walkers.inputs.errors import Stopped, WalkersError, check_utf8, refused
+from walkers.inputs.sweep import Sweep
+from walkers.postprocess.analysis import current_result
+from walkers.runner.binary import Engine, find_engine
+from walkers.runner.directory import is_locked, run_place, unfinished
+from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
+from walkers.runner.summary import pairs_of_beads, predicted_seconds
+from walkers.sweeps.making import check_audit, make_runs
+from walkers.sweeps.site import Site, check_path, pilots, threads
+from walkers.sweeps.table import (
+    PARSL,
+    RECORD_NAME,
+    SweepRecord,
+    describe_sweep,
+    states,
+    velocity_in,
+    velocity_of,
+    with_unit,
+    write_record,
+)
 from walkers.templates.scene import sharing_key
 
 if TYPE_CHECKING:
@@ -82,11 +95,6 @@ class Options:
             raise refused("cores", told)
         return replace(self, workers=max(1, self.workers // ranks), site=site)
 
-    @property
-    def longest_seconds(self) -> float:
-        """Predicted time that no shared deck may exceed: well below the limit, for a point by itself could be."""
-        return min(LONGEST_SECONDS, 0.5 * self.time_limit) if self.time_limit else LONGEST_SECONDS
-
 
 @dataclass(frozen=True)
 class Failure:
@@ -120,10 +128,7 @@ _WORST_FIRST = (
     "",  # what is not in this list
     *("BlowUp", "BeadsLost", "WalkersMet", "TimeLimitExceeded", "RunBusy"),
 )
-
-
-def _severity(failure: Failure) -> int:
-    return _WORST_FIRST.index(failure.reason if failure.reason in _WORST_FIRST else "")
+_SEVERITY = {name: rank for rank, name in enumerate(_WORST_FIRST)}
 
 
 @dataclass(frozen=True)
@@ -132,10 +137,6 @@ class PlannedDeck:
 
     points: tuple[int, ...]
     seconds: float
-
-    def part(self, points: Sequence[int]) -> PlannedDeck:
-        """A deck of some of its points."""
-        return PlannedDeck(tuple(points), self.seconds * len(points) / len(self.points))
 
 
 def pack(cases: Mapping[int, Case], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
@@ -195,11 +196,6 @@ def makespan(seconds: Iterable[float], workers: int) -> float:
     return max(ends)
 
 
-def halves(points: Sequence[int]) -> list[Sequence[int]]:
-    """The two halves of a deck of several points."""
-    return _parts(points, 2)
-
-
 def unfinished_parts(
     points: Sequence[int], cases: Mapping[int, Case], is_finished: Callable[[int], bool]
 ) -> list[PlannedDeck]:
@@ -213,15 +209,17 @@ def unfinished_parts(
         return []
     if not any(finished):
         return [_deck(points, cases)]
-    return [part for half in halves(points) for part in unfinished_parts(half, cases, is_finished)]
+    return [part for half in _parts(points, 2) for part in unfinished_parts(half, cases, is_finished)]
 
 
-def missing_decks(
+def _missing_decks(
     cases: Sequence[Case], points: Sequence[int], options: Options, is_settled: Callable[[int], bool]
 ) -> list[PlannedDeck]:
     """The decks of some points of which anything is missing, as they are whatever is finished."""
     numbered = {point: cases[point] for point in points}
-    packed = pack(numbered, options.decks_at_once, options.longest_seconds) if numbered else []
+    # A shared deck stays well below the limit, for a point by itself could be near it.
+    longest = min(LONGEST_SECONDS, 0.5 * options.time_limit) if options.time_limit else LONGEST_SECONDS
+    packed = pack(numbered, options.decks_at_once, longest) if numbered else []
     return [part for deck in packed for part in unfinished_parts(deck.points, numbered, is_settled)]
 
 
@@ -262,46 +260,164 @@ class SweepPlan:
         return "\n".join(lines)
 
 
-def schedule(plan: SweepPlan, on_progress: Callable[[SweepProgress], None] | None = None) -> list[Failure]:
-    """Make all runs of a sweep that are missing; the points that failed.
+def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = None) -> SweepPlan:
+    """Resolve a sweep's points and see what is missing; nothing is written.
 
-    All others are finished then or, below the end of a descent, not needed.
+    What it is given, and raises, is as of `run_sweep`.
     """
+    check_utf8(out.absolute())
+    binary = find_engine(engine)
+    cases = list(sweep.cases())
+    options = options.for_ranks(max(case.run.ranks for case in cases))
+    record = describe_sweep(sweep, cases, binary, out)
+    if options.site is not None:
+        check_path(record.directory)
+    found = states(record)
+    final = [
+        Failure(point, run, state.reason or "", state.message or "", str(state.directory))
+        for point, (run, state) in enumerate(zip(record.runs, found, strict=True))
+        if state.status == "failed" and state.reason in options.final
+    ]
+    settled = {point for point, state in enumerate(found) if state.status in ("finished", "not needed")}
+    settled |= {failure.point for failure in final}
+    decks = _missing_decks(cases, range(len(cases)), options, settled.__contains__)
+    return SweepPlan(record, cases, binary, decks, [state.status for state in found], options, final)
+
+
+def run_sweep(
+    sweep: Sweep,
+    out: Path,
+    options: Options,
+    *,
+    engine: str | None = None,
+    allow_failed_audit: bool = False,
+    on_progress: Callable[[SweepProgress], None] | None = None,
+) -> tuple[SweepRecord, list[Failure]]:
+    """Make all runs of a sweep that are missing.
+
+    Parameters
+    ----------
+    sweep, out, options
+        From `walkers.inputs.sweep.load_sweep`; folder of the run directories; how it is to be run.
+    engine, allow_failed_audit
+        As of `walkers.run`.
+    on_progress
+        Called a few times a second.
+
+    Returns
+    -------
+    record, failures
+        The sweep (`walkers.sweeps.table.load` reads the table from ``record.directory``), and the points that failed;
+        all others are finished or, below the end of a descent, not needed.
+
+    Raises
+    ------
+    InputError
+        If a point cannot be used, or a cluster's shell would not take the folder for one.
+    runner.EngineFailure
+        If there is no engine, its audit failed, or somebody removed the sweep's directory meanwhile.
+    sweeps.scheduler.ClusterFailed
+        If the cluster's jobs end without having worked.
+    """
+    plan = plan_sweep(sweep, out, options, engine)
+    record = plan.record
+    if plan.decks:
+        check_audit(plan.engine, allow_failed_audit)
+    write_record(record)
+    if not plan.decks:
+        return record, plan.final
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with suppress(ValueError, OSError):  # each point of a running deck keeps a lock open
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    plan.record.out.mkdir(parents=True, exist_ok=True)
-    with _workers(plan.options, plan.record) as submit:
-        return _Scheduler(plan, submit).run(on_progress or (lambda _: None))
+    with _workers(plan.options, record) as submit:
+        failures = _Scheduler(plan, submit).run(on_progress or (lambda _: None))
+    if not (record.directory / RECORD_NAME).is_file():
+        raise OutputGone(record.directory)
+    return record, failures
+
+
+# --- workers ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Report:
+    """What became of a deck: velocities (m/s) of its finished runs (others are busy elsewhere), or its failure.
+
+    A failure has the name of its class, what it says, and where its remains are.
+    """
+
+    finished: Mapping[str, float] = field(default_factory=dict)
+    failure: str | None = None
+    message: str = ""
+    directory: str | None = None
+
+
+def work(
+    stop: threading.Event | None,
+    runs: Sequence[str],
+    cases: Sequence[Case],
+    out: Path,
+    engine: Engine,
+    time_limit: float | None,
+    retries: int = 0,
+) -> Report:
+    """Make the runs of some names of one deck, on a worker, until it is to stop; a deck that fails is tried again.
+
+    Never raises what is known to happen: see `Report`.
+    """
+
+    def look(_: object = None) -> None:
+        if stop is not None and stop.is_set():
+            raise Stopped("stopped")
+
+    try:
+        look()
+        own = find_engine(str(engine.path))
+        if own.sha256 != engine.sha256:
+            raise EngineDiffers(own.path)
+        if list(runs) != [run_place(case, own, out).name for case in cases]:
+            raise ProgramDiffers
+        made = make_runs(cases, out, own, on_progress=look, time_limit=time_limit)
+        return Report({name: velocity_in(current_result(run.directory)) for name, run in made.runs.items()})
+    except (OSError, WalkersError) as error:
+        if retries and not isinstance(error, Stopped):
+            return work(stop, runs, cases, out, engine, time_limit, retries - 1)
+        reason, message, directory = type(error).__name__, str(error), None
+        if isinstance(error, EngineFailure):
+            directory = str(unfinished(out / runs[0])) if error.directory else None
+        elif isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+            reason, message = DiskFull.__name__, f"disk full: {error.filename or out}"
+        elif isinstance(error, OSError) and error.filename:
+            message = f"{error.filename}: {error.strerror}"
+        return Report(failure=reason, message=message, directory=directory)
 
 
 @contextmanager
 def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Future[Report]]]:
-    """Start Parsl; yield what takes `walkers.sweeps.shared_deck.work` with its arguments but the sweep's name there.
+    """Start Parsl; yield what takes the arguments of `work`, but the first, there.
 
     At the end the workers and their engines have ended, however the block is left.
     """
     import parsl
 
-    folder = record.directory / PARSL
-    sweep = uuid4().hex
-    stop = STOPS[sweep] = threading.Event()
-    config = threads(options.workers, folder) if options.site is None else pilots(options.site, folder)
+    folder, stop = record.directory / PARSL, None
+    if options.site is None:
+        stop, config = threading.Event(), threads(options.workers, folder)
+    else:
+        config = pilots(options.site, folder)
     try:
         kernel = parsl.DataFlowKernel(config)
     except Exception as error:  # whatever Parsl raises: an address that this machine does not have, ports in use
-        del STOPS[sweep]
         told = " ".join(str(error).split())
-        raise ClusterFailed(
-            f"Parsl cannot start ({told}); see {folder}, and [executor] address in the site file"
-        ) from error
+        told = f"Parsl cannot start ({told}); see {folder}, and [executor] address in the site file"
+        raise ClusterFailed(told) from error
     try:
-        yield partial(parsl.python_app(work, data_flow_kernel=kernel), sweep)
+        yield partial(parsl.python_app(work, data_flow_kernel=kernel), stop)
     finally:
-        stop.set()
+        if stop is not None:
+            stop.set()
         kernel.cleanup()
-        del STOPS[sweep]
-        if options.site is None:  # threads leave nothing to look into
+        if stop is not None:  # threads leave nothing to look into
             shutil.rmtree(kernel.run_dir, ignore_errors=True)
             with suppress(OSError):
                 folder.rmdir()
@@ -381,7 +497,7 @@ class _Scheduler:
             batch = next(self.batches[group], None)
             if batch is None:
                 return
-            for deck in missing_decks(self.cases, batch, self.plan.options, self._is_settled):
+            for deck in _missing_decks(self.cases, batch, self.plan.options, self._is_settled):
                 self._hand_out(deck, group)
 
     def _hand_out(self, deck: PlannedDeck, group: int) -> None:
@@ -417,8 +533,8 @@ class _Scheduler:
             self.settled.add(run)
             self.seconds_done += deck.seconds
         elif left:
-            for part in halves(left) if report.failure else [left]:
-                self._hand_out(deck.part(part), group)
+            for part in _parts(left, 2) if report.failure else [left]:
+                self._hand_out(PlannedDeck(tuple(part), deck.seconds * len(part) / len(deck.points)), group)
 
     def _progress(self) -> SweepProgress:
         first = list(self.groups_of)[: 4 * self.plan.options.decks_at_once]  # the others wait
@@ -433,5 +549,5 @@ class _Scheduler:
             running=sum(len(deck.points) for deck in made),
             elapsed=elapsed,
             left=waiting / self.seconds_done * elapsed if self.seconds_done else None,
-            worst_failure=min(self.failures, key=_severity, default=None),
+            worst_failure=min(self.failures, key=lambda one: _SEVERITY.get(one.reason, _SEVERITY[""]), default=None),
         )

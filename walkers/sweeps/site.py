@@ -18,16 +18,15 @@ import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib import import_module
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
+from walkers.inputs.changes import value_at
 from walkers.inputs.errors import InputError, Problem, refused
-from walkers.inputs.library import expected_of, suggestion
+from walkers.inputs.library import expected_of
 from walkers.inputs.messages import quoted, validated
 from walkers.inputs.reading import read_toml
 from walkers.physics.units import Whole
@@ -85,6 +84,17 @@ class SiteFile(BaseModel):
     provider: dict[str, Any] = {}
     executor: dict[str, Any] = {}
 
+    @field_validator("scheduler", "launcher")
+    @classmethod
+    def _check_known(cls, name: str, info: ValidationInfo) -> str:
+        import parsl.providers
+
+        if info.field_name == "launcher" and name not in _launchers():
+            raise ValueError(expected_of(name, sorted(_launchers())))
+        if info.field_name == "scheduler" and name not in (*_SCHEDULERS, *parsl.providers.__all__):
+            raise ValueError(f"{expected_of(name, _SCHEDULERS)}, or a provider of Parsl's")
+        return name
+
 
 @dataclass(frozen=True)
 class Site:
@@ -110,12 +120,16 @@ def cores_here() -> int:
 
 
 def load_site(path: str | Path) -> Site:
-    """Read a site file; `InputError` tells unknown keys with those that Parsl's class takes."""
+    """Read a site file; `InputError` tells what is wrong with it, in Parsl's words if it is Parsl that refuses it."""
     document = read_toml(Path(path))
     site = Site(validated(SiteFile, document, str(path), "a site"))
-    problems = _problems(site.file, document)
-    if problems:
-        raise InputError(str(path), problems)
+    settings = [[table, key] for table in ("provider", "executor") for key in document.get(table, ())]
+    for place in (["partition"], ["account"], *settings):
+        value = value_at(document, place)
+        for text in value if isinstance(value, list) else [value]:
+            if isinstance(text, str) and place[-1] not in _SHELL_TEXTS and (odd := _ODD.search(text)):
+                expected = f"{_TAKEN}, found {odd[0]!r}; [provider] scheduler_options takes whole lines of a script"
+                raise InputError(str(path), [Problem(".".join(place), quoted(document, place), expected)])
     try:
         pilots(site, Path("parsl"))
     except Exception as error:  # whatever Parsl's classes raise about what they are given
@@ -124,55 +138,6 @@ def load_site(path: str | Path) -> Site:
     return site
 
 
-def _problems(file: SiteFile, document: Mapping[str, Any]) -> list[Problem]:
-    """What pydantic cannot see: what Parsl does not know, and what a shell or a script would take for more than a name.
-
-    Parsl writes texts there as they are.
-    """
-    found: list[Problem] = []
-
-    def refuse(place: list[str], expected: str) -> None:
-        found.append(Problem(".".join(place), quoted(document, place), expected))
-
-    provider = _provider(file.scheduler)
-    if provider is None:
-        refuse(["scheduler"], f"{expected_of(file.scheduler, _SCHEDULERS)}, or a provider of Parsl's")
-        return found
-    taken = _parameters("parsl.providers", provider)
-    for key, names in _OURS.items():
-        if key in document and not taken.intersection(names) and key != "cores":
-            refuse([key], f"{provider} has no such setting")
-    tables = {"provider": taken, "executor": _parameters("parsl.executors", "HighThroughputExecutor")}
-    settings = [([table, key], known) for table, known in tables.items() for key in document.get(table, {})]
-    for place, known in settings:
-        if place[1] not in known:
-            refuse(place, f"unknown key; Parsl takes {', '.join(sorted(known))}{suggestion(place[1], known)}")
-    for place in (["partition"], ["account"], *(place for place, _ in settings)):
-        value = document.get(place[0]) if len(place) == 1 else document[place[0]][place[1]]
-        texts = [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, str)]
-        odd = next(filter(None, map(_ODD.search, texts)), None)
-        if odd and place[-1] not in _SHELL_TEXTS:
-            expected = f"{_TAKEN}, found {odd[0]!r}; [provider] scheduler_options takes whole lines of a script"
-            refuse(place, expected)
-    if file.launcher is not None and file.launcher not in _launchers():
-        refuse(["launcher"], f"expected one of {', '.join(sorted(_launchers()))}")
-    return found
-
-
-def _provider(scheduler: str) -> str | None:
-    """Name of the class of Parsl's for a scheduler."""
-    import parsl.providers
-
-    return _SCHEDULERS.get(scheduler, scheduler if scheduler in parsl.providers.__all__ else None)
-
-
-@cache
-def _parameters(module: str, name: str) -> frozenset[str]:
-    parameters = inspect.signature(getattr(import_module(module), name)).parameters
-    return frozenset(parameters) - {"label", "provider", "launcher"}
-
-
-@cache
 def _launchers() -> Mapping[str, str]:
     """Our names for Parsl's launchers (``srun``) and theirs (``SrunLauncher``)."""
     import parsl.launchers
@@ -206,12 +171,17 @@ def pilots(site: Site, run_dir: Path) -> Config:
     from parsl.jobs.error_handlers import windowed_error_handler
 
     file = site.file
-    name = _provider(file.scheduler) or file.scheduler
+    name = _SCHEDULERS.get(file.scheduler, file.scheduler)
+    provider_class = getattr(parsl.providers, name)
+    taken = inspect.signature(provider_class).parameters
     # A node is shared with others unless the provider table says otherwise; jobs come and go with the work.
-    given = {"worker_init": _worker_init(file), "exclusive": False, "min_blocks": 0}
-    given |= {theirs: getattr(file, key) for key, names in _OURS.items() for theirs in names}
-    taken = _parameters("parsl.providers", name)
-    settings = {key: value for key, value in given.items() if key in taken and value is not None}
+    ours = {"worker_init": _worker_init(file), "exclusive": False, "min_blocks": 0}
+    settings = {key: value for key, value in ours.items() if key in taken}
+    for key, names in _OURS.items():
+        theirs = next((one for one in names if one in taken), None)
+        if theirs is not None or (key in file.model_fields_set and key != "cores"):  # then it is Parsl's to refuse it
+            settings[theirs or key] = getattr(file, key)
+    settings = {key: value for key, value in settings.items() if value is not None}
     # On several nodes each needs a step of its own to start its workers.
     launcher = file.launcher or ("srun" if name == "SlurmProvider" and file.nodes > 1 else None)
     if launcher is not None:
@@ -228,13 +198,8 @@ def pilots(site: Site, run_dir: Path) -> Config:
         options["launch_cmd"] = f"{file.container} {DEFAULT_LAUNCH_CMD}"
     if name == "LocalProvider":  # pilots on this machine: nobody else is to be listened to, and Parsl listens to all
         options["address"] = "127.0.0.1"
-    # TOML has lists only, while Parsl's ranges are tuples.
-    own, others = (
-        {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
-        for table in (file.provider, file.executor)
-    )
-    provider = getattr(parsl.providers, name)(**(settings | own))
-    executor = HighThroughputExecutor(label="pilots", provider=provider, **(options | others))
+    provider = provider_class(**(settings | _as_tuples(file.provider)))
+    executor = HighThroughputExecutor(label="pilots", provider=provider, **(options | _as_tuples(file.executor)))
     return Config(
         executors=[executor],
         run_dir=str(run_dir),
@@ -243,6 +208,11 @@ def pilots(site: Site, run_dir: Path) -> Config:
         retries=_MOST_LOSSES,
         retry_handler=_cost_of_failure,
     )
+
+
+def _as_tuples(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Parsl's ranges are tuples, while TOML has lists only."""
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
 
 
 def _cost_of_failure(error: Exception, _: object) -> float:

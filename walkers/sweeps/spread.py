@@ -20,10 +20,8 @@ from walkers.postprocess.analysis import analyses, analyses_of
 from walkers.postprocess.gait import SEPARATED
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_name
-from walkers.sweeps.record import row_of
-from walkers.sweeps.run import run_sweep
-from walkers.sweeps.scheduler import Failure, Options
-from walkers.sweeps.table import load
+from walkers.sweeps.scheduler import Failure, Options, run_sweep
+from walkers.sweeps.table import load, row_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -126,7 +124,7 @@ def run_spread(
     """Run a case with all that nobody measured drawn from its ranges.
 
     The case is as it was read from a file: its own values say what is uncertain. All else is as of
-    `walkers.sweeps.run.run_sweep`.
+    `walkers.sweeps.scheduler.run_sweep`.
 
     Notes
     -----

@@ -1,0 +1,376 @@
+"""Make runs: one by decks of its own, segment by segment, or several at once by a shared deck.
+
+A run is made in ``NAME-HASH.incomplete``, its segments in ``segments/0000``, ``segments/0001``, … there, each from a
+restart file to the next. A segment that is being made is called ``0003.new`` and gets its name when it is whole; an
+interrupted run goes on after the last one. Since the segments are the same whether the run was interrupted or not, so
+is all that comes out of it, bit for bit.
+
+A shared deck runs in the ``….incomplete`` of the first of its runs. What it wrote is parted among the runs, each of
+which gets a directory like any other, with the deck and what the engine said in ``shared_deck``.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from walkers.inputs.case import Case
+from walkers.inputs.errors import Stopped, WalkersError
+from walkers.postprocess.analysis import tabulate
+from walkers.runner.binary import Engine, read_audit
+from walkers.runner.directory import (
+    CASE_NAME,
+    FAILURE_NAME,
+    FIRST_SEGMENT,
+    SEGMENT_NAME,
+    SEGMENTS,
+    FinishedRun,
+    finished_run,
+    locked,
+    move_into_place,
+    recover,
+    room_on_disk,
+    run_place,
+    segment_directories,
+    unfinished,
+    write_deck,
+    write_segment_record,
+)
+from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
+from walkers.runner.files import fsync_path, link_or_copy, read_json, settle, write_json
+from walkers.runner.launch import EngineReport, Progress, check_room, launch
+from walkers.runner.manifest import write_manifest
+from walkers.runner.provenance import look_ahead
+from walkers.templates.deck import (
+    OUTPUT_NAME,
+    PREVIOUS_RESTART_NAME,
+    RESTART_NAME,
+    Deck,
+    Segment,
+    first_segment,
+    next_segment,
+    render_deck,
+    render_shared_deck,
+    settling_steps,
+)
+
+DECK_FOLDER = "shared_deck"
+"""In a run directory: the deck that made it together with others, and what the engine said."""
+_LEAST_BYTES = 150
+"""Of a restart file, an atom: whole ones had 300 to 580."""
+_RMS_VELOCITY = re.compile(rb"^root mean square velocity (\S+)", re.MULTILINE)
+"""Of the beads, by mass, m/s; decks that let them come to rest have it printed."""
+_Tell = Callable[[Progress], None]
+
+
+class DamagedSegment(WalkersError):
+    """A segment of an unfinished run that cannot be gone on from."""
+
+
+def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
+    """Refuse an engine whose audit failed (`AuditFailed`), unless told otherwise; warn of one that never had one."""
+    audit = read_audit(engine.sha256)
+    if audit is None:
+        message = "this engine was never audited; prove what it computes with: walkers audit"
+        warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
+    elif not audit.passed and not allow_failed_audit:
+        raise AuditFailed(audit.failures)
+
+
+@dataclass(frozen=True)
+class Made:
+    """Runs that were wanted: the finished ones, by their names, which of these were found, and which others make."""
+
+    runs: Mapping[str, FinishedRun]
+    found: frozenset[str]
+    busy: frozenset[str]
+
+
+def make_runs(
+    cases: Sequence[Case],
+    out: Path,
+    engine: Engine,
+    *,
+    force: bool = False,
+    on_progress: _Tell | None = None,
+    time_limit: float | None = None,
+) -> Made:
+    """Make the runs that are missing, in one deck, and tabulate them; a single one goes on where it was interrupted.
+
+    Parameters
+    ----------
+    cases
+        Cases that may share a deck (`walkers.templates.scene`).
+    force
+        Also make those that are there; they are replaced by finished ones only.
+    on_progress, time_limit
+        Called a few times a second while the engine runs: what it raises ends the engine. Wall time in s that this may
+        take for each segment.
+
+    Raises
+    ------
+    runner.EngineFailure
+        If the engine fails. Of several cases nothing is left then: they are to be tried apart.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    places = {run_place(case, engine, out): case for case in cases}
+    with locked(places) as ours:
+        for place in ours:
+            recover(place)
+        runs = {} if force else {place.name: run for place in places if (run := finished_run(place))}
+        found = frozenset(runs)
+        busy = frozenset(place.name for place in places if place not in ours and place.name not in runs)
+        missing = {place: case for place, case in places.items() if place in ours and place.name not in runs}
+        locks = [ours[place] for place in missing]
+        if len(missing) == 1:
+            ((place, case),) = missing.items()
+            with open_locked(case, engine, place, locks, anew=force) as opened:
+                opened.make(on_progress=on_progress, time_limit=time_limit)
+                tabulate(opened.directory)
+                runs[place.name] = opened.finish()
+        elif missing:
+            left = {place.name: case for place, case in missing.items()}
+            for cycles in next(iter(left.values())).run.attempts:
+                if left:
+                    runs |= _make_together(left, cycles, out, engine, locks, on_progress, time_limit)
+                left = {name: case for name, case in left.items() if name not in runs}
+    return Made(runs, found, busy)
+
+
+def _are_steady(directory: Path) -> bool:
+    from walkers.postprocess.gait import are_steady  # numpy is loaded while the engine runs
+
+    return are_steady(directory)
+
+
+# --- one run ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class OpenRun:
+    """A run that is being made, or gone on with, in a directory of its own beside its final place (`open_locked`).
+
+    ``done`` is what the segments that are whole say of themselves.
+    """
+
+    case: Case
+    engine: Engine
+    directory: Path
+    place: Path
+    locks: Sequence[int]
+    done: list[dict[str, Any]]
+    started: float = field(default_factory=time.time)
+
+    def make(
+        self,
+        *,
+        on_progress: _Tell | None = None,
+        time_limit: float | None = None,
+        render: Callable[[Case, Segment], Deck] = render_deck,
+    ) -> None:
+        """Make the segments that are missing, by decks that ``render`` makes; if the engine fails, those before stay.
+
+        The time limit, s, is of each.
+        """
+        begun, made = time.perf_counter(), 0
+        look_ahead()
+        for cycles in self.case.run.attempts:
+            case = self.case.for_cycles(cycles)
+            if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
+                for directory in segment_directories(self.directory):  # an attempt for fewer cycles
+                    shutil.rmtree(directory)
+                self.done.clear()
+            while (segment := self._next_segment(case)) is not None:
+                tell = _teller(case, segment, on_progress, made, begun) if on_progress else None
+                self._make(segment, render(case, segment), tell, time_limit)
+                made += segment.end - segment.begin
+            if cycles < self.case.run.cycles and _are_steady(self.directory):
+                return
+
+    def _next_segment(self, case: Case) -> Segment | None:
+        """The segment that is to be made next, of the run or an attempt at it; None after the last one."""
+        if not self.done:
+            return first_segment(case)
+        begin, start = int(self.done[-1]["end"]), self._drive_from()
+        if start is None:
+            return Segment(begin, begin + settling_steps(case), None)
+        return next_segment(case, Segment(begin, begin, start))
+
+    def _drive_from(self) -> int | None:
+        """Step at which the drive begins: the end of the first segment that leaves the beads at rest, or the last."""
+        run = self.case.run
+        for segment in self.done:
+            if segment["drive_from"] is not None:
+                return int(segment["drive_from"])
+            at_rest = segment["root_mean_square_velocity"] < run.settled_below
+            if at_rest or segment["end"] * run.time_step >= run.longest_settling:
+                return int(segment["end"])
+        return None
+
+    def _make(self, segment: Segment, deck: Deck, tell: Callable[[int], None] | None, time_limit: float | None) -> None:
+        folder, number = self.directory / SEGMENTS, len(self.done)
+        new, before = folder / f"{number:04d}.new", folder / f"{number - 1:04d}"
+        shutil.rmtree(new, ignore_errors=True)
+        with room_on_disk(new, deck.layout.bead_dump_bytes):
+            new.mkdir()
+            write_deck(deck, new, before if number else None)
+            if segment.begin:
+                shutil.copyfile(before / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
+            report = launch(deck, new, self.engine, on_step=tell, time_limit=time_limit, keep_open=self.locks)
+            (new / PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
+            restart = new / RESTART_NAME
+            size = restart.stat().st_size if restart.exists() else 0
+            if not self.case.run.in_one and size < _LEAST_BYTES * deck.layout.atoms:  # the engine does not look at it
+                raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
+            velocities = _RMS_VELOCITY.findall((new / OUTPUT_NAME).read_bytes())
+            record = write_segment_record(new, segment, report, float(velocities[-1]) if velocities else None)
+            settle()
+            new.rename(folder / f"{number:04d}")
+            fsync_path(folder)
+        # The restart before the last one is kept, should the last one prove bad.
+        if number > 1:
+            (folder / f"{number - 2:04d}" / RESTART_NAME).unlink(missing_ok=True)
+        self.done.append(record)
+
+    def finish(self) -> FinishedRun:
+        """Write the manifest, last, and move the directory to its place."""
+        wall_seconds, loop_seconds = (sum(one[name] for one in self.done) for name in ("wall_seconds", "loop_seconds"))
+        report = EngineReport(self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"]))
+        start = self._drive_from() or 0
+        rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
+        settling = {"drive_from": start, "settled": rest[-1] if rest else None, "segments": len(self.done)}
+        about: dict[str, Any] = {"started": self.started, "directory": self.directory, **settling}
+        write_manifest(self.case, self.place.name, self.engine, report, **about)
+        settle()
+        move_into_place(self.directory, self.place)
+        return FinishedRun(self.place)
+
+
+def _teller(
+    case: Case, segment: Segment, tell: _Tell, made: int = 0, begun: float | None = None
+) -> Callable[[int], None]:
+    """What makes of a segment's step the progress of its run."""
+    since = time.perf_counter() if begun is None else begun
+
+    def advance(step: int) -> None:
+        step, start = max(step, segment.begin), segment.drive_from
+        done, seconds = 0 if start is None else step - start, time.perf_counter() - since
+        simulated = step * case.run.time_step
+        tell(Progress(done, case.run.steps, simulated, seconds, made + step - segment.begin, start is None))
+
+    return advance
+
+
+@contextmanager
+def open_locked(
+    case: Case, engine: Engine, place: Path, locks: Sequence[int], *, anew: bool = False
+) -> Iterator[OpenRun]:
+    """Make a run, whose place its caller has locked, in a directory of its own, or go on with it, unless ``anew``.
+
+    Left without `OpenRun.finish` the directory stays as ``….incomplete``, with a ``failure.json`` if something failed.
+    """
+    directory = unfinished(place)
+    recover(place)
+    if anew:
+        shutil.rmtree(directory, ignore_errors=True)
+    try:
+        with room_on_disk(directory):
+            (directory / SEGMENTS).mkdir(parents=True, exist_ok=True)
+            # What an earlier call left beside its whole segments: tables, and parts of files and segments.
+            for path in (*directory.iterdir(), *(directory / SEGMENTS).glob("*.new")):
+                if path.is_file():
+                    path.unlink()
+                elif path.name != SEGMENTS:
+                    shutil.rmtree(path)
+            write_json(directory / CASE_NAME, case.as_dict(), at_once=False)
+            done = [_read_segment(path) for path in segment_directories(directory)]
+            yield OpenRun(case, engine, directory, place, locks, done)
+    except Stopped:
+        raise
+    except (WalkersError, OSError) as failure:
+        said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
+        with suppress(OSError):  # a full disk: the message reaches the user all the same
+            write_json(directory / FAILURE_NAME, said)
+        raise
+
+
+def _read_segment(directory: Path) -> dict[str, Any]:
+    try:
+        record = read_json(directory / SEGMENT_NAME)
+        if record["end"] > record["begin"] and "drive_from" in record:
+            return record
+        raise ValueError("begin, end or drive_from make no sense")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        message = f"{directory} is damaged ({error}): delete {directory.parent.parent} to have the run made again"
+        raise DamagedSegment(message) from error
+
+
+# --- several runs -----------------------------------------------------------------------------------------------------
+
+
+def _make_together(
+    cases: Mapping[str, Case],
+    cycles: int,
+    out: Path,
+    engine: Engine,
+    locks: Sequence[int],
+    on_progress: _Tell | None,
+    time_limit: float | None,
+) -> dict[str, FinishedRun]:
+    """Make runs of so many cycles by one deck; those finished whose walkers are steady, or that take no more cycles.
+
+    Whatever else there is of them goes: what fails together is to be made apart.
+    """
+    tried = {name: case.for_cycles(cycles) for name, case in cases.items()}
+    deck, started = render_shared_deck(list(tried.values())), time.time()
+    first = next(iter(cases))
+    incomplete = unfinished(out / first)
+    shutil.rmtree(incomplete, ignore_errors=True)
+    try:
+        with room_on_disk(incomplete, deck.layout.bead_dump_bytes):
+            check_room(out, 2 * deck.layout.bead_dump_bytes)  # the whole and its parts, side by side
+            (incomplete / DECK_FOLDER).mkdir(parents=True)
+            write_deck(deck, incomplete / DECK_FOLDER)
+            # To others it is the first of the runs, unfinished.
+            for name, case in [(".", cases[first]), *cases.items()]:
+                (incomplete / name).mkdir(exist_ok=True)
+                write_json(incomplete / name / CASE_NAME, case.as_dict(), at_once=False)
+            look_ahead()
+            tell = _teller(tried[first], first_segment(tried[first]), on_progress) if on_progress else None
+            folder = incomplete / DECK_FOLDER
+            report = launch(deck, folder, engine, on_step=tell, time_limit=time_limit, keep_open=locks)
+            _part(incomplete, tried, deck, report)
+            done = [name for name in cases if cycles >= cases[name].run.cycles or _are_steady(incomplete / name)]
+            shared = {"first": first, "runs": len(done), "walkers": len(deck.layout.walkers)}
+            own: dict[str, Any] = {"started": started, "drive_from": 0, "segments": 1, "shared_deck": shared}
+            for name in done:
+                tabulate(incomplete / name)
+                write_manifest(cases[name], name, engine, report, directory=incomplete / name, **own)
+            settle()
+            for name in done:
+                move_into_place(incomplete / name, out / name)
+    finally:
+        shutil.rmtree(incomplete, ignore_errors=True)
+    for name in done:  # what was left of a run that was once made alone, and killed
+        shutil.rmtree(unfinished(out / name), ignore_errors=True)
+    return {name: FinishedRun(out / name) for name in done}
+
+
+def _part(incomplete: Path, cases: Mapping[str, Case], deck: Deck, report: EngineReport) -> None:
+    """Give each run its part of what the deck wrote, and the deck."""
+    from walkers.postprocess.splitting import split_output
+
+    places = {incomplete / name / FIRST_SEGMENT: case for name, case in cases.items()}
+    for place in places:
+        place.mkdir(parents=True)
+    split_output(incomplete / DECK_FOLDER, deck.layout, places)
+    for name, (place, case) in zip(cases, places.items(), strict=True):
+        write_segment_record(place, first_segment(case), report)
+        shutil.copytree(incomplete / DECK_FOLDER, incomplete / name / DECK_FOLDER, copy_function=link_or_copy)
