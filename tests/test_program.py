@@ -16,7 +16,7 @@ from tests.conftest import PROGRAM, SHORT, call, document, to_toml
 from walkers import find_run, load_case
 from walkers import run as run_case
 from walkers.inputs.reading import shipped_cases
-from walkers.main import COMMANDS
+from walkers.main import _program
 from walkers.physics.time_step import WALKER_FRACTIONS
 from walkers.postprocess import read_result, read_table
 from walkers.runner import find_engine, finished_run
@@ -103,7 +103,7 @@ def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch
 def test_help_names_every_command() -> None:
     shown = call("--help", check=True).stdout
     assert not set(shown) & set("╭│╰─"), "boxes are for terminals"
-    for command in COMMANDS:
+    for command in (one.name for one in _program().registered_commands):
         assert f"\n  {command} " in shown
         assert call(command, "-h", check=True).stdout == call(command, "--help", check=True).stdout
     for module in ("walkers", "walkers.main"):

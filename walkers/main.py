@@ -17,14 +17,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-COMMANDS = {
-    **{"show": "look", "deck": "make", "run": "make"},
-    **dict.fromkeys(("result", "plot", "render", "film", "vtk", "paraview", "export", "theory"), "look"),
-    "sweep": "make",
-    **dict.fromkeys(("status", "table", "climb", "compare", "list", "clean", "report", "verify", "archive"), "look"),
-    **dict.fromkeys(("figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"), "make"),
-}
-"""Modules of `walkers.commands` in which the commands are functions, in the order of ``walkers --help``."""
+from walkers.commands.arguments import program
 
 _INTERRUPTED = 130
 _STDOUT = "standard output"
@@ -115,20 +108,9 @@ def _check_words(words: list[str]) -> None:
 
 
 def _program() -> typer.Typer:
-    program = typer.Typer(
-        name="walkers",
-        help="Wet granular walkers, simulated with LIGGGHTS.",
-        no_args_is_help=True,
-        add_completion=True,
-        pretty_exceptions_enable=False,
-        rich_markup_mode=None,  # rich takes longer to load than all that most commands need
-        context_settings={"help_option_names": ["-h", "--help"]},
-    )
-    program.callback()(_options)
-    for name, module in COMMANDS.items():
-        function = "list_" if name == "list" else name.replace("-", "_")
-        command = getattr(import_module(f"walkers.commands.{module}"), function)
-        program.command(name=name, short_help=command.__doc__)(command)
+    """The program with its commands, in the order of ``walkers --help``."""
+    for module in ("runs", "studies"):
+        import_module(f"walkers.commands.{module}")
     return program
 
 
@@ -138,6 +120,7 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+@program.callback()
 def _options(
     version: Annotated[
         bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show what is installed and exit.")

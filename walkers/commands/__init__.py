@@ -1,1 +1,1 @@
-"""The commands: each a few lines around functions that can be called from Python."""
+"""The commands of the program; they are few lines each around what a user could call from Python."""
