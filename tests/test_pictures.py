@@ -16,9 +16,8 @@ from PIL import Image
 from tests.printed import letters, spoilt
 from walkers.inputs import InputError
 from walkers.postprocess import Group, read_motion, read_table
-from walkers.postprocess.analysis import plot_run
+from walkers.postprocess.analysis import figures_of, plot_run
 from walkers.postprocess.drawing import series_look, styled
-from walkers.postprocess.figures import walk_figures
 from walkers.postprocess.paraview import write_paraview, write_vtk
 from walkers.postprocess.series import render_series
 
@@ -132,7 +131,7 @@ def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
     with pytest.raises(InputError, match="jpeg"):
         plot_run(directory, tmp_path / "none", ["jpeg"])
     assert not (tmp_path / "none").exists()
-    figures = walk_figures(read_motion(directory).groups)
+    figures = figures_of(directory)
     assert [spoilt(figures[name]) + letters(figures[name]) for name in ("walk", "gait")] == [
         ["a", "b", "c"],
         ["a", "b"],

@@ -12,11 +12,11 @@ import pytest
 
 from walkers.inputs import load_case
 from walkers.postprocess import read_motion, read_result, read_table
+from walkers.postprocess.analyses.walking import Walking, walkers_met
 from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result
 from walkers.postprocess.gait import fit_slopes, gait, settled_samples, steady_walkers, walk
 from walkers.postprocess.motion import Group
 from walkers.postprocess.tables import described
-from walkers.postprocess.walking import Walking, walkers_met
 from walkers.runner.directory import SEGMENTS
 from walkers.runner.files import write_json
 from walkers.runner.manifest import record_tables
