@@ -37,7 +37,7 @@ RESULT_NAME = "result.json"
 _WIDTH = 110
 Described = Mapping[str, tuple[str, str]]
 """From the names of columns to their units and meanings."""
-_UNITS = {"m/s": ("mm/s", 1e3), "m": ("mm", 1e3), "rad": ("°", degrees(1.0)), "share": ("%", 100.0)}
+_UNITS = {"J": ("nJ", 1e9), "m/s": ("mm/s", 1e3), "m": ("mm", 1e3), "rad": ("°", degrees(1.0)), "share": ("%", 100.0)}
 """For units of the result, those that are shown, and how many of them one is."""
 _DIGITS = 4
 """Significant, of a number without an error; with one, so many that two digits of the error are seen."""
@@ -126,9 +126,9 @@ class Row:
 
     @property
     def text(self) -> str:
-        """The number with its standard error and its unit."""
-        told = [one.text for one in (self.value, self.error) if one is not None]
-        return f"{' ± '.join(told)} {self.unit}".rstrip()
+        """The number with its standard error, if that shows, and its unit."""
+        value, error = ("" if one is None else one.text for one in (self.value, self.error))
+        return f"{value}{f' ± {error}' if error and 'e-' not in error else ''} {self.unit}".rstrip()
 
 
 def rounded(value: float, error: float | None = None) -> str:

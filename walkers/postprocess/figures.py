@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MOST_NAMED = 12  # walkers, or climbs, in a legend
+MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """How events are marked (`walkers.postprocess.clusters.Event`)."""
 _MARKERS = "so^vD"
@@ -82,7 +82,7 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
         for place, walker in enumerate(group.walkers):
             number = walker.walker
             told = f"{number}: {facing[int(walker.facing < 0)]}, {slope[place] * 1e3:.3g} mm/s"
-            look = (told if number < _MOST_NAMED else "", number)
+            look = (told if number < MOST_NAMED else "", number)
             walked.append(Line(time, distance[:, place] * 1e3, *look))
             turned.append(Line(time, np.degrees(group.orientation[::strobe, place]), *look))
             paths.append(Line(way[:, place] @ group.drive_axis, way[:, place] @ group.across_axis, *look))
@@ -167,12 +167,12 @@ def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
         own = (members["track"] == track) & (members["bead"] == leader)
         leads, speed = "large" if clusters["leader_large"][track] else "small", clusters["speed"][track] * 1e3
         told = f"{clusters['size'][track]} beads climb, led by a\n{leads} one: {speed:.1f} mm/s"
-        label = told if climbed and named[track] <= _MOST_NAMED else ""
+        label = told if climbed and named[track] <= MOST_NAMED else ""
         colour, width = (2, 1.6) if climbed else (_OTHERS, 0.6)
         yield Line(members["time"][own], members["height"][own] * 1e3, label, colour, width=width)
-    if len(named) and named[-1] > _MOST_NAMED:
+    if len(named) and named[-1] > MOST_NAMED:
         nothing = np.empty(0)
-        yield Line(nothing, nothing, f"and {named[-1] - _MOST_NAMED} more climbs", 2, width=1.6)
+        yield Line(nothing, nothing, f"and {named[-1] - MOST_NAMED} more climbs", 2, width=1.6)
 
 
 def _events(events: Columns) -> Iterator[Line]:
@@ -198,7 +198,7 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
             line.set(**series_look(number), markevery=(number % 6, 6), linewidth=0.9)
     axes["walked"].set_title("grey: settling")
     letter_panels(axes.values())
-    more = f" (the first {_MOST_NAMED})" if sum(len(group.walkers) for group in groups) > _MOST_NAMED else ""
+    more = f" (the first {MOST_NAMED})" if sum(len(group.walkers) for group in groups) > MOST_NAMED else ""
     handles = axes["walked"].get_legend_handles_labels()
     told = f"walker: facing at the start, velocity{more}"
     figure.legend(*handles, loc="outside lower center", ncols=4, title=told)
