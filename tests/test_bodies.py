@@ -122,7 +122,7 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     assert done.walkers["make"].tolist() == [0, 0, 1, 1, 2]
     assert done.walkers["rotation_3"].isna().tolist() == [True, True, False, False, False]
     assert "of 0.3/0.2/0.2 mm" in done.describe()
-    assert {path.name for path in done.plot()} == {"walk.png", "gait.png"}
+    assert {path.name for path in done.plot()} == {"walk.png", "gait.png", "work.png"}
     assert done.vtk().exists()
     # Contact 3 is bead on bead of a dimer, and bead 3 on the floor of a trimer: they are not averaged.
     assert done.result["sliding"] == makes[0]["sliding"]
@@ -233,7 +233,7 @@ def test_a_bead_may_lie_on_a_plane_beside_walkers_or_alone(tmp_path: Path) -> No
     """It rolls along the drive, held down; alone there is nothing to measure, but its motion and a picture."""
     bead = {"placed": [{"radius": "0.3 mm", "at": ["5 mm", "-3 mm", "0.29999 mm"]}]}
     run = {"cycles": 8, "settling_cycles": 4, "samples_per_cycle": 20, "longest_settling": "0 s"}
-    for tables, names in (({**bead, "dimers": dimers(1)}, {"walking"}), (bead, set[str]())):
+    for tables, names in (({**bead, "dimers": dimers(1)}, {"walking", "work"}), (bead, set[str]())):
         done = walkers.run(of_tables(**tables, run=run), tmp_path)
         assert set(done.result["analyses"]) == names
         assert done.motion.position[-1, -1][1:] == pytest.approx([-3e-3, 0.3e-3], abs=1e-6)

@@ -122,7 +122,7 @@ def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
     directory: Path, run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:
     paths = plot_run(directory, tmp_path, ["pdf", "svg", "png"])
-    names = [f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg", "png")]
+    names = [f"{name}.{form}" for name in ("walk", "gait", "work") for form in ("pdf", "svg", "png")]
     assert [path.name for path in paths] == names
     assert all(directory.name.encode() in path.read_bytes() for path in paths)
     assert len(Image.open(paths[2]).convert("RGB").getcolors(maxcolors=1 << 24)) > 20
