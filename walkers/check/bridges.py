@@ -3,13 +3,12 @@
 A published law gives the pull over the surface tension, F/γ, of a bridge of constant volume at gaps, in Derjaguin's
 way (`walkers.physics.capillary.derjaguin_radius`) where it was made for equal spheres. Those that the program has are
 found in `walkers.physics.laws`; of the others, here, coefficients and numbers of equations are those in the source of
-YADE (its ViscElCapPhys) and, for Bagheri et al., of MercuryDPM, by these authors.
+YADE (its ViscElCapPhys).
 
 References
 ----------
 T. Weigert, S. Ripperger, Part. Part. Syst. Charact. 16 (1999) 238–242,
 doi 10.1002/(SICI)1521-4117(199910)16:5<238::AID-PPSC238>3.0.CO;2-E.
-M. Bagheri, S. Roy, T. Pöschel, Comput. Part. Mech. 11 (2024) 2179–2190, doi 10.1007/s40571-024-00772-5.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib import import_module
-from math import acos, cos, degrees, inf, log, pi, radians, sin, sqrt
+from math import acos, cos, degrees, inf, pi, radians, sin, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -60,21 +59,6 @@ def weigert(radius_1: float, radius_2: float, volume: float, contact_angle: floa
     return pi * line**2 * pressure + 2.0 * pi * line * np.sin(angle + contact_angle)
 
 
-def bagheri(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
-    """Bagheri, Roy and Pöschel (2024), Eqs. 24–30, with the gap over `walkers.physics.laws.willett.rupture`."""
-    radius = derjaguin_radius(radius_1, radius_2)
-    v, t = volume / radius**3, contact_angle
-    a, b = 0.4158 * v**0.2835 + 0.6474, -0.2087 * v**0.3113 + 2.267
-    touching = 2.0 * pi * (1.0 - 0.3823 * v**0.2586) * (1.0 - a * sin(t) ** b)
-    a_s = -0.3319 * v**0.4974 + 0.6717 * v**0.1995
-    b_s = 13.84 * v**-0.3909 - 12.11 * v**-0.3945
-    cubic = -0.007815 * log(v) ** 2 - 0.2105 * log(v) - 1.426
-    linear = -1.78 * v**0.8351 + 0.6669 * v**-0.01391
-    b_s *= cubic * t**3 + linear * t + 1.0
-    s = gaps / willett.rupture(radius_1, radius_2, volume, contact_angle)
-    return np.asarray(radius * touching * (1.0 + a_s * s) / (1.0 + b_s * a_s * s + b_s * s**2))
-
-
 def willett_simple(
     radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray
 ) -> FloatArray:
@@ -111,7 +95,6 @@ LAWS = (
     Law("Willett 2000, Eq. 12", willett_simple, willett.rupture),
     Law("Lambert 2008", rabinovich.lambert),
     Law("Weigert 1999", weigert),
-    Law("Bagheri 2024", bagheri, willett.rupture, error=0.04),
 )
 FITS = tuple(law for law in LAWS if law.error < inf)
 SOULIE = next(law for law in LAWS if law.pull is soulie.pull)
