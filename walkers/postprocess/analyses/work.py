@@ -113,4 +113,4 @@ def work_of(group: Group) -> FloatArray:
             work += pull[:, None] * ((next_one - one) @ np.array(harmonic.direction))
     samples = group.case.run.samples_per_cycle
     cycles = len(work) // samples
-    return _mass(group) * work[: cycles * samples].reshape(cycles, samples, -1).sum(axis=1)
+    return np.asarray(_mass(group) * work[: cycles * samples].reshape(cycles, samples, -1).sum(axis=1))
