@@ -74,7 +74,15 @@ def shipped(**changes: Any) -> Any:
 
 @pytest.mark.parametrize(
     ("arrangement", "sizes"),
-    [("chain", "Lss"), ("fan", "Lss"), ("fan", "Lsss"), ("ring", "Lsss"), ("diamond", "Lsss"), ("diamond", "LsLs")],
+    [
+        ("chain", "Lss"),
+        ("fan", "Lss"),
+        ("fan", "Lsss"),
+        ("ring", "Lsss"),
+        ("diamond", "Lsss"),
+        ("diamond", "LsLs"),
+        ("raft", "sssssss"),
+    ],
 )
 def test_beads_of_a_cluster_touch_as_its_arrangement_says(arrangement: str, sizes: str) -> None:
     """Touching pairs overlap by what carries their load, the beads the floor too, and no others overlap."""
@@ -110,6 +118,17 @@ def test_a_chain_of_two_is_a_dimer() -> None:
     assert resolve_case({**tables, "clusters": [cluster("chain", "Ls", **start)]}, name="test") == make_case()
     cases = [of_tables(cluster(arrangement, "Ls")) for arrangement in ("fan", "chain")]
     np.testing.assert_allclose(*([bead.centre for bead in place((case,))[0].beads] for case in cases), atol=1e-15)
+
+
+def test_a_raft_holds_together_and_stays(run_directory: Callable[..., Path]) -> None:
+    """Seven equal beads, each in the ring joined to three: none is large, and the drive has no direction."""
+    run = {"cycles": 12, "settling_cycles": 6, "samples_per_cycle": 10}
+    case = of_tables(cluster("raft", "sssssss"), drive={**FIG1B["drive"], "peak_acceleration": "10 g"}, run=run)
+    assert [len(neighbours) for _, neighbours in case.walkers[0].bridged] == [6, *[3] * 6]
+    result = read_result(run_directory(case))
+    assert result["separated_fraction"] == 0.0
+    assert result["work"]["mean"] > 1e-9
+    assert abs(result["axial_velocity"]["mean"]) < 1e-6
 
 
 def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
