@@ -130,7 +130,7 @@ def touching(places: Sequence[tuple[float, float]], radii: Sequence[float], slac
 
 def _sites(number: int) -> Places:
     """So many sites of a hexagonal lattice: the origin, the one behind it, and on around it; their distance is 1."""
-    reach = range(-number, number + 1) if number < 10 else range(-10, 11)
+    reach = range(-10, 11)  # of 100 sites the outermost is six away
     sites = [(one + other / 2.0, other * sqrt(0.75)) for one in reach for other in reach]
     return sorted(sites, key=lambda at: (round(hypot(*at), 6), round(atan2(-at[1], -at[0]) % (2.0 * pi), 6)))[:number]
 
