@@ -9,6 +9,7 @@ import sys
 import warnings
 from contextlib import suppress
 from importlib import import_module
+from inspect import isfunction
 from io import BufferedWriter, FileIO, TextIOWrapper
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,8 +17,6 @@ from types import FrameType
 from typing import Annotated, Any, NoReturn
 
 import typer
-
-from walkers.commands.arguments import program
 
 _INTERRUPTED = 130
 _STDOUT = "standard output"
@@ -108,9 +107,21 @@ def _check_words(words: list[str]) -> None:
 
 
 def _program() -> typer.Typer:
-    """The program with its commands, in the order of ``walkers --help``."""
-    for module in ("runs", "studies"):
-        import_module(f"walkers.commands.{module}")
+    """The program, whose commands are the public functions of modules."""
+    program = typer.Typer(
+        name="walkers",
+        help="Wet granular walkers, simulated with LIGGGHTS.",
+        no_args_is_help=True,
+        add_completion=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,  # rich takes longer to load than all that most commands need
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    program.callback()(_options)
+    for place in ("walkers.commands.runs", "walkers.commands.studies"):
+        for name, function in vars(import_module(place)).items():
+            if isfunction(function) and function.__module__ == place and not name.startswith("_"):
+                program.command(name.strip("_").replace("_", "-"), short_help=function.__doc__)(function)
     return program
 
 
@@ -120,7 +131,6 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@program.callback()
 def _options(
     version: Annotated[
         bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show what is installed and exit.")

@@ -1,1 +1,1 @@
-"""The commands of the program; they are few lines each around what a user could call from Python."""
+"""The commands: the public functions of `runs` and `studies`, in the order of ``walkers --help``."""

@@ -1,4 +1,4 @@
-"""The program, arguments and options that several of its commands share, and what commands do alike."""
+"""Arguments and options that several commands share, and what commands do alike."""
 
 from __future__ import annotations
 
@@ -6,26 +6,15 @@ import json
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
-from typer import Argument, Option, Typer
+from typer import Argument, Option
 
 from walkers.completion import names_of_cases, offering
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case as ResolvedCase
     from walkers.sweeps.scheduler import Options
-
-program = Typer(
-    name="walkers",
-    help="Wet granular walkers, simulated with LIGGGHTS.",
-    no_args_is_help=True,
-    add_completion=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,  # rich takes longer to load than all that most commands need
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 _CASE = "A case file, or the name of a shipped case such as fig1b."
 _RUN = "A run: its directory, its name in --out, or a case whose run is looked up there."
@@ -50,12 +39,6 @@ CaseName = Annotated[
     str | None, Option(metavar="NAME", help="Only what is of the case of this name.", autocompletion=names_of_cases)
 ]
 OlderThan = Annotated[str | None, Option(metavar="AGE", help=_AGE)]
-
-
-def command(function: _Function) -> _Function:
-    """Make a function a command of its name; ``walkers --help`` has its docstring."""
-    name = function.__name__.strip("_").replace("_", "-")
-    return program.command(name, short_help=function.__doc__)(function)
 
 
 class By(TypedDict):

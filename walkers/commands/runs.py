@@ -24,7 +24,6 @@ from walkers.commands.arguments import (
     Set,
     SweepColumn,
     check_folder,
-    command,
     load,
     on_cores,
     print_as,
@@ -46,7 +45,6 @@ _SLOWDOWN = "So many times slower than in reality; for 5 to 10 s."
 _INTERVAL = "Time between views of the whole, as '2 s' or 'T/4' (of a cycle)."
 
 
-@command
 def show(case: Case, settings: Set = None, as_json: Json = False) -> None:
     """Show each value of a case and where it comes from, its forces, its time step and its cost."""
     loaded = load(case, settings)
@@ -56,7 +54,6 @@ def show(case: Case, settings: Set = None, as_json: Json = False) -> None:
     print_as(as_json, lambda: summary, lambda: describe(summary))
 
 
-@command
 def deck(case: Case, settings: Set = None, to: Path | None = Option(None, help=_DECK)) -> None:
     """Print the LIGGGHTS deck of a case (of a run in segments, the first), or write it with its files."""
     from walkers.inputs.errors import refused
@@ -78,7 +75,6 @@ def deck(case: Case, settings: Set = None, to: Path | None = Option(None, help=_
     print(f"{to / DECK_NAME}    run it there with: sh {RUN_NAME}")
 
 
-@command
 def run(
     cases: list[str] = Argument(metavar="CASE...", help=_CASES, autocompletion=_OFFERED),
     settings: Set = None,
@@ -126,7 +122,6 @@ def run(
     return 1 if failed else 0
 
 
-@command
 def result(run: Run, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
     """Print the result of a finished run."""
     from dataclasses import replace
@@ -135,7 +130,6 @@ def result(run: Run, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
     print_as(as_json, lambda: found.result, found.describe)
 
 
-@command
 def plot(
     run: RunOrSweep,
     out: Out = DEFAULT_OUT,
@@ -164,7 +158,6 @@ def plot(
     print_lines(run_at(place, run).plot(to, formats or ["png"]))
 
 
-@command
 def render(
     run: Run,
     out: Out = DEFAULT_OUT,
@@ -190,7 +183,6 @@ def render(
         print_lines(found.render(to, images=number))
 
 
-@command
 def film(
     run: Run,
     out: Out = DEFAULT_OUT,
@@ -220,7 +212,6 @@ def film(
     print(path)
 
 
-@command
 def vtk(
     run: Run,
     out: Out = DEFAULT_OUT,
@@ -233,7 +224,6 @@ def vtk(
     print(_run_to_place(run, out, as_placed).vtk(to, every=every, vtu=vtu, as_placed=as_placed))
 
 
-@command
 def paraview(
     run: Run,
     out: Out = DEFAULT_OUT,
@@ -261,7 +251,6 @@ def _run_to_place(run: str, out: Path, as_placed: bool) -> walkers.Run:
     return found
 
 
-@command
 def export(
     run: Run,
     to: Path = Option(help="The .xyz (extended XYZ) or .lammpstrj (LAMMPS dump) to write."),
@@ -272,7 +261,6 @@ def export(
     print(walkers.find_run(run, out).export(to, every=every))
 
 
-@command
 def theory(case: Case, settings: Set = None, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
     """Print what the paper's model and its extensions predict, beside the engine's result if the case was run."""
     from walkers.inputs.errors import InputError, Problem

@@ -28,7 +28,6 @@ from walkers.commands.arguments import (
     Set,
     SweepColumn,
     check_folder,
-    command,
     load,
     on_cores,
     print_as,
@@ -53,7 +52,6 @@ _ANY, _SWEEPS = offering("case", "run", "sweep"), offering("sweep")
 _THRESHOLDS = "Instead: how many climbs there are with other thresholds of what is one."
 
 
-@command
 def sweep(
     sweep: str = Argument(metavar="SWEEP", help=_SWEEP_FILE, autocompletion=offering("sweep file")),
     settings: Set = None,
@@ -96,7 +94,6 @@ def sweep(
     return 1 if failures else 0
 
 
-@command
 def status(
     directory: str = Argument(metavar="DIR", help=f"{_SWEEP}; or the folder of several.", autocompletion=_SWEEPS),
     out: Out = DEFAULT_OUT,
@@ -108,7 +105,6 @@ def status(
     print_lines(describe_status(one) for one in sweeps_in(find_sweep(directory, out)))
 
 
-@command
 def table(
     directory: str = Argument(metavar="DIR", help=f"{_SWEEP}.", autocompletion=_SWEEPS),
     out: Out = DEFAULT_OUT,
@@ -137,7 +133,6 @@ def table(
         print(tables.short_text(frame))
 
 
-@command
 def climb(
     directory: str = Argument(metavar="DIR", help="A sweep of piles, a folder of runs, or one run (or its case)."),
     out: Out = DEFAULT_OUT,
@@ -166,7 +161,6 @@ def climb(
     print_as(as_json, lambda: found, lambda: "\n".join(lines))
 
 
-@command
 def compare(
     first: RunOrSweep, second: RunOrSweep, out: Out = DEFAULT_OUT, y: SweepColumn = None, as_json: Json = False
 ) -> None:
@@ -186,7 +180,6 @@ def compare(
     print_as(as_json, lambda: found.contents, lambda: found.text)
 
 
-@command
 def list_(
     out: Out = DEFAULT_OUT,
     case: CaseName = None,
@@ -211,7 +204,6 @@ def list_(
     print_as(as_json, lambda: folder.as_json(found), lambda: folder.as_text(found))
 
 
-@command
 def clean(
     runs: list[str] | None = Argument(None, metavar="[RUN|SWEEP]...", help=_RUNS, autocompletion=_ANY),
     out: Out = DEFAULT_OUT,
@@ -240,7 +232,6 @@ def clean(
     return 1 if left else 0
 
 
-@command
 def report(
     what: str = Argument(metavar="RUN|SWEEP", help=_REPORTED, autocompletion=_ANY),
     out: Out = DEFAULT_OUT,
@@ -250,7 +241,6 @@ def report(
     print(walkers.report(what, to, out))
 
 
-@command
 def verify(
     what: str = Argument(metavar="RUN|SWEEP|ARCHIVE", help="A run's or sweep's directory, an archive, or a case."),
     out: Out = DEFAULT_OUT,
@@ -264,7 +254,6 @@ def verify(
     return 0 if all(one.passed for one in found) else 1
 
 
-@command
 def archive(
     what: str = Argument(metavar="RUN|SWEEP", help="A run's or sweep's directory, or a case."),
     out: Out = DEFAULT_OUT,
@@ -289,7 +278,6 @@ def archive(
     print(write_archive(place.path, to, ArchiveOptions(not without_dumps, authors, licence)))
 
 
-@command
 def figures(
     out: Out = DEFAULT_OUT,
     to: Path = Option(Path("figures"), help="Folder of the figures."),
@@ -315,7 +303,6 @@ def figures(
     return 1 if made.failures or made.left_out else 0
 
 
-@command
 def model_terms(
     to: Path = Option(Path("figures"), help="Folder of the tables."),
     generations: int = Option(120, min=1, help="Of each search."),
@@ -330,7 +317,6 @@ def model_terms(
     return 0
 
 
-@command
 def calibrate(
     calibration: str = Argument(
         metavar="CALIBRATION", help="A calibration file, or a shipped calibration such as ruby."
@@ -358,7 +344,6 @@ def calibrate(
     return 0  # a set whose run fails is an outcome: it counts as far off
 
 
-@command
 def audit(
     only: list[str] | None = Option(None, help="Name of a check; may be repeated."),
     quick: bool = Option(False, "--quick", help="Leave out the checks that take longest."),
@@ -388,7 +373,6 @@ def audit(
     return 1 if report.failures else 0
 
 
-@command
 def crosscheck(
     case: Case,
     out: Out = DEFAULT_OUT,
@@ -429,7 +413,6 @@ def crosscheck(
     return 1 if chapter.failures else 0
 
 
-@command
 def validate(
     chapters: list[str] | None = Argument(None, metavar="[CHAPTER]...", help="Some chapters; all if left out."),
     quick: bool = Option(False, "--quick", help="Of each the part that takes seconds."),

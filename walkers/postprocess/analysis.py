@@ -159,10 +159,8 @@ def number_of(result: Mapping[str, Any], key: str, unit: str = "", error: float 
 class Measured:
     """A run whose figures are drawn: its motion and its tables (`tables_of`) are read when they are asked for, once."""
 
-    def __init__(self, directory: Path, motion: Motion | None = None) -> None:
+    def __init__(self, directory: Path) -> None:
         self.directory, self.case = directory, case_of(directory)
-        if motion is not None:
-            self.motion = motion
 
     @cached_property
     def motion(self) -> Motion:

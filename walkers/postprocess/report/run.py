@@ -9,15 +9,7 @@ from typing import Any
 from walkers.inputs.case import Case
 from walkers.inputs.changes import dotted
 from walkers.inputs.origins import Origin, text_of
-from walkers.postprocess.analysis import (
-    Measured,
-    analyses_in,
-    analyses_of,
-    current_result,
-    quantities_of,
-    warnings_of,
-)
-from walkers.postprocess.motion import read_motion
+from walkers.postprocess.analysis import Measured, analyses_in, analyses_of, current_result, quantities_of, warnings_of
 from walkers.postprocess.report.page import NAME, check_report, drawn, fill, packed_plots, write_page
 from walkers.postprocess.report.player import MOST_PLACES, player_of
 from walkers.runner.directory import case_of
@@ -39,14 +31,13 @@ class RunReport:
     ) -> None:
         from bokeh.layouts import column
 
-        motion = read_motion(directory)
-        case = motion.case
+        run = Measured(directory)
+        case = run.motion.case
         self.id, self.name, self.title = section, directory.resolve().name, case.title or case.name
         self.shown = shown_of(case, current_result(directory), origins)
         self.manifest = read_json(directory / MANIFEST_NAME)
-        self.player = player_of(motion, places=places)
+        self.player = player_of(run.motion, places=places)
         self.carried = {f"player-{section}": base64.b64encode(self.player.plot.get_binary_snapshot(9)).decode()}
-        run = Measured(directory, motion)
         figures = (one for analysis in analyses_of(case) for one in analysis.panels(run).values())
         if panels := [panel for figure in figures for panel in figure]:
             plots = column(*map(drawn, panels), sizing_mode="stretch_width")
