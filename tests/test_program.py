@@ -113,6 +113,13 @@ def test_help_names_every_command() -> None:
     assert all(f"make {target}" in targets for target in ("walker", "test", "help", "clean"))
 
 
+def test_what_is_shipped_is_listed_as_it_is_run() -> None:
+    listed = call("shipped", check=True).stdout.splitlines()
+    for command, name in (("run", "fig1b"), ("sweep", "fig3"), ("calibrate", "ruby")):
+        (line,) = [one for one in listed if one.split()[:3] == ["walkers", command, name]]
+        assert len(line.split()) > 4, "a title"
+
+
 def test_version_names_package_commit_and_engine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     package, engine = call("--version", check=True).stdout.splitlines()
     assert package.startswith("granular-walkers 0.")

@@ -45,6 +45,16 @@ _SLOWDOWN = "So many times slower than in reality; for 5 to 10 s."
 _INTERVAL = "Time between views of the whole, as '2 s' or 'T/4' (of a cycle)."
 
 
+def shipped() -> None:
+    """List the cases, sweeps and calibrations that come with the program, by the commands that take them."""
+    from walkers.inputs.reading import read_toml
+    from walkers.inputs.reading import shipped as files_of
+
+    for kind, command in (("case", "run"), ("sweep", "sweep"), ("calibration", "calibrate")):
+        titles = {name: read_toml(file).get("title", "") for name, file in files_of(kind).items()}
+        print_lines(f"walkers {command} {name:{30 - len(command)}} {title}" for name, title in titles.items())
+
+
 def show(case: Case, settings: Set = None, as_json: Json = False) -> None:
     """Show each value of a case and where it comes from, its forces, its time step and its cost."""
     loaded = load(case, settings)
