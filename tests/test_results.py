@@ -96,12 +96,12 @@ def test_a_result_of_before_is_made_anew_if_it_can_be(
     known = read_result(copy)
     assert known["analyses"] == {"walking": Walking.version, "work": 1}
     lacking = {key: value for key, value in known.items() if key not in ("separated_fraction", "analyses")}
-    for old in ({**lacking, "analyses": {"walking": Walking.version - 1, "work": 1}}, lacking):
+    for old in ({**lacking, "analyses": {"walking": Walking.version - 1}}, lacking):
         write_json(copy / RESULT_NAME, old)
         record_tables(copy, [RESULT_NAME])
         assert current_result(copy) == known
         assert read_result(copy) == known
-    write_json(copy / RESULT_NAME, {**known, "analyses": {"walking": Walking.version - 1, "work": 1}})
+    write_json(copy / RESULT_NAME, {**known, "analyses": {"walking": Walking.version - 1}})
     record_tables(copy, [RESULT_NAME])
 
     def refuse(*_: object) -> None:
@@ -111,7 +111,7 @@ def test_a_result_of_before_is_made_anew_if_it_can_be(
         patch.setattr("walkers.postprocess.analysis.forget_tables", refuse)
         assert current_result(copy) == known
     shutil.rmtree(copy / SEGMENTS)  # as in an archive without dumps
-    assert current_result(copy) == {**known, "analyses": {"walking": Walking.version - 1, "work": 1}}
+    assert current_result(copy) == {**known, "analyses": {"walking": Walking.version - 1}}
 
 
 def test_symmetric_dimers_need_not_be_on_the_axis_to_be_kept(run_directory: Callable[..., Path]) -> None:
