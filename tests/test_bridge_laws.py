@@ -16,15 +16,15 @@ from walkers.check.bridges import willett_simple
 from walkers.inputs import load_case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.run_tables import limits_of
-from walkers.physics import rabinovich, reynolds, van_der_waals, willett, young_laplace
-from walkers.physics import soulie as soulie_law
+from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 from walkers.physics.capillary import (
     bridge_volume_at_wall,
 )
 from walkers.physics.capillary import rupture_distance as rupture_of_lian
 from walkers.physics.laplace import force_curve, rupture_distance
-from walkers.physics.laws import LAWS, by_name
+from walkers.physics.laws import LAWS, by_name, rabinovich, van_der_waals, willett, young_laplace
+from walkers.physics.laws import soulie as soulie_law
 from walkers.physics.matter import Liquid
 from walkers.physics.time_step import AUTO_FRACTIONS, LONGEST_WALKER_STEP, WALKER_FRACTIONS
 from walkers.templates.bridge_tables import TOLERANCE, UnusableLawError, tabulated
@@ -206,23 +206,23 @@ def test_a_law_of_ones_own(tmp_path: Path) -> None:
     file = tmp_path / "own.py"
     file.write_text(
         "from functools import partial\n"
-        "from walkers.physics import van_der_waals\n"
+        "from walkers.physics.laws import van_der_waals\n"
         "law = partial(van_der_waals.law, hamaker_constant=13e-20)\n"
     )
     given = surfaces()
     own, known = (by_name(name)(given).forces(np.zeros(1)) for name in (f"{file}:law", "van-der-waals"))
     assert own.pull[0] == pytest.approx(2.0 * known.pull[0])
-    assert by_name("walkers.physics.willett:law") is willett.law
+    assert by_name("walkers.physics.laws.willett:law") is willett.law
 
 
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("no-such-law", "expected one of soulie, young-laplace"),
+        ("no-such-law", "expected one of .*soulie, .*young-laplace"),
         ("nowhere.py:law", "cannot be imported"),
         ("walkers.nowhere:law", "cannot be imported"),
-        ("walkers.physics.willett:nothing", "has no function nothing"),
-        ("walkers.physics.willett:", "expected one of"),
+        ("walkers.physics.laws.willett:nothing", "has no function nothing"),
+        ("walkers.physics.laws.willett:", "expected one of"),
     ],
 )
 def test_names_that_are_no_laws(name: str, message: str) -> None:

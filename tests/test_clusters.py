@@ -8,6 +8,7 @@ import pytest
 
 from walkers.inputs.boundary import Boundary
 from walkers.physics.capillary import bridge_volume_between_beads
+from walkers.postprocess.analyses.piles import coordination_of_inner, liquid_of_beads, packing_profile, segregation
 from walkers.postprocess.clusters import (
     Beads,
     Climb,
@@ -23,7 +24,6 @@ from walkers.postprocess.clusters import (
 )
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Bridges
-from walkers.postprocess.piles import coordination_of_inner, liquid_of_beads, packing_profile, segregation
 
 BULK = list(range(20))
 TIME = np.arange(0.0, 4.0, 0.02)

@@ -21,9 +21,8 @@ from tests.printed import letters, spoilt
 from walkers.inputs import InputError
 from walkers.inputs.boundary import Boundary
 from walkers.postprocess import Group, Motion, read_motion, read_table
-from walkers.postprocess.analysis import plot_run
+from walkers.postprocess.analysis import figures_of, plot_run
 from walkers.postprocess.drawing import series_look, styled
-from walkers.postprocess.figures import walk_figures
 from walkers.postprocess.films import FilmOptions, film_times
 from walkers.postprocess.paraview import write_paraview, write_vtk
 from walkers.postprocess.scene import Scene, Window, camera_axes, mesh_of, walls_of
@@ -131,7 +130,7 @@ def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
     directory: Path, run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:
     paths = plot_run(directory, tmp_path, ["pdf", "svg", "png"])
-    names = [f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg", "png")]
+    names = [f"{name}.{form}" for name in ("walk", "gait", "work") for form in ("pdf", "svg", "png")]
     assert [path.name for path in paths] == names
     assert all(directory.name.encode() in path.read_bytes() for path in paths)
     assert len(Image.open(paths[2]).convert("RGB").getcolors(maxcolors=1 << 24)) > 20
@@ -140,7 +139,7 @@ def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
     with pytest.raises(InputError, match="jpeg"):
         plot_run(directory, tmp_path / "none", ["jpeg"])
     assert not (tmp_path / "none").exists()
-    figures = walk_figures(read_motion(directory).groups)
+    figures = figures_of(directory)
     assert [spoilt(figures[name]) + letters(figures[name]) for name in ("walk", "gait")] == [
         ["a", "b", "c"],
         ["a", "b"],

@@ -27,10 +27,9 @@ from tests.printed import spoilt
 from walkers.inputs import Case, InputError, load_case, resolve_case, shipped_cases
 from walkers.inputs.sweep import expand
 from walkers.postprocess import current_result, read_motion, read_table, tabulate
-from walkers.postprocess.analysis import tables_of
-from walkers.postprocess.figures import climb_figure
+from walkers.postprocess.analyses.piles import Pile
+from walkers.postprocess.analysis import figures_of, tables_of
 from walkers.postprocess.motion import FLOOR, read_bridges
-from walkers.postprocess.piles import Pile
 from walkers.postprocess.tables import described
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
@@ -376,7 +375,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     motion = read_motion(run)
     assert "between beads, at rest" in told("result", str(run))
     assert told("plot", str(run), "--to", "here") == "here/climb.png"
-    assert spoilt(climb_figure(small(), tables_of(run))) == []
+    assert spoilt(figures_of(run)["climb"]) == []
     for name, option in (("box", ("--images", "2")), ("row", ("--interval", "0.1 s"))):
         assert told("render", str(run), "--to", f"here/{name}.png", *option) == f"here/{name}.png"
         picture = pv.read(in_folder / "here" / f"{name}.png")

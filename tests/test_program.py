@@ -16,7 +16,7 @@ from tests.conftest import PROGRAM, SHORT, call, document, to_toml
 from walkers import find_run, load_case
 from walkers import run as run_case
 from walkers.inputs.reading import shipped_cases
-from walkers.main import COMMANDS
+from walkers.main import _program
 from walkers.physics.time_step import WALKER_FRACTIONS
 from walkers.postprocess import read_result, read_table
 from walkers.runner import find_engine, finished_run
@@ -70,7 +70,7 @@ def test_from_a_case_file_to_a_deck_and_pictures(in_folder: Path) -> None:
     done = subprocess.run([PROGRAM, "run", "mine.toml"], capture_output=True, text=True, check=True)
     assert "toward the large bead" in done.stdout
     assert "(already run)" in call("run", "mine.toml", check=True).stdout
-    for command, last in (("plot", "gait.png"), ("vtk", "walkers.pvd"), ("render", "walker.png")):
+    for command, last in (("plot", "work.png"), ("vtk", "walkers.pvd"), ("render", "walker.png")):
         path = Path(call(command, "mine.toml", check=True).stdout.split()[-1])
         assert path.name == last
         assert path.exists()
@@ -103,7 +103,7 @@ def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch
 def test_help_names_every_command() -> None:
     shown = call("--help", check=True).stdout
     assert not set(shown) & set("╭│╰─"), "boxes are for terminals"
-    for command in COMMANDS:
+    for command in (one.name for one in _program().registered_commands):
         assert f"\n  {command} " in shown
         assert call(command, "-h", check=True).stdout == call(command, "--help", check=True).stdout
     for module in ("walkers", "walkers.main"):
@@ -111,6 +111,13 @@ def test_help_names_every_command() -> None:
         assert done.stdout == shown
     targets = subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert all(f"make {target}" in targets for target in ("walker", "test", "help", "clean"))
+
+
+def test_what_is_shipped_is_listed_as_it_is_run() -> None:
+    listed = call("shipped", check=True).stdout.splitlines()
+    for command, name in (("run", "fig1b"), ("sweep", "fig3"), ("calibrate", "ruby")):
+        (line,) = [one for one in listed if one.split()[:3] == ["walkers", command, name]]
+        assert len(line.split()) > 4, "a title"
 
 
 def test_version_names_package_commit_and_engine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import sys
 import warnings
 from contextlib import suppress
 from importlib import import_module
+from inspect import isfunction
 from io import BufferedWriter, FileIO, TextIOWrapper
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,15 +17,6 @@ from types import FrameType
 from typing import Annotated, Any, NoReturn
 
 import typer
-
-COMMANDS = {
-    **{"show": "look", "deck": "make", "run": "make"},
-    **dict.fromkeys(("result", "plot", "render", "film", "vtk", "paraview", "export", "theory"), "look"),
-    "sweep": "make",
-    **dict.fromkeys(("status", "table", "climb", "compare", "list", "clean", "report", "verify", "archive"), "look"),
-    **dict.fromkeys(("figures", "model-terms", "calibrate", "audit", "crosscheck", "validate"), "make"),
-}
-"""Modules of `walkers.commands` in which the commands are functions, in the order of ``walkers --help``."""
 
 _INTERRUPTED = 130
 _STDOUT = "standard output"
@@ -115,6 +107,7 @@ def _check_words(words: list[str]) -> None:
 
 
 def _program() -> typer.Typer:
+    """The program, whose commands are the public functions of modules."""
     program = typer.Typer(
         name="walkers",
         help="Wet granular walkers, simulated with LIGGGHTS.",
@@ -125,10 +118,10 @@ def _program() -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     program.callback()(_options)
-    for name, module in COMMANDS.items():
-        function = "list_" if name == "list" else name.replace("-", "_")
-        command = getattr(import_module(f"walkers.commands.{module}"), function)
-        program.command(name=name, short_help=command.__doc__)(command)
+    for place in ("walkers.commands.runs", "walkers.commands.studies"):
+        for name, function in vars(import_module(place)).items():
+            if isfunction(function) and function.__module__ == place and not name.startswith("_"):
+                program.command(name.strip("_").replace("_", "-"), short_help=function.__doc__)(function)
     return program
 
 

@@ -265,7 +265,7 @@ def run(
 def _load_postprocess() -> None:
     import pyarrow.parquet  # noqa: F401
 
-    import walkers.postprocess.walking  # noqa: F401
+    import walkers.postprocess.analyses.walking  # noqa: F401
 
 
 def sweep(

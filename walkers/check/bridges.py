@@ -1,22 +1,22 @@
 """Published laws of bridges beside the Young–Laplace equation, and walkers by other laws.
 
 A published law gives the pull over the surface tension, F/γ, of a bridge of constant volume at gaps, in Derjaguin's
-way (`walkers.physics.capillary.derjaguin_radius`) where it was made for equal spheres. Coefficients and numbers of
-equations are those in the source of YADE (its ViscElCapPhys) and, for Bagheri et al., of MercuryDPM, by these authors.
+way (`walkers.physics.capillary.derjaguin_radius`) where it was made for equal spheres. Those that the program has are
+found in `walkers.physics.laws`; of the others, here, coefficients and numbers of equations are those in the source of
+YADE (its ViscElCapPhys).
 
 References
 ----------
-Soulié et al. (2006), Willett et al. (2000), Rabinovich et al. (2005), Lambert et al. (2008): in `walkers.physics`.
 T. Weigert, S. Ripperger, Part. Part. Syst. Charact. 16 (1999) 238–242,
 doi 10.1002/(SICI)1521-4117(199910)16:5<238::AID-PPSC238>3.0.CO;2-E.
-M. Bagheri, S. Roy, T. Pöschel, Comput. Part. Mech. 11 (2024) 2179–2190, doi 10.1007/s40571-024-00772-5.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from math import acos, cos, degrees, inf, log, pi, radians, sin, sqrt
+from importlib import import_module
+from math import acos, cos, degrees, inf, pi, radians, sin, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -26,10 +26,11 @@ from walkers.check.report import Chapter, Line
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
-from walkers.physics import capillary, rabinovich, soulie, willett, young_laplace
+from walkers.physics import capillary, laws
 from walkers.physics.bridge import FloatArray, Surfaces
 from walkers.physics.capillary import derjaguin_radius
 from walkers.physics.laplace import force_curve
+from walkers.physics.laws import rabinovich, soulie, willett, young_laplace
 from walkers.pipeline import run
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, series_look, styled
 
@@ -41,7 +42,7 @@ COMPARED = ("fig1b", "climber-dimer")
 WALKED, WALKED_BY = ("fig1b", "fig4a"), ("young-laplace", "willett", "rabinovich", "soulie")
 """Cases and laws of the velocities."""
 _FRACTIONS, _ANGLES = (0.01, 0.05, 0.25), (0.0, radians(40.0))
-_GAPS, _FIT = 280, 0.04
+_GAPS = 280
 
 
 def weigert(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
@@ -56,21 +57,6 @@ def weigert(radius_1: float, radius_2: float, volume: float, contact_angle: floa
     return pi * line**2 * pressure + 2.0 * pi * line * np.sin(angle + contact_angle)
 
 
-def bagheri(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
-    """Bagheri, Roy and Pöschel (2024), Eqs. 24–30, with the gap over `walkers.physics.willett.rupture`."""
-    radius = derjaguin_radius(radius_1, radius_2)
-    v, t = volume / radius**3, contact_angle
-    a, b = 0.4158 * v**0.2835 + 0.6474, -0.2087 * v**0.3113 + 2.267
-    touching = 2.0 * pi * (1.0 - 0.3823 * v**0.2586) * (1.0 - a * sin(t) ** b)
-    a_s = -0.3319 * v**0.4974 + 0.6717 * v**0.1995
-    b_s = 13.84 * v**-0.3909 - 12.11 * v**-0.3945
-    cubic = -0.007815 * log(v) ** 2 - 0.2105 * log(v) - 1.426
-    linear = -1.78 * v**0.8351 + 0.6669 * v**-0.01391
-    b_s *= cubic * t**3 + linear * t + 1.0
-    s = gaps / willett.rupture(radius_1, radius_2, volume, contact_angle)
-    return np.asarray(radius * touching * (1.0 + a_s * s) / (1.0 + b_s * a_s * s + b_s * s**2))
-
-
 def willett_simple(
     radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray
 ) -> FloatArray:
@@ -80,34 +66,36 @@ def willett_simple(
     return 2.0 * pi * radius * cos(contact_angle) / (1.0 + 2.1 * s + 10.0 * s**2)
 
 
-def rupture_of_lian(radius_1: float, radius_2: float, volume: float, contact_angle: float) -> float:  # noqa: ARG001
-    """Lian, Thornton and Adams (1993), whatever the radii."""
-    return capillary.rupture_distance(volume, contact_angle)
-
-
 class Law(NamedTuple):
     """A published law: its ``pull`` (radii, volume, contact angle, gaps → F/γ) and its ``rupture`` distance.
 
-    Those that give no rupture distance have Lian et al.'s.
+    Those that give no rupture distance have Lian et al.'s (1993), whatever the radii. The ``error`` is that of the pull
+    at contact, over Young–Laplace's: of those that were made of its solutions.
     """
 
     name: str
     pull: Callable[[float, float, float, float, FloatArray], FloatArray]
-    rupture: Callable[[float, float, float, float], float]
+    rupture: Callable[[float, float, float, float], float] = lambda *bridge: capillary.rupture_distance(*bridge[2:])
+    error: float = inf
 
 
-SOULIE = Law("Soulié 2006 (stock engine)", soulie.pull, rupture_of_lian)
-FITS = (Law("Willett 2000", willett.pull, willett.rupture), Law("Bagheri 2024", bagheri, willett.rupture))
-"""Those made of solutions of the equation."""
+def _shipped() -> Iterator[Law]:
+    """Those of `walkers.physics.laws` that were published as a pull: files that say as whose."""
+    for name in laws.LAWS:
+        told = vars(import_module(laws.by_name(name).__module__))
+        if "PUBLISHED" in told:
+            given = {key: told[key] for key in ("pull", "rupture") if key in told}
+            yield Law(told["PUBLISHED"], error=told.get("ERROR", inf), **given)
+
+
 LAWS = (
-    SOULIE,
-    FITS[0],
+    *_shipped(),
     Law("Willett 2000, Eq. 12", willett_simple, willett.rupture),
-    Law("Rabinovich 2005", rabinovich.pull, rupture_of_lian),
-    Law("Lambert 2008", rabinovich.lambert, rupture_of_lian),
-    Law("Weigert 1999", weigert, rupture_of_lian),
-    FITS[1],
+    Law("Lambert 2008", rabinovich.lambert),
+    Law("Weigert 1999", weigert),
 )
+FITS = tuple(law for law in LAWS if law.error < inf)
+SOULIE = next(law for law in LAWS if law.pull is soulie.pull)
 
 
 def shapes(names: tuple[str, ...]) -> dict[str, Surfaces]:
@@ -157,12 +145,12 @@ def deviation(law: Law, surfaces: Surfaces) -> Deviation:
 def chapter(out: Path, *, quick: bool = False) -> Chapter:
     """Published laws beside the Young–Laplace equation, and, unless ``quick``, walkers by other laws."""
     compared = shapes(COMPARED)
-    laws = {law: {key: deviation(law, one) for key, one in compared.items()} for law in LAWS}
+    published = {law: {key: deviation(law, one) for key, one in compared.items()} for law in LAWS}
     lines = []
-    for law, found in laws.items():
+    for law, found in published.items():
         for key, one in found.items():
-            what, allowed = f"{law.name}, {key}", _FIT if law in FITS else inf
-            lines.append(Line(f"{what}: pull at contact over Young–Laplace's", 1.0, one.pull, allowed))
+            what = f"{law.name}, {key}"
+            lines.append(Line(f"{what}: pull at contact over Young–Laplace's", 1.0, one.pull, law.error))
             lines.append(Line(f"{what}: work over Young–Laplace's", 1.0, one.work))
     velocities: dict[str, dict[str, float]] = {}
     for name in () if quick else WALKED_BY:
@@ -173,8 +161,8 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
         "bridges.md.j2",
         degrees=degrees,
         compared=compared,
-        laws={law.name: found for law, found in laws.items()},
-        best_pull=max(abs(one.pull - 1.0) for law in FITS for one in laws[law].values()),
+        laws={law.name: found for law, found in published.items()},
+        best_pull=max(abs(one.pull - 1.0) for law in FITS for one in published[law].values()),
         soulie_at_walls=[deviation(SOULIE, one) for one in _walls()],
         fractions=_FRACTIONS,
         angles=_ANGLES,

@@ -1,1 +1,1 @@
-"""The commands: each a few lines around functions that can be called from Python."""
+"""The commands: the public functions of `runs` and `studies`, in the order of ``walkers --help``."""

@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 from typer import Argument, Option
 
@@ -39,6 +39,13 @@ CaseName = Annotated[
     str | None, Option(metavar="NAME", help="Only what is of the case of this name.", autocompletion=names_of_cases)
 ]
 OlderThan = Annotated[str | None, Option(metavar="AGE", help=_AGE)]
+
+
+class By(TypedDict):
+    """What runs cases."""
+
+    engine: str | None
+    allow_failed_audit: bool
 
 
 def load(case: str, settings: list[str] | None) -> ResolvedCase:

@@ -121,15 +121,6 @@ def _ring(radii: Sequence[float], apart: Apart) -> Places:
     return places
 
 
-ARRANGEMENTS: Mapping[str, Arrangement] = {
-    "chain": Arrangement(_row, _chain, 2, "one behind the other, the first in front"),
-    "fan": Arrangement(_spokes, _fan, 2, "the first in front, the others side by side behind it"),
-    "diamond": Arrangement(_crossed, _diamond, 4, "one in front, two side by side behind it, one at the back", most=4),
-    "ring": Arrangement(_closed, _ring, 3, "in a ring, the first in front"),
-}
-"""By the names that case files use."""
-
-
 def touching(places: Sequence[tuple[float, float]], radii: Sequence[float], slack: float) -> Pairs:
     """The beads at given places on a plane that are nearer to each other than a share of their radii."""
     found = []
@@ -138,6 +129,34 @@ def touching(places: Sequence[tuple[float, float]], radii: Sequence[float], slac
         if gap < slack * min(radii[one], radii[other]):
             found.append((one, other))
     return tuple(found)
+
+
+def _sites(number: int) -> Places:
+    """So many sites of a hexagonal lattice: the origin, the one behind it, and on around it; their distance is 1."""
+    reach = range(-10, 11)  # of 100 sites the outermost is six away
+    sites = [(one + other / 2.0, other * sqrt(0.75)) for one in reach for other in reach]
+    return sorted(sites, key=lambda at: (round(hypot(*at), 6), round(atan2(-at[1], -at[0]) % (2.0 * pi), 6)))[:number]
+
+
+def _neighbours(number: int) -> Pairs:
+    return touching(_sites(number), [0.5] * number, _TOUCHING)
+
+
+def _raft(radii: Sequence[float], apart: Apart) -> Places:
+    if len(set(radii)) > 1:
+        raise ValueError("a raft takes beads of one radius")
+    size = apart(0, 1)
+    return [(size * (0.5 + along), size * aside) for along, aside in _sites(len(radii))]
+
+
+ARRANGEMENTS: Mapping[str, Arrangement] = {
+    "chain": Arrangement(_row, _chain, 2, "one behind the other, the first in front"),
+    "fan": Arrangement(_spokes, _fan, 2, "the first in front, the others side by side behind it"),
+    "diamond": Arrangement(_crossed, _diamond, 4, "one in front, two side by side behind it, one at the back", most=4),
+    "ring": Arrangement(_closed, _ring, 3, "in a ring, the first in front"),
+    "raft": Arrangement(_neighbours, _raft, 3, "of one radius, on a hexagonal lattice, the first in the middle"),
+}
+"""By the names that case files use."""
 
 
 @dataclass(frozen=True)

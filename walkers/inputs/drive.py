@@ -19,6 +19,7 @@ LARGEST_RATIO = 24
 WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
     "sine": ((1, 1.0),),
     "triangle": tuple((k, 8.0 / pi**2 / k**2 * (-1.0) ** (k // 2)) for k in range(1, 10, 2)),
+    "sawtooth": tuple((k, 2.0 / pi / k * (-1.0) ** (k + 1)) for k in range(1, 10)),
 }
 """Of the acceleration: multiples of the frequency and shares of the peak. A triangle's series is cut at 0.96 of it."""
 _FEW = 3

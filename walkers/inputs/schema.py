@@ -159,7 +159,7 @@ class DriveTable(HarmonicTable):
     """
 
     frequency: units.Frequency | None = None  # type: ignore[assignment]
-    waveform: Literal["sine", "triangle"] = "sine"
+    waveform: Literal["sine", "triangle", "sawtooth"] = "sine"
     frame: Literal["lab", "container"] | None = None
     harmonics: Annotated[list[HarmonicTable], Field(max_length=24)] = []
 

@@ -1,7 +1,7 @@
-"""What is measured of a run, and by what: a list of analyses, each of which says for which cases it means something.
+"""What is measured of a run, and by what: analyses, each of which says for which cases it means something.
 
-To add one, write a class like `walkers.postprocess.walking.Walking` and name it in `ANALYSES`. What runs have of
-tables, results, text, reports and figures, and sweeps of columns, follows.
+A class in a module of `walkers.postprocess.analyses` is one more. What runs have of tables, results, text, reports and
+figures, and sweeps of columns, follows from what it declares.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from importlib import import_module
 from math import degrees, floor, isfinite, log10, nan
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from walkers.inputs.case import Case
@@ -28,16 +29,15 @@ from walkers.runner.manifest import MANIFEST_NAME, FileChanged, check_unchanged,
 if TYPE_CHECKING:  # how far a sweep is can be told without numpy
     from matplotlib.figure import Figure
 
+    from walkers.postprocess.figures import Panel
     from walkers.postprocess.motion import Bridges, Motion
     from walkers.postprocess.tables import Columns
 
-ANALYSES = ("walking.Walking", "meetings.Meetings", "piles.Pile")
-"""In the order in which results tell of them: their modules in this package and their classes."""
 RESULT_NAME = "result.json"
 _WIDTH = 110
 Described = Mapping[str, tuple[str, str]]
 """From the names of columns to their units and meanings."""
-_UNITS = {"m/s": ("mm/s", 1e3), "m": ("mm", 1e3), "rad": ("°", degrees(1.0)), "share": ("%", 100.0)}
+_UNITS = {"J": ("nJ", 1e9), "m/s": ("mm/s", 1e3), "m": ("mm", 1e3), "rad": ("°", degrees(1.0)), "share": ("%", 100.0)}
 """For units of the result, those that are shown, and how many of them one is."""
 _DIGITS = 4
 """Significant, of a number without an error; with one, so many that two digits of the error are seen."""
@@ -124,6 +124,12 @@ class Row:
         """In which all of them are shown."""
         return next((one.unit for one in (self.value, self.smallest) if one is not None), "")
 
+    @property
+    def text(self) -> str:
+        """The number with its standard error, if that shows, and its unit."""
+        value, error = ("" if one is None else one.text for one in (self.value, self.error))
+        return f"{value}{f' ± {error}' if error and 'e-' not in error else ''} {self.unit}".rstrip()
+
 
 def rounded(value: float, error: float | None = None) -> str:
     """A number with the digits that its error leaves (two of the error's), or four."""
@@ -150,11 +156,32 @@ def number_of(result: Mapping[str, Any], key: str, unit: str = "", error: float 
     return Number(key, value, shown, 1 if factor == 1.0 else factor, error)
 
 
+class Measured:
+    """A run whose figures are drawn: its motion and its tables (`tables_of`) are read when they are asked for, once."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory, self.case = directory, case_of(directory)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Of its beads."""
+        from walkers.postprocess.motion import read_motion
+
+        return read_motion(self.directory)
+
+    @cached_property
+    def tables(self) -> dict[str, Columns]:
+        """By their names."""
+        return tables_of(self.directory)
+
+
 class Analysis(ABC):
     """Something that is measured of runs.
 
     Attributes
     ----------
+    order
+        Results tell first of those that have a small one; their first line is the headline.
     version
         Of its method: results of another one are made anew.
     tables
@@ -163,8 +190,9 @@ class Analysis(ABC):
         Columns of a sweep's table that follow from a point's case, and those of `columns` that count first.
     """
 
+    order: ClassVar[int] = 9
     name: ClassVar[str]
-    version: ClassVar[int]
+    version: ClassVar[int] = 1
     tables: ClassVar[Mapping[str, type]]
     derived: ClassVar[Described] = {}
     headlines: ClassVar[tuple[str, ...]] = ()
@@ -187,9 +215,11 @@ class Analysis(ABC):
     def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
         """What it finds, in the order of reports; of an empty result, with all that have a column."""
 
-    @abstractmethod
     def lines(self, result: Mapping[str, Any]) -> list[str]:
-        """What it found, as text: mm, mm/s, degrees."""
+        """What it found, as text: here the numbers that reports have, with their errors, in mm, mm/s, degrees."""
+        rows = (one.row(result) for one in self.quantities(result) if one.label)
+        told = [f"{one.name} {one.text}" for one in rows if one.value is not None]
+        return [f"  {self.name:10} {'; '.join(told) or '-'}"]
 
     @property
     def columns(self) -> Described:
@@ -225,17 +255,28 @@ class Analysis(ABC):
         del motion
         return lambda _: {}
 
-    def figures(self, directory: Path) -> Mapping[str, Figure]:
-        """Its figures of a run, by the names of their files."""
-        del directory
+    def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
+        """What is plotted of a run, by the names of its figures' files; reports have all panels."""
+        del run
         return {}
+
+    def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
+        """A figure of its panels: here one below the other."""
+        from walkers.postprocess.figures import stacked
+
+        del name
+        return stacked(panels, run.case)
 
 
 @cache
 def analyses() -> tuple[Analysis, ...]:
-    """All analyses."""
-    places = (place.split(".") for place in ANALYSES)
-    return tuple(getattr(import_module(f"walkers.postprocess.{module}"), name)() for module, name in places)
+    """All analyses, in the order in which results tell of them."""
+    from walkers.postprocess.analyses import __name__ as package
+    from walkers.postprocess.analyses import __path__ as place
+
+    for module in iter_modules(place):
+        import_module(f"{package}.{module.name}")
+    return tuple(kind() for kind in sorted(Analysis.__subclasses__(), key=lambda kind: (kind.order, kind.name)))
 
 
 def analyses_of(case: Case) -> list[Analysis]:
@@ -356,7 +397,8 @@ def current_result(directory: str | Path) -> dict[str, Any]:
         result.setdefault("rests_on", [])  # of runs that did not say it
         lines_of_rest(result["rests_on"])
         versions = {one.name: one.version for one in wanted}
-        if result["analyses"].keys() == versions.keys() and all(one.can_show(result) for one in wanted):
+        there = analyses_in(result)  # without those that came later
+        if bool(there) == bool(wanted) and all(one.can_show(result) for one in there):
             kept = result
         whole = intact(directory, [name for one in wanted for name in one.tables])
         if kept and whole and check_unchanged(directory, [RESULT_NAME]) and result["analyses"] == versions:
@@ -437,8 +479,15 @@ def quantities_of(result: Mapping[str, Any]) -> list[Row]:
     return [row for row in rows if row.value is not None]
 
 
+def figures_of(directory: Path) -> dict[str, Figure]:
+    """The figures of a run, by the names of their files."""
+    run = Measured(directory)
+    found = {(name, one): panels for one in analyses_of(run.case) for name, panels in one.panels(run).items()}
+    return {name: one.draw(name, panels, run) for (name, one), panels in found.items() if panels}
+
+
 def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:
-    """Draw the figures of a run: of walkers ``walk`` and, if it was sampled often enough, ``gait``; of piles ``climb``.
+    """Draw the figures that the analyses of a run have, such as ``walk`` of walkers, ``climb`` of piles.
 
     Pictures of `walkers.postprocess.drawing.FORMATS` go to a folder, or to the run directory itself; an ``InputError``
     says that there is no such format.
@@ -446,11 +495,8 @@ def plot_run(directory: Path, destination: Path | None = None, formats: Sequence
     check_formats(formats)
     destination = destination or directory
     destination.mkdir(parents=True, exist_ok=True)
-    figures = {
-        name: figure for one in analyses_of(case_of(directory)) for name, figure in one.figures(directory).items()
-    }
     return [
         path
-        for name, figure in figures.items()
+        for name, figure in figures_of(directory).items()
         for path in save_figure(figure, destination / name, [directory.name], formats)
     ]

@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MOST_NAMED = 12  # walkers, or climbs, in a legend
+MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """How events are marked (`walkers.postprocess.clusters.Event`)."""
 _MARKERS = "so^vD"
+_HEIGHT = 1.6  # inches of a panel
 _GREY, _OTHERS = "#5b6770", "#c78a2c"
 
 
@@ -53,7 +54,7 @@ class Panel:
     """A plot: title, labels of its axes, lines from the lowest to the uppermost, and what is grey behind them.
 
     ``band`` are two lines of the same x with grey between them, ``settled`` the x up to which it is grey, ``log`` says
-    that y is logarithmic.
+    that y is logarithmic, ``zero`` that a figure shows where y is zero, ``height`` how high it is there, over others.
     """
 
     title: str
@@ -63,6 +64,8 @@ class Panel:
     band: tuple[Line, Line] | None = None
     settled: float = 0.0
     log: bool = False
+    zero: bool = False
+    height: float = 1.0
 
 
 def walk_panels(groups: list[Group]) -> list[Panel]:
@@ -79,7 +82,7 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
         for place, walker in enumerate(group.walkers):
             number = walker.walker
             told = f"{number}: {facing[int(walker.facing < 0)]}, {slope[place] * 1e3:.3g} mm/s"
-            look = (told if number < _MOST_NAMED else "", number)
+            look = (told if number < MOST_NAMED else "", number)
             walked.append(Line(time, distance[:, place] * 1e3, *look))
             turned.append(Line(time, np.degrees(group.orientation[::strobe, place]), *look))
             paths.append(Line(way[:, place] @ group.drive_axis, way[:, place] @ group.across_axis, *look))
@@ -122,11 +125,11 @@ def gait_panels(group: Group) -> list[Panel]:
         for number, name in enumerate(names)
     ]
     x = "time (cycles of the drive), the last two"
-    panels = [Panel(f"walker {first.walker}", x, "velocity; beads:\n−R dφ/dt (mm/s)", lines)]
+    panels = [Panel(f"walker {first.walker}", x, "velocity; beads:\n−R dφ/dt (mm/s)", lines, zero=True, height=2.5)]
     shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
     if np.any(shaken):  # faster than its walkers by far: in their panel it would make them all flat
         line = Line(phase, first.facing * shaken * 1e3, colour=_GREY, dashed=True)
-        panels.append(Panel("substrate, positive as for the walker", x, "velocity\n(mm/s)", [line]))
+        panels.append(Panel("substrate, positive as for the walker", x, "velocity\n(mm/s)", [line], zero=True))
     return panels
 
 
@@ -142,7 +145,7 @@ def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
         Line(time, 1e3 * bed[f"surface_{side}"], "surface, 10th to\n90th percentile") for side in ("low", "high")
     )
     leaders = [surface, *_leaders(tables), *_events(tables["events"])]
-    panels = [Panel("Clusters' leaders", x, "height (mm)", leaders, (low, high))]
+    panels = [Panel("Clusters' leaders", x, "height (mm)", leaders, (low, high), height=2.0)]
     segregation = {"brazil_nut": "all beads", "brazil_nut_of_bulk": "bulk alone"}
     joined = {"bridges": "bridges", "contacts": "contacts"}
     for title, y, columns in (
@@ -152,7 +155,7 @@ def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
     ):
         named = enumerate(columns.items())
         lines = [Line(time, bed[name], told, 2 * number, dashed=number > 0) for number, (name, told) in named]
-        panels.append(Panel(title, x, y, lines, log=len(lines) == 1))
+        panels.append(Panel(title, x, y, lines, log=len(lines) == 1, zero=columns is joined))
     return panels
 
 
@@ -164,12 +167,12 @@ def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
         own = (members["track"] == track) & (members["bead"] == leader)
         leads, speed = "large" if clusters["leader_large"][track] else "small", clusters["speed"][track] * 1e3
         told = f"{clusters['size'][track]} beads climb, led by a\n{leads} one: {speed:.1f} mm/s"
-        label = told if climbed and named[track] <= _MOST_NAMED else ""
+        label = told if climbed and named[track] <= MOST_NAMED else ""
         colour, width = (2, 1.6) if climbed else (_OTHERS, 0.6)
         yield Line(members["time"][own], members["height"][own] * 1e3, label, colour, width=width)
-    if len(named) and named[-1] > _MOST_NAMED:
+    if len(named) and named[-1] > MOST_NAMED:
         nothing = np.empty(0)
-        yield Line(nothing, nothing, f"and {named[-1] - _MOST_NAMED} more climbs", 2, width=1.6)
+        yield Line(nothing, nothing, f"and {named[-1] - MOST_NAMED} more climbs", 2, width=1.6)
 
 
 def _events(events: Columns) -> Iterator[Line]:
@@ -181,19 +184,13 @@ def _events(events: Columns) -> Iterator[Line]:
 
 
 @styled
-def walk_figures(groups: list[Group]) -> dict[str, Figure]:
-    """The figures of the walkers of a run, by name.
-
-    ``walk``: strobed positions, distance walked and orientation; and, if the run was sampled at least eight times a
-    cycle, ``gait``: velocity and rotation velocities through two cycles, as in Fig. 4 of Khan et al., and the
-    substrate's velocity.
-    """
+def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
+    """Strobed positions of the first walker; distance walked and orientation of all (`walk_panels`)."""
     rows = [["strobe", "walked"], ["strobe", "turned"]]
     figure, axes = new_figure(TWO_COLUMNS, 5.2, mosaic=rows, width_ratios=[1, 1.6])
-    title = _title(groups[0].case)
-    figure.suptitle(title)
+    figure.suptitle(_title(groups[0].case))
     _draw_strobe(axes["strobe"], groups[0])
-    for name, panel in zip(("walked", "turned"), walk_panels(groups), strict=False):
+    for name, panel in (("walked", walked), ("turned", turned)):
         _draw(axes[name], panel)
         axes[name].set_xlabel(panel.x)
         for number, line in enumerate(axes[name].lines):
@@ -201,31 +198,20 @@ def walk_figures(groups: list[Group]) -> dict[str, Figure]:
             line.set(**series_look(number), markevery=(number % 6, 6), linewidth=0.9)
     axes["walked"].set_title("grey: settling")
     letter_panels(axes.values())
-    more = f" (the first {_MOST_NAMED})" if sum(len(group.walkers) for group in groups) > _MOST_NAMED else ""
+    more = f" (the first {MOST_NAMED})" if sum(len(group.walkers) for group in groups) > MOST_NAMED else ""
     handles = axes["walked"].get_legend_handles_labels()
     told = f"walker: facing at the start, velocity{more}"
     figure.legend(*handles, loc="outside lower center", ncols=4, title=told)
-    figures = {"walk": figure}
-    if panels := gait_panels(groups[0]):
-        figures["gait"], below = _stacked(panels, title, 3.0 + 1.3 * len(panels), [2.5, 1.0][: len(panels)])
-        for one in below:
-            one.axhline(0.0, color="0.4", lw=0.6)
-    return figures
-
-
-@styled
-def climb_figure(case: Case, tables: Mapping[str, Columns]) -> Figure:
-    """What a pile did: `pile_panels`, one below the other."""
-    title = f"{plain_text(case.title or case.name)}\n{case.count} beads, {case.drive.described()}"
-    figure, axes = _stacked(pile_panels(tables), title, 8.0, [2, 1, 1, 1])
-    axes[2].set_ylim(0.0, None)
     return figure
 
 
-def _stacked(panels: Sequence[Panel], title: str, height: float, ratios: Sequence[float]) -> tuple[Figure, Any]:
-    """Panels one below the other, their legends beside them."""
+@styled
+def stacked(panels: Sequence[Panel], case: Case) -> Figure:
+    """Panels of a run of a case one below the other, their legends beside them."""
+    ratios = [panel.height for panel in panels]
+    height = _HEIGHT * sum(ratios)
     figure, axes = new_figure(TWO_COLUMNS, height, nrows=len(panels), height_ratios=ratios, sharex=True, squeeze=False)
-    figure.suptitle(title)
+    figure.suptitle(_title(case))
     for one, panel in zip(axes[:, 0], panels, strict=True):
         _draw(one, panel)
         one.set_title(panel.title)
@@ -234,7 +220,7 @@ def _stacked(panels: Sequence[Panel], title: str, height: float, ratios: Sequenc
     axes[-1, 0].set_xlabel(panels[-1].x)
     letter_panels(axes[:, 0] if len(panels) > 1 else ())
     figure.align_ylabels()
-    return figure, axes[:, 0]
+    return figure
 
 
 def _draw(axes: Axes, panel: Panel) -> None:
@@ -249,17 +235,21 @@ def _draw(axes: Axes, panel: Panel) -> None:
         axes.fill_between(low.x, low.y, high.y, color="0.85", lw=0, label=low.label, zorder=0)
     if panel.settled:
         axes.axvspan(0.0, panel.settled, color="0.93", zorder=0)
+    if panel.zero:
+        axes.axhline(0.0, color="0.4", lw=0.6)
     if panel.log:
         axes.set_yscale("log", nonpositive="mask")
     axes.set_ylabel(panel.y)
 
 
 def _title(case: Case) -> str:
-    makes = [" / ".join(f"{radius * 1e3:g}" for radius in make.radii) for make in case.walkers]
-    gamma0 = ""
-    if len(case.walkers[0].radii) == 2:
-        gamma0 = f" ($\\Gamma_0$ = {dimer_of(case).gamma0(case.drive.peak_acceleration):.3g})"
-    return f"{plain_text(case.title or case.name)}\nR = {'; '.join(makes)} mm, {case.drive.described()}{gamma0}"
+    shown, gamma0 = f"{case.count} beads", ""
+    if case.walkers and not case.loose:
+        makes = [" / ".join(f"{radius * 1e3:g}" for radius in make.radii) for make in case.walkers]
+        shown = f"R = {'; '.join(makes)} mm"
+        if len(case.walkers[0].radii) == 2:
+            gamma0 = f" ($\\Gamma_0$ = {dimer_of(case).gamma0(case.drive.peak_acceleration):.3g})"
+    return f"{plain_text(case.title or case.name)}\n{shown}, {case.drive.described()}{gamma0}"
 
 
 def _draw_strobe(axes: Axes, group: Group) -> None:

@@ -21,6 +21,8 @@ from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 
 FLOOR = 0
 """Number of the floor among the walls of a container; the others are the side walls."""
+LEAST_SAMPLES = 8
+"""A cycle, with which frames show what happens within one."""
 _OF_FRAMES = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin")
 _OF_BEADS = ("position", "velocity", "spin", "mean_spin")
 
@@ -81,7 +83,7 @@ class Motion:
     @property
     def follows_cycles(self) -> bool:
         """Whether frames follow each other closely enough to show what happens within a cycle of the drive."""
-        return self.case.run.samples_per_cycle >= 8
+        return self.case.run.samples_per_cycle >= LEAST_SAMPLES
 
     @property
     def driven(self) -> Motion:

@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.boundary import Flat
+from walkers.postprocess.analyses.piles import Pile, tracks_of
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, boundary_motion
-from walkers.postprocess.piles import Pile, tracks_of
 
 if TYPE_CHECKING:
     import pyvista as pv

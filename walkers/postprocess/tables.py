@@ -117,8 +117,7 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     directory
         The run directory.
     name
-        ``trajectory``, ``walkers``, ``bridges`` or ``meetings``, of a pile ``bed``, ``clusters``, ``events``,
-        ``members`` or ``profile``.
+        One of those of its analyses, such as ``trajectory``, ``walkers``, ``bridges``, of a pile ``bed``, ``clusters``.
 
     Returns
     -------

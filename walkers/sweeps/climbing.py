@@ -21,9 +21,9 @@ import numpy.typing as npt
 
 from walkers.inputs.changes import dotted
 from walkers.inputs.errors import refused
+from walkers.postprocess.analyses.piles import Pile, climbs_by
 from walkers.postprocess.analysis import tables_of
 from walkers.postprocess.clusters import ClimbCriteria
-from walkers.postprocess.piles import Pile, climbs_by
 from walkers.runner.directory import CASE_NAME, FinishedRun, finished_places, finished_run
 from walkers.sweeps.table import RECORD_NAME, read_record, result_in, states, value_text
 

@@ -9,9 +9,7 @@ from typing import Any
 from walkers.inputs.case import Case
 from walkers.inputs.changes import dotted
 from walkers.inputs.origins import Origin, text_of
-from walkers.postprocess.analysis import analyses_in, analyses_of, current_result, quantities_of, tables_of, warnings_of
-from walkers.postprocess.figures import Panel, gait_panels, pile_panels, velocity_panel, walk_panels
-from walkers.postprocess.motion import Motion, read_motion
+from walkers.postprocess.analysis import Measured, analyses_in, analyses_of, current_result, quantities_of, warnings_of
 from walkers.postprocess.report.page import NAME, check_report, drawn, fill, packed_plots, write_page
 from walkers.postprocess.report.player import MOST_PLACES, player_of
 from walkers.runner.directory import case_of
@@ -33,27 +31,17 @@ class RunReport:
     ) -> None:
         from bokeh.layouts import column
 
-        motion = read_motion(directory)
-        case = motion.case
+        run = Measured(directory)
+        case = run.motion.case
         self.id, self.name, self.title = section, directory.resolve().name, case.title or case.name
         self.shown = shown_of(case, current_result(directory), origins)
         self.manifest = read_json(directory / MANIFEST_NAME)
-        self.player = player_of(motion, places=places)
+        self.player = player_of(run.motion, places=places)
         self.carried = {f"player-{section}": base64.b64encode(self.player.plot.get_binary_snapshot(9)).decode()}
-        if panels := _panels(motion):
+        figures = (one for analysis in analyses_of(case) for one in analysis.panels(run).values())
+        if panels := [panel for figure in figures for panel in figure]:
             plots = column(*map(drawn, panels), sizing_mode="stretch_width")
             self.carried[f"plots-{section}"] = packed_plots(plots)
-
-
-def _panels(motion: Motion) -> list[Panel]:
-    """What is plotted of a run."""
-    case, tables = motion.case, tables_of(motion.directory)
-    names = {one.name for one in analyses_of(case)}
-    panels: list[Panel] = []
-    if "walking" in names:
-        groups = motion.groups
-        panels += [*walk_panels(groups), velocity_panel(case, tables["walkers"]), *gait_panels(groups[0])]
-    return [*panels, *(pile_panels(tables) if "pile" in names else [])]
 
 
 def report_run(directory: Path, to: Path | None = None, origins: Origins = None) -> Path:

@@ -1,12 +1,12 @@
-"""Commands on what is there: text, tables, pictures, files for other programs, archives; listing and removing."""
+"""Commands on many runs: sweeps, folders, archives; the paper, calibrations, checks of the engine."""
 
 from __future__ import annotations
 
 import sys
-from contextlib import suppress
+import warnings
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import typer
 from typer import Argument, Option
@@ -14,18 +14,22 @@ from typer import Argument, Option
 import walkers
 from walkers import DEFAULT_OUT
 from walkers.commands.arguments import (
+    AllowFailedAudit,
+    By,
     Case,
     CaseName,
+    EngineName,
     Formats,
+    Jobs,
     Json,
     OlderThan,
     Out,
-    Run,
     RunOrSweep,
     Set,
     SweepColumn,
     check_folder,
     load,
+    on_cores,
     print_as,
     print_lines,
     refuse,
@@ -33,12 +37,14 @@ from walkers.commands.arguments import (
 )
 from walkers.completion import offering
 
+if TYPE_CHECKING:
+    from walkers.check.report import Chapter
+    from walkers.inputs.case import Case as Resolved
+
+_MANY = 10_000
+"""Points of a sweep that take seconds to be resolved."""
+_SWEEP_FILE = "A sweep file, or a shipped sweep such as fig2."
 _SWEEP = "A sweep: its directory or its name in --out"
-_FOLDER = "Folder to write, replaced if it holds nothing else; RUN/vtk if left out."
-_EVERY = "One of so many samples of the drive; one a cycle if left out."
-_AS_PLACED = "Walkers where the deck has them, not side by side."
-_SLOWDOWN = "So many times slower than in reality; for 5 to 10 s."
-_INTERVAL = "Time between views of the whole, as '2 s' or 'T/4' (of a cycle)."
 _WITHIN = "Climbs until then, s of drive; if left out until the shortest run's end."
 _RUNS = "Runs and sweeps: names in --out, or directories."
 _REPORTED = "One of them: its directory, its name in --out, or a case."
@@ -48,170 +54,46 @@ _PILES = "Sweeps of piles, folders of runs, or runs (or their cases)."
 _NULL = "Runs in which nothing can climb: print their false climbs at each threshold beside; repeatable."
 
 
-def show(case: Case, settings: Set = None, as_json: Json = False) -> None:
-    """Show each value of a case and where it comes from, its forces, its time step and its cost."""
-    loaded = load(case, settings)
-    from walkers.runner.summary import describe, summarise
-
-    summary = summarise(loaded)
-    print_as(as_json, lambda: summary, lambda: describe(summary))
-
-
-def result(run: Run, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
-    """Print the result of a finished run."""
+def sweep(
+    sweep: str = Argument(metavar="SWEEP", help=_SWEEP_FILE, autocompletion=offering("sweep file")),
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    jobs: Jobs = None,
+    site: Path | None = Option(None, help="A site file: run on that cluster instead."),
+    dry_run: bool = Option(False, "--dry-run", help="Say what would be done, and its cost; write nothing."),
+    retries: int = Option(0, min=0, help="How often a failed point is tried again."),
+    limit: float | None = Option(None, min=0.0, help="Stop an engine after this many seconds."),
+    engine: EngineName = None,
+    allow_failed_audit: AllowFailedAudit = False,
+) -> int:
+    """Run the points of a sweep that are missing, on all cores or on a cluster; exit status 1 if any failed."""
     from dataclasses import replace
 
-    found = replace(walkers.find_run(run, out), cached=False)
-    print_as(as_json, lambda: found.result, found.describe)
+    from walkers.inputs.changes import settings_of
+    from walkers.inputs.sweep import load_sweep
+    from walkers.postprocess.analysis import lines_of_rest, rests_on
+    from walkers.progress import progress_of_sweep
+    from walkers.sweeps.scheduler import plan_sweep, run_sweep
+    from walkers.sweeps.site import load_site
+    from walkers.sweeps.table import describe_status
 
-
-def plot(
-    run: RunOrSweep,
-    out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help="Of a run the folder for its figures; of a sweep the file (.png, .pdf, .svg)."),
-    x: str | None = Option(None, help="Of a sweep: a key that varies, or a column of its table."),
-    y: SweepColumn = None,
-    hue: str | None = Option(None, help="Of a sweep: what colours tell apart; or none."),
-    panels: str | None = Option(None, help="Of a sweep: what panels tell apart; or none."),
-    log_x: bool = Option(False, "--logx", help="Of a sweep: x logarithmic."),
-    log_y: bool = Option(False, "--logy", help="Of a sweep: y logarithmic."),
-    theory: bool = Option(False, "--theory", help="Of a sweep: what the theory predicts, too."),
-    formats: Formats = None,
-) -> None:
-    """Draw a sweep's table; or a run: where walkers went and turned, and their gait; of a pile, what climbed."""
-    from walkers.pipeline import locate, run_at
-
-    place = locate(run, out)
-    if place.kind == "sweep":
-        refuse("--format", bool(formats), "is for runs: a sweep's figure has the format of --to's name")
-        log = "x" * log_x + "y" * log_y
-        print(walkers.plot_sweep(place.path, to, x=x, y=y, hue=hue, panels=panels, log=log, theory=theory))
-        return
-    given = {"--x": x, "--y": y, "--hue": hue, "--panels": panels, "--logx": log_x, "--logy": log_y, "--theory": theory}
-    for option, value in given.items():
-        refuse(option, bool(value), "is for sweeps")
-    print_lines(run_at(place, run).plot(to, formats or ["png"]))
-
-
-def render(
-    run: Run,
-    out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help="The PNG to write; in the run directory if left out."),
-    walker: int | None = Option(None, min=0, help="Number of a walker to show by itself."),
-    images: int | None = Option(None, min=1, max=20, help="How many times to show; 6 if left out."),
-    interval: str | None = Option(None, help=_INTERVAL),
-) -> None:
-    """Render a walker at several times, or views of a whole run (off-screen); for films: walkers film."""
-    from walkers.postprocess.series import render_series, seconds_apart
-
-    found, number = walkers.find_run(run, out), images or 6
-    refuse("--interval", interval is not None and walker is not None, "is for views of the whole")
-    if walker is not None:
-        count = sum(make.replicates for make in found.case.walkers)
-        refuse("--walker", not count, "the run has none")
-        refuse("--walker", walker >= count, f"expected less than {count}, the run's number of walkers")
-        print_lines(render_series(found.directory, to, images=number, walker=walker))
-    elif interval is not None:
-        apart = seconds_apart(interval, found.directory)
-        print_lines(render_series(found.directory, to, images=number, apart=apart))
-    else:
-        print_lines(found.render(to, images=number))
-
-
-def film(
-    run: Run,
-    out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help="The .mp4 or .gif to write; film.mp4 in the run directory."),
-    size: str = Option("720p", help="360p, 480p, 720p, 1080p, or pixels as 1280x720."),
-    fps: int = Option(25, min=1, max=60, help="Pictures a second."),
-    slowdown: float | None = Option(None, min=0.05, max=10000.0, help=_SLOWDOWN),
-    walker: int | None = Option(None, min=0, help="Number of the walker to show; the first one."),
-    begin: str | None = Option(None, "--from", help="Physical time of the first picture, as '0.1 s'."),
-    end: str | None = Option(None, "--until", help="Physical time of the last picture."),
-) -> None:
-    """Film a walker, a tray, a cluster or a pile: MP4 or GIF, with time, slow motion and scale (off-screen)."""
-    from walkers.postprocess.films import FilmOptions, parse_size, parse_time
-    from walkers.progress import progress_of_film
-
-    found = walkers.find_run(run, out)
-    options = FilmOptions(
-        size=parse_size(size),
-        fps=fps,
-        slowdown=slowdown,
-        walker=walker,
-        begin=parse_time("--from", begin) if begin else 0.0,
-        end=parse_time("--until", end) if end else None,
-    )
-    with progress_of_film(found.case.name) as advance:
-        path = found.film(to, options, on_progress=advance)
-    print(path)
-
-
-def vtk(
-    run: Run,
-    out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help=_FOLDER),
-    as_placed: bool = Option(False, "--as-placed", help=_AS_PLACED),
-    vtu: bool = Option(False, "--vtu", help="Also write the beads as .vtu."),
-    every: int | None = Option(None, min=1, help=_EVERY),
-) -> None:
-    """Write beads, bridges and boundary as .vtp with a .pvd in seconds."""
-    print(_run_to_place(run, out, as_placed).vtk(to, every=every, vtu=vtu, as_placed=as_placed))
-
-
-def paraview(
-    run: Run,
-    out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help=_FOLDER),
-    as_placed: bool = Option(False, "--as-placed", help=_AS_PLACED),
-    every: int | None = Option(None, min=1, help=_EVERY),
-    colour: str | None = Option(None, help="Array to colour the beads by; walker, else speed."),
-    start: bool = Option(False, "--open", help="Start ParaView with it."),
-) -> None:
-    """Write what walkers vtk writes and a script that shows it in ParaView: spheres, bridges, walls, time."""
-    from walkers.postprocess.paraview import open_paraview
-
-    found = _run_to_place(run, out, as_placed)
-    script = found.paraview(to, colour=colour, every=every, as_placed=as_placed)
-    print(script)
-    if start:
-        open_paraview(script)
-
-
-def _run_to_place(run: str, out: Path, as_placed: bool) -> walkers.Run:
-    """A run; ``--as-placed`` is refused of walkers that are nowhere else."""
-    found = walkers.find_run(run, out)
-    wrong = as_placed and not found.case.apart
-    refuse("--as-placed", wrong, "is for independent walkers: these stand where they are")
-    return found
-
-
-def export(
-    run: Run,
-    to: Path = Option(help="The .xyz (extended XYZ) or .lammpstrj (LAMMPS dump) to write."),
-    out: Out = DEFAULT_OUT,
-    every: int = Option(1, min=1, help="One of so many samples of the drive."),
-) -> None:
-    """Write the beads' trajectory as extended XYZ or as a LAMMPS dump: mm, s, relative to the boundary."""
-    print(walkers.find_run(run, out).export(to, every=every))
-
-
-def theory(case: Case, settings: Set = None, out: Out = DEFAULT_OUT, as_json: Json = False) -> None:
-    """Print what the paper's model and its extensions predict, beside the engine's result if the case was run."""
-    from walkers.inputs.errors import InputError, Problem
-    from walkers.runner.failures import EngineMissing
-    from walkers.theory.prediction import describe, predict
-
-    try:
-        loaded = load(case, settings)
-        prediction = predict(loaded)
-    except ValueError as error:
-        key, _, told = str(error).partition(": ")
-        raise InputError(case, [Problem(key, None, told)]) from error
-    found: dict[str, Any] | None = None
-    with suppress(InputError, EngineMissing):  # not run yet, or never to be run here
-        found = walkers.find_run(loaded, out).result
-    print_as(as_json, lambda: {**prediction, "engine": found}, lambda: describe(prediction, found))
+    loaded = load_sweep(sweep, settings_of(settings or ()))
+    check_folder("--out", out)
+    refuse("--jobs", jobs is not None and site is not None, "a site says by itself how many decks run at once")
+    if len(loaded.rows) > _MANY:
+        tell(f"{loaded.name}: resolving {len(loaded.rows)} points, some 2,000 a second")
+    options = replace(on_cores(jobs), site=load_site(site) if site else None, retries=retries, time_limit=limit)
+    if dry_run:
+        print(plan_sweep(loaded, out, options, engine).as_text())
+        return 0
+    with progress_of_sweep(loaded.name) as advance:
+        how = By(engine=engine, allow_failed_audit=allow_failed_audit)
+        record, failures = run_sweep(loaded, out.resolve() if site else out, options, on_progress=advance, **how)
+    tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
+    print(describe_status(record.directory))
+    same = [one for one in next(loaded.cases()).origins if one.key not in loaded.keys]  # what varies is in the table
+    print_lines(lines_of_rest(rests_on(same)))
+    return 1 if failures else 0
 
 
 def status(
@@ -407,3 +289,157 @@ def archive(
     place = locate(what, out)
     refuse(what, place.kind == "archive", "an archive: unpack it and give a run or a sweep in it")
     print(write_archive(place.path, to, ArchiveOptions(not without_dumps, authors, licence)))
+
+
+def figures(
+    out: Out = DEFAULT_OUT,
+    to: Path = Option(Path("figures"), help="Folder of the figures."),
+    only: list[str] | None = Option(None, help="Name of a figure, or comparison; may be repeated."),
+    formats: Formats = None,
+    jobs: Jobs = None,
+    engine: EngineName = None,
+    allow_failed_audit: AllowFailedAudit = False,
+) -> int:
+    """Draw the paper's figures with engine, theory and published values; runs that are missing are made first."""
+    from walkers.paper.make import FORMATS, make_figures
+    from walkers.progress import progress_of_sweep
+
+    how = By(engine=engine, allow_failed_audit=allow_failed_audit)
+    wanted, shown = only or (), formats or FORMATS
+    made = make_figures(out, to, on_cores(jobs), only=wanted, formats=shown, progress_of=progress_of_sweep, **how)
+    for name, failures in made.failures.items():
+        tell(*(f"{name}: point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
+    tell(*(f"{figure} is left out: {reason}" for figure, reason in made.left_out.items()))
+    print_lines(made.files)
+    if made.compared:
+        print(f"{made.agree} of {made.compared} published numbers agree: {to / 'comparison.md'}")
+    return 1 if made.failures or made.left_out else 0
+
+
+def model_terms(to: Path = Option(Path("figures"), help="Folder of the table.")) -> None:
+    """Fit the theory to the published numbers with one term after the other; no engine is needed."""
+    from walkers.paper.model_terms import PAGE_NAME, try_model_terms
+
+    check_folder("--to", to)
+    print_lines(f"misfit {one.misfit:5.1f}, {one.met:2d} met: {one.name}" for one in try_model_terms(to))
+    print(to / PAGE_NAME)
+
+
+def calibrate(
+    calibration: str = Argument(
+        metavar="CALIBRATION", help="A calibration file, or a shipped calibration such as ruby."
+    ),
+    out: Out = DEFAULT_OUT,
+    to: Path | None = Option(None, help="Folder of tables and figures; OUT/NAME if left out."),
+    jobs: Jobs = None,
+    engine: EngineName = None,
+    allow_failed_audit: AllowFailedAudit = False,
+) -> int:
+    """Calibrate, or go on with it: waves of runs, emulators, posterior, predictions by the engine."""
+    from walkers.calibration.calibrate import calibrate
+    from walkers.calibration.report import write_outcome
+    from walkers.inputs.calibration import load_calibration
+    from walkers.progress import progress_of_sweep
+
+    read = load_calibration(calibration)
+    check_folder("--out", out)
+    folder = to or out / read.name
+    check_folder("--to", folder)
+    how = By(engine=engine, allow_failed_audit=allow_failed_audit)
+    found = calibrate(read, out, on_cores(jobs), progress_of=progress_of_sweep, **how)
+    tell(*(f"{name}: {len(failures)} points failed" for name, failures in found.failures.items()))
+    print_lines(write_outcome(found, folder))
+    return 0  # a set whose run fails is an outcome: it counts as far off
+
+
+def audit(
+    only: list[str] | None = Option(None, help="Name of a check; may be repeated."),
+    quick: bool = Option(False, "--quick", help="Leave out the checks that take longest."),
+    as_json: Json = False,
+    engine: EngineName = None,
+) -> int:
+    """Measure forces of engine and contact model beside a second engine and closed forms; exit 1 if a line fails."""
+    from walkers.check.audit import record, run_audit, selected
+    from walkers.inputs.errors import refused
+    from walkers.runner.binary import find_engine
+    from walkers.runner.failures import EngineMissing
+
+    checks = selected(only or (), quick=quick)
+    try:
+        binary = find_engine(engine)
+    except EngineMissing as missing:
+        if engine is None:
+            raise
+        raise refused("--engine", str(missing)) from missing
+    report = run_audit(checks, engine=binary, on_done=_tell_seconds)
+    print_as(as_json, report.as_dict, report.as_text)
+    if not only:
+        try:
+            record(report, quick=quick)
+        except OSError as error:
+            warnings.warn(f"the outcome cannot be kept: {error}", stacklevel=1)
+    return 1 if report.failures else 0
+
+
+def crosscheck(
+    case: Case,
+    out: Out = DEFAULT_OUT,
+    cycles: int | None = Option(None, help="Of the drive, in place of the case's own."),
+    without: list[str] | None = Option(None, metavar="TERM", help="Leave a term out, such as friction."),
+    settings: Set = None,
+    seeds: int = Option(1, min=1, help="Of a pile: so many starts, for the statistics."),
+    as_json: Json = False,
+    engine: EngineName = None,
+    allow_failed_audit: AllowFailedAudit = False,
+) -> int:
+    """Compare a case's run with an engine of our own, written from the published formulas; exit 1 if they differ."""
+    from walkers.check.crosscheck import crosscheck, shortened
+    from walkers.check.engine import TERMS
+    from walkers.check.report import as_dict
+    from walkers.inputs.errors import refused
+    from walkers.progress import progress_of
+
+    loaded = load(case, settings)
+    check_folder("--out", out)
+    refuse("--seeds", seeds > 1 and loaded.mixture is None, "is for piles: walkers and placed beads start but one way")
+    for term in without or ():
+        refuse(f"--without {term}", term not in TERMS, f"expected one of {', '.join(TERMS)}")
+    try:
+        loaded = loaded if cycles is None else shortened(loaded, cycles)
+    except ValueError as error:
+        raise refused("--cycles", str(error)) from error
+
+    def make(one: Resolved, folder: Path) -> walkers.Run:
+        with progress_of(one.name) as advance:
+            return walkers.run(one, folder, engine=engine, progress=advance, allow_failed_audit=allow_failed_audit)
+
+    found = crosscheck(loaded, out, without or (), seeds=seeds, make=make)
+    chapter = found.chapter()
+    print_as(as_json, lambda: as_dict([chapter], case=loaded.name, without=list(found.without)), chapter.as_text)
+    if not as_json:
+        tell(*(f"{loaded.name}: differs: {line.what}" for line in chapter.failures))
+    return 1 if chapter.failures else 0
+
+
+def validate(
+    chapters: list[str] | None = Argument(None, metavar="[CHAPTER]...", help="Some chapters; all if left out."),
+    quick: bool = Option(False, "--quick", help="Of each the part that takes seconds."),
+    out: Out = DEFAULT_OUT,
+    to: Path | None = Option(None, help="Folder of the page; OUT/validation if left out."),
+    jobs: int | None = Option(None, "-j", "--jobs", min=1, help="Chapters at once; all cores if left out."),
+    as_json: Json = False,
+) -> int:
+    """Check the decks against published benchmarks, exact solutions and a second engine, and write a page of it."""
+    from walkers.check.report import as_dict, validate
+
+    check_folder("--out", out)
+    folder, cores = to or out / "validation", on_cores(jobs).workers
+    check_folder("--to", folder)
+    made = validate(out, folder, only=chapters or (), quick=quick, jobs=cores, on_done=_tell_seconds)
+    print_as(as_json, lambda: as_dict(made.chapters), lambda: "\n".join(map(str, made.files)))
+    tell(*(f"not as expected: {statement}" for statement in made.failed))
+    return 1 if made.failed else 0
+
+
+def _tell_seconds(chapter: Chapter) -> None:
+    tell(f"{chapter.name} ({chapter.seconds:.1f} s)")

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
-from walkers.postprocess.analysis import Analysis, Described, Quantity, tables_of
+from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity, tables_of
 from walkers.postprocess.clusters import (
     Assembly,
     Beads,
@@ -35,10 +34,9 @@ from walkers.postprocess.clusters import (
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
 from walkers.postprocess.tables import Columns, columns_of, columns_of_rows
-from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from walkers.postprocess.figures import Panel
 
 _LAYERS = 0.5
 """Thickness of the layers of the packing profile, in diameters of the largest bead."""
@@ -98,6 +96,7 @@ class Member:
 class Pile(Analysis):
     """What loose beads in a container do: the bed, and the clusters that climb."""
 
+    order = 2
     name = "pile"
     version = 8
     tables: ClassVar[Mapping[str, type]] = {
@@ -258,11 +257,11 @@ class Pile(Analysis):
 
         return of_frame
 
-    def figures(self, directory: Path) -> Mapping[str, Figure]:
+    def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
         """Heights of the clusters, their events, segregation and agitation."""
-        from walkers.postprocess.figures import climb_figure
+        from walkers.postprocess.figures import pile_panels
 
-        return {"climb": climb_figure(case_of(directory), tables_of(directory))}
+        return {"climb": pile_panels(run.tables)}
 
 
 def _late(motion: Motion) -> BoolArray:

@@ -10,7 +10,7 @@ a simulation must be a small part.
 
 A law of one's own takes another constant, in a file of its own, by its name there (`walkers.physics.laws`):
 
-    law = functools.partial(walkers.physics.van_der_waals.law, hamaker_constant=15e-20)
+    law = functools.partial(walkers.physics.laws.van_der_waals.law, hamaker_constant=15e-20)
 
 References
 ----------

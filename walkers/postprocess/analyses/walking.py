@@ -7,18 +7,17 @@ smallest, with the walkers that face left and right also apart.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import degrees, nan, sqrt
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
-from walkers.postprocess.analysis import Analysis, Described, Quantity
+from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.gait import (
     POSTURES,
@@ -34,11 +33,13 @@ from walkers.postprocess.gait import (
     walk,
     ways,
 )
-from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges, read_motion
+from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from walkers.postprocess.figures import Panel
 
 SAME = 0.05
 """Walkers that faced either way and differ by more than this share are told apart first of all."""
@@ -124,6 +125,7 @@ class BridgeRows:
 class Walking(Analysis):
     """How walkers walk."""
 
+    order = 0
     name = "walking"
     version = 5
     tables: ClassVar[Mapping[str, type]] = {"trajectory": Trajectory, "walkers": WalkerRows, "bridges": BridgeRows}
@@ -262,11 +264,19 @@ class Walking(Analysis):
             warnings.append("walkers came close to each other and are not independent: give them more spacing")
         return warnings
 
-    def figures(self, directory: Path) -> Mapping[str, Figure]:
-        """Where they went and turned, and their gait if it was sampled often enough."""
-        from walkers.postprocess.figures import walk_figures
+    def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
+        """Where they went and turned, how fast; and their gait if it was sampled often enough."""
+        from walkers.postprocess.figures import gait_panels, velocity_panel, walk_panels
 
-        return walk_figures(read_motion(directory).groups)
+        groups = run.motion.groups
+        walked = [*walk_panels(groups), velocity_panel(run.case, run.tables["walkers"])]
+        return {"walk": walked, "gait": gait_panels(groups[0])}
+
+    def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
+        """How they walked beside a walker's beads, to scale."""
+        from walkers.postprocess.figures import walk_figure
+
+        return walk_figure(run.motion.groups, *panels[:2]) if name == "walk" else super().draw(name, panels, run)
 
 
 def _stacked(parts: list[Columns]) -> Columns:
@@ -344,7 +354,7 @@ def _bridge_rows(motion: Motion, bridges: Bridges, contact_of: Mapping[tuple[int
     )
 
 
-def _spread(values: FloatArray, error_of_one: float = nan) -> dict[str, Any]:
+def spread(values: FloatArray, error_of_one: float = nan) -> dict[str, Any]:
     """Mean, extremes and standard error of the mean over replicates (of a single one: that of its fit)."""
     count = len(values)
     if count == 0:
@@ -375,10 +385,10 @@ def _summary(walkers: Columns) -> dict[str, Any]:
         return {f"{named}_{name.rpartition('_')[2]}": _mean(walkers[name]) for name in columns}
 
     return {
-        "velocity": _spread(velocity, float(walkers["standard_error"][0])),
-        "right_facing": _spread(velocity[facing > 0]),
-        "left_facing": _spread(velocity[facing < 0]),
-        "kept_heading": _spread(velocity[~turned]),
+        "velocity": spread(velocity, float(walkers["standard_error"][0])),
+        "right_facing": spread(velocity[facing > 0]),
+        "left_facing": spread(velocity[facing < 0]),
+        "kept_heading": spread(velocity[~turned]),
         "axial_velocity": {
             "mean": _mean(axial),
             "right_facing": _mean(axial[facing > 0]),
@@ -389,7 +399,7 @@ def _summary(walkers: Columns) -> dict[str, Any]:
         "sliding": means("sliding", "contact"),
         "open": means("open", "contact"),
         "separated_fraction": _mean(walkers["separated_fraction"]),
-        "orientation_end": _spread(walkers["orientation_end"]),
+        "orientation_end": spread(walkers["orientation_end"]),
         "steady": int(np.sum(walkers["steady"])),
         "turned_round": int(np.sum(turned)),
         "walkers": len(velocity),

@@ -54,7 +54,7 @@ def law(surfaces: Surfaces) -> Curve:
 def _solved(other_radius: float, volume: float, contact_angle: float) -> tuple[float, Chebyshev]:
     """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's radius."""
     shape = (other_radius, volume, contact_angle)
-    source = Path(__file__).with_name("laplace.py").read_bytes()  # what is kept is of this solver
+    source = Path(__file__).parents[1].joinpath("laplace.py").read_bytes()  # what is kept is of this solver
     name = sha256(source + repr((NODES, _SMALL, shape)).encode()).hexdigest()[:24]
     place = user_cache_path("granular-walkers") / "young-laplace" / f"{name}.npy"
     try:

@@ -29,8 +29,8 @@ class Meeting:
 class Meetings(Analysis):
     """Who met whom, how long they stuck, how many were together."""
 
+    order = 1
     name = "meetings"
-    version = 1
     tables: ClassVar[Mapping[str, type]] = {"meetings": Meeting}
 
     def applies(self, case: Case) -> bool:

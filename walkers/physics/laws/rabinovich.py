@@ -22,12 +22,14 @@ from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 from walkers.physics.capillary import derjaguin_radius, rupture_distance
 
+PUBLISHED = "Rabinovich 2005"
+
 
 def lambert(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
     """Rabinovich et al.'s without its second term, as Lambert et al. (2008) correct it: 2πRγ cos θ / (1 + h / 2d).
 
     d, half the immersed height, from the volume: 2d/h = -1 + √(1 + 2V / πRh²) (Rabinovich et al., Eq. 20).
-    Parameters and result as for `walkers.physics.soulie.pull`.
+    Parameters and result as for `walkers.physics.laws.soulie.pull`.
     """
     radius = derjaguin_radius(radius_1, radius_2)
     # h / 2d without a division by h.

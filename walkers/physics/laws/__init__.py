@@ -1,7 +1,8 @@
 """Laws of liquid bridges by name: those that come with the program, and a user's own.
 
-A law is a function `Surfaces → Curve` (`walkers.physics.bridge`), in a file of its own with its equation and source. A
-user's own is named by where it is, ``package.module:function`` or ``path/to/file.py:function``.
+A law is a function `Surfaces → Curve` (`walkers.physics.bridge`). Those that come with the program are the functions
+``law`` of the files beside this one, each with its equation and source, named as the file; another file there is
+another law. A user's own is named by where it is, ``package.module:function`` or ``path/to/file.py:function``.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from inspect import getsourcefile
 from pathlib import Path
+from pkgutil import iter_modules
 from types import ModuleType
 from typing import TYPE_CHECKING
 
@@ -20,14 +22,8 @@ from walkers.physics.matter import Liquid
 if TYPE_CHECKING:  # numpy is not needed to know a law by its name
     from walkers.physics.bridge import BridgeLaw
 
-LAWS = {
-    "soulie": "walkers.physics.soulie",
-    "young-laplace": "walkers.physics.young_laplace",
-    "willett": "walkers.physics.willett",
-    "rabinovich": "walkers.physics.rabinovich",
-    "van-der-waals": "walkers.physics.van_der_waals",
-}
-"""Modules whose function ``law`` is the law of that name."""
+LAWS = tuple(one.name.replace("_", "-") for one in iter_modules(__path__))
+"""Names of those that come with the program."""
 
 
 def by_name(name: str) -> BridgeLaw:
@@ -38,7 +34,9 @@ def by_name(name: str) -> BridgeLaw:
     ValueError
         If there is none of this name; what a user's own file or module raises is the error's cause.
     """
-    place, _, function = name.rpartition(":") if name not in LAWS else (LAWS[name], "", "law")
+    place, _, function = name.rpartition(":")
+    if name in LAWS:
+        place, function = f"{__name__}.{name.replace('-', '_')}", "law"
     if not place or not function:
         raise ValueError(
             f"bridge law {name!r}: expected one of {', '.join(LAWS)}, package.module:function or file.py:function"

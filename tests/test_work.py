@@ -1,0 +1,28 @@
+"""The work of the drive on walkers."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from walkers.inputs.loads import contact_loads, dimer_of
+from walkers.postprocess import current_result, read_table
+from walkers.postprocess.analysis import describe_result, figures_of
+from walkers.runner.directory import case_of
+
+
+def test_the_drive_pays_for_what_slides(run_directory: Callable[..., Path]) -> None:
+    """Equal beads that keep each other from rolling, hardly held by friction: 4 A μ N in a cycle, to no end."""
+    directory = run_directory(
+        dimers={"radii": ["0.25 mm", "0.25 mm"], "replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
+        liquid={"viscosity_ratio": 1e-4},
+        contact={"friction": {"bead_wall": 0.01, "bead_bead": 1.0}, "rolling_friction": 0.0},
+        run={"cycles": 60, "settling_cycles": 50, "samples_per_cycle": 20},
+    )
+    case, result = case_of(directory), current_result(directory)
+    pressed = sum(contact_loads(case).capillary[:2]) + dimer_of(case).total_mass * case.pressing_gravity
+    assert result["work"]["mean"] == pytest.approx(4.0 * case.drive.amplitude * 0.01 * pressed, rel=0.02)
+    assert result["cost_of_transport"]["n"] == 0
+    assert read_table(directory, "work")["work"][50:].mean() == pytest.approx(result["work"]["mean"])
+    assert f"of the drive in a cycle {1e9 * result['work']['mean']:.4g} nJ\n" in describe_result(directory, result)
+    assert len(figures_of(directory)["work"].axes) == 1

@@ -1,0 +1,116 @@
+"""The analysis of the work that the drive does on walkers, and of what their way costs.
+
+In the frame of the walls the shaking is an inertial force -M a(t) at a walker's mass centre, a being the walls'
+acceleration. Its work in a cycle, W = -M ∮ a · dx along the way x of the mass centre relative to the walls, is what
+friction, bridges and collisions dissipate of a steady walker; in the laboratory it is the work of the walls' forces.
+With v the velocity along the heading and f the drive's frequency, the cost of transport is f W / (M g |v|): the
+power over that of lifting the walker as fast as it walks.
+
+With 20 samples a cycle the work is that with 200 within 0.01 %, with 10 within 0.2 %.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import pi
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from walkers.inputs.case import Case
+from walkers.physics.units import ACCELERATION_OF_ONE_G
+from walkers.postprocess.analyses.walking import spread
+from walkers.postprocess.analysis import Analysis, Measured, Quantity
+from walkers.postprocess.dump import FloatArray, IntArray
+from walkers.postprocess.figures import MOST_NAMED, Line, Panel
+from walkers.postprocess.gait import STEADY_SPEED, walk
+from walkers.postprocess.motion import LEAST_SAMPLES, Group, Motion
+from walkers.postprocess.tables import Columns, columns_of
+
+_PARTS = 10
+"""Of an interval between samples: with 20 samples a cycle a 200th of it, over which the force is that of its middle."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """``work.parquet``: one row per walker and cycle."""
+
+    walker: Annotated[IntArray, "", "number of the walker, from 0"]
+    cycle: Annotated[IntArray, "", "number of the cycle of the drive, from 0"]
+    work: Annotated[FloatArray, "J", "of the drive on the walker in this cycle"]
+
+
+class Working(Analysis):
+    """What the drive spends on walkers."""
+
+    name = "work"
+    tables: ClassVar[Mapping[str, type]] = {"work": Work}
+
+    def applies(self, case: Case) -> bool:
+        """Of walkers whose cycles are followed."""
+        return bool(case.walkers) and case.run.samples_per_cycle >= LEAST_SAMPLES
+
+    def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
+        """The work in each cycle; its mean over those after the settling ones, and what the way costs."""
+        groups, settled = motion.groups, motion.case.run.settled_strobes
+        works = [work_of(group) for group in groups]
+        means = [work[settled:].mean(axis=0) for work in works]
+        costs = [mean / _lifted(group) for mean, group in zip(means, groups, strict=True)]
+        walker, cycles = [one.walker for group in groups for one in group.walkers], len(works[0])
+        each = np.concatenate(works, axis=1).T.reshape(-1)
+        rows = Work(np.repeat(walker, cycles), np.tile(np.arange(cycles), len(walker)), each)
+        cost = np.concatenate(costs)
+        summary = {"work": spread(np.concatenate(means)), "cost_of_transport": spread(cost[np.isfinite(cost)])}
+        return {"work": columns_of(rows)}, summary
+
+    def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
+        """Of a cycle, and of the way."""
+        del result
+        yield Quantity(
+            "work", "of the drive in a cycle", "J", "work", "of the drive on a walker in a cycle, their mean"
+        )
+        told = "power of the drive over that of lifting a walker as fast as it walks, mean over the walkers"
+        yield Quantity("cost_of_transport", "cost of transport", "", "cost_of_transport", told)
+
+    def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
+        """The work on each walker, cycle by cycle."""
+        walker, cycle, work = run.tables["work"].values()
+        lines = []
+        for number in range(walker.max() + 1):
+            these, label = walker == number, f"walker {number}" if number < MOST_NAMED else ""
+            lines.append(Line(cycle[these], 1e9 * work[these], label, number))
+        settled = float(run.motion.case.run.settled_strobes)
+        title = "Work of the drive on each walker; grey: settling"
+        panel = Panel(title, "cycle of the drive", "work (nJ)", lines, settled=settled, zero=True)
+        return {"work": [panel]}
+
+
+def _mass(group: Group) -> float:
+    """Of each walker, kg."""
+    return float(4.0 / 3.0 * pi * np.sum(group.radii**3) * group.case.density)
+
+
+def _lifted(group: Group) -> FloatArray:
+    """Work to lift each walker as far as it walks in a cycle, J, shape (W,); NaN of those that hardly walk."""
+    speed = np.abs(walk(group).velocity)
+    speed[speed < STEADY_SPEED] = np.nan
+    return _mass(group) * ACCELERATION_OF_ONE_G * speed / group.case.drive.frequency
+
+
+def work_of(group: Group) -> FloatArray:
+    """Of the drive on each walker in each cycle, J, shape (cycles, W)."""
+    shares = np.linspace(0.0, 1.0, _PARTS + 1)
+    ways = [Group(group.motion.between(share), group.make, group.walkers).mass_centre for share in shares]
+    begin, interval = group.time[:-1], np.diff(group.time)
+    work = np.zeros(ways[0].shape[:2])
+    for part, (one, next_one) in enumerate(pairwise(ways)):
+        time = begin + (part + 0.5) / _PARTS * interval
+        for harmonic in group.case.drive.harmonics:
+            phase = harmonic.angular_frequency * time + harmonic.phase
+            pull = harmonic.peak_acceleration * np.sin(phase)
+            work += pull[:, None] * ((next_one - one) @ np.array(harmonic.direction))
+    samples = group.case.run.samples_per_cycle
+    cycles = len(work) // samples
+    return np.asarray(_mass(group) * work[: cycles * samples].reshape(cycles, samples, -1).sum(axis=1))
