@@ -195,7 +195,8 @@ def test_tables_made_anew_are_what_the_manifest_says(run: Path) -> None:
     _verified(run)
     again = FinishedRun(run).manifest["tabulated"]
     assert again["commit"] == software().commit
-    assert set(again["files"]) == {"result.json", "walkers.parquet", "trajectory.parquet", "bridges.parquet"}
+    tables = {f"{name}.parquet" for name in ("walkers", "trajectory", "bridges", "work")}
+    assert set(again["files"]) == {"result.json", *tables}
 
 
 # --- archives ---------------------------------------------------------------------------------------------------------
@@ -217,7 +218,7 @@ def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
     assert Run(there).result == Run(run).result
     assert load_case(there / "test.toml") == make_case(run=SHORT)
     call("plot", str(there), check=True)
-    assert _verified(unpacked)[1:] == [f"  made since runs/{run.name}/ (2 files)"]
+    assert _verified(unpacked)[1:] == [f"  made since runs/{run.name}/ (3 files)"]
     (there / "segments" / "0001").mkdir()
     (there / "result.json").unlink()
     (there / "result.json").symlink_to("nowhere")
