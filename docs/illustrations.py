@@ -140,10 +140,12 @@ _SHOWN = ("walking", "meetings", "pile")  # analyses of what they show
 
 def digest(cases: Iterable[Case]) -> str:
     """Twelve hex digits over all that cases' runs depend on but the engine's binary, and over how they are measured."""
+    cases = list(cases)
+    shown = [one for one in analyses() if one.name in _SHOWN and any(map(one.applies, cases))]
     told = {
         "cases": [case.determinants() for case in cases],
         "decks": CONTENT_VERSION,
-        "analyses": {one.name: one.version for one in analyses() if one.name in _SHOWN},
+        "analyses": {one.name: one.version for one in shown},
     }
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12]
 

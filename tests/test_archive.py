@@ -138,7 +138,7 @@ def test_what_changed_is_named(run: Path, tmp_path: Path) -> None:
     for name in ("film.mp4", "vtk/walkers_0000.vtp", "vtk/walkers_0001.vtp", ".DS_Store", "test.toml"):
         (run / name).parent.mkdir(exist_ok=True)
         (run / name).write_bytes(b"new")
-    since = [f"  made since {name}" for name in (".DS_Store", "film.mp4", "test.toml", "vtk/ (2 files)")]
+    since = [f"  made since {name}" for name in (".DS_Store", "film.mp4", "test.toml", "vtk/ (3 files)")]
     assert _verified(run)[1:] == since
     dump = run / "segments" / "0000" / "beads.bin"
     dump.write_bytes(bytes([dump.read_bytes()[0] ^ 1]) + dump.read_bytes()[1:])
@@ -201,7 +201,7 @@ def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
     assert Run(there).result == Run(run).result
     assert load_case(there / "test.toml") == make_case(run=SHORT)
     call("plot", str(there), check=True)
-    assert _verified(unpacked)[1:] == [f"  made since runs/{run.name}/ (2 files)"]
+    assert _verified(unpacked)[1:] == [f"  made since runs/{run.name}/ (3 files)"]
     (there / "segments" / "0001").mkdir()
     (there / "result.json").unlink()
     (there / "result.json").symlink_to("nowhere")

@@ -88,7 +88,7 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     assert run is not None
     assert {path.name for path in run.directory.iterdir()} == {
         *("case.json", "manifest.json", "result.json", "segments"),
-        *("trajectory.parquet", "walkers.parquet", "bridges.parquet"),
+        *("trajectory.parquet", "walkers.parquet", "bridges.parquet", "work.parquet"),
     }
     assert {path.name for path in (run.directory / "segments").iterdir()} == {"0000"}
     assert {path.name for path in (run.directory / FIRST_SEGMENT).iterdir()} == {
