@@ -471,6 +471,7 @@ def test_a_longer_run_does_not_make_climbs_likelier(monkeypatch: pytest.MonkeyPa
     everything = summed_up(monkeypatch, results)
     assert (everything["climbed"], everything["out_of_pile"]["climbed"]) == (4, 2)
     assert everything["out_of_pile"]["onsets"] == [1.0, 2.0]
+    assert everything["median"] == 2.0  # half have qualified then; half had begun a second before
 
 
 def test_runs_of_different_lengths_tell_one_probability(monkeypatch: pytest.MonkeyPatch) -> None:
