@@ -100,6 +100,7 @@ def run(
     """Run cases, unless they have been run, and print their results (with --json an object a line)."""
     from walkers.progress import progress_of, progress_of_sweep
     from walkers.runner.failures import EngineFailure
+    from walkers.runner.summary import notes
 
     refuse("--points", points is not None and not spread, "is for --spread")
     loaded = [load(case, settings) for case in cases]  # a mistake in the last file shows before the first run starts
@@ -111,6 +112,7 @@ def run(
             list(spread_sweep(case, points or POINTS, engine).cases())
     failed, how = False, By(engine=engine, allow_failed_audit=allow_failed_audit)
     for case in loaded:
+        tell(*(f"{case.name}: {note}" for note in notes(case)))
         try:
             with progress_of(case.name) as advance:
                 done = walkers.run(case, out, force=force, progress=advance, time_limit=limit, **how)

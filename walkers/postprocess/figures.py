@@ -175,6 +175,40 @@ def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
         yield Line(nothing, nothing, f"and {named[-1] - MOST_NAMED} more climbs", 2, width=1.6)
 
 
+def assembly_panels(tables: Mapping[str, Columns]) -> list[Panel]:
+    """The past of the beads of the first climb out of a pile, from rest until it counted as a climb.
+
+    Heights, thick from where bridges join a bead to the others; how many are joined, and how many are at a wall. Of the
+    tables of a pile; none where nothing climbed out of it.
+    """
+    clusters, past = tables["clusters"], tables["assembly"]
+    first = np.flatnonzero(clusters["climbed"] & clusters["out_of_pile"])
+    if not len(first):
+        return []
+    track = min(first, key=lambda number: float(clusters["qualified"][number]))
+    own = {name: column[past["track"] == clusters["track"][track]] for name, column in past.items()}
+    x, heights = "time from the begin of the drive (s)", []
+    for number, bead in enumerate(np.unique(own["bead"])):
+        time, height, joined = (own[name][own["bead"] == bead] for name in ("time", "height", "joined"))
+        leads = ", leads" if bead == clusters["leader"][track] else ""
+        told = f"{'large' if own['large'][own['bead'] == bead][0] else 'small'} bead {bead}{leads}"
+        heights.append(Line(time, 1e3 * height, "", number, width=0.6))
+        heights.append(Line(time, 1e3 * np.where(joined, height, np.nan), told, number, width=2.0))
+    times, at = np.unique(own["time"], return_inverse=True)
+    counts = {"joined to most of them": "joined", "in the pile's bulk": "in_bulk", "at a side wall": "at_wall"}
+    numbers = [
+        Line(times, np.bincount(at, own[name]).astype(float), told, 2 * number, dashed=number > 0)
+        for number, (told, name) in enumerate(counts.items())
+    ]
+    bed = tables["bed"]
+    seen = (bed["time"] >= times[0]) & (bed["time"] <= times[-1])
+    heights.insert(0, Line(bed["time"][seen], 1e3 * bed["surface"][seen], "surface of the pile", _GREY))
+    return [
+        Panel("The beads of the first climb, thick where they are joined", x, "height (mm)", heights, height=2.0),
+        Panel("How many of them are", x, "beads", numbers, zero=True),
+    ]
+
+
 def _events(events: Columns) -> Iterator[Line]:
     """A mark where something happened to a cluster, at the height of its leader."""
     for kind, marker in _MARKS.items():

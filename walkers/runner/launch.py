@@ -289,7 +289,8 @@ class _Watch:
             return self._blow_up(clearance / seconds)
         told = (
             f"{lost} bead(s) left the simulation box before step {step}: walkers went further than the box is wide (a "
-            "larger dimers.spacing or a shorter run keeps them in), or a pile's beads left over the rim"
+            "larger dimers.spacing or a shorter run keeps them in), or climbers rose above the walls, which end at "
+            "twice their height (a larger boundary.height or a shorter run keeps them in)"
         )
         return failures.BeadsLost(told, self.directory, lost=lost)
 

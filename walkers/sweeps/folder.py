@@ -151,14 +151,17 @@ def _age(path: Path, now: float) -> float:
 
 
 def weigh(path: Path) -> tuple[int, float]:
-    """Bytes of a file or of all in a directory, and when one was last written (s since the epoch; 0 if none was)."""
-    size, newest = 0, 0.0
+    """Bytes of a file or of all in a directory, and when one was last written (s since the epoch; 0 if none was).
+
+    What has several names, as the tables that the segments of a pile share, counts once.
+    """
+    size, newest = {}, 0.0
     for file in [path, *path.rglob("*")]:
         with suppress(OSError):  # just being removed
             about = file.lstat()
             if not S_ISDIR(about.st_mode):
-                size, newest = size + about.st_size, max(newest, about.st_mtime)
-    return size, newest
+                size[about.st_dev, about.st_ino], newest = about.st_size, max(newest, about.st_mtime)
+    return sum(size.values()), newest
 
 
 def _sweep(path: Path, runs: Sequence[Entry], now: float) -> Entry | None:

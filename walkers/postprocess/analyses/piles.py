@@ -98,7 +98,7 @@ class Pile(Analysis):
 
     order = 2
     name = "pile"
-    version = 8
+    version = 9
     tables: ClassVar[Mapping[str, type]] = {
         "bed": Bed,
         "clusters": Climb,
@@ -155,6 +155,7 @@ class Pile(Analysis):
             "clusters": len(tracks),
             "events": dict(Counter(event.event for event in events)),
             "climbs": [_told_climb(climb) for climb in climbs if climb.climbed],
+            "rim": case.boundary.height,
             "definition": vars(definition),
         }
 
@@ -241,6 +242,7 @@ class Pile(Analysis):
                 f"    {climb['begin']:.2f} to {climb['end']:.2f} s: {climb['gain'] * 1e3:.2f} mm up to "
                 f"{climb['height'] * 1e3:.2f} mm {where} {' '.join(climb['walls'])} at {speed} mm/s, led by a "
                 f"{_leader(climb)} bead, {climb['size']} beads ({climb['large']} large)"
+                + (f"; over the rim, at {result['rim'] * 1e3:g} mm" if climb["height"] > result["rim"] else "")
                 + ("" if climb["out_of_pile"] else "; it has hung on a wall since the pouring")
             )
         return lines
@@ -258,10 +260,11 @@ class Pile(Analysis):
         return of_frame
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """Heights of the clusters, their events, segregation and agitation."""
-        from walkers.postprocess.figures import pile_panels
+        """Heights of the clusters, their events, segregation and agitation; the past of the first climb's beads."""
+        from walkers.postprocess.figures import assembly_panels, pile_panels
 
-        return {"climb": pile_panels(run.tables)}
+        assembly = assembly_panels(run.tables)
+        return {"climb": pile_panels(run.tables)} | ({"assembly": assembly} if assembly else {})
 
 
 def _late(motion: Motion) -> BoolArray:

@@ -1,0 +1,25 @@
+"""The law of `walkers.physics.laws.young_laplace` for bridges that form when films touch, not when beads do.
+
+A film of φ of a bead's volume is R ((1 + φ)^⅓ - 1) thick: 1 µm for a bead of 0.3 mm and φ = 0.01. Between beads a
+bridge forms at a gap of both films, at a wall at that of the bead's alone (nothing is known of the wall's).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from walkers.physics.bridge import Curve, Surfaces
+from walkers.physics.laws import young_laplace
+
+
+def film(radius: float, volume_fraction: float) -> float:
+    """Thickness of an even film on a bead (m), given the film's volume over the bead's."""
+    return float(radius * ((1.0 + volume_fraction) ** (1.0 / 3.0) - 1.0))
+
+
+def law(surfaces: Surfaces) -> Curve:
+    """Young–Laplace's pull and rupture, Reynolds' resistances; formation at a gap of both films."""
+    curve = young_laplace.law(surfaces)
+    beads = [surfaces.radius] if surfaces.at_wall else [surfaces.radius, surfaces.other_radius]
+    films = sum(film(radius, surfaces.liquid.volume_fraction) for radius in beads)
+    return replace(curve, formation=min(films, curve.rupture))
