@@ -17,7 +17,7 @@ from tests.conftest import call, document, mounted, to_toml
 from walkers.inputs.readable import differing, flattened
 from walkers.runner.directory import MANIFEST_NAME, finished_places, locked
 from walkers.runner.files import read_json, write_json
-from walkers.sweeps.folder import bytes_text
+from walkers.sweeps.folder import bytes_text, weigh
 
 OTHER, FASTER = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}
 SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
@@ -272,3 +272,9 @@ def test_clean_leaves_what_somebody_put_into_a_sweeps_directory(out: Path) -> No
     assert "stays, for walkers did not write it: measured.csv, notes, sliding_1.png" in told
     call("clean", "grid", "--yes", check=True)
     assert {str(path.relative_to(sweep)): path.read_text() for path in sweep.rglob("*.*")} == theirs
+
+
+def test_a_file_with_two_names_weighs_once(tmp_path: Path) -> None:
+    (tmp_path / "table").write_bytes(b"0" * 1000)
+    (tmp_path / "other").hardlink_to(tmp_path / "table")
+    assert weigh(tmp_path)[0] == 1000

@@ -34,6 +34,7 @@ from walkers.postprocess.tables import described
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
 from walkers.runner.failures import EngineError, EngineKilled, RunBusy
+from walkers.runner.summary import notes
 from walkers.sweeps.climbing import conditions_in, describe_climbs, leaders, summarise_climbs
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
 from walkers.sweeps.site import Site, SiteFile
@@ -583,3 +584,19 @@ def test_a_container_holds_its_beads(shape: str, walls: int, tmp_path: Path) -> 
         assert shape == "octagon" or len(held) == len(set(held.tolist()))
         number += len(held)
     assert number >= 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({}, []),
+        ({"mixture.small_share": 1}, ["no large beads"]),
+        ({"mixture.small_share": 0}, ["no small beads"]),
+        ({"run.duration": "10 s"}, [r"climbers faster than 7\.[67] mm/s"]),
+    ],
+)
+def test_what_is_said_of_a_pile_before_it_is_shaken(changes: dict[str, Any], told: list[str]) -> None:
+    """(2 · 40 mm - 41 µL/(0.55 (5.3 mm)²))/10 s is 7.7 mm/s."""
+    found = notes(load_case("pile-small", changes))
+    assert len(found) == len(told)
+    assert all(re.match(one, other) for one, other in zip(told, found, strict=True))
