@@ -34,6 +34,8 @@ from walkers.postprocess.tables import described
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
 from walkers.runner.failures import EngineError, EngineKilled, RunBusy
+from walkers.runner.files import read_json
+from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runner.summary import notes
 from walkers.sweeps.climbing import conditions_in, describe_climbs, leaders, summarise_climbs
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
@@ -518,6 +520,21 @@ def test_leaders_by_chance() -> None:
     assert one["p_among_beads"] == pytest.approx(3.0 / 10.0, abs=0.02)
     assert two["p_among_own"] == pytest.approx(1.0 / 16.0, abs=0.01)
     assert one["share_of_large"] == 0.1
+
+
+def test_a_climber_that_leaves_the_container_ends_the_run(tmp_path: Path) -> None:
+    """It climbs at 4.8 mm/s; its upper bead is 3.2 mm below where the walls end; segments are of 0.05 s."""
+    tables = tomllib.loads(shipped_cases()["cluster"].read_text())
+    tables["contact"]["friction"] = {"bead_bead": 0.3, "bead_wall": 0.3}
+    places = ((0.545, 2.0), (0.3075, 1.18135))
+    tables["placed"] = [{"radius": f"{r} mm", "at": [f"{2.5001 - r} mm", "0 mm", f"{z} mm"]} for r, z in places]
+    tables["boundary"]["height"] = "2.6 mm"
+    tables["run"] |= {"duration": "1 s", "segment": "0.05 s"}
+    finished = walkers.run(resolve_case(tables, name="cluster"), tmp_path)
+    assert finished.result["driven"] == pytest.approx(3.2e-3 / 4.79e-3, abs=0.1)
+    assert "left the simulation box" in read_json(finished.directory / MANIFEST_NAME)["ended"]
+    assert "then climbers left the container" in finished.describe()
+    assert call("verify", str(finished.directory)).returncode == 0
 
 
 def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tmp_path: Path) -> None:

@@ -92,6 +92,10 @@ class BeadsLost(EngineFailure):
     """Beads left the simulation box. Seen in the number of atoms, which the engine prints every cycle."""
 
 
+class BeadsOverTheTop(BeadsLost):
+    """The beads that were lost were last seen nearest to the top of the box: climbers that outgrow a container."""
+
+
 class BlowUp(EngineFailure):
     """A bead is faster than the drive can make it, or its speed is no number: most often too large a time step."""
 

@@ -193,6 +193,7 @@ class _Watch:
         self.log = directory / OUTPUT_NAME
         self.step = 0
         self.clearance: float | None = None  # from the outermost bead to the box at that step, m
+        self.nearest_is_top = False  # whether that bead is the highest one
         self.version: str | None = None
         self.failure: failures.EngineFailure | None = None
         self.error = self.last_line = self.rest = b""
@@ -275,8 +276,10 @@ class _Watch:
         """What a status line tells of the beads, given the one before."""
         fastest, lost = self.deck.fastest, self.layout.atoms - atoms
         seconds, clearance = (step - self.step) * self.layout.time_step, self.clearance
-        sides = zip(*self.deck.box, bounds[::2], bounds[1::2], strict=True)
+        sides = list(zip(*self.deck.box, bounds[::2], bounds[1::2], strict=True))
+        over = self.nearest_is_top
         self.clearance = min(min(low - floor, ceiling - high) for floor, ceiling, low, high in sides)
+        self.nearest_is_top = sides[2][1] - sides[2][3] == self.clearance
         self.step = step
         if not speed <= fastest:
             return self._blow_up(speed)
@@ -290,9 +293,9 @@ class _Watch:
         told = (
             f"{lost} bead(s) left the simulation box before step {step}: walkers went further than the box is wide (a "
             "larger dimers.spacing or a shorter run keeps them in), or climbers rose above the walls, which end at "
-            "twice their height (a larger boundary.height or a shorter run keeps them in)"
+            "twice boundary.height"
         )
-        return failures.BeadsLost(told, self.directory, lost=lost)
+        return (failures.BeadsOverTheTop if over else failures.BeadsLost)(told, self.directory, lost=lost)
 
     def _blow_up(self, speed: float) -> failures.BlowUp:
         seen = f"moves at {speed:.3g} m/s" if math.isfinite(speed) else "has a speed or position that is no number"

@@ -72,7 +72,7 @@ def notes(case: Case) -> list[str]:
     room = 2.0 * case.boundary.height - volume / (_LOOSE_PACKING * case.boundary.cross_section)
     if (fastest := room * case.drive.frequency / case.run.cycles) < _FASTEST_CLIMB:
         told.append(
-            f"climbers faster than {fastest * 1e3:.1f} mm/s rise above twice boundary.height within the run, and end it"
+            f"climbers faster than {fastest * 1e3:.1f} mm/s rise above twice boundary.height, and end the run early"
         )
     return told
 

@@ -135,9 +135,9 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
 
         Of all climbs that qualified in these seconds: ``climbs``; ``rate`` (1/s, of one start) with the exact Poisson
         ``rate_interval``; ``dispersion``, the variance over the mean of the climbs of a run (1 where they do not depend
-        on each other; None where runs are of different lengths); ``times`` and ``onsets`` (s, when the first climb of
-        each run qualified and had begun), ``speeds`` (m/s), ``heights`` (m, of the leaders at last), ``sizes``; and of
-        who led what `leaders` says.
+        on each other; None where lengths of runs differ by more than a tenth); ``times`` and ``onsets`` (s, when the
+        first climb of each run qualified and had begun), ``speeds`` (m/s), ``heights`` (m, of the leaders at last),
+        ``sizes``; and of who led what `leaders` says.
 
         And all of this of a part of the climbs alone: ``on_plain_walls``, ``in_corners``, and ``out_of_pile``, without
         clusters that have hung on a wall since the pouring.
@@ -165,7 +165,7 @@ def _summary(results: Sequence[Mapping[str, Any]], within: float | None) -> dict
     first = np.array([min((climb["qualified"] for climb in climbs), default=np.inf) for climbs in counted])
     every = [climb for climbs in counted for climb in climbs]
     numbers, seconds = [len(climbs) for climbs in counted], float(watched.sum())
-    alike = np.ptp(watched) <= _ALIKE * watched.max() and len(numbers) > 1 and every
+    alike = np.ptp(watched) <= 0.1 * watched.max() and len(numbers) > 1 and every
     return {
         "within": at,
         "runs": len(results),

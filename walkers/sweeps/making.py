@@ -43,7 +43,7 @@ from walkers.runner.directory import (
     write_deck,
     write_segment_record,
 )
-from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
+from walkers.runner.failures import AuditFailed, BeadsOverTheTop, UnauditedEngineWarning
 from walkers.runner.files import fsync_path, link_or_copy, read_json, settle, write_json
 from walkers.runner.launch import EngineReport, Progress, check_room, launch
 from walkers.runner.manifest import write_manifest
@@ -157,7 +157,7 @@ def _are_steady(directory: Path) -> bool:
 class OpenRun:
     """A run that is being made, or gone on with, in a directory of its own beside its final place (`open_locked`).
 
-    ``done`` is what the segments that are whole say of themselves.
+    ``done`` is what the segments that are whole say of themselves, ``ended`` why there are not more, if not all are.
     """
 
     case: Case
@@ -167,6 +167,7 @@ class OpenRun:
     locks: Sequence[int]
     done: list[dict[str, Any]]
     started: float = field(default_factory=time.time)
+    ended: str | None = None
 
     def make(
         self,
@@ -189,7 +190,16 @@ class OpenRun:
                 self.done.clear()
             while (segment := self._next_segment(case)) is not None:
                 tell = _teller(case, segment, on_progress, made, begun) if on_progress else None
-                self._make(segment, render(case, segment), tell, time_limit)
+                try:
+                    self._make(segment, render(case, segment), tell, time_limit)
+                except BeadsOverTheTop as over:
+                    begun_at = self._drive_from()
+                    if not case.boundary.closed or begun_at is None or segment.begin <= begun_at:
+                        raise
+                    # A climber left the container: that ends the experiment, and spoils nothing of what was before.
+                    shutil.rmtree(self.directory / SEGMENTS / f"{len(self.done):04d}.new")
+                    self.ended = str(over)
+                    return
                 made += segment.end - segment.begin
             if cycles < self.case.run.cycles and _are_steady(self.directory):
                 return
@@ -246,6 +256,7 @@ class OpenRun:
         start = self._drive_from() or 0
         rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
         settling = {"drive_from": start, "settled": rest[-1] if rest else None, "segments": len(self.done)}
+        settling |= {"ended": self.ended} if self.ended else {}
         about: dict[str, Any] = {"started": self.started, "directory": self.directory, **settling}
         write_manifest(self.case, self.place.name, self.engine, report, **about)
         settle()

@@ -126,7 +126,7 @@ _WORST_FIRST = (
     *("EngineMissing", "EngineDiffers", "ProgramDiffers", "DiskFull", "OutputGone", "EngineNeverStarted"),
     *("EngineError", "MissingFrames", "EngineKilled", "EngineSilent", "LogTooLong"),
     "",  # what is not in this list
-    *("BlowUp", "BeadsLost", "WalkersMet", "TimeLimitExceeded", "RunBusy"),
+    *("BlowUp", "BeadsLost", "BeadsOverTheTop", "WalkersMet", "TimeLimitExceeded", "RunBusy"),
 )
 _SEVERITY = {name: rank for rank, name in enumerate(_WORST_FIRST)}
 

@@ -38,6 +38,8 @@ from walkers.postprocess.tables import Columns, columns_of, columns_of_rows
 if TYPE_CHECKING:
     from walkers.postprocess.figures import Panel
 
+_WHOLE = 1.0 - 1e-6
+"""Of its duration: a run that was shaken for less ended early."""
 _LAYERS = 0.5
 """Thickness of the layers of the packing profile, in diameters of the largest bead."""
 
@@ -98,7 +100,7 @@ class Pile(Analysis):
 
     order = 2
     name = "pile"
-    version = 9
+    version = 10
     tables: ClassVar[Mapping[str, type]] = {
         "bed": Bed,
         "clusters": Climb,
@@ -156,6 +158,7 @@ class Pile(Analysis):
             "events": dict(Counter(event.event for event in events)),
             "climbs": [_told_climb(climb) for climb in climbs if climb.climbed],
             "rim": case.boundary.height,
+            "duration": case.run.cycles / case.drive.frequency,
             "definition": vars(definition),
         }
 
@@ -217,12 +220,13 @@ class Pile(Analysis):
         """Did it climb, when, how fast, who led."""
         surface, nuts, bridges = result["surface"], result["brazil_nut"], result["coordination"]
         rest, inner, shaken = bridges["rest"], bridges["rest_inner"], bridges["shaken"]
-        alone = ""
+        alone, early = "", result["driven"] < _WHOLE * result["duration"]
         if inner["beads"]:
             alone = f"; {inner['beads']} beads at no wall have {inner['bridges']:.2f} and {inner['contacts']:.2f}"
         lines = [
             f"{result['case']}: {result['beads']} beads ({result['large']} large), {result['drive']}",
-            f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling",
+            f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling"
+            + (f"; then climbers left the container, before {result['duration']:.3g} s" if early else ""),
             f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
             f"  segregation (z of large - z of small)/sum: {nuts['start']:.3f} at the start, "
             f"{nuts['end']:.3f} at the end",
