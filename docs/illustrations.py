@@ -23,7 +23,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from walkers import load_case, run
+from walkers import load_case, run, sweep
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.report import write_outcome
 from walkers.check.report import validate
@@ -38,6 +38,14 @@ from walkers.postprocess.analysis import analyses
 from walkers.postprocess.films import FilmOptions
 from walkers.postprocess.series import render_series
 from walkers.runner.files import read_json, write_json, write_text
+from walkers.sweeps.climbing import (
+    conditions_in,
+    describe_climbs,
+    describe_origins,
+    summarise_climbs,
+    summarise_origins,
+)
+from walkers.sweeps.climbing_figure import write_climbs
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import cores_here
 from walkers.templates.deck import CONTENT_VERSION
@@ -83,6 +91,30 @@ def _of_run(
     return Illustration((file,), lambda: [load_case(case, changes)], make)
 
 
+def _of_climbs(*names: str, assembly: Mapping[str, Any] | None = None) -> Illustration:
+    """What `walkers climb` draws and prints of a sweep; and how the first climb of the run of a case assembled."""
+    name = names[0]
+    files = [f"figures/{name}.png", f"figures/{name}.md", *(["figures/pile-assembly.png"] if assembly else [])]
+
+    def make(out: Path, docs: Path) -> None:
+        for sweep_name in names:
+            sweep(sweep_name, out)
+        conditions = conditions_in([out / sweep_name for sweep_name in names])
+        found = [summarise_climbs(one.runs) for one in conditions]
+        write_climbs(conditions, found, docs / files[0])
+        told = [
+            "\n".join(filter(None, [one.label, describe_climbs(climbs), describe_origins(summarise_origins(one.runs))]))
+            for one, climbs in zip(conditions, found, strict=True)
+        ]
+        command = f"$ walkers climb {' '.join(names)}"
+        write_text(docs / files[1], "\n".join([f"# {name}", "", "```console", command, *told, "```", ""]))
+        if assembly:
+            (drawn,) = (path for path in run(load_case("pile-small", assembly), out).plot() if path.stem == "assembly")
+            shutil.copy(drawn, docs / files[2])
+
+    return Illustration(tuple(files), lambda: [one for each in names for one in load_sweep(each).cases()], make)
+
+
 def _make_model_terms(_: Path, docs: Path) -> None:
     try_model_terms(docs / "figures")
 
@@ -120,6 +152,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     ),
     "tray": _of_run("tray", "tray"),
     "climber": _of_run("climber", "climber"),
+    "pile-starts": _of_climbs("pile-starts", assembly={"run.duration": "10 s", "run.seed": 10}),
     "pile": _of_run("pile", "pile-small", {"run.duration": "10 s"}, apart=2.0),
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),

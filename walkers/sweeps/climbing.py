@@ -139,6 +139,8 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
         first climb of each run qualified and had begun), ``speeds`` (m/s), ``heights`` (m, of the leaders at last),
         ``sizes``; and of who led what `leaders` says.
 
+        ``each`` has what the results say of each climb, and the name of its run.
+
         And all of this of a part of the climbs alone: ``on_plain_walls``, ``in_corners``, and ``out_of_pile``, without
         clusters that have hung on a wall since the pouring.
     """
@@ -149,6 +151,9 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
         "out_of_pile": lambda climb: climb["out_of_pile"],
     }
     found = _summary(results, within)
+    found["each"] = [
+        {"run": run.name, **climb} for run, one in zip(runs, results, strict=True) for climb in one["climbs"]
+    ]
     for name, belongs in parts.items():
         some = [{**result, "climbs": list(filter(belongs, result["climbs"]))} for result in results]
         found[name] = _summary(some, within)
@@ -272,8 +277,8 @@ def describe_origins(found: Mapping[str, Any]) -> str:
         f"  assembly   no two beads of {found['strangers']} of {found['climbs']} climbers were neighbours at rest; "
         f"{found['share_of_bridges']:.0%} of their bridges were there then\n"
         f"             their last beads joined {found['whole_before']:.2f} s before they came free (median)\n"
-        f"             leaders of {found['leaders_at_wall']} were at a wall at rest (by chance: p = "
-        f"{found['p_at_wall']:.2g}; {found['share_at_wall']:.0%} of all beads were)"
+        f"             leaders of {found['leaders_at_wall']} were at a wall at rest, as {found['share_at_wall']:.0%} "
+        f"of all beads (by chance: {_told_p(found['p_at_wall'])})"
     )
 
 
@@ -465,9 +470,9 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
         sizes = ", ".join(f"{size}: {found['sizes'].count(size)}" for size in sorted(set(found["sizes"])))
         lines += [
             *(f"    {name.replace('_', ' '):15} {text}" for name, text in told.items()),
-            f"  leader     large in {found['led_by_large']} of {found['climbs']} climbs (by chance: p = "
-            f"{found['p_among_beads']:.2g} among all beads, {found['share_of_large']:.0%} of which are large; p = "
-            f"{found['p_among_own']:.2g} among a climb's own)",
+            f"  leader     large in {found['led_by_large']} of {found['climbs']} climbs (by chance among all beads, "
+            f"{found['share_of_large']:.0%} of which are large: {_told_p(found['p_among_beads'])}; among its own: "
+            f"{_told_p(found['p_among_own'])})",
             f"  first one  counted after {_range(found['times'])} s, begun after {_range(found['onsets'])} s",
             f"  beads      {sizes}",
             f"  height     {_range(np.array(found['heights']) * 1e3)} mm",
@@ -476,6 +481,10 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
         speeds = np.array(found["speeds"]) * 1e3
         lines.append(f"  speed      {_range(speeds)} mm/s, median {np.median(speeds):.2f} mm/s")
     return "\n".join(lines)
+
+
+def _told_p(value: float) -> str:
+    return f"p = {value:.2g}" if value > 1.5 / _DRAWS else f"p < {2 / _DRAWS:g}"
 
 
 def _told_rate(found: Mapping[str, Any]) -> str:
