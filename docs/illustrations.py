@@ -54,6 +54,8 @@ RECORD = Path("figures") / "made-from.json"
 _BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)")
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
+_ASSEMBLES = {"run.duration": "10 s", "run.seed": 10}
+"""The pile whose first climber the page follows from rest: on a plain wall, of beads that were no neighbours."""
 _OF_CALIBRATION = ("corner", "predictions")
 
 
@@ -152,7 +154,11 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     ),
     "tray": _of_run("tray", "tray"),
     "climber": _of_run("climber", "climber"),
-    "pile-starts": _of_climbs("pile-starts", assembly={"run.duration": "10 s", "run.seed": 10}),
+    "pile-starts": _of_climbs("pile-starts", assembly=_ASSEMBLES),
+    "pile-film": _of_run(
+        *("pile", "pile-small", _ASSEMBLES),
+        film=FilmOptions(size=(360, 640), fps=10, slowdown=1.0, begin=2.5, end=8.5),
+    ),
     "pile": _of_run("pile", "pile-small", {"run.duration": "10 s"}, apart=2.0),
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),

@@ -101,9 +101,10 @@ class SweepRecord:
 
     @property
     def axes(self) -> list[tuple[str, ...]]:
-        """The keys that vary, those together that its file has in one ``[[zip]]`` or ``[[sample]]``."""
+        """The keys that vary, those together that its file has in one table beside ``[axes]``."""
         together = [flatten(table, is_axis) for table in self.file.get("zip", ())]
         together += [flatten(table["ranges"], is_axis) for table in self.file.get("sample", ())]
+        together += [flatten(self.file.get("one_at_a_time", {}), is_axis)]
         axis_of = {key: tuple(keys) for keys in together for key in keys}
         return list(dict.fromkeys(axis_of.get(key, (key,)) for key in self.units))
 
