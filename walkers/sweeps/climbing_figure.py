@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
 
 _ACROSS = 3
 _ROW = 2.1  # inches
+_RATE = "climbs per start and second"
 _KINDS = (("all", "", "ko"), ("plain walls", "on_plain_walls", "C1s"), ("corners", "in_corners", "C2^"))
 """Of all climbs and of parts of them: label, key in what `summarise_climbs` gives, colour and marker."""
 
@@ -29,24 +29,32 @@ def climbs_figure(conditions: Sequence[Condition], found: Sequence[Mapping[str, 
 
     The first row is of the first condition that differs by nothing, else of the first one: the share of piles that have
     climbed by a time (Kaplan and Meier's estimate), speeds against sizes, rates. Below is a panel for each key that
-    varies: the rates against its values, of conditions that differ by nothing else.
+    varies: the rates against its values, of conditions that differ by nothing else. Where conditions differ by several
+    keys, or come from several sweeps, a single panel lists them all.
     """
     usual = next((number for number, one in enumerate(conditions) if not one.differs), 0)
     keys = list(dict.fromkeys(key for one in conditions for key in one.differs))
-    panels = [(name, *_at(conditions, name)) for name in keys]
-    rows = 1 + ceil(len(panels) / _ACROSS)
-    figure, axes = new_figure(TWO_COLUMNS, _ROW * rows, nrows=rows, ncols=_ACROSS, squeeze=False)
-    shown = axes.ravel()
-    _draw_survival(shown[0], found[usual])
-    _draw_climbs(shown[1], found[usual])
-    _draw_rates(shown[2], [""], [found[usual]])
-    shown[2].legend()
-    for panel, (name, labels, numbers) in zip(shown[_ACROSS:], panels, strict=False):
-        _draw_rates(panel, labels, [found[number] for number in numbers])
-        panel.set_xlabel(plain_text(name))
-    for panel in shown[_ACROSS + len(panels) :]:
-        panel.remove()
-    letter_panels(shown[: _ACROSS + len(panels)])
+    first = ["survival", "climbs", "rates"]
+    if any(len(one.differs) > 1 or one.source for one in conditions):
+        mosaic, heights = [first, ["conditions"] * _ACROSS], [1.0, 0.3 + len(conditions) / 6.0]
+    else:
+        blank = ["."] * (-len(keys) % _ACROSS)
+        panels = [*keys, *blank]
+        mosaic = [first, *(panels[start : start + _ACROSS] for start in range(0, len(panels), _ACROSS))]
+        heights = [1.0] * len(mosaic)
+    figure, axes = new_figure(TWO_COLUMNS, _ROW * sum(heights), mosaic=mosaic, height_ratios=heights)
+    _draw_survival(axes["survival"], found[usual])
+    _draw_climbs(axes["climbs"], found[usual])
+    _draw_rates(axes["rates"], [""], [found[usual]])
+    axes["rates"].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    if "conditions" in axes:
+        labels = [one.label or "as usual" for one in conditions]
+        _draw_rates(axes["conditions"], labels[::-1], found[::-1], across=True)
+    for name in keys if "conditions" not in axes else ():
+        labels, numbers = _at(conditions, name)
+        _draw_rates(axes[name], labels, [found[number] for number in numbers])
+        axes[name].set_xlabel(plain_text(name))
+    letter_panels(axes.values())
     return figure
 
 
@@ -83,17 +91,24 @@ def _draw_climbs(panel: Axes, found: Mapping[str, Any]) -> None:
     panel.set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
 
 
-def _draw_rates(panel: Axes, labels: Sequence[str], found: Sequence[Mapping[str, Any]]) -> None:
-    """Rates with their exact intervals, side by side."""
+def _draw_rates(
+    panel: Axes, labels: Sequence[str], found: Sequence[Mapping[str, Any]], *, across: bool = False
+) -> None:
+    """Rates with their exact intervals, side by side; or one above the other, ``across`` the panel."""
     for place, (label, key, look) in enumerate(_KINDS):
         some = [one[key] if key else one for one in found]
         rates, ends = np.array([one["rate"] for one in some]), np.array([one["rate_interval"] for one in some])
-        at = np.arange(len(found)) + 0.15 * (place - 1)
-        panel.errorbar(at, rates, np.abs(ends.T - rates), fmt=look, label=label, linestyle="none", markersize=3.0)
-    panel.set_xticks(
-        np.arange(len(labels)), [plain_text(label) for label in labels], rotation=30 if len(labels) > 4 else 0
-    )
-    panel.set(ylabel="climbs per start and second", ylim=(0.0, None), xlim=(-0.5, len(labels) - 0.5))
+        at, errors = np.arange(len(found)) + 0.15 * (place - 1), np.abs(ends.T - rates)
+        given: dict[str, Any] = {"xerr": errors} if across else {"yerr": errors}
+        x, y = (rates, at) if across else (at, rates)
+        panel.errorbar(x, y, fmt=look, label=label, linestyle="none", markersize=3.0, **given)
+    told, places, sides = [plain_text(label) for label in labels], np.arange(len(labels)), (-0.5, len(labels) - 0.5)
+    if across:
+        panel.set_yticks(places, told)
+        panel.set(xlabel=_RATE, xlim=(0.0, None), ylim=sides)
+    else:
+        panel.set_xticks(places, told, rotation=30 if len(labels) > 4 else 0)
+        panel.set(ylabel=_RATE, ylim=(0.0, None), xlim=sides)
 
 
 _COLUMNS = (
