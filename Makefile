@@ -87,8 +87,8 @@ docs: engine .venv/ready-docs ## Build the documentation into build/site, to be 
 	@echo "open build/site/index.html"
 
 .PHONY: bench
-bench: setup ## Measure what docs/explanation/performance.md states
-	.venv/bin/python tests/benchmark.py
+bench: setup ## Measure what docs/explanation/performance.md states (ONLY=large: a second of ten thousand beads)
+	.venv/bin/python tests/benchmark.py $(ONLY)
 
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
