@@ -6,7 +6,7 @@ import sys
 import warnings
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 from typer import Argument, Option
@@ -153,24 +153,25 @@ def climb(
     if to is not None:
         check_place(to, *(f".{form}" for form in FORMATS), ".csv")
     conditions = climbing.conditions_in([locate(one, out).path for one in what])
+    lines: list[str] = []
+    found: list[dict[str, Any]] = []
     if thresholds or null:
         for option, given in {"--within": within, "--to": to}.items():
             refuse(option, given is not None, "has no meaning with --sensitivity or --null")
         nulls = climbing.conditions_in([locate(one, out).path for one in null]) if null else []
-        tried = {one.label: climbing.sensitivity(one.runs) for one in conditions}
-        tried |= {f"null: {one.label}": climbing.sensitivity(one.runs) for one in nulls}
-        lines = [line for label, rows in tried.items() for line in (label, climbing.describe_sensitivity(rows)) if line]
-        print_as(as_json, lambda: tried, lambda: "\n".join(lines))
-        return
-    found = {one.label: climbing.summarise_climbs(one.runs, within) for one in conditions}
-    if to is not None:
-        write_climbs(conditions, list(found.values()), to)
-    lines = []
-    for one in conditions:
-        told = found[one.label]
-        told["assembly"] = climbing.summarise_origins(one.runs)
-        told_origins = climbing.describe_origins(told["assembly"])
-        lines += filter(None, [one.label, climbing.describe_climbs(told), told_origins])
+        nulls = [one for one in nulls if one.differs] or nulls  # a sweep of controls may have the usual pile as well
+        named = [(one.label, one) for one in conditions] + [(f"null: {one.label}".rstrip(), one) for one in nulls]
+        for label, one in named:
+            found.append({"condition": label, "thresholds": climbing.sensitivity(one.runs)})
+            lines += filter(None, [label, climbing.describe_sensitivity(found[-1]["thresholds"])])
+    else:
+        found = [climbing.summarise_climbs(one.runs, within) for one in conditions]
+        if to is not None:
+            write_climbs(conditions, found, to)
+        for one, told in zip(conditions, found, strict=True):
+            told |= {"condition": one.label, "assembly": climbing.summarise_origins(one.runs)}
+            origins = climbing.describe_origins(told["assembly"])
+            lines += filter(None, [one.label, climbing.describe_climbs(told), origins])
     print_as(as_json, lambda: found, lambda: "\n".join(lines))
 
 
