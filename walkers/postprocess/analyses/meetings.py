@@ -127,11 +127,11 @@ class Meetings(Analysis):
         return case.meets
 
     def derived_of(self, case: Case) -> dict[str, float]:
-        """Coverage."""
+        """Coverage, to three digits, so that trays that were meant to have the same are drawn together."""
         boundary, spacing = case.boundary, max(one.spacing for one in case.walkers)
         cell = spacing * (spacing if isinf(boundary.width) else boundary.width)
         floor = boundary.cross_section if boundary.closed else cell * sum(one.replicates for one in case.walkers)
-        return {"coverage": pi * sum(radius**2 for radius in case.all_radii) / floor}
+        return {"coverage": float(f"{pi * sum(radius**2 for radius in case.all_radii) / floor:.3g}")}
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """Events from one recorded frame of bridges to the next; who stands together from the first has merged then."""
