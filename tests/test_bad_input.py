@@ -83,6 +83,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"dimers": {"gap": "-50 um"}}, "overlap by more than 2 %"),
     ({"dimers": {"replicates": 2, "spacing": "0.5 mm"}}, 'dimers.spacing = "0.5 mm": neighbouring walkers would touch'),
     ({"dimers": {"replicates": 4, "spacing": "0.9 mm", "meet": True}}, "expected at least 0.99 mm"),
+    ({"dimers": {"replicates": 9, "spacing": "1 mm", "meet": True}}, "as they are turned, beads of two walkers would"),
     (cluster("star", "0.3 mm", "0.2 mm"), 'arrangement = "star": expected one of chain, fan, diamond, ring, raft'),
     (cluster("ring", "0.3 mm", "0.2 mm"), "clusters[0].radii"),
     (cluster("raft", "0.3 mm", "0.2 mm", "0.2 mm"), "a raft takes beads of one radius"),

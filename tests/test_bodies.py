@@ -20,6 +20,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive, Harmonic, common_frequency
 from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import read_toml, shipped_cases
+from walkers.postprocess.analyses.meetings import Course, Meeting, collective
 from walkers.postprocess.analysis import describe_result, read_result
 from walkers.postprocess.gait import postures, turned_over_at
 from walkers.postprocess.motion import read_motion
@@ -178,6 +179,42 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     first = tray.result["groups_at_end"][0]
     apart = np.linalg.norm(centre[-12:, first[1]] - centre[-12:, first[0]], axis=-1)
     assert apart.max() < 1.1 * group.make.length  # they hold on to each other, however they turn
+
+
+def test_what_walkers_do_as_many_is_counted() -> None:
+    """Two meet head on at 5 s and rest; two walk side by side at half the speed from 1 to 3 s, and part."""
+    time = np.linspace(0.0, 10.0, 101)
+    heading = np.array([[1.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    size, held = np.ones((101, 4), dtype=np.int64), np.zeros((101, 4), dtype=bool)
+    size[50:, :2] = size[10:31, 2:] = 2
+    held[-1, 3] = True  # in the last frame it has come to a wall
+    speed = np.ones((100, 4)) * MM_PER_S
+    speed[50:, :2], speed[10:30, 2:] = 0.0, 0.5 * MM_PER_S
+    way = np.concatenate([np.zeros((1, 4)), np.cumsum(0.1 * speed, axis=0)])
+    course = Course(time, way[..., None] * heading, np.broadcast_to(heading, (101, 4, 2)), size, held)
+    told = ((1.0, "merged", 2, 3, pi / 2), (3.0, "parted", 2, 3, pi / 2), (5.0, "merged", 0, 1, pi))
+    meetings = [Meeting(at, event, one, other, 2, angle) for at, event, one, other, angle in told]
+    found = collective(course, meetings, np.array([1.0, 0.0]))
+    never = {"met": 0, "parted": 0, "walking": 0, "resting": 0}
+    fates = {"following": never, "side": {**never, "met": 1, "parted": 1}, "head_on": {**never, "met": 1, "resting": 1}}
+    assert {name: found.pop(name) for name in fates} == fates
+    joined = 40 * 0.5 / 140  # of 140 intervals between frames in which one was joined, 40 at half the speed
+    assert found == pytest.approx(
+        {
+            "meeting_rate": 2 * 2 / (4 * 10.0),
+            "pair_lifetime": 2.0 + 5.0,
+            "pair_time": 2.0 + 5.0,
+            "clustered_share": 0.5,
+            "largest_cluster": 2,
+            "held_share": 0.25,
+            "nematic_order": (3 - 1) / 4,
+            "polar_order": np.sqrt(2.0) / 4,
+            "free_speed": MM_PER_S,
+            "joined_speed": joined * MM_PER_S,
+            "speed_ratio": joined,
+            "slow_share": 0.5,
+        }
+    )
 
 
 @pytest.mark.parametrize("width", ["1.4 mm", "0.5998 mm"])

@@ -17,6 +17,8 @@ from PIL import Image
 from tests.conftest import call, run_shipped, shipped_sweep
 from tests.printed import letters, spoilt
 from walkers.inputs import load_case
+from walkers.inputs.axes import is_axis
+from walkers.inputs.changes import flatten
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import read_toml
 from walkers.inputs.sweep import shipped_sweeps
@@ -76,6 +78,10 @@ def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
             if name == "climb-friction":
                 given["zip"][0] = {f"contact.friction.bead_{other}": [0.3, 0.5] for other in ("wall", "bead")}
             run_shipped(name, given, out)
+        few = {"drive.peak_acceleration": ["2 g", "8 g"], "run.seed": [1, 2]}
+        given = shipped_sweep("tray-phases", {"run.duration": "0.1 s"}, few)
+        given["zip"] = [{key: values[:4] for key, values in flatten(given["zip"][0], is_axis).items()}]
+        run_shipped("tray-phases", given, out)
 
     return Sources(once("paper", run))
 
@@ -135,13 +141,23 @@ def test_compared_numbers_are_those_of_the_runs(sources: Sources) -> None:
     assert rows["fig4a_velocity"]["theory"] == pytest.approx(predicted)
 
 
-PANELS = {"fig1b": 3, "fig2": 3, "fig3": 0, "fig4": 2, "alignment": 4, "modes": 2, "climbing": 6, "zoo": 15}
+PANELS = {
+    "fig1b": 3,
+    "fig2": 3,
+    "fig3": 0,
+    "fig4": 2,
+    "alignment": 4,
+    "modes": 2,
+    "climbing": 6,
+    "zoo": 15,
+    "tray-phases": 10,
+}
 
 
 @pytest.mark.parametrize("name", PANELS)
 def test_figures_can_be_printed_and_say_what_they_were_made_from(sources: Sources, tmp_path: Path, name: str) -> None:
     drawing = FIGURES[name]
-    assert drawing.only_asked == (name in ("climbing", "zoo"))
+    assert drawing.only_asked == (name in ("climbing", "zoo", "tray-phases"))
     runs = sources.runs(*drawing.sweeps)
     figure = drawing.draw(sources)
     assert spoilt(figure) == []

@@ -14,6 +14,7 @@ from walkers.inputs import InputError
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import Sweep, expand, load_sweep
+from walkers.postprocess.analyses.meetings import Meetings
 from walkers.sweeps.scheduler import LONGEST_SECONDS, MOST_WALKERS, makespan, pack, unfinished_parts
 from walkers.templates.deck import render_shared_deck
 from walkers.templates.scene import sharing_key
@@ -126,6 +127,12 @@ def test_shipped_sweeps_are_the_papers() -> None:
     assert all(dimer.gamma0(peak) == pytest.approx(0.5) for dimer, peak in fig3)
     turned = _cases(load_sweep("alignment"))
     assert {round(np.degrees(case.walkers[0].angle)) for case in turned} == set(range(0, 91, 15))
+    trays = [
+        (one.walkers[0].replicates, Meetings().derived_of(one)["coverage"]) for one in _cases(load_sweep("tray-phases"))
+    ]
+    assert len(trays) == 96
+    assert {number for number, _ in trays} == {2, 16, 64}
+    assert {coverage for _, coverage in trays} == {0.05, 0.14, 0.25}
     modes = _cases(load_sweep("modes"))
     assert {round(dimer_of(case).sin_delta, 6) for case in modes} == {step / 20 for step in range(9)}
 

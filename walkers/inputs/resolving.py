@@ -325,7 +325,7 @@ def _check_bodies(case: Case, file: CaseFile) -> None:
         raise unusable("run.seed", "expected none where the beads are placed: every start would be the same")
     if mixture is not None:
         _check_pour(mixture, boundary, case.tops_of_others(mixture))
-    if case.placed is not None or (case.walkers and not boundary.bare):
+    if case.placed is not None or case.meets or (case.walkers and not boundary.bare):
         _check_places(case, [key for key, table in file.walkers.items() for _ in range(table.replicates)])
 
 
@@ -358,6 +358,7 @@ def _check_places(case: Case, keys: list[str]) -> None:
     beads = [
         (key, (x + one.x, y + one.y, one.z), one.radius) for key, (x, y), walker in of_walkers for one in walker.beads
     ]
+    owner = [number for number, walker in enumerate(standing) for _ in walker.beads]
     placed = case.placed.beads if case.placed is not None else ()
     walking = len(beads)
     beads += [(f"placed[{number}]", (x, y, z), radius) for number, (x, y, z, radius) in enumerate(placed)]
@@ -372,12 +373,15 @@ def _check_places(case: Case, keys: list[str]) -> None:
             raise unusable("boundary.height", f"too low for the walkers of {key}")
         if number >= walking and (beside or z < least or z + radius > boundary.height):
             raise unusable(f"{key}.at", "expected a bead within the boundary")
-    if not placed:
+    if not (placed or case.meets):
         return
     from scipy.spatial import cKDTree
 
     near = cKDTree([place for _, place, _ in beads]).query_pairs(2.0 * max(radius for *_, radius in beads))
-    for one, other in sorted((pair for pair in near if pair[1] >= walking), key=lambda pair: pair[::-1]):
+    strangers = (pair for pair in near if pair[1] >= walking or owner[pair[0]] != owner[pair[1]])
+    for one, other in sorted(strangers, key=lambda pair: pair[::-1]):
         (key, place, first), (other_key, other_place, second) = beads[one], beads[other]
         if dist(place, other_place) < first + second - _OVERLAP * min(first, second):
+            if other < walking:
+                raise unusable(f"{other_key}.spacing", "as they are turned, beads of two walkers would overlap")
             raise unusable(f"{other_key}.at", f"overlaps with {key if one >= walking else f'one of {key}'}")

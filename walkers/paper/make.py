@@ -12,7 +12,7 @@ from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
 from walkers.paper.figures import fig1b, fig2, fig3, fig4, fig_sensitivity
-from walkers.paper.maps import fig_alignment, fig_climbing, fig_modes, fig_zoo
+from walkers.paper.maps import fig_alignment, fig_climbing, fig_modes, fig_trays, fig_zoo
 from walkers.paper.published import NothingFinishedError, ProgressOf, Sources
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.runner.files import write_text
@@ -44,6 +44,7 @@ FIGURES = {
     "sensitivity": Drawing(fig_sensitivity, ("sensitivity",), "What the disagreements depend on"),
     "climbing": Drawing(fig_climbing, ("climb-friction", "climb-tilt"), "What stands on a wall and climbs it", True),
     "zoo": Drawing(fig_zoo, ("zoo", "zoo-corner"), "Clusters on a wall and in a corner", True),
+    "tray-phases": Drawing(fig_trays, ("tray-phases",), "Whether walkers on a tray cluster, align or jam", True),
 }
 COMPARISON = "comparison"
 COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")

@@ -1,4 +1,4 @@
-"""Figures beside the paper's own: how dimers align, in which modes they walk, what climbs a wall."""
+"""Figures beside the paper's own: how dimers align, in which modes they walk, what climbs a wall, what trays do."""
 
 from __future__ import annotations
 
@@ -53,6 +53,14 @@ _SPEEDS = (-10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0)
 """mm/s, on the scale of colours."""
 _SIDE_BY_SIDE = 5
 """Clusters."""
+_OF_TRAYS = {
+    "share in clusters": ("clustered_share",),
+    "share in the largest": ("largest_share",),
+    "order": ("nematic_order", "polar_order"),
+    "joined / free speed": ("speed_ratio",),
+    "share that is slow": ("slow_share",),
+}
+"""Columns of a sweep's table that share a panel, solid and dashed, by its label."""
 _LARGEST_DRIVE = 10.0
 """Peak acceleration in g up to which the paper shakes."""
 _BEGINNINGS = (15.0, 45.0)
@@ -314,3 +322,47 @@ def _draw_cluster(axes: Axes, group: Group) -> None:
             large = frame and radius > group.case.border * 1e3
             axes.add_patch(Circle((-y, x), radius, lw=0.8, **{**style, **({"fc": "#e0566c"} if large else {})}))
     axes.set(xlim=(-1.5, 1.5), ylim=(-2.15, 2.15), aspect="equal")
+
+
+# --- trays ------------------------------------------------------------------------------------------------------------
+
+
+@styled
+def fig_trays(sources: Sources) -> Figure:
+    """Whether walkers on closed trays cluster, align and jam, against acceleration; a column for each coverage."""
+    from matplotlib.lines import Line2D
+
+    table = sources.finished("tray-phases")
+    shares = {"largest_share": table["largest_cluster"] / table["walkers"], "percent": (100.0 * table["coverage"])}
+    table = table.assign(**shares).round({"percent": 0})
+    coverages, numbers = sorted(table["percent"].unique()), sorted(table["walkers"].unique())
+    size = {"nrows": len(_OF_TRAYS), "ncols": len(coverages), "sharex": True, "sharey": "row", "squeeze": False}
+    figure, rows = new_figure(TWO_COLUMNS, 7.6, **size)
+    for panels, (label, columns) in zip(rows, _OF_TRAYS.items(), strict=True):
+        panels[0].set_ylabel(label)
+        for panel, coverage in zip(panels, coverages, strict=True):
+            for place, number in enumerate(numbers):
+                here = table[(table["percent"] == coverage) & (table["walkers"] == number)]
+                for column, style in zip(columns, ("-", "--"), strict=False):
+                    seeds = here.groupby("drive.peak_acceleration")[column]
+                    mean = seeds.mean()
+                    errors = [mean - seeds.min(), seeds.max() - mean]
+                    x = mean.index * 1.06 ** (place - 1)
+                    panel.errorbar(x, mean, errors, fmt="os^D"[place], ls=style, color=f"C{place}", ms=3.5, capsize=2)
+            panel.set_xscale("log")
+            panel.set_xticks(ticks := sorted(table["drive.peak_acceleration"].unique()), [f"{one:g}" for one in ticks])
+            panel.set_xticks([], minor=True)
+    for panel, coverage in zip(rows[0], coverages, strict=True):
+        panel.set_title(f"{coverage:g} % covered")
+    for panel in rows[-1]:
+        panel.set_xlabel("peak acceleration (g)")
+    letter_panels(rows.flat)
+    handles = [
+        Line2D([], [], label=f"{number} walkers", marker="os^D"[place], color=f"C{place}")
+        for place, number in enumerate(numbers)
+    ]
+    handles += [
+        Line2D([], [], color="0.3", ls=style, label=name) for name, style in (("nematic", "-"), ("polar", "--"))
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return figure

@@ -1,18 +1,84 @@
-"""The analysis of walkers that are meant to meet: when bridges join two of them, and when the last one breaks."""
+"""The analysis of walkers that are meant to meet: who meets whom, what becomes of them, whether they cluster or jam.
+
+Walkers are *joined* if bridges lead from one to the other, directly or by others; those that are joined are a cluster.
+A cluster, or a walker by itself, is *held* if a bridge joins one of its beads to a side wall. A walker is *free* if it
+is neither joined nor held. A *meeting* begins with the first bridge between two walkers and ends, if it does, when the
+last one between them is gone; two that meet again have another one. *At the end* is the last tenth of the drive.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite, isinf, nan, pi
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from walkers.inputs.boundary import FLOOR
 from walkers.inputs.case import Case
-from walkers.postprocess.analysis import Analysis, Quantity
+from walkers.postprocess.analysis import Analysis, Described, Quantity
 from walkers.postprocess.clusters import connected
-from walkers.postprocess.motion import Motion, read_bridges
+from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
+from walkers.postprocess.motion import Group, Motion, read_bridges
 from walkers.postprocess.tables import Columns, columns_of_rows
+
+_APPROACHES = {
+    "following": (0.0, "less than 60° apart"),
+    "side": (pi / 3.0, "60° to 120° apart"),
+    "head_on": (2.0 * pi / 3.0, "more than 120° apart"),
+}
+"""By the angle between the headings of two that meet: from which on, and its words."""
+_FATES = {
+    "parted": "have parted",
+    "walking": "are still joined at the end, and their middle is not slow",
+    "resting": "are still joined at the end, and their middle is slow",
+}
+_SLOW = 0.1
+"""Of a free walker's speed; what is slower is called slow."""
+_END = 0.1
+"""Of the drive; its last part, over which the end is measured."""
+_NUMBERS = {
+    "meeting_rate": ("meetings of a walker", "1/s", "meetings in which a walker takes part, in a second"),
+    "pair_lifetime": (
+        "mean life of a pair",
+        "s",
+        "pair_time over the number of partings: the mean life if pairs part at random; NaN if none did",
+    ),
+    "pair_time": ("time that pairs were joined", "s", "summed over all meetings"),
+    "clustered_share": ("walkers in clusters", "share", "walkers joined to others in the last frame"),
+    "largest_cluster": ("walkers in the largest cluster", "", "in the last frame; 1 if none are joined"),
+    "held_share": (
+        "walkers held by side walls",
+        "share",
+        "walkers that bridges join to a side wall in the last frame, themselves or by others",
+    ),
+    "nematic_order": (
+        "nematic order along the drive axis",
+        "",
+        "mean of cos 2θ of all walkers over the last tenth of the drive, θ from the drive axis to the heading: 1 all "
+        "along it, 0 any way, -1 all across it",
+    ),
+    "polar_order": (
+        "polar order",
+        "",
+        "length of the mean of all walkers' headings, averaged over the last tenth of the drive: 1 all one way; of N "
+        "that head any way 0.89/√N",
+    ),
+    "free_speed": (
+        "speed of free walkers",
+        "m/s",
+        "mean speed, from cycle to cycle and whichever way, of walkers joined to no other and to no side wall",
+    ),
+    "joined_speed": ("speed of joined walkers", "m/s", "the same of walkers in clusters that no side wall holds"),
+    "speed_ratio": ("speed of joined walkers over free ones'", "", "joined_speed over free_speed"),
+    "slow_share": (
+        "slow walkers at the end",
+        "share",
+        "walkers that in the last tenth of the drive come less far than at a tenth of free_speed",
+    ),
+}
+"""Of each number of the result that has a column: its label in reports, its unit, what it is."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +90,21 @@ class Meeting:
     walker: Annotated[int, "", "number of one of the two"]
     other: Annotated[int, "", "number of the other"]
     size: Annotated[int, "", "walkers that are joined by bridges, directly or by others, with the first one after that"]
+    angle: Annotated[float, "rad", "between the headings of the two then: 0 alike, pi opposite"]
+
+
+@dataclass(frozen=True)
+class Course:
+    """W walkers in K frames, at least one a cycle: time, s, shape (K,); mass centre, m, and heading, shape (K, W, 2).
+
+    And how many walkers are joined with each, itself too, and whether a side wall holds it or one of these, (K, W).
+    """
+
+    time: FloatArray
+    centre: FloatArray
+    heading: FloatArray
+    size: IntArray
+    held: BoolArray
 
 
 class Meetings(Analysis):
@@ -31,51 +112,165 @@ class Meetings(Analysis):
 
     order = 1
     name = "meetings"
+    version = 2
     tables: ClassVar[Mapping[str, type]] = {"meetings": Meeting}
+    derived: ClassVar[Described] = {
+        "coverage": (
+            "",
+            "area of the beads, seen from above, over that of the container's floor; where walkers can walk away over "
+            "that of the squares on which they start, at the start",
+        )
+    }
 
     def applies(self, case: Case) -> bool:
         """Where walkers are meant to meet."""
         return case.meets
 
+    def derived_of(self, case: Case) -> dict[str, float]:
+        """Coverage, to three digits, so that trays that were meant to have the same are drawn together."""
+        boundary, spacing = case.boundary, max(one.spacing for one in case.walkers)
+        cell = spacing * (spacing if isinf(boundary.width) else boundary.width)
+        floor = boundary.cross_section if boundary.closed else cell * sum(one.replicates for one in case.walkers)
+        return {"coverage": float(f"{pi * sum(radius**2 for radius in case.all_radii) / floor:.3g}")}
+
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """Events from one recorded frame of bridges to the next; who stands together from the first has merged then."""
         rows: list[Meeting] = []
         before: frozenset[tuple[int, int]] = frozenset()
-        groups: list[list[int]] = []
-        largest = 1
+        centre, heading = _places(motion)
+        floored = motion.case.boundary.walls[0].name == FLOOR
+        frames, sizes, held = [], [], []
         for bridges in read_bridges(motion):
             owners = np.sort(motion.walker_of[bridges.beads], axis=1)
             apart = (owners[:, 0] >= 0) & (owners[:, 0] != owners[:, 1])
             now = frozenset((int(one), int(other)) for one, other in owners[apart])
             labels = connected(len(motion.walkers), np.array(sorted(now), dtype=np.int64).reshape(-1, 2))
-            groups = [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
-            size = {walker: len(group) for group in groups for walker in group}
-            largest = max([largest, *size.values()])
+            size = np.bincount(labels)[labels]
+            at_sides = motion.walker_of[bridges.wall_beads[(bridges.walls > 0) & floored]]
+            held.append(np.isin(labels, labels[at_sides[at_sides >= 0]]))
+            sizes.append(size)
+            frames.append(bridges.frame)
             seconds = float(motion.time[bridges.frame])
             for event, pairs in (("merged", now - before), ("parted", before - now)):
-                rows += [Meeting(seconds, event, one, other, size[one]) for one, other in sorted(pairs)]
+                for one, other in sorted(pairs):
+                    cosine = float(heading[bridges.frame, one] @ heading[bridges.frame, other])
+                    angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+                    rows.append(Meeting(seconds, event, one, other, int(size[one]), angle))
             before = now
+        groups = [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
         events = [row.event for row in rows]
+        run = motion.case.run
+        often = max(1, run.samples_per_cycle // run.samples_per_bridge_sample)
+        # From the begin of the drive to the end, the same phase of each cycle.
+        kept = np.arange(len(frames) - 1, -1, -often)[::-1]
+        kept = kept[motion.time[frames][kept] >= 0.0]
+        strobed = np.array(frames)[kept]
+        course = Course(
+            motion.time[strobed], centre[strobed], heading[strobed], np.array(sizes)[kept], np.array(held)[kept]
+        )
         return {"meetings": columns_of_rows(Meeting, rows)}, {
             "merged": events.count("merged"),
             "parted": events.count("parted"),
-            "largest_group": largest,
+            "largest_group": int(np.max(sizes)),
             "groups_at_end": sorted((group for group in groups if len(group) > 1), key=len, reverse=True),
+            **collective(course, rows, np.array(motion.case.drive_axis)[:2]),
         }
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
-        """How often, and how many together."""
+        """How often and what of it, how many together, how they stand, how they are slowed down."""
         del result
         label = "meetings of walkers"
         yield Quantity("merged", f"{label}: merged", "", "merged", "how often two walkers stuck together")
         yield Quantity("parted", f"{label}: parted", "", "parted", "how often two of them parted again")
         told = "walkers in the largest group that bridges ever joined"
         yield Quantity("largest_group", "most walkers together", "", "largest_group", told)
+        for name, (label, unit, told) in _NUMBERS.items():
+            yield Quantity(name, label, unit, name, told)
+        for approach, (_, angle) in _APPROACHES.items():
+            told = f"meetings of two whose headings are {angle}"
+            yield Quantity(f"{approach}.met", "", "", f"{approach}_met", told)
+            for fate, words in _FATES.items():
+                told = f"of {approach}_met those that {words}"
+                yield Quantity(f"{approach}.{fate}", "", "", f"{approach}_{fate}", told)
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """How often, and who is together at the end."""
         together = "; ".join(", ".join(map(str, group)) for group in result["groups_at_end"])
+        slow = result["slow_share"]
         return [
             f"  meetings   {result['merged']} merged, {result['parted']} parted, at most {result['largest_group']} "
-            f"together; at the end {f'walkers {together}' if together else 'all are alone'}"
+            f"together; at the end {f'walkers {together}' if together else 'all are alone'}",
+            f"             at the end {100.0 * result['clustered_share']:.0f} % in clusters"
+            f"{'' if slow is None else f', {100.0 * slow:.0f} % slow'}; nematic order {result['nematic_order']:.2f}, "
+            f"polar order {result['polar_order']:.2f}",
         ]
+
+
+def _places(motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Mass centres (m) and headings of all walkers, by their numbers, in all frames, seen from above: (F, W, 2)."""
+    centre, heading = (np.zeros((len(motion.time), len(motion.walkers), 2)) for _ in range(2))
+    for number, make in enumerate(motion.case.walkers):
+        group = Group(motion, make, [walker for walker in motion.walkers if walker.make == number])
+        own = [walker.walker for walker in group.walkers]
+        centre[:, own], heading[:, own] = group.mass_centre[..., :2], group.heading[..., :2]
+    return centre, heading
+
+
+def collective(course: Course, meetings: Sequence[Meeting], axis: FloatArray) -> dict[str, Any]:
+    """What a result says of walkers as many, from their course and their meetings; None for what is unknown.
+
+    ``axis`` is the unit vector of the drive. See the columns of `Meetings` for what each number is.
+    """
+    time, last = course.time, len(course.time) - 1
+    begin = min(int(np.searchsorted(time, time[-1] - _END * (time[-1] - time[0]))), last - 1)
+    steps = np.diff(time)[:, None]
+    speed = np.linalg.norm(np.diff(course.centre, axis=0), axis=-1) / steps
+
+    def mean_speed(there: BoolArray) -> float:
+        """Of what is so at both ends of an interval."""
+        found = speed[there[:-1] & there[1:]]
+        return float(found.mean()) if found.size else nan
+
+    alone = course.size == 1
+    free, joined = mean_speed(alone & ~course.held), mean_speed(~alone & ~course.held)
+    way = (course.centre[-1] - course.centre[begin]) / (time[-1] - time[begin])
+    slow = np.linalg.norm(way, axis=-1) < _SLOW * free
+    heading = course.heading[begin:]
+    fates = {name: dict.fromkeys(("met", *_FATES), 0) for name in _APPROACHES}
+    seconds = 0.0
+    for met, lasted, parted in _lives(meetings, float(time[-1])):
+        seconds += lasted
+        found = fates[[name for name, (least, _) in _APPROACHES.items() if met.angle >= least][-1]]
+        both = float(np.linalg.norm(way[met.walker] + way[met.other])) / 2.0
+        found["met"] += 1
+        found["parted" if parted else "walking" if both >= _SLOW * free else "resting"] += 1
+    partings, meets = (sum(one[what] for one in fates.values()) for what in ("parted", "met"))
+    numbers = {
+        "meeting_rate": 2.0 * meets / (course.size.shape[1] * float(time[-1] - time[0])),
+        "pair_lifetime": seconds / partings if partings else nan,
+        "pair_time": seconds,
+        "clustered_share": float((~alone[-1]).mean()),
+        "largest_cluster": int(course.size[-1].max()),
+        "held_share": float(course.held[-1].mean()),
+        "nematic_order": float((2.0 * (heading @ axis) ** 2 - 1.0).mean()),
+        "polar_order": float(np.linalg.norm(heading.mean(axis=1), axis=-1).mean()),
+        "free_speed": free,
+        "joined_speed": joined,
+        "speed_ratio": joined / free if free else nan,
+        "slow_share": float(slow.mean()) if isfinite(free) else nan,
+    }
+    return {**{name: one if isfinite(one) else None for name, one in numbers.items()}, **fates}
+
+
+def _lives(meetings: Sequence[Meeting], end: float) -> Iterator[tuple[Meeting, float, bool]]:
+    """Each meeting, how long the two were joined (s), and whether they parted before the end."""
+    together: dict[tuple[int, int], Meeting] = {}
+    for one in meetings:
+        pair = one.walker, one.other
+        if one.event == "merged":
+            together[pair] = one
+        else:
+            met = together.pop(pair)
+            yield met, one.time - met.time, True
+    for met in together.values():
+        yield met, end - met.time, False
