@@ -37,7 +37,7 @@ from walkers.runner.failures import EngineError, EngineKilled, RunBusy
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runner.summary import notes
-from walkers.sweeps.climbing import conditions_in, describe_climbs, leaders, summarise_climbs
+from walkers.sweeps.climbing import conditions_in, describe_climbs, leaders, summarise_climbs, survival
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
 from walkers.sweeps.site import Site, SiteFile
 from walkers.sweeps.table import load
@@ -511,6 +511,13 @@ def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch
     assert (other.label, other.runs) == ("deck version = 6", [tmp_path / "e-5"])
 
 
+def test_runs_that_climbers_ended_tell_of_later_times() -> None:
+    """Two piles have climbed, and their climbers left; a third one has not climbed by 2.5 s: nobody knows after that."""
+    left = survival(np.array([1.0, 2.0]), np.array([3.0, 3.5]), 5.0)
+    assert (left["probability"], left["interval"]) == (1.0, pytest.approx([0.025**0.5, 1.0]))
+    assert survival(np.array([1.0, 2.0, np.inf]), np.array([3.0, 3.5, 2.5]), 5.0)["probability"] is None
+
+
 def test_leaders_by_chance() -> None:
     """Of 10 beads 3 are large: so are two leaders with 3/10 × 2/9, one that leads twice with 3/10."""
     climb = {"leader": 0, "leader_large": True, "large": 1, "size": 4}
@@ -532,7 +539,7 @@ def test_a_climber_that_leaves_the_container_ends_the_run(tmp_path: Path) -> Non
     tables["run"] |= {"duration": "1 s", "segment": "0.05 s"}
     finished = walkers.run(resolve_case(tables, name="cluster"), tmp_path)
     assert finished.result["driven"] == pytest.approx(3.2e-3 / 4.79e-3, abs=0.1)
-    assert "left the simulation box" in read_json(finished.directory / MANIFEST_NAME)["ended"]
+    assert "over its walls" in read_json(finished.directory / MANIFEST_NAME)["ended"]
     assert "then climbers left the container" in finished.describe()
     assert call("verify", str(finished.directory)).returncode == 0
 

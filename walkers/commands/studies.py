@@ -45,7 +45,7 @@ _MANY = 10_000
 """Points of a sweep that take seconds to be resolved."""
 _SWEEP_FILE = "A sweep file, or a shipped sweep such as fig2."
 _SWEEP = "A sweep: its directory or its name in --out"
-_WITHIN = "Climbs until then, s of drive; if left out until the shortest run's end."
+_WITHIN = "Climbs until then, s of drive; if left out until the first run ends that has not climbed."
 _RUNS = "Runs and sweeps: names in --out, or directories."
 _REPORTED = "One of them: its directory, its name in --out, or a case."
 _ANY, _SWEEPS = offering("case", "run", "sweep"), offering("sweep")
@@ -138,7 +138,7 @@ def table(
 def climb(
     what: list[str] = Argument(metavar="WHAT…", help=_PILES, autocompletion=_ANY),
     out: Out = DEFAULT_OUT,
-    within: float | None = Option(None, min=0.0, help=_WITHIN),
+    within: float | None = Option(None, min=1e-9, help=_WITHIN),
     thresholds: bool = Option(False, "--sensitivity", help=_THRESHOLDS),
     null: list[str] | None = Option(None, help=_NULL),
     to: Path | None = Option(None, help="Write the figure (.png, .svg, .pdf) or the table (.csv) into this file."),
@@ -152,14 +152,15 @@ def climb(
 
     if to is not None:
         check_place(to, *(f".{form}" for form in FORMATS), ".csv")
-    conditions = climbing.conditions_in([locate(one, out).path for one in what])
+    places = [locate(one, out).path for one in what]
+    conditions = climbing.conditions_in(places)
+    tell(*(f"warning: {left}" for place in places if (left := climbing.unfinished_points(place))))
     lines: list[str] = []
     found: list[dict[str, Any]] = []
     if thresholds or null:
         for option, given in {"--within": within, "--to": to}.items():
             refuse(option, given is not None, "has no meaning with --sensitivity or --null")
         nulls = climbing.conditions_in([locate(one, out).path for one in null]) if null else []
-        nulls = [one for one in nulls if one.differs] or nulls  # a sweep of controls may have the usual pile as well
         named = [(one.label, one) for one in conditions] + [(f"null: {one.label}".rstrip(), one) for one in nulls]
         for label, one in named:
             found.append({"condition": label, "thresholds": climbing.sensitivity(one.runs)})
@@ -169,7 +170,7 @@ def climb(
         if to is not None:
             write_climbs(conditions, found, to)
         for one, told in zip(conditions, found, strict=True):
-            told |= {"condition": one.label, "assembly": climbing.summarise_origins(one.runs)}
+            told |= {"condition": one.label, "assembly": climbing.summarise_origins(one.runs, within)}
             origins = climbing.describe_origins(told["assembly"])
             lines += filter(None, [one.label, climbing.describe_climbs(told), origins])
     print_as(as_json, lambda: found, lambda: "\n".join(lines))

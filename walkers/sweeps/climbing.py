@@ -30,7 +30,7 @@ from walkers.sweeps.table import RECORD_NAME, read_record, result_in, states, va
 FloatArray = npt.NDArray[np.float64]
 
 _CONFIDENCE = 0.95
-_NO_CONDITION = ("name", "title", "seed", "run.cycles", "run.cycles_per_segment")
+_NO_CONDITION = ("name", "title", "seed", "run.seed", "run.cycles", "run.duration")
 """Keys of a case that are none of a condition under which a pile is shaken: how long it was, is none."""
 _DRAWS = 10_000
 _ALIKE = 1e-6  # lengths of runs that differ by less, relatively, are the same
@@ -74,6 +74,15 @@ def conditions_in(directories: Sequence[Path]) -> list[Condition]:
     return found
 
 
+def unfinished_points(directory: Path) -> str:
+    """How many points of a sweep are not finished, which no statistics can know of; empty where none, or no sweep."""
+    if not (directory / RECORD_NAME).exists():
+        return ""
+    found = [state.status for state in states(read_record(directory))]
+    left = len(found) - found.count("finished")
+    return f"{directory.name}: {left} of {len(found)} points are not finished and left out" if left else ""
+
+
 def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
     """What the runs of one condition in a directory have for each key that varies, as text; and these runs."""
     varied: dict[Path, dict[str, str]] = {}
@@ -89,7 +98,7 @@ def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
         varied = {place: {} for place in places}
     runs = [run for path in varied if (run := finished_run(path)) is not None]
     try:
-        piles = {run.directory.name.rpartition("-")[2]: run for run in runs if Pile().applies(run.case)}
+        piles = {str(run.manifest.get("run", run.directory)): run for run in runs if Pile().applies(run.case)}
         cases = {run.directory: _determinants(run) for run in piles.values()}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise refused(directory, f"a case cannot be read ({error})") from error
@@ -99,9 +108,9 @@ def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
     differ = [key for key in keys if len({str(case.get(key)) for case in cases.values()}) > 1]
     groups: dict[str, tuple[dict[str, str], dict[Any, Path]]] = {}
     for path, case in sorted(cases.items(), key=lambda one: -one[1].get("run.cycles", 0)):
-        own = {key: value_text(case.get(key)) for key in differ}
+        own, exact = {key: value_text(case.get(key)) for key in differ}, str([case.get(key) for key in differ])
         made_by = {key: own[key] for key in ("deck version", "engine") if key in own}
-        _, starts = groups.setdefault(str(own), ((varied[path] | made_by) if varied[path] else own, {}))
+        _, starts = groups.setdefault(exact, ((varied[path] | made_by) if varied[path] else own, {}))
         starts.setdefault(case.get("seed"), path)
     order = {path: number for number, path in enumerate(varied)}
     sets = [(values, sorted(starts.values(), key=order.__getitem__)) for values, starts in groups.values()]
@@ -124,7 +133,7 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
         Run directories of piles.
     within
         Seconds of drive by which a pile has climbed or not, and after which no run counts any more; if left out the
-        length of the shortest run, the longest time at which all of them still count.
+        end of the first run that ends without a climb, the longest time at which all of them still count.
 
     Returns
     -------
@@ -139,7 +148,7 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
         first climb of each run qualified and had begun), ``speeds`` (m/s), ``heights`` (m, of the leaders at last),
         ``sizes``; and of who led what `leaders` says.
 
-        ``each`` has what the results say of each climb, and the name of its run.
+        ``each`` has what the results say of each climb, whenever it qualified, and the name of its run.
 
         And all of this of a part of the climbs alone: ``on_plain_walls``, ``in_corners``, and ``out_of_pile``, without
         clusters that have hung on a wall since the pouring.
@@ -163,7 +172,9 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
 def _summary(results: Sequence[Mapping[str, Any]], within: float | None) -> dict[str, Any]:
     """`summarise_climbs` of results."""
     driven = np.array([result["driven"] for result in results])
-    at, cut = (float(driven.min()), np.inf) if within is None else (within, within)
+    # A run that ended since a climber left it says as much of its first climb as a longer one.
+    still = [float(result["driven"]) for result in results if not result["climbs"]]
+    at, cut = (min(still, default=float(driven.max())), np.inf) if within is None else (within, within)
     watched = np.minimum(driven, cut)
     counted = [[climb for climb in result["climbs"] if climb["qualified"] <= cut] for result in results]
     firsts = [min(climbs, key=lambda climb: climb["qualified"]) for climbs in counted if climbs]
@@ -204,25 +215,29 @@ def _rate(name: str, events: int, seconds: float) -> dict[str, Any]:
     return {name: events / seconds, f"{name}_interval": [low / seconds, high / seconds]}
 
 
-def origins(run: Path) -> list[dict[str, Any]]:
-    """Where the beads of each climb of a run came from, from the run's tables.
+def origins(run: Path, within: float | None = None) -> list[dict[str, Any]]:
+    """Where the beads of each climb of a run came from, that had qualified ``within`` (s), from the run's tables.
 
     Returns
     -------
     list of dict
         A row a climb: ``size`` and ``out_of_pile``; at rest, before the drive: ``bridges_at_rest`` between its beads,
         ``leader_at_wall_at_rest`` and ``at_wall_at_rest`` (beads bridged to a side wall), ``share_at_wall`` of all
-        beads of the pile; ``bridges`` between its beads when it qualified; ``whole_before`` (s, how long before it came
-        free of the pile its last bead was joined to the others for good; negative where that was later).
+        beads of the leader's size; ``bridges`` between its beads when it qualified; ``whole_before`` (s, how long
+        before it came free of the pile its last bead was joined to the others for good; negative where later).
     """
     import pandas as pd
 
     tables = tables_of(run)
     bed, clusters = tables["bed"], pd.DataFrame(tables["clusters"]).set_index("track")
     rest = max(int(np.searchsorted(bed["time"], 0.0)) - 1, 0)
-    beads, rows = result_in(run)["beads"], []
+    result, rows = result_in(run), []
+    large, small = bed["large_at_wall"][rest], bed["at_wall"][rest] - bed["large_at_wall"][rest]
+    share = {True: large / max(result["large"], 1), False: small / max(result["beads"] - result["large"], 1)}
     for track, past in pd.DataFrame(tables["assembly"]).groupby("track"):
-        frames = past.groupby("time")
+        if within is not None and clusters["qualified"][track] > within:
+            continue
+        leader, frames = clusters["leader"][track], past.groupby("time")
         first, last = (frames.get_group(time) for time in (past["time"].min(), past["time"].max()))
         apart = past.loc[~past["joined"], "time"].max()
         whole = past["time"].min() if np.isnan(apart) else apart
@@ -232,16 +247,16 @@ def origins(run: Path) -> list[dict[str, Any]]:
                 "out_of_pile": bool(clusters["out_of_pile"][track]),
                 "bridges_at_rest": int(first["neighbours"].sum() // 2),
                 "bridges": int(last["neighbours"].sum() // 2),
-                "leader_at_wall_at_rest": bool(first.set_index("bead")["at_wall"][clusters["leader"][track]]),
+                "leader_at_wall_at_rest": bool(first.set_index("bead")["at_wall"].get(leader, False)),
                 "at_wall_at_rest": int(first["at_wall"].sum()),
-                "share_at_wall": float(bed["at_wall"][rest] / beads),
+                "share_at_wall": float(share[bool(clusters["leader_large"][track])]),
                 "whole_before": float(clusters["first"][track] - whole),
             }
         )
     return rows
 
 
-def summarise_origins(runs: Sequence[Path]) -> dict[str, Any]:
+def summarise_origins(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
     """Whether climbers assemble while the pile is shaken: `origins` over several runs.
 
     Returns
@@ -249,10 +264,10 @@ def summarise_origins(runs: Sequence[Path]) -> dict[str, Any]:
     dict
         ``climbs``; ``strangers`` (climbs no two of whose beads were neighbours at rest), ``share_of_bridges`` (of those
         that the climbers had when they qualified, how many were there at rest), ``leaders_at_wall`` (at rest),
-        ``share_at_wall`` (of all beads at rest) with ``p_at_wall``, the probability of so many leaders at a wall by
-        chance, if leaders did not depend on each other; ``whole_before`` (s, median).
+        ``share_at_wall`` (of all beads of the leaders' sizes, at rest) with ``p_at_wall``, the probability of so many
+        leaders at a wall by chance, if leaders did not depend on each other; ``whole_before`` (s, median).
     """
-    rows = [row for run in runs for row in origins(run)]
+    rows = [row for run in runs for row in origins(run, within)]
     if not rows:
         return {"climbs": 0}
     chances = np.array([row["share_at_wall"] for row in rows])
@@ -278,7 +293,7 @@ def describe_origins(found: Mapping[str, Any]) -> str:
         f"{found['share_of_bridges']:.0%} of their bridges were there then\n"
         f"             their last beads joined {found['whole_before']:.2f} s before they came free (median)\n"
         f"             leaders of {found['leaders_at_wall']} were at a wall at rest, as {found['share_at_wall']:.0%} "
-        f"of all beads (by chance: {_told_p(found['p_at_wall'])})"
+        f"of all beads of their sizes (by chance: {_told_p(found['p_at_wall'])})"
     )
 
 
@@ -340,25 +355,26 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
         that ended without it).
 
         The interval is that of Greenwood's variance of log(-log) of the survival, where it exists; where none or all
-        have climbed, the binomial one (Clopper and Pearson 1934) of the records that are so long.
+        have climbed, the binomial one (Clopper and Pearson 1934) of the records that are so long, or in which it has
+        happened.
     """
     from scipy.stats import binomtest
 
     censored = first > watched
-    longest = watched >= at * (1.0 - _ALIKE)
+    watched_so_long = watched >= at * (1.0 - _ALIKE)
+    followed = int((watched_so_long | (first <= np.minimum(watched, at))).sum())
     share = _share(first, watched)
     half = np.flatnonzero(share.probabilities >= 0.5)
-    probability = float(share.evaluate(at)) if longest.any() else None
+    probability = float(share.evaluate(at)) if watched_so_long.any() or not censored.any() else None
     interval = None
     if probability is not None and 0.0 < probability < 1.0:
         interval = [float(end.evaluate(at)) for end in _ends(share)]
     elif probability is not None:
-        followed = int(longest.sum())
         exact = binomtest(round(probability) * followed, followed).proportion_ci(_CONFIDENCE)
         interval = [float(exact.low), float(exact.high)]
     return {
         "climbed": int((~censored & (first <= at)).sum()),
-        "ended": int((censored & ~longest).sum()),
+        "ended": int((censored & ~watched_so_long).sum()),
         "censored": int(censored.sum()),
         "probability": probability,
         "interval": interval,
@@ -488,7 +504,8 @@ def _told_p(value: float) -> str:
 
 
 def _told_rate(found: Mapping[str, Any]) -> str:
-    return f"{found['climbs']}: {found['rate']:.3g} per start and second{_interval(found['rate_interval'])}"
+    rate = "-" if found["rate"] is None else f"{found['rate']:.3g} per start and second"
+    return f"{found['climbs']}: {rate}{_interval(found['rate_interval'])}"
 
 
 def _interval(ends: Sequence[float] | None, digits: str = ".3g") -> str:

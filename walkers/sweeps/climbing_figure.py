@@ -84,10 +84,10 @@ def _draw_survival(panel: Axes, found: Mapping[str, Any]) -> None:
 
 
 def _draw_climbs(panel: Axes, found: Mapping[str, Any]) -> None:
-    for label, key, look in _KINDS[1:]:
-        sizes, speeds = found[key]["sizes"], found[key]["speeds"]
-        if len(sizes) == len(speeds):
-            panel.plot(sizes, np.array(speeds) * 1e3, look, markerfacecolor="none", label=label)
+    for corner, (label, _, look) in enumerate(_KINDS[1:]):
+        some = [one for one in found["each"] if one["speed"] is not None and (len(one["walls"]) > 1) == bool(corner)]
+        sizes, speeds = [one["size"] for one in some], [one["speed"] * 1e3 for one in some]
+        panel.plot(sizes, speeds, look, markerfacecolor="none", label=label)
     panel.set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
 
 
@@ -97,7 +97,8 @@ def _draw_rates(
     """Rates with their exact intervals, side by side; or one above the other, ``across`` the panel."""
     for place, (label, key, look) in enumerate(_KINDS):
         some = [one[key] if key else one for one in found]
-        rates, ends = np.array([one["rate"] for one in some]), np.array([one["rate_interval"] for one in some])
+        rates = np.array([one["rate"] for one in some], dtype=float)  # NaN where nothing was shaken
+        ends = np.array([one["rate_interval"] or (np.nan, np.nan) for one in some])
         at, errors = np.arange(len(found)) + 0.15 * (place - 1), np.abs(ends.T - rates)
         given: dict[str, Any] = {"xerr": errors} if across else {"yerr": errors}
         x, y = (rates, at) if across else (at, rates)

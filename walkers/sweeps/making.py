@@ -198,7 +198,7 @@ class OpenRun:
                         raise
                     # A climber left the container: that ends the experiment, and spoils nothing of what was before.
                     shutil.rmtree(self.directory / SEGMENTS / f"{len(self.done):04d}.new")
-                    self.ended = str(over)
+                    self.ended = f"{over.lost} bead(s) left the container over its walls in the next segment"
                     return
                 made += segment.end - segment.begin
             if cycles < self.case.run.cycles and _are_steady(self.directory):

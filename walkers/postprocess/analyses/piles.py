@@ -69,6 +69,7 @@ class Bed:
     liquid_in_bridges: Annotated[float, "m^3", "sum of the volumes of all bridges, those to walls too"]
     bulk: Annotated[int, "", "beads in the bulk"]
     at_wall: Annotated[int, "", "beads that a bridge joins to a side wall"]
+    large_at_wall: Annotated[int, "", "large ones among these"]
     clusters: Annotated[int, "", "clusters that are free of the bulk and held to a side wall"]
     highest: Annotated[float, "m", "height of the topmost bead of these; the surface where there is none"]
 
@@ -100,7 +101,7 @@ class Pile(Analysis):
 
     order = 2
     name = "pile"
-    version = 10
+    version = 11
     tables: ClassVar[Mapping[str, type]] = {
         "bed": Bed,
         "clusters": Climb,
@@ -390,6 +391,7 @@ def _bed(
         liquid_in_bridges=float(liquid.sum()),
         bulk=int(bulk.sum()),
         at_wall=int(joined[1].sum()),
+        large_at_wall=int((joined[1] & large).sum()),
         clusters=len(held),
         highest=max([middle, *(float(position[bead, 2]) for members, _ in held for bead in members)]),
     )
