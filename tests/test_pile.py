@@ -512,7 +512,7 @@ def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch
 
 
 def test_runs_that_climbers_ended_tell_of_later_times() -> None:
-    """Two piles have climbed, and their climbers left; a third one has not climbed by 2.5 s: nobody knows after that."""
+    """Two piles have climbed, and their climbers left. A third has not by 2.5 s: nobody knows after that."""
     left = survival(np.array([1.0, 2.0]), np.array([3.0, 3.5]), 5.0)
     assert (left["probability"], left["interval"]) == (1.0, pytest.approx([0.025**0.5, 1.0]))
     assert survival(np.array([1.0, 2.0, np.inf]), np.array([3.0, 3.5, 2.5]), 5.0)["probability"] is None
