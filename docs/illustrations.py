@@ -93,9 +93,9 @@ def _of_run(
     return Illustration((file,), lambda: [load_case(case, changes)], make)
 
 
-def _of_climbs(*names: str, assembly: Mapping[str, Any] | None = None) -> Illustration:
-    """What `walkers climb` draws and prints of a sweep; and how the first climb of the run of a case assembled."""
-    name = names[0]
+def _of_climbs(name: str, *others: str, assembly: Mapping[str, Any] | None = None) -> Illustration:
+    """What `walkers climb` draws and prints of sweeps; and how the first climb of the run of a case assembled."""
+    names = (*others, name)
     files = [f"figures/{name}.png", f"figures/{name}.md", *(["figures/pile-assembly.png"] if assembly else [])]
 
     def make(out: Path, docs: Path) -> None:
@@ -155,6 +155,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "tray": _of_run("tray", "tray"),
     "climber": _of_run("climber", "climber"),
     "pile-starts": _of_climbs("pile-starts", assembly=_ASSEMBLES),
+    "pile-controls": _of_climbs("pile-controls", "pile-starts"),
     "pile-film": _of_run(
         *("pile", "pile-small", _ASSEMBLES),
         film=FilmOptions(size=(360, 640), fps=10, slowdown=1.0, begin=2.5, end=8.5),

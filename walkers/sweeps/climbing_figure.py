@@ -48,7 +48,7 @@ def climbs_figure(conditions: Sequence[Condition], found: Sequence[Mapping[str, 
     _draw_rates(axes["rates"], [""], [found[usual]])
     axes["rates"].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     if "conditions" in axes:
-        labels = [one.label or "as usual" for one in conditions]
+        labels = [_in_short(one) for one in conditions]
         _draw_rates(axes["conditions"], labels[::-1], found[::-1], across=True)
     for name in keys if "conditions" not in axes else ():
         labels, numbers = _at(conditions, name)
@@ -56,6 +56,11 @@ def climbs_figure(conditions: Sequence[Condition], found: Sequence[Mapping[str, 
         axes[name].set_xlabel(plain_text(name))
     letter_panels(axes.values())
     return figure
+
+
+def _in_short(one: Condition) -> str:
+    """What tells a condition from the others, a line a key; of keys the last word."""
+    return "\n".join(f"{key.rpartition('.')[2]} {told}" for key, told in one.differs.items()) or one.source or "usual"
 
 
 def _at(conditions: Sequence[Condition], key: str) -> tuple[list[str], list[int]]:
