@@ -38,13 +38,7 @@ from walkers.postprocess.analysis import analyses
 from walkers.postprocess.films import FilmOptions
 from walkers.postprocess.series import render_series
 from walkers.runner.files import read_json, write_json, write_text
-from walkers.sweeps.climbing import (
-    conditions_in,
-    describe_climbs,
-    describe_origins,
-    summarise_climbs,
-    summarise_origins,
-)
+from walkers.sweeps import climbing
 from walkers.sweeps.climbing_figure import write_climbs
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import cores_here
@@ -101,15 +95,14 @@ def _of_climbs(name: str, *others: str, assembly: Mapping[str, Any] | None = Non
     def make(out: Path, docs: Path) -> None:
         for sweep_name in names:
             sweep(sweep_name, out)
-        conditions = conditions_in([out / sweep_name for sweep_name in names])
-        found = [summarise_climbs(one.runs) for one in conditions]
+        conditions = climbing.conditions_in([out / sweep_name for sweep_name in names])
+        found = list(map(climbing.summarise, conditions))
         write_climbs(conditions, found, docs / files[0])
-        told = [
-            "\n".join(filter(None, [one.label, describe_climbs(climbs), describe_origins(summarise_origins(one.runs))]))
-            for one, climbs in zip(conditions, found, strict=True)
-        ]
         command = f"$ walkers climb {' '.join(names)}"
-        write_text(docs / files[1], "\n".join([f"# {name}", "", "```console", command, *told, "```", ""]))
+        write_text(
+            docs / files[1],
+            "\n".join([f"# {name}", "", "```console", command, *map(climbing.describe, found), "```", ""]),
+        )
         if assembly:
             (drawn,) = (path for path in run(load_case("pile-small", assembly), out).plot() if path.stem == "assembly")
             shutil.copy(drawn, docs / files[2])

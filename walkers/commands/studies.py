@@ -166,13 +166,10 @@ def climb(
             found.append({"condition": label, "thresholds": climbing.sensitivity(one.runs)})
             lines += filter(None, [label, climbing.describe_sensitivity(found[-1]["thresholds"])])
     else:
-        found = [climbing.summarise_climbs(one.runs, within) for one in conditions]
+        found = [climbing.summarise(one, within) for one in conditions]
+        lines += map(climbing.describe, found)
         if to is not None:
             write_climbs(conditions, found, to)
-        for one, told in zip(conditions, found, strict=True):
-            told |= {"condition": one.label, "assembly": climbing.summarise_origins(one.runs, within)}
-            origins = climbing.describe_origins(told["assembly"])
-            lines += filter(None, [one.label, climbing.describe_climbs(told), origins])
     print_as(as_json, lambda: found, lambda: "\n".join(lines))
 
 

@@ -206,6 +206,16 @@ class Case:
         return sum(body.count for body in self.bodies)
 
     @property
+    def large(self) -> int:
+        """How many of them are large."""
+        return sum(radius > self.border for radius in self.all_radii)
+
+    @property
+    def duration(self) -> float:
+        """How long it is shaken, s; what runs until it is steady, at most."""
+        return self.run.cycles / self.drive.frequency
+
+    @property
     def radii(self) -> list[float]:
         """The different radii of the beads, m, in the order of the bodies."""
         return list(dict.fromkeys(radius for body in self.bodies for radius in body.radii))

@@ -97,9 +97,8 @@ def reach(case: Case) -> float:
     Walkers move at a few per cent of the substrate's peak velocity (0.14 of it was the fastest seen, at Γ0 = 0.76
     and friction 0.5); 0.3 of it through the whole run leaves room for those that hop, and sideways as well.
     """
-    duration = case.run.cycles / case.drive.frequency
     longest = max((walkers.length for walkers in case.walkers), default=0.0)
-    return 0.3 * case.drive.peak_velocity * duration + 2.0 * longest
+    return 0.3 * case.drive.peak_velocity * case.duration + 2.0 * longest
 
 
 def hop_height(case: Case) -> float:

@@ -65,16 +65,19 @@ def notes(case: Case) -> list[str]:
     """What is to be said of a pile before it is shaken, if anything: beads of one size, low walls."""
     if not (case.loose and case.boundary.closed and case.mixture):
         return []
-    large = sum(radius > case.border for radius in case.all_radii)
-    told = [f"no {name} beads" for name, number in (("large", large), ("small", case.count - large)) if not number]
-    told = [f"{one}: in the paper large beads lead small ones" for one in told]
-    volume = sum(4.0 / 3.0 * pi * radius**3 for radius in case.all_radii)
-    room = 2.0 * case.boundary.height - volume / (_LOOSE_PACKING * case.boundary.cross_section)
-    if (fastest := room * case.drive.frequency / case.run.cycles) < _FASTEST_CLIMB:
+    numbers = {"large": case.large, "small": case.count - case.large}
+    told = [f"no {name} beads: in the paper large beads lead small ones" for name, one in numbers.items() if not one]
+    room = 2.0 * case.boundary.height - _volume(case) / (_LOOSE_PACKING * case.boundary.cross_section)
+    if (fastest := room / case.duration) < _FASTEST_CLIMB:
         told.append(
             f"climbers faster than {fastest * 1e3:.1f} mm/s rise above twice boundary.height, and end the run early"
         )
     return told
+
+
+def _volume(case: Case) -> float:
+    """Of all beads, m³."""
+    return sum(4.0 / 3.0 * pi * radius**3 for radius in case.all_radii)
 
 
 def summarise(case: Case) -> dict[str, Any]:
@@ -89,15 +92,14 @@ def summarise(case: Case) -> dict[str, Any]:
         ``"auto"``), ``run`` (steps, samples, predicted seconds).
     """
     run, drive, limits = case.run, case.drive, limits_of(case).as_dict()
-    volume = sum(4.0 / 3.0 * pi * radius**3 for radius in case.all_radii)
-    large = sum(radius > case.border for radius in case.all_radii)
+    volume = _volume(case)
     known = library.material(case.material) if case.material in library.materials() else None
     summary: dict[str, Any] = {
         "case": case.as_dict(),
         "drive": {name: getattr(drive, name) for name in ("peak_acceleration", "amplitude", "peak_velocity")},
         "beads": {
-            "small": len(case.all_radii) - large,
-            "large": large,
+            "small": case.count - case.large,
+            "large": case.large,
             "mass": volume * case.density,
             "volume": volume,
             "liquid": volume * case.liquid.volume_fraction,

@@ -33,6 +33,12 @@ _CONFIDENCE = 0.95
 _NO_CONDITION = ("name", "title", "seed", "run.seed", "run.cycles", "run.duration")
 """Keys of a case that are none of a condition under which a pile is shaken: how long it was, is none."""
 _DRAWS = 10_000
+_PARTS: Mapping[str, Callable[[Mapping[str, Any]], bool]] = {
+    "on_plain_walls": lambda climb: len(climb["walls"]) == 1,
+    "in_corners": lambda climb: len(climb["walls"]) > 1,
+    "out_of_pile": lambda climb: climb["out_of_pile"],
+}
+"""Parts of the climbs of a result."""
 _ALIKE = 1e-6  # lengths of runs that differ by less, relatively, are the same
 
 
@@ -154,16 +160,11 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
         clusters that have hung on a wall since the pouring.
     """
     results = [result_in(run) for run in runs]
-    parts: dict[str, Callable[[Mapping[str, Any]], bool]] = {
-        "on_plain_walls": lambda climb: len(climb["walls"]) == 1,
-        "in_corners": lambda climb: len(climb["walls"]) > 1,
-        "out_of_pile": lambda climb: climb["out_of_pile"],
-    }
     found = _summary(results, within)
     found["each"] = [
         {"run": run.name, **climb} for run, one in zip(runs, results, strict=True) for climb in one["climbs"]
     ]
-    for name, belongs in parts.items():
+    for name, belongs in _PARTS.items():
         some = [{**result, "climbs": list(filter(belongs, result["climbs"]))} for result in results]
         found[name] = _summary(some, within)
     return found
@@ -322,9 +323,11 @@ def leaders(climbs: Sequence[tuple[int, int, Sequence[Mapping[str, Any]]]]) -> d
     dealt, own = np.zeros(_DRAWS), np.zeros(_DRAWS)
     for number, some, told in climbs:
         _, times = np.unique([climb["leader"] for climb in told], return_counts=True)
-        if len(times):  # the leaders are the first of the beads, in an order that is shuffled
-            order = draw.permuted(np.tile(np.arange(number) < some, (_DRAWS, 1)), axis=1)
-            dealt += order[:, : len(times)] @ times
+        left = np.full(_DRAWS, some)  # large names that are still to be dealt out, to one leader after the other
+        for place, weight in enumerate(times):
+            is_large = draw.random(_DRAWS) < left / (number - place)
+            dealt += weight * is_large
+            left -= is_large
         for climb in told:
             own += draw.random(_DRAWS) < climb["large"] / climb["size"]
     p_values = {
@@ -468,12 +471,22 @@ def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def summarise(condition: Condition, within: float | None = None) -> dict[str, Any]:
+    """`summarise_climbs` of a condition, with its label as ``condition`` and `summarise_origins` as ``assembly``."""
+    found = summarise_climbs(condition.runs, within)
+    return found | {"condition": condition.label, "assembly": summarise_origins(condition.runs, within)}
+
+
+def describe(found: Mapping[str, Any]) -> str:
+    """`summarise` as text; s, mm, mm/s."""
+    return "\n".join(filter(None, [found["condition"], describe_climbs(found), describe_origins(found["assembly"])]))
+
+
 def describe_climbs(found: Mapping[str, Any]) -> str:
     """`summarise_climbs` as text; s, mm, mm/s."""
     if found["probability"] is None:
         return f"no run is as long as {found['within']:g} s"
     half = "not reached" if found["median"] is None else f"{found['median']:.2f} s"
-    told = {name: _told_rate(found[name]) for name in ("on_plain_walls", "in_corners", "out_of_pile")}
     lines = [
         f"{found['climbed']} of {found['runs']} runs climbed within {found['within']:.3g} s"
         + (f", {found['ended']} ended before and had not" if found["ended"] else "")
@@ -485,7 +498,7 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
     if found["climbs"]:
         sizes = ", ".join(f"{size}: {found['sizes'].count(size)}" for size in sorted(set(found["sizes"])))
         lines += [
-            *(f"    {name.replace('_', ' '):15} {text}" for name, text in told.items()),
+            *(f"    {name.replace('_', ' '):15} {_told_rate(found[name])}" for name in _PARTS),
             f"  leader     large in {found['led_by_large']} of {found['climbs']} climbs (by chance among all beads, "
             f"{found['share_of_large']:.0%} of which are large: {_told_p(found['p_among_beads'])}; among its own: "
             f"{_told_p(found['p_among_own'])})",

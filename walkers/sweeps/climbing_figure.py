@@ -118,7 +118,19 @@ def _draw_rates(
 
 
 _COLUMNS = (
-    *("runs", "seconds", "within", "climbed", "probability", "probability_low", "probability_high", "median", "climbs"),
+    *(
+        "condition",
+        "where",
+        "runs",
+        "seconds",
+        "within",
+        "climbed",
+        "probability",
+        "probability_low",
+        "probability_high",
+        "median",
+        "climbs",
+    ),
     *("rate", "rate_low", "rate_high", "dispersion", "led_by_large", "share_of_large", "p_among_beads", "p_among_own"),
 )
 
@@ -143,12 +155,8 @@ def write_climbs(conditions: Sequence[Condition], found: Sequence[Mapping[str, A
     for one, all_of_it in zip(conditions, found, strict=True):
         for label, key, _ in _KINDS:
             told = all_of_it[key] if key else all_of_it
-            ends = {"probability": told["interval"], "rate": told["rate_interval"]}
-            sides = {
-                f"{name}_{side}": (pair or (None, None))[at]
-                for name, pair in ends.items()
-                for at, side in enumerate(("low", "high"))
-            }
-            of_it = {name: value for name, value in {**told, **sides}.items() if name in _COLUMNS}
-            rows.append({"condition": one.label, "where": label, **{name: of_it[name] for name in _COLUMNS}})
-    write_bytes(to, pd.DataFrame(rows).to_csv(index=False).encode())
+            sides: dict[str, Any] = {"condition": one.label, "where": label}
+            for name, ends in (("probability", told["interval"]), ("rate", told["rate_interval"])):
+                sides[f"{name}_low"], sides[f"{name}_high"] = ends or (None, None)
+            rows.append({**told, **sides})
+    write_bytes(to, pd.DataFrame(rows, columns=_COLUMNS).to_csv(index=False).encode())

@@ -159,7 +159,7 @@ class Pile(Analysis):
             "events": dict(Counter(event.event for event in events)),
             "climbs": [_told_climb(climb) for climb in climbs if climb.climbed],
             "rim": case.boundary.height,
-            "duration": case.run.cycles / case.drive.frequency,
+            "duration": case.duration,
             "definition": vars(definition),
         }
 
@@ -167,8 +167,8 @@ class Pile(Analysis):
         """Numbers of beads and the length of the drive."""
         return {
             "beads": case.count,
-            "large": sum(radius > case.border for radius in case.all_radii),
-            "duration": case.run.cycles / case.drive.frequency,
+            "large": case.large,
+            "duration": case.duration,
         }
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
