@@ -90,7 +90,7 @@ def launch(
     deck, directory, engine
         The deck; where its files are already, and the engine works; the binary.
     on_step
-        Called a few times a second with the step that the engine is at; what it raises ends the engine.
+        Called a few times a second, and at the end, with the step that the engine is at; what it raises ends the engine.
     time_limit
         Wall time in s after which the run is stopped.
     keep_open
@@ -244,7 +244,9 @@ class _Watch:
                 with suppress(OSError):  # a folder that is gone
                     if self.log.stat().st_size > self.deck.log_limit:  # before its engine had ended
                         os.truncate(self.log, int(self.deck.log_limit))
-        return self.verdict(process.returncode)
+        report = self.verdict(process.returncode)
+        on_step(self.step)
+        return report
 
     def look(self) -> None:
         """Take in what the engine has written since the last look, as far as its log may go, or how long it has not."""
