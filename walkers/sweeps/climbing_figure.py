@@ -29,8 +29,8 @@ def climbs_figure(conditions: Sequence[Condition], found: Sequence[Mapping[str, 
 
     The first row is of the first condition that differs by nothing, else of the first one: the share of piles that have
     climbed by a time (Kaplan and Meier's estimate), speeds against sizes, rates. Below is a panel for each key that
-    varies: the rates against its values, of conditions that differ by nothing else. Where conditions differ by several
-    keys, or come from several sweeps, a single panel lists them all.
+    varies: the rates against its values, of conditions that differ by nothing else, and how many of the piles climbed.
+    Where conditions differ by several keys, or come from several sweeps, a single panel lists them all.
     """
     usual = next((number for number, one in enumerate(conditions) if not one.differs), 0)
     keys = list(dict.fromkeys(key for one in conditions for key in one.differs))
@@ -52,7 +52,9 @@ def climbs_figure(conditions: Sequence[Condition], found: Sequence[Mapping[str, 
         _draw_rates(axes["conditions"], labels[::-1], found[::-1], across=True)
     for name in keys if "conditions" not in axes else ():
         labels, numbers = _at(conditions, name)
-        _draw_rates(axes[name], labels, [found[number] for number in numbers])
+        some = [found[number] for number in numbers]
+        climbed = [f"{label}\n{one['climbed']}/{one['runs']}" for label, one in zip(labels, some, strict=True)]
+        _draw_rates(axes[name], climbed, some)
         axes[name].set_xlabel(plain_text(name))
     letter_panels(axes.values())
     return figure
