@@ -90,7 +90,7 @@ def launch(
     deck, directory, engine
         The deck; where its files are already, and the engine works; the binary.
     on_step
-        Called a few times a second, and at the end, with the step that the engine is at; what it raises ends the engine.
+        Called a few times a second, and at the end, with the step that the engine is at; an exception ends the engine.
     time_limit
         Wall time in s after which the run is stopped.
     keep_open
