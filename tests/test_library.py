@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import importlib
 import sys
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-import walkers
 from tests.conftest import call, document, to_toml
 from walkers.inputs import InputError, load_case, resolve_case
 from walkers.inputs.case import Case
-from walkers.inputs.library import _of_packages, check_library, library_of, unmeasured
+from walkers.inputs.library import _of_packages, library_of, unmeasured
 from walkers.inputs.origins import Origin
-from walkers.inputs.schema import LibraryFile
 from walkers.inputs.sweep import expand
 from walkers.packages import offers
 from walkers.physics.mixtures import water_glycerol
@@ -42,22 +39,16 @@ def origins(case: Case) -> dict[str, Origin]:
 # --- the numbers ------------------------------------------------------------------------------------------------------
 
 
-def test_every_number_of_the_library_has_a_source() -> None:
+def test_every_number_of_the_library_has_a_source_and_defaults_lie_within_their_ranges() -> None:
     materials, liquids = SHIPPED.names("materials"), SHIPPED.names("liquids")
-    assert {"stainless steel", "borosilicate glass", "alumina", "zirconia", "PMMA", "PTFE", "brass"} < {*materials}
-    assert {"water", "ethanol", "ethylene glycol", "hexadecane", "silicone oil 100 cSt"} < {*liquids}
     known = [number for name in materials for number in SHIPPED.material(name).values()]
     known += [number for name in liquids for number in SHIPPED.liquid(name).values()]
     assert len(known) >= 90
     assert all(number.value > 0 and len(number.source) > 8 for number in known)
     densities = {name: SHIPPED.material(name)["density"].value for name in materials}
     assert sorted(densities, key=lambda name: densities[name])[:: len(densities) - 1] == ["polystyrene", "brass"]
-
-
-def test_defaults_lie_within_their_ranges() -> None:
-    """At the end of its range is the angle of a liquid that wets."""
     for key, loose in unmeasured().items():
-        if key != "liquid.contact_angle":
+        if key != "liquid.contact_angle":  # a liquid that wets is at the end
             assert loose.range[0] < loose.usual.value < loose.range[1]
 
 
@@ -146,7 +137,7 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Pat
         load_case("mine.toml")
 
 
-def test_a_library_elsewhere(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_library_elsewhere_is_named(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (own / "library.toml").rename(own / "other.toml")
     monkeypatch.setenv("WALKERS_LIBRARY", "")
     assert "weighed" in call("--library", "other.toml", "show", "mine.toml", check=True).stdout
@@ -173,16 +164,6 @@ def test_a_library_that_is_none_is_one_message(own: Path, text: str, told: str) 
         assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
         assert "library.toml: " in done.stderr
         assert told in done.stderr
-
-
-def test_the_librarys_own_file_is_one() -> None:
-    """But for the pairs' calibration, the defaults, and the mixture, whose numbers are computed."""
-    text = Path(walkers.__file__).parent.joinpath("inputs", "library.toml").read_text("utf-8")
-    tables = tomllib.loads(text)
-    del tables["unmeasured"], tables["surface_pairs"], tables["liquids"]["water-glycerol"]
-    assert LibraryFile.model_validate(tables, context="written").liquids
-    with pytest.raises(InputError, match=r"materials\.ruby: is in the library"):
-        check_library(tables, "copy")
 
 
 # --- packages ---------------------------------------------------------------------------------------------------------

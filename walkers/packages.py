@@ -29,18 +29,11 @@ class Offer:
     place: str
     entry: EntryPoint
 
-    def load(self) -> Any:
-        """The object that it names; raises `ValueError` with the package's name if it cannot be imported."""
+    def load(self, *, call: bool = True) -> Any:
+        """What the function that it names returns, or the function; raises `ValueError` with the package's name."""
         try:
-            return self.entry.load()
-        except (Exception, SystemExit) as error:
-            raise self.broken(f"{type(error).__name__}: {error}") from error
-
-    def made(self) -> Any:
-        """What the function that it names returns; raises `ValueError` with the package's name if it cannot."""
-        function = self.load()
-        try:
-            return function()
+            found = self.entry.load()
+            return found() if call else found
         except (Exception, SystemExit) as error:
             raise self.broken(f"{type(error).__name__}: {error}") from error
 

@@ -8,11 +8,12 @@ from importlib import resources
 from pathlib import Path
 
 from walkers.inputs.errors import refused
-from walkers.inputs.library import Known, Library, read_library, suggestion, unmeasured
+from walkers.inputs.library import HALF, Known, Library, read_library, suggestion, unmeasured
 from walkers.inputs.reading import read_toml, shipped
 from walkers.packages import offers
 from walkers.physics.laws import LAWS
 from walkers.physics.mixtures import MIXTURES
+from walkers.physics.units import TEMPERATURE, quantity_text
 
 _COLUMNS: Mapping[str, tuple[str, ...]] = {
     "materials": ("density", "youngs_modulus", "poissons_ratio"),
@@ -21,6 +22,7 @@ _COLUMNS: Mapping[str, tuple[str, ...]] = {
     "not measured": ("default",),
     **dict.fromkeys(("bridge laws", "cases", "sweeps", "calibrations"), ()),
 }
+_HEADS = {"youngs_modulus": "Young's modulus", "poissons_ratio": "Poisson's ratio"}
 COMMANDS = {"cases": "run", "sweeps": "sweep", "calibrations": "calibrate"}
 NOT_KNOWN = """\
 Nobody has measured the friction between other pairs of wet surfaces, nor the values below. A case that does not give
@@ -61,11 +63,8 @@ def _of_library(known_to: Library) -> Iterator[Entry]:
         for name in one.tables.get("materials", ()):
             yield Entry("materials", name, one.place, known_to.material(name))
         for name in one.tables.get("liquids", ()):
-            if name in MIXTURES:
-                numbers = known_to.liquid(name, (0.5, 293.15))
-                yield Entry("liquids", name, one.place, numbers, "at mass_fraction = 0.5, 20 degC")
-            else:
-                yield Entry("liquids", name, one.place, known_to.liquid(name))
+            note = f"at mass_fraction = {HALF[0]}, {quantity_text(HALF[1], TEMPERATURE)}" if name in MIXTURES else ""
+            yield Entry("liquids", name, one.place, known_to.liquid(name), note)
         for pair in one.tables.get("surface_pairs", ()):
             first, second = pair["materials"]
             yield Entry("surface pairs", f"{first} on {second}", one.place, known_to.surface_pair(first, second))
@@ -83,31 +82,22 @@ def describe(found: Sequence[Entry]) -> str:
     for kind, columns in _COLUMNS.items():
         if kind == "not measured":
             lines += ["", NOT_KNOWN]
-        heads = [
-            column.replace("youngs", "Young's").replace("poissons", "Poisson's").replace("_", " ") for column in columns
-        ]
-        rows = [[kind.capitalize(), *heads]]
+        rows = [[kind.capitalize(), *(_HEADS.get(column, column.replace("_", " ")) for column in columns), ""]]
         for one in found:
             if one.kind == kind:
-                marked = f"[{one.place}]" if one.place else ""
-                cells = [_cell(one.numbers, column) for column in columns]
-                rows.append([f"  {one.name}", *cells, " ".join(filter(None, (one.text, marked)))])
-        widths = [max(len(row[at]) if at < len(row) else 0 for row in rows) for at in range(len(columns) + 1)]
-        lines += ["", *("  ".join(_padded(row, widths)).rstrip() for row in rows)]
+                note = f"{one.text} [{one.place}]" if one.place else one.text
+                rows.append([f"  {one.name}", *(_cell(one.numbers, column) for column in columns), note.strip()])
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines.append("")
+        lines += ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
     return "\n".join(lines[1:])
-
-
-def _padded(row: Sequence[str], widths: Sequence[int]) -> list[str]:
-    return [cell.ljust(widths[at]) if at < len(widths) else cell for at, cell in enumerate(row)]
 
 
 def _cell(numbers: Mapping[str, Known], column: str) -> str:
     """A number with its range; of a viscosity the one that is known."""
-    known = numbers.get(column) or next(
-        (one for key, one in numbers.items() if column and key.endswith(f"_{column}")), None
-    )
+    known = next((one for key, one in numbers.items() if f"_{key}".endswith(f"_{column}")), None)
     if known is None:
-        return "-" if column else ""
+        return "-"
     ends = f" ({known.range[0]} to {known.range[1]})" if known.range else ""
     return f"{known.written}{ends}"
 

@@ -25,6 +25,7 @@ from walkers.physics.units import quantity_text
 
 FILE_NAME = "library.toml"
 VARIABLE = "WALKERS_LIBRARY"
+HALF = (0.5, 293.15)
 PAIR_KEYS = (
     *("friction", "rolling_friction", "viscosity_ratio", "minimum_separation_ratio", "volume_fraction"),
     *("contact_angle", "restitution"),
@@ -117,24 +118,20 @@ class Library:
 
     def material(self, name: str) -> Mapping[str, Known]:
         """Density (kg/m³), Young's modulus (Pa) and Poisson's ratio of a material (KeyError: there is none)."""
-        return self._numbers("materials", name)
+        return self._numbers("materials", name, {})
 
     def liquid(self, name: str, mixture: tuple[float, float] | None = None) -> Mapping[str, Known]:
         """Surface tension (N/m), a viscosity (m²/s or Pa s) and density (kg/m³) of a liquid (KeyError: there is none).
 
-        ``mixture`` has the mass fraction and the temperature (K) of one whose numbers depend on them.
+        ``mixture`` is the mass fraction and the temperature (K) of one whose numbers depend on them; `HALF` if None.
         """
-        return self._numbers("liquids", name, MIXTURES[name](*mixture) if mixture else {})
+        return self._numbers("liquids", name, MIXTURES[name](*mixture or HALF) if name in MIXTURES else {})
 
-    def _numbers(self, kind: str, name: str, computed: Mapping[str, float] | None = None) -> Mapping[str, Known]:
+    def _numbers(self, kind: str, name: str, computed: Mapping[str, float]) -> Mapping[str, Known]:
         for one in self.collections():
             if found := one.tables.get(kind, {}).get(name):
-                values = {
-                    key: {"value": quantity_text(float(f"{value:.4g}"), _KINDS[key])}
-                    for key, value in (computed or {}).items()
-                }
-                entries = {key: {**values.get(key, {}), **entry} for key, entry in found.items()}
-                return {key: _known(key, entry, one) for key, entry in entries.items() if "value" in entry}
+                texts = {key: quantity_text(float(f"{value:.4g}"), _KINDS[key]) for key, value in computed.items()}
+                return {key: _known(key, {"value": texts.get(key), **entry}, one) for key, entry in found.items()}
         raise KeyError(name)
 
     def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, Known]:
@@ -162,13 +159,10 @@ def _of_packages() -> Sequence[Collection]:
     found = []
     for offer in offers("walkers.materials").values():
         try:
-            tables = offer.made()
-            try:
-                check_library(tables, "")
-            except InputError as error:
-                raise offer.broken(error.problems[0]) from error
+            tables = offer.load()
+            check_library(tables, offer.place)
             found.append(Collection("package", offer.place, tables))
-        except ValueError as error:
+        except (ValueError, InputError) as error:
             warn_of(error)
     return found
 
@@ -189,17 +183,21 @@ def check_library(tables: object, source: str) -> None:
     if not isinstance(tables, Mapping):
         raise refused(source, "expected the tables of a library: materials, liquids, surface_pairs")
     validated(LibraryFile, tables, source, "a library")
-    shipped, told = _contents(), "is in the library of the program; expected another name"
+    shipped, told = _contents(), "is in the library of the program; expected "
     again = [
-        f"{kind}.{name}" for kind in ("materials", "liquids") for name in tables.get(kind, ()) if name in shipped[kind]
+        Problem(f"{kind}.{name}", None, f"{told}another name")
+        for kind in ("materials", "liquids")
+        for name in tables.get(kind, ())
+        if name in shipped[kind]
+    ]
+    pairs = [sorted(one["materials"]) for one in shipped["surface_pairs"]]
+    again += [
+        Problem(f"surface_pairs[{number}]", " on ".join(pair["materials"]), f"{told}its numbers in the case instead")
+        for number, pair in enumerate(tables.get("surface_pairs", ()))
+        if sorted(pair["materials"]) in pairs
     ]
     if again:
-        raise InputError(source, [Problem(key, None, told) for key in again])
-    pairs = [sorted(one["materials"]) for one in shipped["surface_pairs"]]
-    for number, pair in enumerate(tables.get("surface_pairs", ())):
-        if sorted(pair["materials"]) in pairs:
-            told = "is in the library of the program; give the numbers in the case instead"
-            raise InputError(source, [Problem(f"surface_pairs[{number}]", " on ".join(pair["materials"]), told)])
+        raise InputError(source, again)
 
 
 def library_of(document: Mapping[str, Any], source: str = "") -> Library:

@@ -127,7 +127,7 @@ def find_input(name: str | Path, kind: str) -> Path:
 def _file_of(offer: Offer) -> Path:
     """The file of a case that a package brings; raises `InputError` with the package's name if there is none."""
     try:
-        path = Path(offer.made())
+        path = Path(offer.load())
         if not path.is_file():
             raise offer.broken(f"no file {path}")
     except (TypeError, ValueError) as error:

@@ -71,7 +71,8 @@ def supplied(document: Mapping[str, Any], known_to: Library, notes: Notes) -> di
         ("boundary.material", wall, "materials", described),
     ):
         if name is not None and not says_all and not known_to.has(kind, name):
-            raise unusable(key, f"not in the library; {expected_of(name, known_to.names(kind))}")
+            told = "not in the library, nor in a library.toml beside the case"
+            raise unusable(key, f"{told}; {expected_of(name, known_to.names(kind))}")
     known, settings = _known(known_to, bead, wall, liquid, _mixture(document, liquid, notes)), {}
     # What was calibrated was so with one law of the bridges: with another it is a guess.
     calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None

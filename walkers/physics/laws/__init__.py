@@ -42,7 +42,7 @@ def by_name(name: str) -> BridgeLaw:
     if name in LAWS:
         place, function = f"{__name__}.{name.replace('-', '_')}", "law"
     elif offer := offers("walkers.bridge_laws").get(name):
-        if not callable(law := offer.load()):
+        if not callable(law := offer.load(call=False)):
             raise offer.broken("it is no function")
         return law  # type: ignore[no-any-return]
     if not place or not function:
