@@ -113,11 +113,16 @@ def test_help_names_every_command() -> None:
     assert all(f"make {target}" in targets for target in ("walker", "test", "help", "clean"))
 
 
-def test_what_is_shipped_is_listed_as_it_is_run() -> None:
-    listed = call("shipped", check=True).stdout.splitlines()
-    for command, name in (("run", "fig1b"), ("sweep", "fig3"), ("calibrate", "ruby")):
-        (line,) = [one for one in listed if one.split()[:3] == ["walkers", command, name]]
-        assert len(line.split()) > 4, "a title"
+def test_the_library_lists_what_can_be_named_and_says_where_each_number_is_from() -> None:
+    listed = [" ".join(line.split()) for line in call("library", check=True).stdout.splitlines()]
+    assert "PMMA 1.19 g/cm^3 3.3 GPa 0.37" in listed
+    assert "contact.friction.bead_wall 0.25 (0.1 to 0.6)" in listed
+    for name in ("fig1b", "fig3", "ruby", "young-laplace"):
+        assert any(line.startswith(f"{name} ") and len(line.split()) > 4 for line in listed), "a title"
+    assert "walkers run fig1b" in call("library", "fig1b", check=True).stdout
+    assert "typical data-sheet value" in call("library", "pmma", check=True).stdout
+    done = call("library", "steel")
+    assert (done.returncode, "expected one of stainless steel, chrome steel" in done.stderr) == (2, True)
 
 
 def test_version_names_package_commit_and_engine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

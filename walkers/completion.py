@@ -28,13 +28,15 @@ def offering(*kinds: str) -> Callable[[typer.Context, str], list[str]]:
     def offered(ctx: typer.Context, incomplete: str) -> list[str]:
         from walkers.inputs.reading import shipped_cases
         from walkers.inputs.sweep import shipped_sweeps
+        from walkers.packages import offers
 
         names: list[str] = []
         for kind in kinds:
             if kind in RECORDS:
                 names += [*_names(ctx, kind), *_typed(incomplete, f"*/{RECORDS[kind]}")]
             else:
-                names += [*(shipped_cases() if kind == "case" else shipped_sweeps()), *_typed(incomplete, "*.toml")]
+                known = [*shipped_cases(), *offers("walkers.cases")] if kind == "case" else shipped_sweeps()
+                names += [*known, *_typed(incomplete, "*.toml")]
         return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
     return offered

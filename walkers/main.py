@@ -131,7 +131,16 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _use_library(file: Path | None) -> None:
+    if file is not None:
+        os.environ["WALKERS_LIBRARY"] = str(file)
+
+
 def _options(
+    library: Annotated[
+        Path | None,
+        typer.Option(callback=_use_library, help="A library of your own, instead of library.toml beside the case."),
+    ] = None,
     version: Annotated[
         bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show what is installed and exit.")
     ] = False,

@@ -16,8 +16,8 @@ from pydantic_core import PydanticUndefined
 from sphinx.application import Sphinx
 from sphinx.config import Config
 
-import walkers.inputs
-from walkers.inputs.reading import read_toml
+from walkers.inputs.catalogue import COMMANDS, NOT_KNOWN, catalogue
+from walkers.inputs.library import Known
 from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.schema import CaseFile, fields_of
 from walkers.main import _program
@@ -26,12 +26,10 @@ from walkers.postprocess.analysis import analyses
 from walkers.postprocess.tables import described
 from walkers.sweeps.table import STATE, derived_columns, result_columns
 
-INPUTS = Path(walkers.inputs.__file__).parent
 program = _program()
 """The program with all of its commands, for the directive ``typer`` of reference/commands.rst."""
 
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
-_KINDS = {"materials": "Materials", "liquids": "Liquids"}
 _PAGE = re.compile(r"docs/(\S+?\.md)")
 
 
@@ -152,42 +150,34 @@ def _tables() -> str:
 
 
 def _library() -> str:
-    """The library of materials and liquids with its sources."""
-    contents = read_toml(INPUTS / "library.toml")
-    text = "# Materials and liquids\n\nWhat `walkers/inputs/library.toml` holds. A case may override each number.\n"
-    for kind, title in _KINDS.items():
-        text += f"\n## {title}\n"
-        for name, entries in contents[kind].items():
-            text += f"\n### {name}\n\n{_sourced(entries)}"
-    text += "\n## Surfaces that touch\n"
-    for entry in contents["surface_pairs"]:
-        numbers = {
-            key: {"source": f"calibrated with {' and '.join(entry['calibrated_with'])}", **one}
-            for key, one in entry.items()
-            if isinstance(one, dict)
-        }
-        text += f"\n### {' on '.join(entry['materials'])}\n\n{_sourced(numbers)}"
-    rows = ((f"`{key}`", str(one.get("usual", "")), _range(one)) for key, one in contents["unmeasured"].items())
-    return f"{text}\n## What nobody has measured\n\n{_table(['', 'usual', 'range'], rows)}"
+    """The library of materials and liquids with its sources, as ``walkers library`` has it."""
+    text = "# Library\n\nThe library of the program. A case can override each number. `walkers library` prints it.\n"
+    found = catalogue(of_others=False)
+    for kind in ("materials", "liquids", "surface pairs"):
+        text += f"\n## {kind.capitalize()}\n"
+        for one in (one for one in found if one.kind == kind):
+            text += f"\n### {one.name}\n\n{one.text}\n\n{_sourced(one.numbers)}"
+    guesses = [(one.name, one.numbers["default"]) for one in found if one.kind == "not measured"]
+    rows = ((f"`{name}`", str(known.written), _range(known)) for name, known in guesses)
+    return f"{text}\n## Not measured\n\n{NOT_KNOWN}\n\n{_table(['', 'default', 'range'], rows)}"
 
 
-def _sourced(entries: Mapping[str, Any]) -> str:
-    linked = {key: _PAGE.sub(r"[docs/\1](../../\1)", one["source"]) for key, one in entries.items()}
-    rows = ((f"`{key}`", str(one["value"]), _range(one), linked[key]) for key, one in entries.items())
+def _sourced(numbers: Mapping[str, Known]) -> str:
+    linked = {key: _PAGE.sub(r"[docs/\1](../../\1)", known.source) for key, known in numbers.items()}
+    rows = ((f"`{key}`", str(known.written), _range(known), linked[key]) for key, known in numbers.items())
     return _table(["", "value", "range", "source"], rows)
 
 
-def _range(entry: Mapping[str, Any]) -> str:
-    return f"{entry['range'][0]} to {entry['range'][1]}" if "range" in entry else ""
+def _range(known: Known) -> str:
+    return f"{known.range[0]} to {known.range[1]}" if known.range else ""
 
 
 def _shipped() -> str:
     """Shipped cases and sweeps with their titles."""
-    text = "# Shipped cases, sweeps and calibrations\n\nEach may be named instead of a file.\n"
-    for folder, command in (("cases", "run"), ("sweeps", "sweep"), ("calibrations", "calibrate")):
-        files = sorted((INPUTS / folder).glob("*.toml"))
-        rows = ((f"`walkers {command} {file.stem}`", str(read_toml(file).get("title", ""))) for file in files)
-        text += f"\n## {folder.capitalize()}\n\n{_table(['', 'title'], rows)}"
+    text = "# Shipped cases, sweeps and calibrations\n\nEvery command accepts these names instead of a file.\n"
+    for kind, command in COMMANDS.items():
+        rows = ((f"`walkers {command} {one.name}`", one.text) for one in catalogue(of_others=False) if one.kind == kind)
+        text += f"\n## {kind.capitalize()}\n\n{_table(['', 'title'], rows)}"
     return text
 
 

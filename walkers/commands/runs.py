@@ -35,6 +35,7 @@ from walkers.completion import offering
 
 _OFFERED = offering("case")
 _CASES = "Case files, or names of shipped cases."
+_NAME = "A material, a liquid, a bridge law, a case, a sweep or a calibration."
 _DECK = "Write the deck and its files into this new folder, to run by hand."
 _LIMIT = "Stop a run (of a pile: a segment) after this many seconds."
 _SPREAD = "Also with what is guessed, calibrated or uncertain drawn from its range: a band."
@@ -45,14 +46,12 @@ _SLOWDOWN = "So many times slower than in reality; for 5 to 10 s."
 _INTERVAL = "Time between views of the whole, as '2 s' or 'T/4' (of a cycle)."
 
 
-def shipped() -> None:
-    """List the cases, sweeps and calibrations that come with the program, by the commands that take them."""
-    from walkers.inputs.reading import read_toml
-    from walkers.inputs.reading import shipped as files_of
+def library(name: str | None = Argument(None, metavar="[NAME]", help=_NAME)) -> None:
+    """List materials, liquids, friction, bridge laws, cases, sweeps and calibrations; or print one with its sources."""
+    from walkers.inputs.catalogue import catalogue, describe, describe_one
 
-    for kind, command in (("case", "run"), ("sweep", "sweep"), ("calibration", "calibrate")):
-        titles = {name: read_toml(file).get("title", "") for name, file in files_of(kind).items()}
-        print_lines(f"walkers {command} {name:{30 - len(command)}} {title}" for name, title in titles.items())
+    found = catalogue()
+    print(describe_one(found, name) if name else describe(found))
 
 
 def show(case: Case, settings: Set = None, as_json: Json = False) -> None:

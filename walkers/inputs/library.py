@@ -1,22 +1,42 @@
-"""The library of materials, liquids and surface pairs (``library.toml``), each number with its source."""
+"""The library of materials, liquids and surface pairs (``library.toml``), each number with its source.
+
+Users add to it by a file of their own, and packages by entry points ``walkers.materials``: a function without arguments
+that returns the tables of such a file.
+"""
 
 from __future__ import annotations
 
 import difflib
+import os
 import tomllib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
+from walkers.inputs.errors import InputError, Problem, refused
+from walkers.inputs.origins import Whence
+from walkers.packages import offers, warn_of
 from walkers.physics import units
+from walkers.physics.mixtures import MIXTURES
+from walkers.physics.units import quantity_text
+
+FILE_NAME = "library.toml"
+VARIABLE = "WALKERS_LIBRARY"
+HALF = (0.5, 293.15)
+PAIR_KEYS = (
+    *("friction", "rolling_friction", "viscosity_ratio", "minimum_separation_ratio", "volume_fraction"),
+    *("contact_angle", "restitution"),
+)
 
 _KINDS = {
     "density": units.DENSITY,
     "youngs_modulus": units.MODULUS,
     "surface_tension": units.SURFACE_TENSION,
     "kinematic_viscosity": units.KINEMATIC_VISCOSITY,
+    "dynamic_viscosity": units.DYNAMIC_VISCOSITY,
     "contact_angle": units.ANGLE,
 }
 
@@ -33,6 +53,8 @@ class Known:
         Ends between which a calibrated number may lie as well (5 to 95 % of the posterior), as a case would write them.
     calibrated_with
         Names of the liquids of the experiments that it was calibrated to; empty if it was not.
+    origin
+        Of whose library it is.
     """
 
     value: float
@@ -40,18 +62,90 @@ class Known:
     source: str = ""
     range: tuple[Any, Any] | None = None
     calibrated_with: tuple[str, ...] = ()
+    origin: Whence = "library"
 
 
 @dataclass(frozen=True)
 class Unmeasured:
-    """What nobody measures and a case may leave out: what is usual then, None if it must be said, and its range.
+    """What nobody measures and a case may leave out: what is usual then, and its range.
 
     ``logarithmic`` says whether the range is of magnitudes; ``range`` is as a case would write it.
     """
 
-    usual: Known | None
+    usual: Known
     range: tuple[Any, Any]
     logarithmic: bool
+
+
+class Collection(NamedTuple):
+    """Tables of materials, liquids and surface pairs, and where they are from: a file, or a package."""
+
+    origin: Whence
+    place: str
+    tables: Mapping[str, Any]
+
+
+class Library:
+    """The materials, liquids and surface pairs that a case can name.
+
+    They are those of the user's own library, those that come with the program, and those of installed packages, which
+    are loaded when a name is among none of the others. No name has two meanings: others cannot bring one of the
+    program's.
+
+    Parameters
+    ----------
+    own
+        The tables of the user's own library, validated.
+    """
+
+    def __init__(self, own: Mapping[str, Any] | None = None) -> None:
+        self._near = [Collection("library", "", _contents())]
+        if own:
+            self._near.insert(0, Collection("own library", own.get("file", ""), own))
+
+    def collections(self) -> Iterator[Collection]:
+        """All collections, those of packages last."""
+        yield from self._near
+        yield from _of_packages()
+
+    def names(self, kind: str) -> tuple[str, ...]:
+        """Names of the ``materials`` or of the ``liquids``."""
+        return tuple(dict.fromkeys(name for one in self.collections() for name in one.tables.get(kind, ())))
+
+    def has(self, kind: str, name: str | None) -> bool:
+        """Whether there is a material or liquid of a name."""
+        return any(name in one.tables.get(kind, ()) for one in self.collections())
+
+    def material(self, name: str) -> Mapping[str, Known]:
+        """Density (kg/m³), Young's modulus (Pa) and Poisson's ratio of a material (KeyError: there is none)."""
+        return self._numbers("materials", name, {})
+
+    def liquid(self, name: str, mixture: tuple[float, float] | None = None) -> Mapping[str, Known]:
+        """Surface tension (N/m), a viscosity (m²/s or Pa s) and density (kg/m³) of a liquid (KeyError: there is none).
+
+        ``mixture`` is the mass fraction and the temperature (K) of one whose numbers depend on them; `HALF` if None.
+        """
+        return self._numbers("liquids", name, MIXTURES[name](*mixture or HALF) if name in MIXTURES else {})
+
+    def _numbers(self, kind: str, name: str, computed: Mapping[str, float]) -> Mapping[str, Known]:
+        for one in self.collections():
+            if found := one.tables.get(kind, {}).get(name):
+                texts = {key: quantity_text(float(f"{value:.4g}"), _KINDS[key]) for key, value in computed.items()}
+                return {key: _known(key, {"value": texts.get(key), **entry}, one) for key, entry in found.items()}
+        raise KeyError(name)
+
+    def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, Known]:
+        """How two wet surfaces touch; empty where there is no value for them.
+
+        ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio``, ``viscosity_ratio``,
+        ``contact_angle`` (rad), ``volume_fraction`` and ``restitution``.
+        """
+        for one in self.collections():
+            for pair in one.tables.get("surface_pairs", ()):
+                if sorted(pair["materials"]) == sorted([first or "", second or ""]):
+                    liquids = tuple(pair.get("calibrated_with", ()))
+                    return {key: _known(key, entry, one, liquids) for key, entry in pair.items() if key in PAIR_KEYS}
+        return {}
 
 
 @cache
@@ -59,53 +153,84 @@ def _contents() -> dict[str, Any]:
     return tomllib.loads(resources.files("walkers.inputs").joinpath("library.toml").read_text("utf-8"))
 
 
-def _known(key: str, entry: Mapping[str, Any], liquids: tuple[str, ...] = ()) -> Known:
+@cache
+def _of_packages() -> Sequence[Collection]:
+    """What packages bring; one that is broken is left out with a warning."""
+    found = []
+    for offer in offers("walkers.materials").values():
+        try:
+            tables = offer.load()
+            check_library(tables, offer.place)
+            found.append(Collection("package", offer.place, tables))
+        except (ValueError, InputError) as error:
+            warn_of(error)
+    return found
+
+
+def _known(key: str, entry: Mapping[str, Any], of: Collection, liquids: tuple[str, ...] = ()) -> Known:
     kind, value = _KINDS.get(key.rpartition(".")[2]), entry["value"]
     number = units.parse_quantity(value, kind) if kind else float(value)
     source = f"calibrated with {' and '.join(liquids)}" if liquids else entry.get("source", "")
     ends = (entry["range"][0], entry["range"][1]) if "range" in entry else None
-    return Known(number, value, source, ends, liquids)
+    return Known(number, value, ", ".join(filter(None, (of.place, source))), ends, liquids, of.origin)
 
 
-def materials() -> tuple[str, ...]:
-    """Names of the materials."""
-    return tuple(_contents()["materials"])
+def check_library(tables: object, source: str) -> None:
+    """Refuse what is no library: raises `InputError` with ``source`` and the keys at fault."""
+    from walkers.inputs.messages import validated
+    from walkers.inputs.schema import LibraryFile
+
+    if not isinstance(tables, Mapping):
+        raise refused(source, "expected the tables of a library: materials, liquids, surface_pairs")
+    validated(LibraryFile, tables, source, "a library")
+    shipped, told = _contents(), "is in the library of the program; expected "
+    again = [
+        Problem(f"{kind}.{name}", None, f"{told}another name")
+        for kind in ("materials", "liquids")
+        for name in tables.get(kind, ())
+        if name in shipped[kind]
+    ]
+    pairs = [sorted(one["materials"]) for one in shipped["surface_pairs"]]
+    again += [
+        Problem(f"surface_pairs[{number}]", " on ".join(pair["materials"]), f"{told}its numbers in the case instead")
+        for number, pair in enumerate(tables.get("surface_pairs", ()))
+        if sorted(pair["materials"]) in pairs
+    ]
+    if again:
+        raise InputError(source, again)
 
 
-def liquids() -> tuple[str, ...]:
-    """Names of the liquids."""
-    return tuple(_contents()["liquids"])
+def library_of(document: Mapping[str, Any], source: str = "") -> Library:
+    """The library for a case, by its tables; raises `InputError` if its own is none."""
+    own = document.get("library")
+    if own is None:
+        return _shipped()
+    try:
+        check_library(own, source)
+    except InputError as error:
+        raise InputError(source, [replace(one, key=f"library.{one.key}") for one in error.problems]) from error
+    return Library(own)
 
 
 @cache
-def material(name: str) -> Mapping[str, Known]:
-    """Density (kg/m³), Young's modulus (Pa) and Poisson's ratio of a material (KeyError: there is none)."""
-    return {key: _known(key, entry) for key, entry in _contents()["materials"][name].items()}
+def _shipped() -> Library:
+    return Library()
 
 
-@cache
-def liquid(name: str) -> Mapping[str, Known]:
-    """Surface tension (N/m), kinematic viscosity (m²/s) and density (kg/m³) of a liquid (KeyError: there is none)."""
-    return {key: _known(key, entry) for key, entry in _contents()["liquids"][name].items()}
+def read_library(folder: Path) -> dict[str, Any]:
+    """The user's own library: the file that the environment names in `VARIABLE`, else that in a folder, else nothing.
 
-
-@cache
-def surface_pair(first: str | None, second: str | None) -> Mapping[str, Known]:
-    """How two wet surfaces touch; empty where the library has no value for them.
-
-    ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio``, ``viscosity_ratio``,
-    ``contact_angle`` (rad), ``volume_fraction`` and ``restitution``.
+    Raises `InputError` if it is none.
     """
-    for pair in _contents()["surface_pairs"]:
-        if sorted(pair["materials"]) == sorted([first or "", second or ""]):
-            liquids = tuple(pair["calibrated_with"])
-            return {key: _known(key, one, liquids) for key, one in pair.items() if isinstance(one, dict)}
-    return {}
+    from walkers.inputs.reading import read_toml
 
-
-def surface_pairs() -> list[tuple[str, str]]:
-    """The pairs of materials whose friction the library has."""
-    return [(entry["materials"][0], entry["materials"][1]) for entry in _contents()["surface_pairs"]]
+    named = os.environ.get(VARIABLE)
+    path = Path(named) if named else folder / FILE_NAME
+    if not (named or path.is_file()):
+        return {}
+    tables = read_toml(path)
+    check_library(tables, str(path))
+    return {"file": str(path), **tables}
 
 
 @cache
@@ -113,7 +238,7 @@ def unmeasured() -> Mapping[str, Unmeasured]:
     """What nobody measures, by the keys of a case."""
     found = {}
     for key, entry in _contents()["unmeasured"].items():
-        usual = _known(key, {"value": entry["usual"]}) if "usual" in entry else None
+        usual = _known(key, {"value": entry["usual"]}, Collection("library", "", {}))
         found[key] = Unmeasured(usual, (entry["range"][0], entry["range"][1]), entry.get("log", False))
     return found
 

@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 
 from walkers.inputs.changes import MISSING, joined, parts_of, value_at
 from walkers.inputs.errors import InputError, Problem, shown, unusable
-from walkers.inputs.library import suggestion, surface_pairs
+from walkers.inputs.library import suggestion
 from walkers.inputs.schema import CaseFile, fields_of
 from walkers.physics.units import WRITTEN
 
@@ -29,11 +29,7 @@ _EXAMPLES = {
     "placed.at": 'three places, x, y and z, such as ["5 mm", "-3 mm", "0.3 mm"]',
     "beads.density": 'such as "4.0 g/cm^3", or a material of the library',
     "liquid.surface_tension": 'such as "19.2 mN/m", or a liquid of the library by name',
-    **dict.fromkeys(
-        ("contact.friction", "contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction"),
-        f"numbers: the library has it for {'; '.join(map(' on '.join, surface_pairs()))} only "
-        "(if it is a guess, say in [uncertain] between which ends)",
-    ),
+    "*.source": 'where the number is from, such as "weighed"',
     "liquid": 'a [liquid] table, such as name = "Si AK5"',
     "boundary": 'a [boundary] table, such as material = "chromium-coated glass"',
     "boundary.material": 'such as "chromium-coated glass"',
@@ -97,7 +93,7 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         told = told.replace(pydantics, ours)
     short_list = kind == "missing" and isinstance(location[-1], int)
     key = joined(location[:-1] if short_list else location)
-    example = _EXAMPLES.get(re.sub(r"\[\d+\]", "", key))
+    example = _EXAMPLES.get(re.sub(r"\[\d+\]", "", key)) or _EXAMPLES.get(f"*.{location[-1]}")
     if kind == "missing":
         told = (
             f"too short; expected {example or 'two numbers'}"
@@ -114,7 +110,8 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
     elif kind == "literal_error":
         told += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
     elif kind in ("model_type", "dict_type", "model_attributes_type", "dataclass_type"):
-        told = f"expected a table [{key}]"
+        a_number = str(context.get("class_name", "")).startswith("Sourced")
+        told = 'expected { value = ..., source = "..." }' if a_number else f"expected a table [{key}]"
     elif example:
         told = f"{told}, {example}" if told.startswith("expected") else f"expected {example}"
     return Problem(key, quoted(document, parts_of(key)), told)

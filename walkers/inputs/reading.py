@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.errors import InputError, check_utf8, refused, shortened
-from walkers.inputs.library import suggestion
+from walkers.inputs.library import FILE_NAME, library_of, read_library, suggestion
+from walkers.packages import Offer, offers
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
@@ -25,6 +26,7 @@ _COMMANDS = {
     "case": "a case: walkers run {}",
     "sweep": "a sweep: walkers sweep {}",
     "calibration": "a calibration: walkers calibrate {}",
+    "library": "a library: cases beside it can name what is in it; walkers library prints it",
     "case.json": "a run's directory: walkers result {}, or plot, render, vtk",
     "sweep.json": "a sweep's directory: walkers table {}, or plot, status; its file goes to walkers sweep",
 }
@@ -70,7 +72,7 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
     (0.0003, 0.00025)
     """
     path = find_input(case, "case")
-    document = read_toml(path)
+    document = read_case(path)
     if changes:
         from walkers.inputs.changes import changed
         from walkers.inputs.messages import blaming, check_key
@@ -80,6 +82,20 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
                 check_key(key)
             document = changed(document, changes)
     return resolve_case(document, source=str(case), name=path.stem)
+
+
+def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
+    """The tables of a case file, the user's own library among them under ``library``.
+
+    That is the library beside the file; beside a case that comes with the program it is that in ``folder``, the working
+    directory if None. A case that has a ``[library]`` itself takes no other.
+    """
+    document = read_toml(path)
+    if "library" not in document and path.name != FILE_NAME:
+        beside = (folder or Path()) if path.parent == _HERE / "cases" else path.parent
+        if own := read_library(beside):
+            document["library"] = own
+    return document
 
 
 def find_input(name: str | Path, kind: str) -> Path:
@@ -101,7 +117,22 @@ def find_input(name: str | Path, kind: str) -> Path:
         raise refused(shortened(str(name)), f"cannot be read: {error.strerror}") from error
     if str(name) in known:
         return known[str(name)]
-    raise refused(name, f"no such file, nor a shipped {kind} ({', '.join(known)}){suggestion(str(name), known)}")
+    offered = offers("walkers.cases") if kind == "case" else {}
+    if offer := offered.get(str(name)):
+        return _file_of(offer)
+    names = [*known, *offered]
+    raise refused(name, f"no such file, nor a shipped {kind} ({', '.join(names)}){suggestion(str(name), names)}")
+
+
+def _file_of(offer: Offer) -> Path:
+    """The file of a case that a package brings; raises `InputError` with the package's name if there is none."""
+    try:
+        path = Path(offer.load())
+        if not path.is_file():
+            raise offer.broken(f"no file {path}")
+    except (TypeError, ValueError) as error:
+        raise refused(offer.name, str(error)) from error
+    return path
 
 
 def _kind_of(path: Path) -> str | None:
@@ -113,6 +144,8 @@ def _kind_of(path: Path) -> str | None:
             document = read_toml(path) if path.stem not in (".", "..") else {}  # refused for its name
             if document.keys() & {"beads", "boundary", "drive", "liquid"}:
                 return "case"
+            if document.keys() & {"materials", "liquids", "surface_pairs"}:
+                return "library"
             of_calibrations = document.keys() & {"parameters", "experiments", "observations"}
             return ("calibration" if of_calibrations else "sweep") if "case" in document else None
     return next((kind for kind in ("case", "sweep", "calibration") if str(path) in shipped(kind)), None)
@@ -149,7 +182,7 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
 
     notes = Notes()
     with blaming(source, document):
-        tables = supplied(document, notes)
+        tables = supplied(document, library_of(document, source), notes)
         file = validated(CaseFile, tables, source)
         try:
             case = resolve(file, name, document, notes)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from itertools import islice
 from math import atan2, dist, isinf, isnan, pi
 from typing import Any, Literal
@@ -19,7 +19,7 @@ from walkers.inputs.boundary import SIZES, Boundary
 from walkers.inputs.case import Case, Run
 from walkers.inputs.changes import MISSING, changed, parts_of, value_at
 from walkers.inputs.errors import unusable
-from walkers.inputs.library import Known, expected_of
+from walkers.inputs.library import Known, Library, expected_of
 from walkers.inputs.loads import contact_loads, reach
 from walkers.inputs.origins import Notes, Origin, origins_of
 from walkers.inputs.run_tables import resolve_drive, resolve_run
@@ -31,7 +31,8 @@ from walkers.inputs.schema import (
 from walkers.physics.dimer import Dimer
 from walkers.physics.laws import LAWS, by_name
 from walkers.physics.matter import DEFAULT_LAW, Liquid
-from walkers.physics.units import ABSENT
+from walkers.physics.mixtures import MIXTURES
+from walkers.physics.units import ABSENT, TEMPERATURE, parse_quantity
 
 _EXAMPLES = {"opening": "120 deg", "width": "5.3 mm", "height": "5.3 mm"}
 _PACKING = 0.55
@@ -45,17 +46,18 @@ _OF_SURFACES = (
     *("liquid.viscosity_ratio", "liquid.volume_fraction", "liquid.contact_angle"),
     *("contact.rolling_friction", "contact.restitution", "contact.minimum_separation_ratio"),
 )
-_OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", "liquid.kinematic_viscosity")
+_VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
+_OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
 SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
 """Keys that a case may leave out because the library has them, or says what is usual."""
 
 
-def supplied(document: Mapping[str, Any], notes: Notes) -> dict[str, Any]:
+def supplied(document: Mapping[str, Any], known_to: Library, notes: Notes) -> dict[str, Any]:
     """The tables of a case with what they leave out and the library has of the materials and the liquid they name.
 
     Raises `InputError` if they name what the library has not, and do not say all about it themselves.
     """
-    said = {key: value_at(document, parts_of(key)) for key in (*SUPPLIED, "liquid.dynamic_viscosity", "liquid.law")}
+    said = {key: value_at(document, parts_of(key)) for key in (*SUPPLIED, "liquid.law")}
     given = {key for key, value in said.items() if value is not MISSING}
     named = {key: value_at(document, parts_of(key)) for key in ("beads.material", "boundary.material", "liquid.name")}
     for key, name in named.items():
@@ -63,38 +65,64 @@ def supplied(document: Mapping[str, Any], notes: Notes) -> dict[str, Any]:
             raise unusable(key, "expected text in quotes")
     bead, wall, liquid = (None if name is MISSING else str(name) for name in named.values())
     described = given.issuperset(_FRICTION)
-    for key, name, names, says_all in (
-        ("beads.material", bead, library.materials(), described and "beads.density" in given),
-        ("liquid.name", liquid, library.liquids(), False),
-        ("boundary.material", wall, library.materials(), described),
+    for key, name, kind, says_all in (
+        ("beads.material", bead, "materials", described and "beads.density" in given),
+        ("liquid.name", liquid, "liquids", False),
+        ("boundary.material", wall, "materials", described),
     ):
-        if name is not None and name not in names and not says_all:
-            raise unusable(key, f"not in the library; {expected_of(name, names)}")
-    known, settings = _known(bead, wall, liquid), {}
+        if name is not None and not says_all and not known_to.has(kind, name):
+            told = "not in the library, nor in a library.toml beside the case"
+            raise unusable(key, f"{told}; {expected_of(name, known_to.names(kind))}")
+    known, settings = _known(known_to, bead, wall, liquid, _mixture(document, liquid, notes)), {}
     # What was calibrated was so with one law of the bridges: with another it is a guess.
     calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
     for key in SUPPLIED:
         there = isinstance(document.get(key.split(".")[0]), Mapping) or key.startswith("contact")
-        instead = key == "liquid.kinematic_viscosity" and "liquid.dynamic_viscosity" in given
+        instead = key in _VISCOSITIES and not given.isdisjoint(_VISCOSITIES)
         if there and key in known and not (key in given or instead):
             settings[key] = known[key].written
             notes[key] = _origin_of(key, known[key], calibrated)
-    return changed({"contact": {}, **document}, settings)
+    tables = changed({"contact": {}, **document}, settings)
+    tables.pop("library", None)
+    return tables
 
 
-@cache
-def _known(bead: str | None, wall: str | None, liquid: str | None) -> dict[str, Known]:
+def _mixture(document: Mapping[str, Any], liquid: str | None, notes: Notes) -> tuple[float, float] | None:
+    """Mass fraction and temperature (K) of a liquid whose numbers depend on them; None of any other."""
+    keys = ("liquid.mass_fraction", "liquid.temperature")
+    share, temperature = (value_at(document, parts_of(key)) for key in keys)
+    if liquid not in MIXTURES:
+        for key, value in zip(keys, (share, temperature), strict=True):
+            if value is not MISSING:
+                raise unusable(key, f'expected none: it is for name = "{next(iter(MIXTURES))}"')
+        return None
+    if type(share) not in (int, float) or not 0 <= share <= 1:
+        missing = "missing; " if share is MISSING else ""
+        raise unusable(keys[0], f"{missing}expected the mass of the glycerol over that of the mixture, such as 0.87")
+    if temperature is MISSING:
+        temperature = "20 degC"
+        notes[keys[1]] = Origin(keys[1], temperature, "default", value=parse_quantity(temperature, TEMPERATURE))
+    try:
+        return float(share), parse_quantity(str(temperature), TEMPERATURE)
+    except ValueError as error:
+        raise unusable(keys[1], str(error)) from error
+
+
+@lru_cache(maxsize=1024)
+def _known(
+    known_to: Library, bead: str | None, wall: str | None, liquid: str | None, mixture: tuple[float, float] | None
+) -> dict[str, Known]:
     """What is usual, and what the library has of materials and a liquid, by the keys of a case."""
-    on_bead, on_wall = library.surface_pair(bead, bead), library.surface_pair(bead, wall)
+    on_bead, on_wall = known_to.surface_pair(bead, bead), known_to.surface_pair(bead, wall)
     found = {
-        "beads.density": library.material(bead).get("density") if bead in library.materials() else None,
+        "beads.density": known_to.material(bead)["density"] if bead and known_to.has("materials", bead) else None,
         "contact.friction.bead_bead": on_bead.get("friction"),
         "contact.friction.bead_wall": on_wall.get("friction"),
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
-        **{f"liquid.{key}": known for key, known in (library.liquid(liquid) if liquid else {}).items()},
+        **{f"liquid.{key}": known for key, known in (known_to.liquid(liquid, mixture) if liquid else {}).items()},
     }
     usual = {key: loose.usual for key, loose in library.unmeasured().items()}
-    return {key: known for key, known in (usual | {key: one for key, one in found.items() if one}).items() if known}
+    return usual | {key: known for key, known in found.items() if known}
 
 
 @cache
@@ -102,7 +130,8 @@ def _origin_of(key: str, known: Known, liquid: str | None) -> Origin:
     """What was calibrated with other liquids is a guess for this one."""
     loose, text = library.unmeasured().get(key), str(known.written)
     if loose is None or (known.source and not known.calibrated_with):
-        return Origin(key, text, "library", known.source, value=known.value)
+        of_sizes = loose is not None and loose.logarithmic
+        return Origin(key, text, known.origin, known.source, known.range, of_sizes, value=known.value)
     if liquid in known.calibrated_with:
         return Origin(key, text, "calibrated", known.source, known.range, loose.logarithmic, value=known.value)
     return Origin(key, text, "default", known.source, loose.range, loose.logarithmic, value=known.value)
@@ -182,7 +211,8 @@ def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
         except ValueError as error:
             raise unusable("liquid.law", str(error)) from error
     of_bridges = float(f"{dynamic * table.viscosity_ratio:.15g}")
-    return replace(table, kinematic_viscosity=None, dynamic_viscosity=of_bridges, viscosity_ratio=1.0)
+    bare = replace(table, kinematic_viscosity=None, mass_fraction=None, temperature=None)
+    return replace(bare, dynamic_viscosity=of_bridges, viscosity_ratio=1.0)
 
 
 def _walkers_of(key: str, table: Walkers, boundary: Boundary, notes: Notes) -> Walkers:

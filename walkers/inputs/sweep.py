@@ -37,7 +37,7 @@ from walkers.inputs.case import BOUNDS, Case
 from walkers.inputs.changes import Value, changed, flatten
 from walkers.inputs.errors import InputError, Problem, refused, unusable
 from walkers.inputs.messages import blaming, check_key, validated
-from walkers.inputs.reading import find_input, read_toml, resolve_case, shipped
+from walkers.inputs.reading import find_input, read_case, read_toml, resolve_case, shipped
 from walkers.inputs.schema import Table
 from walkers.physics.units import Speed, Whole
 
@@ -172,7 +172,7 @@ def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) ->
         with blaming(str(sweep)):
             if not isinstance(document.get("set", {}), Mapping):
                 raise unusable("set", "expected a table of keys")
-            document = {**document, "set": {**flatten(document.get("set", {})), **changes}}
+            document = {**document, "set": {**settings_in(document.get("set", {})), **changes}}
         name = _name_with(name, changes)
     made = expand(document, source=str(sweep), name=name, folder=path.parent)
     told = "varies in this sweep: it cannot be set as well"
@@ -201,7 +201,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
     base = _base(file.case, source, folder)
     try:
         with blaming(source):
-            axes, settings = file.all_axes(), flatten(file.set)
+            axes, settings = file.all_axes(), settings_in(file.set)
             keys, rows = combinations(axes)
             units = [
                 unit_of(axis.keys[at], [row[at] for row in axis.rows]) for axis in axes for at in range(len(axis.keys))
@@ -210,8 +210,9 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
                 if key in _SAME_RUN:
                     raise unusable(key, f"does not vary: points with another {key} alone are the same run")
             for key in (*settings, *keys):
-                check_key(key)
-            tables = changed(read_toml(base), settings)
+                if key != "library":
+                    check_key(key)
+            tables = changed(read_case(base, folder), settings)
             changed(tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
         raise refused(source, "has tables within tables without end") from error
@@ -228,6 +229,12 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         descent=Descent(descend.key, len(axes[-1].rows), descend.until_below) if descend else None,
         file=document,
     )
+
+
+def settings_in(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Dotted keys of a case's tables, the user's own library in them as it is."""
+    own = {"library": tables["library"]} if "library" in tables else {}
+    return own | flatten({key: value for key, value in tables.items() if key != "library"})
 
 
 def _base(case: str, source: str, folder: Path) -> Path:

@@ -90,7 +90,7 @@ def walkers_of_the_paper() -> dict[Point, Case]:
     cases = {}
     for point in (one for number in FITTED for part in (number.of, number.over) for one in _at_the_ends(part)):
         case = point.case()
-        known = library.liquid(case.liquid.name or "")
+        known = library.library_of({}).liquid(case.liquid.name or "")
         viscosity = known["kinematic_viscosity"].value * known["density"].value
         liquid = replace(case.liquid, dynamic_viscosity=viscosity, volume_fraction=0.01, contact_angle=0.0)
         contact = replace(case.contact, minimum_separation_ratio=0.01)

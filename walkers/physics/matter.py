@@ -18,12 +18,15 @@ DEFAULT_LAW = "young-laplace"
 class Liquid:
     """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
 
+    ``mass_fraction`` (of the glycerol) and ``temperature`` (20 °C if left out) are of the liquid ``water-glycerol``.
     ``volume_fraction`` is the liquid on a bead over the bead's volume, ``viscosity_ratio`` the viscosity of the bridges
     over that of the liquid: how strongly they drag. Resolved, ``dynamic_viscosity`` is the bridges'.
     ``law`` is that of the bridges, one of `walkers.physics.laws` or a function of yours, ``file.py:function``.
     """
 
     name: str | None = None
+    mass_fraction: Annotated[Number | None, Field(ge=0, le=1, exclude=True)] = None
+    temperature: Annotated[units.Temperature | None, Field(exclude=True)] = None
     surface_tension: units.SurfaceTension
     density: units.Density | None = None
     kinematic_viscosity: Annotated[units.KinematicViscosity | None, Field(exclude=True)] = None

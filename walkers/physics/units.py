@@ -43,6 +43,8 @@ _USUAL: Mapping[str, tuple[str, float]] = {
     **{"Pa": ("Pa", 1.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9)},
 }
 """What the usual units are in SI units, as pint has them too: a case that has no others need not wait for pint."""
+_ZEROS: Mapping[str, float] = {"K": 0.0, "degC": 273.15, "°C": 273.15}
+"""Units of temperature and their zeros, K."""
 
 
 @dataclass(frozen=True)
@@ -92,14 +94,20 @@ def parse_quantity(text: str, kind: Kind) -> float:
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:
         raise ValueError(kind.expectation)
-    unit, factor = _USUAL.get(match["unit"]) or (kind.unit, _by_pint(match["unit"], kind))
+    usual = (kind.unit, 1.0) if _has_zero(match["unit"], kind) else _USUAL.get(match["unit"])
+    unit, factor = usual or (kind.unit, _by_pint(match["unit"], kind))
     if unit != kind.unit:
         raise ValueError(kind.expectation)
     # Rounded: 4.0 g/cm³ is 4000 kg/m³, not 3999.9999999999995.
-    value = float(f"{float(match['number']) * factor:.15g}")
+    value = float(f"{float(match['number']) * factor + _ZEROS.get(match['unit'], 0.0):.15g}")
     if value != 0.0 and not kind.smallest <= abs(value) <= kind.largest:
         raise ValueError(f"{kind.expectation}; it must lie within {kind.smallest:g} and {kind.largest:g} {kind.unit}")
     return value
+
+
+def _has_zero(symbol: str, kind: Kind) -> bool:
+    """Whether it is a unit of temperature, which has a zero of its own."""
+    return kind.unit == TEMPERATURE.unit and symbol in _ZEROS
 
 
 @cache
@@ -119,6 +127,8 @@ def _registry() -> UnitRegistry[float]:
 @lru_cache(maxsize=1024)  # a sweep reads thousands of quantities in the same few units
 def _by_pint(symbol: str, kind: Kind) -> float:
     """How many of the kind's SI unit a unit is that is not among the usual ones."""
+    if kind.unit == TEMPERATURE.unit:
+        raise ValueError(kind.expectation)
     units = _registry()
     try:
         unit = units.parse_units(_GRAM_SYMBOL.sub("gee", symbol) if kind.unit == ACCELERATION.unit else symbol)
@@ -147,7 +157,7 @@ def split_quantity(text: str) -> tuple[float, str]:
 def quantity_text(value: float, kind: Kind) -> str:
     """A number of SI units in the unit of the kind's example, as a case could say it."""
     unit = _NUMBER_AND_UNIT.fullmatch(kind.example)["unit"]  # type: ignore[index]
-    return f"{value / _USUAL[unit][1]:.6g} {unit}"
+    return f"{(value - _ZEROS.get(unit, 0.0)) / _USUAL.get(unit, ('', 1.0))[1]:.6g} {unit}"
 
 
 def kind_in(annotations: Iterable[Any]) -> Kind | None:
@@ -174,6 +184,7 @@ SURFACE_TENSION = Kind("surface tension", "N/m", "19.2 mN/m", 10.0, 1e-9, POSITI
 KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0, sign=NOT_NEGATIVE)
 DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4, sign=NOT_NEGATIVE)
 MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3, POSITIVE)
+TEMPERATURE = Kind("temperature", "K", "20 degC", 373.15, 273.15)
 FILE_SIZE = Kind("size of a file", "byte", "64 MB", 1e15, 1.0, POSITIVE)
 
 Length = Annotated[float, LENGTH]
@@ -192,6 +203,7 @@ Density = Annotated[float, DENSITY]
 SurfaceTension = Annotated[float, SURFACE_TENSION]
 KinematicViscosity = Annotated[float, KINEMATIC_VISCOSITY]
 DynamicViscosity = Annotated[float, DYNAMIC_VISCOSITY]
+Temperature = Annotated[float, TEMPERATURE]
 FileSize = Annotated[float, FILE_SIZE]
 
 

@@ -449,7 +449,8 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     lines = listed("guessed", [one for one in rests if one["guessed"]])
     if lines:
         lines.append("             the result is worth what these are; a band instead: walkers run CASE --spread")
-    for head, origin in (("as given", "given"), ("calibrated", "calibrated")):
+    whence = {"as given": "given", "calibrated": "calibrated", "library": "own library", "package": "package"}
+    for head, origin in whence.items():
         lines += listed(head, [one for one in rests if not one["guessed"] and one["origin"] == origin])
     return lines
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 from math import ceil, isfinite, pi
 from typing import Any
 
-from walkers.inputs import library
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
+from walkers.inputs.library import Known, library_of
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import printable
@@ -80,6 +80,12 @@ def _volume(case: Case) -> float:
     return sum(4.0 / 3.0 * pi * radius**3 for radius in case.all_radii)
 
 
+def _youngs_modulus(case: Case) -> Known | None:
+    """Of the material of the beads, if the library has it."""
+    known_to, name = library_of(case.document), case.material
+    return known_to.material(name).get("youngs_modulus") if name and known_to.has("materials", name) else None
+
+
 def summarise(case: Case) -> dict[str, Any]:
     """Everything that ``walkers show`` prints, SI units.
 
@@ -93,7 +99,7 @@ def summarise(case: Case) -> dict[str, Any]:
     """
     run, drive, limits = case.run, case.drive, limits_of(case).as_dict()
     volume = _volume(case)
-    known = library.material(case.material) if case.material in library.materials() else None
+    known = _youngs_modulus(case)
     summary: dict[str, Any] = {
         "case": case.as_dict(),
         "drive": {name: getattr(drive, name) for name in ("peak_acceleration", "amplitude", "peak_velocity")},
@@ -103,7 +109,7 @@ def summarise(case: Case) -> dict[str, Any]:
             "mass": volume * case.density,
             "volume": volume,
             "liquid": volume * case.liquid.volume_fraction,
-            "stiffness_ratio": case.contact.youngs_modulus / known["youngs_modulus"].value if known else None,
+            "stiffness_ratio": case.contact.youngs_modulus / known.value if known else None,
         },
         "notes": notes(case),
         "contacts": [contact for walkers in case.walkers for contact in _contacts(case, walkers)],
@@ -210,7 +216,7 @@ def _whence(one: dict[str, Any]) -> str:
         ends = f", called uncertain{ends}"
     elif origin == "default" and ends:
         return f"guessed ({source or 'nobody measured it'}){ends}"
-    elif origin == "calibrated":
+    elif origin in ("calibrated", "package"):
         return source + ends
     return (f"{origin}: {source}" if source else origin) + ends
 

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.axes import sampled, unit_cube, unit_of
 from walkers.inputs.case import Case
-from walkers.inputs.changes import flatten
 from walkers.inputs.errors import refused
 from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin
 from walkers.inputs.readable import readable_unit
-from walkers.inputs.sweep import Sweep
+from walkers.inputs.sweep import Sweep, settings_in
 from walkers.postprocess.analysis import analyses, analyses_of
 from walkers.postprocess.gait import SEPARATED
 from walkers.runner.binary import find_engine
@@ -112,7 +111,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         descent=None,
         file={
             "case": case.name,
-            "set": flatten(case.document, lambda _: False),
+            "set": settings_in(case.document),
             "sample": [{"method": "sobol", "points": points, "seed": seed, "ranges": ranges}],
         },
     )

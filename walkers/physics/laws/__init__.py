@@ -2,7 +2,8 @@
 
 A law is a function `Surfaces → Curve` (`walkers.physics.bridge`). Those that come with the program are the functions
 ``law`` of the files beside this one, each with its equation and source, named as the file; another file there is
-another law. A user's own is named by where it is, ``package.module:function`` or ``path/to/file.py:function``.
+another law. Packages bring laws by entry points ``walkers.bridge_laws``. A user's own is named by where it is,
+``package.module:function`` or ``path/to/file.py:function``.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pkgutil import iter_modules
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from walkers.packages import offers
 from walkers.physics.matter import Liquid
 
 if TYPE_CHECKING:  # numpy is not needed to know a law by its name
@@ -27,7 +29,9 @@ LAWS = tuple(one.name.replace("_", "-") for one in iter_modules(__path__))
 
 
 def by_name(name: str) -> BridgeLaw:
-    """The law of a name: of `LAWS`, ``package.module:function`` or, from the working directory, ``file.py:function``.
+    """The law of a name: of `LAWS`, of an installed package, ``package.module:function`` or ``file.py:function``.
+
+    Files are those of the working directory.
 
     Raises
     ------
@@ -37,10 +41,13 @@ def by_name(name: str) -> BridgeLaw:
     place, _, function = name.rpartition(":")
     if name in LAWS:
         place, function = f"{__name__}.{name.replace('-', '_')}", "law"
+    elif offer := offers("walkers.bridge_laws").get(name):
+        if not callable(law := offer.load(call=False)):
+            raise offer.broken("it is no function")
+        return law  # type: ignore[no-any-return]
     if not place or not function:
-        raise ValueError(
-            f"bridge law {name!r}: expected one of {', '.join(LAWS)}, package.module:function or file.py:function"
-        )
+        names = ", ".join([*LAWS, *offers("walkers.bridge_laws")])
+        raise ValueError(f"bridge law {name!r}: expected one of {names}, package.module:function or file.py:function")
     law = getattr(_module(name, place), function, None)
     if not callable(law):
         raise ValueError(f"bridge law {name!r}: {place} has no function {function}")

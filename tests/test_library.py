@@ -1,0 +1,239 @@
+"""The library: its numbers, a user's own, what packages bring, and how all of it is listed."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.conftest import call, document, to_toml
+from walkers.inputs import InputError, load_case, resolve_case
+from walkers.inputs.case import Case
+from walkers.inputs.library import _of_packages, library_of, unmeasured
+from walkers.inputs.origins import Origin
+from walkers.inputs.sweep import expand
+from walkers.packages import offers
+from walkers.physics.mixtures import water_glycerol
+from walkers.physics.units import TEMPERATURE, parse_quantity
+from walkers.sweeps.spread import spread_sweep
+
+SHIPPED = library_of({})
+OWN = """
+[materials."my beads"]
+density = { value = "2.45 g/cm^3", source = "weighed" }
+
+[[surface_pairs]]
+materials = ["my beads", "glass"]
+friction  = { value = 0.21, source = "tilting table", range = [0.18, 0.24] }
+"""
+
+
+def origins(case: Case) -> dict[str, Origin]:
+    return {one.key: one for one in case.origins}
+
+
+# --- the numbers ------------------------------------------------------------------------------------------------------
+
+
+def test_every_number_of_the_library_has_a_source_and_defaults_lie_within_their_ranges() -> None:
+    materials, liquids = SHIPPED.names("materials"), SHIPPED.names("liquids")
+    known = [number for name in materials for number in SHIPPED.material(name).values()]
+    known += [number for name in liquids for number in SHIPPED.liquid(name).values()]
+    assert len(known) >= 90
+    assert all(number.value > 0 and len(number.source) > 8 for number in known)
+    densities = {name: SHIPPED.material(name)["density"].value for name in materials}
+    assert sorted(densities, key=lambda name: densities[name])[:: len(densities) - 1] == ["polystyrene", "brass"]
+    for key, loose in unmeasured().items():
+        if key != "liquid.contact_angle":  # a liquid that wets is at the end
+            assert loose.range[0] < loose.usual.value < loose.range[1]
+
+
+# Mass fraction, °C, viscosity (mPa s; Segur and Oberstar 1951), density (g/cm³; Bosart and Snoddy 1928), both as in the
+# tables of the Glycerine Producers' Association (1963), surface tension (mN/m; water by IAPWS, glycerol by CRC).
+TABULATED = [
+    (0.0, 20.0, 1.005, 0.99823, 72.74),
+    (0.1, 20.0, 1.31, 1.02210, None),
+    (0.5, 20.0, 6.00, 1.12630, None),
+    (0.6, 20.0, 10.8, 1.15380, None),
+    (0.8, 20.0, 60.1, 1.20850, None),
+    (0.9, 20.0, 219.0, 1.23510, None),
+    (1.0, 20.0, 1410.0, 1.26108, 63.0),
+    (0.0, 25.0, 0.893, 0.99705, 71.97),
+]
+
+
+@pytest.mark.parametrize(("share", "celsius", "viscosity", "density", "tension"), TABULATED)
+def test_water_and_glycerol_as_tabulated(
+    share: float, celsius: float, viscosity: float, density: float, tension: float | None
+) -> None:
+    found = water_glycerol(share, celsius + 273.15)
+    assert found["dynamic_viscosity"] == pytest.approx(1e-3 * viscosity, rel=0.03)
+    assert found["density"] == pytest.approx(1e3 * density, rel=5e-4)
+    if tension is not None:
+        assert found["surface_tension"] == pytest.approx(1e-3 * tension, rel=3e-3)
+
+
+def test_a_mixture_follows_its_fraction_and_temperature() -> None:
+    def of(**liquid: Any) -> Case:
+        tables = document(liquid={"name": "water-glycerol", "mass_fraction": 0.87, **liquid})
+        return resolve_case(tables, name="mixed")
+
+    case = of()
+    assert case.liquid.dynamic_viscosity == pytest.approx(0.1448)  # Cheng's formula by hand
+    assert case.liquid.density == pytest.approx(1227.0)
+    temperature, viscosity = (origins(case)[f"liquid.{key}"] for key in ("temperature", "dynamic_viscosity"))
+    assert (temperature.text, temperature.origin) == ("20 degC", "default")
+    assert "Cheng" in viscosity.source
+    assert of(temperature="293.15 K").determinants() == case.determinants()
+    assert of(temperature="25 degC").liquid.dynamic_viscosity < 0.8 * case.liquid.dynamic_viscosity
+    assert Case.from_dict(case.as_dict()) == case
+    assert parse_quantity("20 °C", TEMPERATURE) == 293.15
+    for liquid, told in (
+        ({"mass_fraction": 87}, "liquid.mass_fraction = 87: expected the mass of the glycerol over"),
+        ({"temperature": 20}, 'liquid.temperature = 20: expected a temperature with its unit, such as "20 degC"'),
+        ({"temperature": "68 degF"}, "expected a temperature"),
+        ({"name": "water"}, 'liquid.mass_fraction = 0.87: expected none: it is for name = "water-glycerol"'),
+    ):
+        with pytest.raises(InputError) as caught:
+            of(**liquid)
+        assert told in str(caught.value)
+
+
+# --- a user's own -----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def own(in_folder: Path) -> Path:
+    """A folder with a case and the library that it takes its beads from."""
+    (in_folder / "library.toml").write_text(OWN)
+    tables = document(beads={"material": "my beads"}, boundary={"material": "glass"})
+    del tables["contact"]["friction"]
+    (in_folder / "mine.toml").write_text(to_toml(tables))
+    return in_folder
+
+
+def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Path) -> None:
+    case = load_case("mine.toml")
+    friction, density = (origins(case)[key] for key in ("contact.friction.bead_wall", "beads.density"))
+    assert (case.density, case.contact.friction_bead_wall) == (2450.0, 0.21)
+    assert (density.origin, density.source) == ("own library", "library.toml, weighed")
+    assert (friction.range, friction.guessed) == ((0.18, 0.24), False)
+    assert origins(load_case("fig1b", {"beads.material": "my beads"}))["beads.density"].origin == "own library"
+    # What it took goes along: into case.json, sweeps, spreads and their archives.
+    varied = spread_sweep(case, 2)
+    assert "contact.friction.bead_wall" in varied.keys
+    sweep = expand({"case": "mine.toml", "axes": {"dimers.replicates": [1, 2]}}, source="s", name="s", folder=own)
+    (own / "library.toml").unlink()
+    again = resolve_case(Case.from_dict(case.as_dict()).document, name="mine")
+    assert (again, again.determinants()) == (case, case.determinants())
+    assert [point.density for point in sweep.cases()] == [2450.0, 2450.0]
+    spread = expand({**varied.file, "case": "mine.toml"}, source="s", name="s", folder=own)
+    assert [point.density for point in spread.cases()] == [2450.0, 2450.0]
+    with pytest.raises(InputError, match=r'beads\.material = "my beads": not in the library'):
+        load_case("mine.toml")
+
+
+def test_a_library_elsewhere_is_named(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (own / "library.toml").rename(own / "other.toml")
+    monkeypatch.setenv("WALKERS_LIBRARY", "")
+    assert "weighed" in call("--library", "other.toml", "show", "mine.toml", check=True).stdout
+    monkeypatch.setenv("WALKERS_LIBRARY", "other.toml")
+    assert "my beads  " in call("library", check=True).stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("materials = 3", "materials = 3: expected a table [materials]"),
+        ('[materials.mine]\ndensity = "2 g/cm^3"', 'density = "2 g/cm^3": expected { value = ..., source = "..." }'),
+        ('[materials.mine]\ndensity = { value = "2 g/cm^3" }', "density.source: missing; expected where the number is"),
+        ('[materials.mine]\ndensity = { value = 2, source = "x" }', "density.value = 2: expected a density with its"),
+        ("[material.mine]", 'material = {"mine": {}}: unknown key'),
+        ('[materials.glass]\ndensity = { value = "2 g/cm^3", source = "x" }', "materials.glass: is in the library of"),
+        ('[[surface_pairs]]\nmaterials = ["glass", "ruby"]', "surface_pairs[0] = glass on ruby: is in the library of"),
+    ],
+)
+def test_a_library_that_is_none_is_one_message(own: Path, text: str, told: str) -> None:
+    (own / "library.toml").write_text(text)
+    for command in (("show", "mine.toml"), ("library",)):
+        done = call(*command)
+        assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+        assert "library.toml: " in done.stderr
+        assert told in done.stderr
+
+
+# --- packages ---------------------------------------------------------------------------------------------------------
+
+MODULE = """
+from pathlib import Path
+from walkers.physics.laws.willett import law
+
+def library():
+    return {"materials": {"lab beads": {"density": {"value": "3 g/cm^3", "source": "supplier"}}}}
+
+def case():
+    return Path(__file__).with_name("lab_case.toml")
+"""
+ENTRIES = """
+[walkers.materials]
+lab = lab_of_tests:library
+[walkers.cases]
+lab-case = lab_of_tests:case
+[walkers.bridge_laws]
+lab-law = lab_of_tests:law
+"""
+BROKEN = "".join(
+    f"[walkers.{kind}]\nbroken-{kind} = lab_that_is_broken:thing\n" for kind in ("materials", "cases", "bridge_laws")
+)
+
+
+@pytest.fixture
+def packages(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A package that brings a material, a case and a law, and one that cannot be imported."""
+    place = tmp_path_factory.mktemp("packages")
+    for name, entries in (("lab", ENTRIES), ("bad", BROKEN)):
+        about = place / f"{name}-1.2.dist-info"
+        about.mkdir()
+        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.2\n")
+        (about / "entry_points.txt").write_text(entries)
+    (place / "lab_of_tests.py").write_text(MODULE)
+    (place / "lab_that_is_broken.py").write_text("import no_such_module\n")
+    tables = document(beads={"material": "lab beads"}, liquid={"law": "lab-law"})
+    (place / "lab_case.toml").write_text(to_toml(tables))
+    monkeypatch.syspath_prepend(place)
+    importlib.invalidate_caches()
+    offers.cache_clear(), _of_packages.cache_clear()
+    yield
+    sys.modules.pop("lab_of_tests", None)
+    offers.cache_clear(), _of_packages.cache_clear()
+
+
+def test_packages_bring_materials_cases_and_laws(packages: None, in_folder: Path) -> None:
+    assert load_case("fig1b").density == 4000.0
+    assert "lab_of_tests" not in sys.modules, "it is imported when something of it is asked for"
+    with pytest.warns(
+        match=r"^package bad 1\.2: walkers\.materials 'broken-materials' cannot be used: ModuleNotFoundError"
+    ):
+        case = load_case("lab-case")
+    density = origins(case)["beads.density"]
+    assert (case.name, case.density) == ("lab_case", 3000.0)
+    assert (density.origin, density.source) == ("package", "package lab 1.2, supplier")
+    shown = call("show", "lab-case", check=True)
+    assert "  package lab 1.2, supplier" in shown.stdout
+
+
+def test_a_broken_package_is_one_message_and_hinders_nothing(packages: None, in_folder: Path) -> None:
+    listed = call("library", check=True)
+    assert [listed.stderr.count(word) for word in ("\n", "package bad 1.2", "Traceback")] == [1, 1, 0]
+    marked = {line.split()[0]: line.split("[")[-1] for line in listed.stdout.splitlines() if line.endswith("1.2]")}
+    assert {"lab", "lab-law", "lab-case", "broken-cases"} <= marked.keys()
+    assert marked["lab-law"] == "package lab 1.2]"
+    for words in (("broken-cases",), ("fig1b", "--set", "liquid.law=broken-bridge_laws")):
+        done = call("show", *words)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+        assert "package bad 1.2: walkers." in done.stderr
+    assert call("show", "fig1b").stderr == ""

@@ -1,0 +1,127 @@
+"""What a case or a command can name, with where it is from: what ``walkers library`` and the documentation list."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+
+from walkers.inputs.errors import refused
+from walkers.inputs.library import HALF, Known, Library, read_library, suggestion, unmeasured
+from walkers.inputs.reading import read_toml, shipped
+from walkers.packages import offers
+from walkers.physics.laws import LAWS
+from walkers.physics.mixtures import MIXTURES
+from walkers.physics.units import TEMPERATURE, quantity_text
+
+_COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "materials": ("density", "youngs_modulus", "poissons_ratio"),
+    "liquids": ("density", "surface_tension", "viscosity"),
+    "surface pairs": ("friction", "rolling_friction"),
+    "not measured": ("default",),
+    **dict.fromkeys(("bridge laws", "cases", "sweeps", "calibrations"), ()),
+}
+_HEADS = {"youngs_modulus": "Young's modulus", "poissons_ratio": "Poisson's ratio"}
+COMMANDS = {"cases": "run", "sweeps": "sweep", "calibrations": "calibrate"}
+NOT_KNOWN = """\
+Nobody has measured the friction between other pairs of wet surfaces, nor the values below. A case that does not give
+them uses these defaults. walkers run --spread varies them within their ranges."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A name of a kind, with its numbers, or title and file; ``place``: the file or package, if not of the program."""
+
+    kind: str
+    name: str
+    place: str = ""
+    numbers: Mapping[str, Known] = field(default_factory=dict)
+    text: str = ""
+    file: str = ""
+
+
+def catalogue(*, of_others: bool = True) -> list[Entry]:
+    """All that can be named: the program's, that of the library in the working directory, and that of packages.
+
+    Raises `InputError` if that library cannot be used. What is wrong with a package is a warning.
+    """
+    found = list(_of_library(Library(read_library(Path()) if of_others else None)))
+    for key, loose in unmeasured().items():
+        found.append(Entry("not measured", key, numbers={"default": replace(loose.usual, range=loose.range)}))
+    found += [Entry("bridge laws", name, text=_summary(name)) for name in LAWS]
+    found += [Entry("bridge laws", one.name, one.place) for one in offers("walkers.bridge_laws").values()]
+    for kind in COMMANDS:
+        files = shipped(kind[:-1]).items()
+        found += [Entry(kind, name, "", {}, str(read_toml(file).get("title", "")), str(file)) for name, file in files]
+    found += [Entry("cases", one.name, one.place) for one in offers("walkers.cases").values()]
+    return found if of_others else [one for one in found if not one.place]
+
+
+def _of_library(known_to: Library) -> Iterator[Entry]:
+    for one in known_to.collections():
+        for name in one.tables.get("materials", ()):
+            yield Entry("materials", name, one.place, known_to.material(name))
+        for name in one.tables.get("liquids", ()):
+            note = f"at mass_fraction = {HALF[0]}, {quantity_text(HALF[1], TEMPERATURE)}" if name in MIXTURES else ""
+            yield Entry("liquids", name, one.place, known_to.liquid(name), note)
+        for pair in one.tables.get("surface_pairs", ()):
+            first, second = pair["materials"]
+            yield Entry("surface pairs", f"{first} on {second}", one.place, known_to.surface_pair(first, second))
+
+
+def _summary(law: str) -> str:
+    """First line of the file of a law."""
+    text = resources.files("walkers.physics.laws").joinpath(f"{law.replace('-', '_')}.py").read_text("utf-8")
+    return text.split('"""')[1].splitlines()[0]
+
+
+def describe(found: Sequence[Entry]) -> str:
+    """Everything that has a name, as tables; what is not of the program is marked with its file or package."""
+    lines = []
+    for kind, columns in _COLUMNS.items():
+        if kind == "not measured":
+            lines += ["", NOT_KNOWN]
+        rows = [[kind.capitalize(), *(_HEADS.get(column, column.replace("_", " ")) for column in columns), ""]]
+        for one in found:
+            if one.kind == kind:
+                note = f"{one.text} [{one.place}]" if one.place else one.text
+                rows.append([f"  {one.name}", *(_cell(one.numbers, column) for column in columns), note.strip()])
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines.append("")
+        lines += ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+    return "\n".join(lines[1:])
+
+
+def _cell(numbers: Mapping[str, Known], column: str) -> str:
+    """A number with its range; of a viscosity the one that is known."""
+    known = next((one for key, one in numbers.items() if f"_{key}".endswith(f"_{column}")), None)
+    if known is None:
+        return "-"
+    ends = f" ({known.range[0]} to {known.range[1]})" if known.range else ""
+    return f"{known.written}{ends}"
+
+
+def describe_one(found: Sequence[Entry], name: str) -> str:
+    """All that is known by a name: numbers with their sources, titles and files; `InputError` if there is nothing."""
+    wanted = [one for one in found if one.name.casefold() == name.casefold()]
+    if not wanted:
+        names = [one.name for one in found]
+        near = [one for one in names if name.casefold() in one.casefold()]
+        told = f"; expected one of {', '.join(near)}" if near else suggestion(name, names)
+        raise refused(name, f"is not in the library{told or '; walkers library lists it'}")
+    # A material, and the pairs that it is part of.
+    wanted += [one for one in found if one.kind == "surface pairs" and wanted[0].name in one.name.split(" on ")]
+    lines = []
+    for one in wanted:
+        lines.append(": ".join(filter(None, (one.name, one.text))) + (f" [{one.place}]" if one.place else ""))
+        if one.kind in COMMANDS:
+            lines += [f"  {one.file}" * bool(one.file), f"  walkers {COMMANDS[one.kind]} {one.name}"]
+        width = max(map(len, one.numbers), default=0)
+        lines += [
+            f"  {key:{width}}  {_cell(one.numbers, key):28}  {known.source}".rstrip()
+            for key, known in one.numbers.items()
+        ]
+    if wanted[0].kind == "materials":
+        lines.append(f"Friction of {wanted[0].name} on other wet surfaces has not been measured: see walkers library.")
+    return "\n".join(filter(None, lines))
