@@ -122,7 +122,7 @@ def test_pages_are_written_anew(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(
         "Walks at <!--fact fig4b_velocity-->9.99<!--/fact--> mm/s.\n\n<!--output-->\n```console\n"
-        "$ walkers list\nsomething old\n```\n\n```console\n$ walkers theory fig1b\n...\n```\n"
+        "$ walkers list\nsomething old\n```\n\n```console\n$ walkers show --theory fig1b\n...\n```\n"
     )
     other = shutil.copy(DOCS / "index.md", tmp_path)
     assert refresh_pages([page, Path(other)], facts(DOCS), tmp_path) == [page]
@@ -130,7 +130,7 @@ def test_pages_are_written_anew(tmp_path: Path) -> None:
     assert f"<!--fact fig4b_velocity-->{facts(DOCS)['fig4b_velocity']}<!--/fact--> mm/s" in text
     assert "something old" not in text
     assert "0 runs, 0 B\n" in text
-    assert "$ walkers theory fig1b\n...\n" in text  # not marked
+    assert "$ walkers show --theory fig1b\n...\n" in text  # not marked
 
 
 # --- examples and notebooks -------------------------------------------------------------------------------------------

@@ -1,10 +1,9 @@
 """Wet granular walkers, simulated with LIGGGHTS: the one public name of the project.
 
-`load_case` reads a case, `run` takes it to its result as ``walkers run`` does, `find_run` finds a finished run, `sweep`
-makes all points of a sweep, `load` gives its table, `plot_sweep` and `sweep_figure` its figure, `report` writes a file
-to mail. The folders of the project are packages below: `physics` (laws), `inputs` (cases), `templates` (decks),
-`runner` (run directories), `postprocess` (what runs mean), and on them `sweeps`, `check`, `theory`, `paper` and
-`calibration`.
+`load_case` reads a case; `run` and `sweep` simulate it as the commands do, `start` does not wait for the end; `load`
+finds what is there. They give a `Run` or a `Sweep`, whose methods plot, film, report and export. The folders of the
+project are packages below: `physics` (laws), `inputs` (cases), `templates` (decks), `runner` (run directories),
+`postprocess` (what runs mean), and on them `sweeps`, `check`, `theory`, `paper` and `calibration`.
 """
 
 from __future__ import annotations
@@ -17,11 +16,9 @@ from walkers.exporting import exporting
 
 if TYPE_CHECKING:
     from walkers.inputs.reading import load_case
-    from walkers.pipeline import Run, find_run, report, run, sweep
-    from walkers.plotting import plot_sweep, sweep_figure
-    from walkers.sweeps.table import load
+    from walkers.pipeline import Run, Sweep, load, run, start, sweep
 
-__all__ = ["Run", "find_run", "load", "load_case", "plot_sweep", "report", "run", "sweep", "sweep_figure"]
+__all__ = ["Run", "Sweep", "load", "load_case", "run", "start", "sweep"]
 
 DEFAULT_OUT = Path("runs")
 RECORDS = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}
@@ -33,10 +30,8 @@ _PACKAGES = (
 _exported = exporting(
     "walkers",
     **{
-        "pipeline": ["Run", "find_run", "report", "run", "sweep"],
-        "plotting": ["plot_sweep", "sweep_figure"],
+        "pipeline": ["Run", "Sweep", "load", "run", "start", "sweep"],
         "inputs.reading": ["load_case"],
-        "sweeps.table": ["load"],
     },
 )
 
