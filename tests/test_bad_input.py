@@ -144,7 +144,7 @@ REFUSED: list[tuple[str, str]] = [
     ("calibrate fig2", "fig2: is a sweep"),
     ("run {sweep}", "is a sweep's directory: walkers list"),
     ("render {sweep}", "is a sweep: expected one of its runs"),
-    ("export --to vtk {sweep}", "is a sweep: expected one of its runs for vtk"),
+    ("export --to vtk {sweep}", "is a sweep: expected one of its runs"),
     ("plot {archive}", "an archive: unpack it"),
     ("list {archive}", "not a sweep: expected a folder"),
     ("list {run}", "is a run: walkers run "),

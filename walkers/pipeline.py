@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -120,7 +120,7 @@ class Run:
         return self.status
 
     @property
-    def finished(self) -> Path:
+    def _finished(self) -> Path:
         """Its directory; `InputError` if it is not finished."""
         if finished_run(self.directory) is None:
             raise refused(self.directory, f"the run is {self._state}")
@@ -150,7 +150,7 @@ class Run:
         """The result, SI units."""
         from walkers.postprocess.analysis import current_result, rests_on
 
-        result = current_result(self.finished)
+        result = current_result(self._finished)
         return result if self.origins is None else {**result, "rests_on": rests_on(self.origins)}
 
     @property
@@ -174,7 +174,7 @@ class Run:
         """A table of the run, see `walkers.postprocess.read_table`."""
         from walkers.postprocess.tables import read_table
 
-        return read_table(self.finished, name)
+        return read_table(self._finished, name)
 
     def describe(self) -> str:
         """The result in a few lines: mm, mm/s, degrees; of an unfinished run how far it is."""
@@ -196,13 +196,13 @@ class Run:
         """Draw its figures, see `walkers.postprocess.analysis.plot_run`: a list of paths, which a notebook shows."""
         from walkers.postprocess.analysis import plot_run
 
-        return Pictures(plot_run(self.finished, _path(to), formats))
+        return Pictures(plot_run(self._finished, _path(to), formats))
 
     def render(self, to: str | Path | None = None, *, images: int = 6) -> Pictures:
         """Render pictures of it, see `walkers.postprocess.series.render_run`: paths, which a notebook shows."""
         from walkers.postprocess.series import render_run
 
-        return Pictures(render_run(self.finished, _path(to), images=images))
+        return Pictures(render_run(self._finished, _path(to), images=images))
 
     def film(
         self,
@@ -214,7 +214,7 @@ class Run:
         """Film it, see `walkers.postprocess.films.render_film`."""
         from walkers.postprocess.films import render_film
 
-        return render_film(self.finished, _path(to), options, on_progress=on_progress)
+        return render_film(self._finished, _path(to), options, on_progress=on_progress)
 
     def view(self, *, height: int = 480) -> k3d.Plot:
         """Its beads in three dimensions, for a notebook, so many pixels high.
@@ -226,7 +226,7 @@ class Run:
         """
         from walkers.postprocess.report.player import player_of
 
-        return player_of(self.finished, height=height).plot
+        return player_of(self._finished, height=height).plot
 
     def report(self, to: str | Path | None = None) -> Path:
         """Write one HTML file to mail, see `walkers.postprocess.report.run.report_run`.
@@ -238,7 +238,7 @@ class Run:
         """
         from walkers.postprocess.report.run import report_run
 
-        return report_run(self.finished, _path(to), self.origins)
+        return report_run(self._finished, _path(to), self.origins)
 
     def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
         """Write it for other programs.
@@ -267,12 +267,12 @@ class Run:
         if form == "deck":
             return export_deck(self.case, place or Path(f"{self.directory.name}-deck"))
         if form == "archive":
-            return write_archive(self.finished, place, ArchiveOptions(**options))
+            return write_archive(self._finished, place, ArchiveOptions(**options))
         if form in SUFFIXES:
-            place = place or self.finished / f"trajectory{SUFFIXES[form][0]}"
-            return write_trajectory(self.finished, place, form, **options)
+            place = place or self._finished / f"trajectory{SUFFIXES[form][0]}"
+            return write_trajectory(self._finished, place, form, **options)
         write = {"vtk": write_vtk, "paraview": write_paraview}[form]
-        return write(self.finished, destination=place, **options)
+        return write(self._finished, destination=place, **options)
 
 
 @dataclass(frozen=True)
@@ -567,10 +567,19 @@ def load(
     return Sweep(place.path) if place.kind == "sweep" else run_at(place, str(what))
 
 
+def load_finished(
+    what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
+) -> Run | Sweep:
+    """Find a finished run, or a sweep; `InputError` with what it is instead."""
+    found = load(what, out, changes)
+    return found if isinstance(found, Sweep) else replace(found, directory=found._finished)
+
+
 def load_run(what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None) -> Run:
     """Find a finished run; `InputError` with what it is instead."""
-    found = run_at(find(what, out, changes), str(what))
-    assert found.finished
+    found = load_finished(what, out, changes)
+    if isinstance(found, Sweep):
+        raise refused(what, NOT_A_RUN["sweep"])
     return found
 
 

@@ -77,12 +77,9 @@ def load_run(run: str, settings: list[str] | None, out: Path) -> FoundRun:
 
 def load_any(what: str, settings: list[str] | None, out: Path) -> FoundRun | Sweep:
     """The finished run or the sweep that was named."""
-    from walkers.pipeline import Run, load
+    from walkers.pipeline import load_finished
 
-    found = load(what, out, changes_of(settings))
-    if isinstance(found, Run):
-        assert found.finished
-    return found
+    return load_finished(what, out, changes_of(settings))
 
 
 def on_cores(jobs: int | None) -> Options:

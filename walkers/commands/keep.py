@@ -10,7 +10,6 @@ from typing import Any, Literal
 import typer
 from typer import Argument, Option
 
-import walkers
 from walkers import DEFAULT_OUT
 from walkers.commands.arguments import (
     CaseName,
@@ -20,8 +19,8 @@ from walkers.commands.arguments import (
     Set,
     changes_of,
     check_folder,
-    load_any,
     load_case,
+    load_run,
     refuse,
     refuse_given,
     tell,
@@ -79,17 +78,21 @@ def export(
         else:
             print(f"{export_deck(case, output)}    run it there with: sh {RUN_NAME}")
         return
-    found, options = load_any(what, settings, out), _options(form, every, as_placed, vtu, colour)
-    if isinstance(found, walkers.Run):
-        wrong = as_placed and not found.case.apart
-        refuse("--as-placed", wrong, "is for independent walkers: these stand where they are")
     if form == "archive":
         from walkers.archive.crate import Author
+        from walkers.archive.writing import ArchiveOptions, write_archive
+        from walkers.finding import NOT_A_RUN, find
 
         refuse("--orcid", len(orcid or ()) > len(author or ()), "expected an --author for each")
         authors = [Author(name, number) for name, number in zip_longest(author or (), orcid or ())]
-        options = {"dumps": not without_dumps, "authors": authors, **({"licence": licence} if licence else {})}
-    print(written := found.export(form, output, **options))
+        place = find(what, out, changes_of(settings))
+        refuse(what, place.kind not in ("run", "sweep"), NOT_A_RUN.get(place.kind, ""))
+        print(write_archive(place.path, output, ArchiveOptions(not without_dumps, authors, licence or "CC-BY-4.0")))
+        return
+    found = load_run(what, settings, out)
+    wrong = as_placed and not found.case.apart
+    refuse("--as-placed", wrong, "is for independent walkers: these stand where they are")
+    print(written := found.export(form, output, **_options(form, every, as_placed, vtu, colour)))
     if start:
         from walkers.postprocess.paraview import open_paraview
 
