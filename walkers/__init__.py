@@ -1,9 +1,8 @@
-"""Wet granular walkers, simulated with LIGGGHTS: the one public name of the project.
+"""Wet granular walkers, simulated with LIGGGHTS.
 
-`load_case` reads a case; `run` and `sweep` simulate it as the commands do, `start` does not wait for the end; `load`
-finds what is there. They give a `Run` or a `Sweep`, whose methods plot, film, report and export. The folders of the
-project are packages below: `physics` (laws), `inputs` (cases), `templates` (decks), `runner` (run directories),
-`postprocess` (what runs mean), and on them `sweeps`, `check`, `theory`, `paper` and `calibration`.
+`load_case` reads a case. `run` and `sweep` run a case and a sweep as the commands do; `start` does not wait for the
+end. `load` finds runs and sweeps. They return a `Run` or a `Sweep`, whose methods plot, film, report and export.
+`FilmOptions` describes a film for `Run.film`.
 """
 
 from __future__ import annotations
@@ -15,10 +14,12 @@ from typing import TYPE_CHECKING, Any
 from walkers.exporting import exporting
 
 if TYPE_CHECKING:
+    from walkers.handles import Run, Sweep
     from walkers.inputs.reading import load_case
-    from walkers.pipeline import Run, Sweep, load, run, start, sweep
+    from walkers.pipeline import load, run, start, sweep
+    from walkers.postprocess.films import FilmOptions
 
-__all__ = ["Run", "Sweep", "load", "load_case", "run", "start", "sweep"]
+__all__ = ["FilmOptions", "Run", "Sweep", "load", "load_case", "run", "start", "sweep"]
 
 DEFAULT_OUT = Path("runs")
 RECORDS = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}
@@ -30,8 +31,10 @@ _PACKAGES = (
 _exported = exporting(
     "walkers",
     **{
-        "pipeline": ["Run", "Sweep", "load", "run", "start", "sweep"],
+        "handles": ["Run", "Sweep"],
+        "pipeline": ["load", "run", "start", "sweep"],
         "inputs.reading": ["load_case"],
+        "postprocess.films": ["FilmOptions"],
     },
 )
 

@@ -13,9 +13,9 @@ from typer import Argument, Option
 from walkers.completion import names_of_cases, offering
 
 if TYPE_CHECKING:
+    from walkers.handles import Run as FoundRun
+    from walkers.handles import Sweep
     from walkers.inputs.case import Case as ResolvedCase
-    from walkers.pipeline import Run as FoundRun
-    from walkers.pipeline import Sweep
     from walkers.sweeps.scheduler import Options
 
 _CASE = "A case: its file, or the name of a shipped case such as fig1b; or a run of it, by its name or its folder."

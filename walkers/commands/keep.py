@@ -69,7 +69,7 @@ def export(
         if form not in forms:
             refuse_given({option: value}, f"is for --to {', '.join(forms)}")
     if form == "deck":
-        from walkers.pipeline import export_deck
+        from walkers.handles import export_deck
         from walkers.templates.deck import RUN_NAME, render_deck
 
         case = load_case(what, settings, out)
