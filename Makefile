@@ -21,14 +21,14 @@ walker: setup ## Run the walker of Fig. 1b (or CASE=...): velocity, pictures, a 
 	@$(WALKERS) plot $(CASE) --out $(OUT) | sed 's/^/  /'
 	@$(WALKERS) render $(CASE) --out $(OUT) | sed 's/^/  /'
 	@echo "film:"
-	@$(WALKERS) film $(CASE) --size $(FILM) --out $(OUT) | sed 's/^/  /'
+	@$(WALKERS) render --film $(CASE) --size $(FILM) --out $(OUT) | sed 's/^/  /'
 	@echo "for ParaView:"
-	@$(WALKERS) vtk $(CASE) --out $(OUT) | sed 's/^/  /'
+	@$(WALKERS) export $(CASE) --to vtk --out $(OUT) | sed 's/^/  /'
 
 .PHONY: sweep
 sweep: setup ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.toml: on that cluster), print its table
 	@$(WALKERS) sweep $(SWEEP) --out $(OUT) $(if $(SITE),--site $(SITE)) $(if $(JOBS),--jobs $(JOBS)); status=$$?; \
-	  [ $$status -gt 1 ] || $(WALKERS) table $(basename $(notdir $(SWEEP))) --out $(OUT); exit $$status
+	  [ $$status -gt 1 ] || $(WALKERS) list $(basename $(notdir $(SWEEP))) --out $(OUT); exit $$status
 
 .PHONY: pile
 pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures, a film; goes on where it was interrupted
@@ -36,7 +36,7 @@ pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures
 
 .PHONY: figures
 figures: setup ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)
-	@$(WALKERS) figures --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
+	@$(WALKERS) paper figures --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
 .PHONY: calibrate
 calibrate: setup ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
@@ -44,7 +44,7 @@ calibrate: setup ## Calibrate friction and drag to the published numbers (CALIBR
 
 .PHONY: model-terms
 model-terms: setup ## Which physics is missing: the theory fitted to the published numbers with each further term
-	@$(WALKERS) model-terms
+	@$(WALKERS) paper terms
 
 .PHONY: test
 test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test first)
@@ -54,7 +54,7 @@ test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test fir
 	.venv/bin/lint-imports
 	.venv/bin/pytest -q -m smoke tests/test_program.py
 	@# Compiles both integrators once; each worker would by itself.
-	@$(WALKERS) theory fig1b > /dev/null & .venv/bin/pytest -q tests/test_crosscheck.py -k momentum > /dev/null & wait
+	@$(WALKERS) show fig1b --theory > /dev/null & .venv/bin/pytest -q tests/test_crosscheck.py -k momentum > /dev/null & wait
 	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"
 
 .PHONY: test-browser
@@ -67,11 +67,11 @@ test-slow: setup ## Run what `make test` leaves out: what only a release needs
 
 .PHONY: audit
 audit: setup ## Prove what the installed engine does, beside a second engine and closed forms
-	@$(WALKERS) audit
+	@$(WALKERS) check engine
 
 .PHONY: validate
 validate: setup ## Check it against published benchmarks, exact solutions and a second engine (under ten minutes)
-	@$(WALKERS) validate --out $(OUT)
+	@$(WALKERS) check literature --out $(OUT)
 
 .PHONY: docs-pictures
 docs-pictures: setup ## Make what docs/ shows and is not of today's parameters: pictures, tables, outputs, numbers (ONLY=fig2: that)

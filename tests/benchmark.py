@@ -117,17 +117,17 @@ def measure_program(folder: Path) -> None:
         engines.append(engine)
     print(f"| `walkers run fig1b`, the engine process | {min(engines):.2f} |")
     print(f"| `walkers run fig1b`, everything else | {min(overheads):.2f} |")
-    for command in ("plot", "vtk", "render"):
-        print(f"| `walkers {command} fig1b` | {_seconds([_PROGRAM, command, 'fig1b'], folder):.2f} |")
+    for command in ("plot", "export --to vtk", "render"):
+        print(f"| `walkers {command} fig1b` | {_seconds([_PROGRAM, *command.split(), 'fig1b'], folder):.2f} |")
 
 
 def measure_figures(folder: Path) -> None:
-    """Time of ``walkers figures`` from nothing, and of the engines within it."""
-    command = [_PROGRAM, "figures", "--out", str(folder / "of-figures"), "--to", str(folder / "figures")]
+    """Time of ``walkers paper figures`` from nothing, and of the engines within it."""
+    command = [_PROGRAM, "paper", "figures", "--out", str(folder / "of-figures"), "--to", str(folder / "figures")]
     seconds, again = _seconds(command, folder), _seconds(command, folder)
     loops = _loops(folder / "of-figures")
     print("\n| | |\n|---|---|")
-    print(f"| `walkers figures` from nothing, wall time | {seconds:.0f} s |")
+    print(f"| `walkers paper figures` from nothing, wall time | {seconds:.0f} s |")
     print(f"| of the engines' loops, on all cores | {sum(loops.values()):.0f} core-seconds in {len(loops)} decks |")
     print(f"| the same again, all runs finished | {again:.0f} s |")
 
@@ -149,7 +149,7 @@ def measure_sweeps(folder: Path) -> None:
         "dry run of 10,000 points": ["sweep", "grid.toml", "--dry-run"],
         "1,000 points of two cycles, two decks at once": ["sweep", "trivial.toml", "-j", "2", "--out", "of-points"],
         "the same again, all finished": ["sweep", "trivial.toml", "--out", "of-points"],
-        "its table": ["table", "of-points/trivial", "--csv"],
+        "its table": ["list", "of-points/trivial", "--json"],
         "`fig2`, 80 points of 6 walkers, two decks at once": ["sweep", "fig2", "-j", "2", "--out", "of-fig2"],
     }.items():
         print(f"| {name} | {_seconds([_PROGRAM, *command], folder):.2f} |", flush=True)

@@ -93,8 +93,8 @@ def _issues(archive: Path, folder: Path, severity: Severity) -> list[str]:
 
 
 def _verified(path: Path, status: int = 0) -> list[str]:
-    """Lines that ``walkers verify`` prints."""
-    done = call("verify", str(path))
+    """Lines that ``walkers check files`` prints."""
+    done = call("check", "files", str(path))
     assert done.returncode == status, (done.stdout, done.stderr)
     return (done.stdout + done.stderr).splitlines()
 
@@ -155,7 +155,7 @@ def test_what_changed_is_named(run: Path, tmp_path: Path) -> None:
         *(f"  not listed segments/{name}" for name in ("0000/walk.png", "0001/", "0002")),
         *since,
     ]
-    refused = call("archive", str(run), "--to", str(tmp_path / "run.zip"))
+    refused = call("export", str(run), "--to", "archive", "-o", str(tmp_path / "run.zip"))
     assert (refused.returncode, "walkers.parquet" in refused.stderr) == (1, True)
     assert not (tmp_path / "run.zip").exists()
 
@@ -187,8 +187,8 @@ def test_manifests_that_do_not_say_what_is_there(
 
 def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
     archive, again = tmp_path / "run.zip", tmp_path / "again.zip"
-    assert call("archive", str(run), "--to", str(archive), *AUTHOR, check=True).stdout == f"{archive}\n"
-    call("archive", str(run), "--to", str(again), *AUTHOR, check=True)
+    assert call("export", str(run), "--to", "archive", "-o", str(archive), *AUTHOR, check=True).stdout == f"{archive}\n"
+    call("export", str(run), "--to", "archive", "-o", str(again), *AUTHOR, check=True)
     assert archive.read_bytes() == again.read_bytes()
     assert set(_issues(archive, tmp_path, Severity.RECOMMENDED)) == NOT_SAID
     assert len(_verified(archive)) == 1
@@ -213,7 +213,7 @@ def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
 
 def test_what_an_archive_says_of_its_run(run: Path, tmp_path: Path) -> None:
     unpacked = tmp_path / "unpacked"
-    shutil.unpack_archive(Run(run).archive(tmp_path / "run.zip", licence="CC0-1.0"), unpacked)
+    shutil.unpack_archive(Run(run).export("archive", tmp_path / "run.zip", licence="CC0-1.0"), unpacked)
     crate, manifest, place = ROCrate(unpacked), FinishedRun(run).manifest, f"runs/{run.name}"
     root = crate.root_dataset
     assert root["citation"].id == PAPER
@@ -241,13 +241,13 @@ def test_what_an_archive_says_of_its_run(run: Path, tmp_path: Path) -> None:
 
 def test_an_archive_without_dumps(run: Path, tmp_path: Path) -> None:
     archive, again = tmp_path / "run.zip", tmp_path / "again.zip"
-    call("archive", str(run), "--to", str(archive), "--without-dumps", check=True)
+    call("export", str(run), "--to", "archive", "-o", str(archive), "--without-dumps", check=True)
     shutil.unpack_archive(archive, tmp_path / "unpacked")
     there = tmp_path / "unpacked" / "runs" / run.name
     files = len(FinishedRun(run).manifest["files"])
     assert _verified(there)[0].endswith(f"{files - 3} files are what they were, 3 left out of the archive")
     assert Run(there).result == Run(run).result
-    call("archive", str(there), "--to", str(again), "--without-dumps", check=True)
+    call("export", str(there), "--to", "archive", "-o", str(again), "--without-dumps", check=True)
     assert archive.read_bytes() == again.read_bytes()
     told = call("plot", str(there))
     assert (told.returncode, "beads.bin" in told.stderr) == (1, True)
@@ -256,7 +256,7 @@ def test_an_archive_without_dumps(run: Path, tmp_path: Path) -> None:
 def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     """Runs that shared a deck come with it, and the table is what it was."""
     archive, unpacked = tmp_path / "sweep.zip", tmp_path / "unpacked"
-    call("archive", str(shared / "angles"), "--to", str(archive), *AUTHOR, check=True)
+    call("export", str(shared / "angles"), "--to", "archive", "-o", str(archive), *AUTHOR, check=True)
     assert _issues(archive, tmp_path, Severity.REQUIRED) == []
     shutil.unpack_archive(archive, unpacked)
     there = unpacked / "runs" / "angles"
@@ -286,7 +286,7 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     gone = _verified(there, 1)
     assert gone[0] == "angles: 0 points have their run"
     assert sum("(missing: point " in line for line in gone) == 2
-    refused = call("archive", str(there), "--to", str(tmp_path / "two.zip"))
+    refused = call("export", str(there), "--to", "archive", "-o", str(tmp_path / "two.zip"))
     assert (refused.returncode, "2 of 2 points are not finished" in refused.stderr) == (2, True)
 
 

@@ -148,7 +148,7 @@ def test_an_engine_that_fails_in_a_check_fails_the_check(own_cache: Path, front:
     assert "out of order" in failed.what
     assert failed.verdict is Verdict.ERROR
     assert record(report, quick=True) is None
-    done = call("audit", "--only", "stock", "--engine", broken)
+    done = call("check", "engine", "--only", "stock", "--engine", broken)
     assert done.returncode == 1
     assert "1 could not be measured" in done.stdout
 
@@ -162,7 +162,7 @@ def test_a_quick_audit_leaves_the_long_checks_out() -> None:
 
 def test_runs_name_the_audit_of_their_engine(own_cache: Path) -> None:
     case = make_case(run=SHORT)
-    with pytest.warns(UnauditedEngineWarning, match="walkers audit"):
+    with pytest.warns(UnauditedEngineWarning, match="walkers check engine"):
         unaudited = run_case(case, own_cache / "a")
     assert _audit_of(unaudited) is None
     kept = record(run_audit(["stock"]), quick=True)
@@ -225,15 +225,15 @@ def test_an_audit_whose_outcome_cannot_be_kept_is_printed(monkeypatch: pytest.Mo
     monkeypatch.setattr("walkers.check.audit.write_audit", full)
     one = {"stock": CHECKS["stock"]}  # as if it were all: a part is not to be kept
     monkeypatch.setattr("walkers.check.audit.CHECKS", one)
-    done = call("audit", "--quick", "--json", check=True)
+    done = call("check", "engine", "--quick", "--json", check=True)
     assert json.loads(done.stdout)["passed"]
     assert "cannot be kept" in done.stderr
 
 
 def test_the_program(own_cache: Path, in_folder: Path) -> None:
-    done = call("audit", "--only", "stock", "--only", "restart", "--json", check=True)
+    done = call("check", "engine", "--only", "stock", "--only", "restart", "--json", check=True)
     assert [check["name"] for check in json.loads(done.stdout)["checks"]] == ["restart", "stock"]
     assert not list(own_cache.rglob("audits/*.json")), "a part of the audit is no audit"
     (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
     told = call("run", "mine.toml", check=True).stderr
-    assert told.count("walkers audit") == 1
+    assert told.count("walkers check engine") == 1

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from tests.conftest import call, document, make_case, to_toml
+from walkers.commands import MOVED
 from walkers.inputs import InputError, resolve_case
 from walkers.physics import units
 from walkers.physics.units import parse_quantity
@@ -90,7 +91,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     (cluster("diamond", "0.3 mm", "0.2 mm", "0.2 mm"), "expected 4 beads in a diamond"),
     (cluster("chain", "0.3 mm", "0.05 mm", "0.3 mm"), "beads 1 and 3 would overlap in a chain"),
     (cluster("fan", "0.3 mm", *["0.2 mm"] * 12), "so many beads do not fit around the first one"),
-    ({"clusters": [WALKER]}, "expected either an arrangement"),
+    ({"clusters": [WALKER]}, "missing; expected such as \"fan\""),
     (at(["0 mm", "0 mm"], ["-1 mm", "0 mm"]), "nothing joins this one to the first"),
     (at(["0 mm", "0 mm"]), "expected a place for each"),
     (at(["0 mm", "0 mm"], ["0.1 mm", "0 mm"]), "clusters[0].at[1]"),
@@ -127,81 +128,99 @@ def test_bad_values(changes: dict[str, Any], told: str) -> None:
     assert message.count("\n") == 0, "one problem, one line"
 
 
-READING = ("result", "plot", "vtk", "render", "film", "paraview")
+READING = ("plot", "render", "render --film", "report", *(f"export --to {form}" for form in ("vtk", "xyz", "archive")))
 REFUSED: list[tuple[str, str]] = [
     # What is of another kind, with the command for it
     ("run fig2", "fig2: is a sweep: walkers sweep fig2"),
     ("show {file}", "is a sweep: walkers sweep "),
-    ("deck {sweep}", "is a sweep's directory: walkers table"),
-    ("run {run}", "is a run's directory: walkers result "),
+    ("export --to deck {sweep}", "is a sweep's directory: walkers list"),
+    ("sweep {run}", "is a run's directory: walkers run "),
     ("sweep fig1b", "fig1b: is a case: walkers run fig1b"),
     ("sweep {case}", "is a case: walkers run "),
     ("sweep {sweep}", "is a sweep's directory"),
-    ("theory ruby", "ruby: is a calibration: walkers calibrate ruby"),
-    ("theory pile-ci", ""),
+    ("show --theory ruby", "ruby: is a calibration: walkers calibrate ruby"),
+    ("show --theory pile-ci", ""),
     ("calibrate fig2", "fig2: is a sweep"),
-    ("result {sweep}", "a sweep's directory: walkers plot, table and status take it"),
-    ("result {archive}", "an archive: unpack it"),
-    ("table {archive}", "not a sweep: expected a folder"),
-    ("status {archive}", "neither a sweep's"),
+    ("run {sweep}", "is a sweep's directory: walkers list"),
+    ("render {sweep}", "is a sweep: expected one of its runs"),
+    ("export --to vtk {sweep}", "is a sweep: expected one of its runs"),
+    ("plot {archive}", "an archive: unpack it"),
+    ("list {archive}", "not a sweep: expected a folder"),
+    ("list {run}", "is a run: walkers run "),
+    ("list {runs}", "walkers list --out "),
+    ("list {sweep} --status failed", "--status: is for folders"),
+    ("list --to table.csv", "--to: expected a sweep"),
+    ("plot {sweep} --set run.seed=2", "is a sweep's directory"),
     ("compare {sweep} {run}", "is a sweep, to be compared with another sweep"),
     ("compare {sweep} fig1b", "is a sweep, to be compared"),
     ("compare {sweep} {other}", "vary the same keys"),
     ("climb {sweep}", "expected a finished run of a pile"),
-    ("archive .", "expected a run directory"),
-    ("verify .", "expected a run directory"),
-    ("report . --to report.html", "not a finished run"),
+    ("check files .", "expected a run directory"),
     ("plot {run} --hue frequency", "--hue: is for sweeps"),
-    *((f"{command} {folder}", "") for command in ("status", "table") for folder in ("empty", "{broken}")),
+    *((f"list {folder}", "") for folder in ("empty", "{broken}")),
     # What is not there, cannot be read or makes no sense
     *((f"{command} fig1b", "no finished run in runs; first do: walkers run fig1b") for command in READING),
     *((f"{command} .", "not a finished run") for command in READING),
     *((f"{command} {{folder}}", "manifest.json cannot be read") for command in READING),
     *((f"sweep {what}", "") for what in ("{bad}", "nosuch", "fig2 --site nosite.toml", "fig2 --out {case}")),
     *((f"{command} fig1b --set 'drive.frequency=70 mm'", 'fig1b: drive.frequency = "70 mm": expected a frequency')
-      for command in ("show", "run", "deck", "theory")),
+      for command in ("show", "run", "export --to deck", "show --theory", "plot", "report", "check")),
     ("sweep fig4 --set 'liquid.name=Si AK5'", 'liquid.name = "Si AK5": varies in this sweep: it cannot be set as well'),
     ("run fig1b --points 2", ""),
     # Options
-    ("audit --engine no-such-engine", ""),
-    ("audit --only nothing", ""),
-    ("validate benchmark", "did you mean"),
-    ("crosscheck fig1b --without magic", "--without magic: expected one of"),
-    ("crosscheck fig1b --cycles 1", "expected at least 3"),
-    ("crosscheck fig1b --seeds 2", "--seeds: is for piles"),
-    ("figures --only fig9", "fig9"),
-    ("figures --only fig4 --format jpeg", "jpeg"),
-    ("figures --only fig4 --to {case}", "base.toml"),
+    ("check engine --engine no-such-engine", ""),
+    ("check engine --only nothing", ""),
+    ("check literature benchmark", "did you mean"),
+    ("check enigne", "enigne: no such file, run or sweep, nor a shipped case"),
+    ("check fig1b --without magic", "--without magic: expected one of"),
+    ("check fig1b --cycles 1", "expected at least 3"),
+    ("check fig1b --seeds 2", "--seeds: is for piles"),
+    ("paper figures --only fig9", "fig9"),
+    ("paper figures --only fig4 --format jpeg", "jpeg"),
+    ("paper figures --only fig4 --to {case}", "base.toml"),
+    # Names of before, and mistyped ones
+    *((f"{old} fig1b", f"{old}: no such command; it is now: walkers {now}") for old, now in MOVED.items()),
+    ("shw fig1b", 'no such command; did you mean "show"?'),
+    ("new {case}", "exists already"),
+    ("new mine --from fig1", 'did you mean "fig1b"?'),
     ("list --out {runs} --older-than soon", "expected an age with its unit"),
     ("list --out {runs} --where frequency", "expected KEY=VALUE"),
     ("list --out {runs} --where frequenzy=2", "no run has such a key"),
-    ("clean nonsense --yes --out {runs}", "no run or sweep"),
+    ("clean nonsense --yes --out {runs}", "nonsense: no such file, run or sweep"),
     ("plot {sweep} --y velocitty", 'did you mean "velocity"?'),
     ("plot {sweep} --y reason", '"reason" has no number'),
     ("plot {sweep} --x bead_wall", '"bead_wall": expected one of'),
     ("plot {sweep} --to figure.jpg", "ends in .png, .svg, .pdf"),
     *((f"report {{run}} --to {place}", "--to: ") for place in ("a.txt", "{folder}", "nowhere/a.html")),
-    ("export {run} --to walk.dcd", "expected the name of a .xyz, .extxyz or .lammpstrj file"),
-    ("paraview {run} --to vtk --colour beauty", "expected one of bead, large, omega, radius, speed, velocity, walker"),
-    ("archive {run} --to run.tar", "--to: expected the name of a .zip file"),
-    ("archive {run} --to nowhere/run.zip", "No such file"),
-    ("archive {run} --licence MINE", "--licence: expected one of CC-BY-4.0"),
-    ("archive {run} --author=", "--author: expected a name"),
-    ("archive {run} --orcid 0000-0002-1825-0097", "--orcid: expected an --author for each"),
-    ("archive {run} --author N --orcid 0000-0002-1825-0098", "--orcid: expected an ORCID"),
-    ("film {run} --to walk.avi", "expected the name of a .mp4 or .gif file"),
-    ("film {run} --to walk.gif --fps 30", "expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF"),
-    ("film {run} --size 333x201", "expected even numbers for an MP4"),
-    ("film {run} --size wide", "expected 360p, 480p, 720p, 1080p"),
-    ("film {run} --walker 2", "expected less than 2"),
-    ("film {run} --from soon", 'expected a time such as "0.1 s"'),
-    ("film {run} --from '0.2 s'", "expected times within the drive, 0 to 0.1 s"),
-    ("film {run} --from '0.05 s' --until '0.05 s'", "expected times within the drive, 0 to 0.1 s"),
+    ("export {run} --to xyz -o walk.dcd", "expected the name of a .xyz or .extxyz file"),
+    ("export {run} --to xyz --vtu", "--vtu: is for --to vtk"),
+    ("export {run} --to deck --every 2", "--every: is for --to vtk, paraview, xyz, lammps"),
+    ("export {run} --to paraview -o vtk --colour beauty", "expected one of bead, large, omega, radius"),
+    *((f"export {{run}} --to archive {words}", told) for words, told in (
+        ("-o run.tar", "--output: expected the name of a .zip file"),
+        ("-o nowhere/run.zip", "No such file"),
+        ("--licence MINE", "--licence: expected one of CC-BY-4.0"),
+        ("--author=", "--author: expected a name"),
+        ("--orcid 0000-0002-1825-0097", "--orcid: expected an --author for each"),
+        ("--author N --orcid 0000-0002-1825-0098", "--orcid: expected an ORCID"),
+    )),
+    ("render {run} --fps 10", "--fps: is for --film"),
+    *((f"render --film {{run}} {words}", told) for words, told in (
+        ("--to walk.avi", "expected the name of a .mp4 or .gif file"),
+        ("--to walk.gif --fps 30", "expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF"),
+        ("--size 333x201", "expected even numbers for an MP4"),
+        ("--size wide", "expected 360p, 480p, 720p, 1080p"),
+        ("--walker 2", "expected less than 2"),
+        ("--images 2", "--images: is for pictures"),
+        ("--from soon", 'expected a time such as "0.1 s"'),
+        ("--from '0.2 s'", "expected times within the drive, 0 to 0.1 s"),
+        ("--from '0.05 s' --until '0.05 s'", "expected times within the drive, 0 to 0.1 s"),
+    )),
     *((f"render {{pile}} --interval {apart}", "") for apart in ("'3 s'", "soon", "T/4")),  # frames are cycles apart
-    *((f"{what} {{pile}} --walker 0", "") for what in ("render", "film")),
-    ("film {pile} --to box.png", ""),
+    *((f"{what} {{pile}} --walker 0", "") for what in ("render", "render --film")),
+    ("render --film {pile} --to box.png", ""),
     ("render {pile} --to box.jpg", ""),
-    *((f"{what} {{pile}} --as-placed", "") for what in ("vtk", "paraview")),
+    *((f"export {{pile}} --to {form} --as-placed", "") for form in ("vtk", "paraview")),
 ]  # fmt: skip
 """Commands, and a part of the line that they are refused with."""
 
@@ -239,6 +258,17 @@ def _message(*arguments: str) -> str:
     assert done.stdout == ""
     assert "Traceback" not in done.stderr
     return done.stderr
+
+
+def test_all_that_is_missing_is_told_at_once(in_folder: Path) -> None:
+    heads = ("[dimers]", "[[clusters]]", "[mixture]", "[beads]", "[liquid]", "[[drive.harmonics]]")
+    (in_folder / "bad.toml").write_text("\n".join([*heads, '[boundary]\nshape = "box"']))
+    told = {line.split(": ")[-2] for line in _message("run", "bad.toml").splitlines()}
+    missing = {"dimers.radii", "clusters[0].radii", "clusters[0].arrangement", "mixture.small", "mixture.large"}
+    missing |= {"mixture.count", "beads.density", "boundary.material", "boundary.width", "boundary.height"}
+    missing |= {"drive.harmonics[0].frequency", "drive.harmonics[0].peak_acceleration", "run.duration"}
+    missing |= {"liquid.surface_tension", "liquid.dynamic_viscosity"}
+    assert missing <= told
 
 
 def test_several_mistakes_are_told_at_once_and_before_the_first_run(in_folder: Path) -> None:
@@ -297,7 +327,6 @@ def test_files_that_are_no_cases_or_not_there(tmp_path: Path) -> None:
 
 def test_misuse_of_the_program() -> None:
     for arguments in (
-        ["shw", "fig1b"],
         ["run", "fig1b", "--limit", "-1"],
         ["run", "fig1b", "--no-such-option"],
         ["run"],

@@ -151,7 +151,7 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     assert done.walkers["rotation_3"].isna().tolist() == [True, True, False, False, False]
     assert "of 0.3/0.2/0.2 mm" in done.describe()
     assert {path.name for path in done.plot()} == {"walk.png", "gait.png", "work.png"}
-    assert done.vtk().exists()
+    assert done.export("vtk").exists()
     # Contact 3 is bead on bead of a dimer, and bead 3 on the floor of a trimer: they are not averaged.
     assert done.result["sliding"] == makes[0]["sliding"]
     assert len(makes[1]["sliding"]) == 6
@@ -252,7 +252,7 @@ def test_a_dimer_in_a_groove_rolls_on_both_walls(tmp_path: Path) -> None:
     assert done.result["velocity"]["mean"] == pytest.approx(0.818 * MM_PER_S, rel=0.01)
     rolling = np.sin(np.radians(60.0)) * done.result["rotation"]["bead_1"]
     assert rolling == pytest.approx(done.result["velocity"]["mean"], rel=0.04)
-    assert done.vtk().exists()
+    assert done.export("vtk").exists()
 
 
 def test_walkers_may_run_in_segments(tmp_path: Path) -> None:

@@ -208,7 +208,7 @@ def test_a_restart_keeps_what_is_between_beads(tmp_path: Path, monkeypatch: pyte
 
 def test_piles_agree_until_they_are_chaotic(in_folder: Path) -> None:
     (in_folder / "pile.toml").write_text(to_toml(pile(16)))
-    done = call("crosscheck", "pile.toml", "--cycles", "9", "--seeds", "2", "--json", check=True)
+    done = call("check", "pile.toml", "--cycles", "9", "--seeds", "2", "--json", check=True)
     (told,) = json.loads(done.stdout)["checks"]
     *means, first, second = [line["what"] for line in told["lines"]]
     seed = load_case("pile-ci").seed
@@ -218,10 +218,10 @@ def test_piles_agree_until_they_are_chaotic(in_folder: Path) -> None:
 
 def test_command(in_folder: Path) -> None:
     """It runs what is missing, prints both engines and exits with 1 if they differ."""
-    done = call("crosscheck", "fig1b", "--cycles", "6", check=True)
+    done = call("check", "fig1b", "--cycles", "6", check=True)
     assert "velocity" in done.stdout
     assert "FAIL" not in done.stdout
-    differs = call("crosscheck", "fig1b", "--cycles", "6", "--without", "lubrication", "--json")
+    differs = call("check", "fig1b", "--cycles", "6", "--without", "lubrication", "--json")
     assert differs.returncode == 1
     told = json.loads(differs.stdout)
     assert told["without"] == ["lubrication"]

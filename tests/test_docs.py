@@ -122,7 +122,7 @@ def test_pages_are_written_anew(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(
         "Walks at <!--fact fig4b_velocity-->9.99<!--/fact--> mm/s.\n\n<!--output-->\n```console\n"
-        "$ walkers list\nsomething old\n```\n\n```console\n$ walkers theory fig1b\n...\n```\n"
+        "$ walkers list\nsomething old\n```\n\n```console\n$ walkers show --theory fig1b\n...\n```\n"
     )
     other = shutil.copy(DOCS / "index.md", tmp_path)
     assert refresh_pages([page, Path(other)], facts(DOCS), tmp_path) == [page]
@@ -130,18 +130,22 @@ def test_pages_are_written_anew(tmp_path: Path) -> None:
     assert f"<!--fact fig4b_velocity-->{facts(DOCS)['fig4b_velocity']}<!--/fact--> mm/s" in text
     assert "something old" not in text
     assert "0 runs, 0 B\n" in text
-    assert "$ walkers theory fig1b\n...\n" in text  # not marked
+    assert "$ walkers show --theory fig1b\n...\n" in text  # not marked
 
 
 # --- examples and notebooks -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("module", ["walkers.pipeline", "walkers.inputs.reading", "walkers.postprocess.motion"])
+@pytest.mark.parametrize(
+    "module", ["walkers.pipeline", "walkers.handles", "walkers.inputs.reading", "walkers.postprocess.motion"]
+)
 def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a folder of the tests (``tmp``), with what a user would have imported."""
-    if module == "walkers.pipeline":  # its sweep is there for its table: Fig. 4b would take all of 60 cycles
+    if module == "pipeline":  # its sweep is there for its table: Fig. 4b would take all of 60 cycles
         monkeypatch.setattr("walkers.inputs.run_tables._MOST_CYCLES", 12)
-    failed, tried = doctest.testmod(import_module(module), extraglobs={"tmp": runs_folder, "walkers": walkers})
+    failed, tried = doctest.testmod(
+        import_module(f"walkers.{module}"), extraglobs={"tmp": runs_folder, "walkers": walkers}
+    )
     assert tried
     assert not failed
 

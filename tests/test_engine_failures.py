@@ -317,7 +317,7 @@ def test_an_interrupt_while_the_engine_is_being_started_comes_after() -> None:
         ("run long.toml", signal.SIGINT, 130, "interrupted"),
         ("run long.toml", signal.SIGTERM, 143, "terminated"),
         ("run long.toml", signal.SIGHUP, 129, "the terminal was closed"),
-        ("audit --only step", signal.SIGINT, 130, "interrupted"),
+        ("check engine --only step", signal.SIGINT, 130, "interrupted"),
     ],
 )
 def test_interrupts_stop_the_engine_and_leave_no_run(

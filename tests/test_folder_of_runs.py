@@ -33,7 +33,7 @@ def out(looked_through: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def _listed(*arguments: str) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = json.loads(call("list", "--json", *arguments, check=True).stdout)
+    found: list[dict[str, Any]] = json.loads(call("list", "--json", "--all", *arguments, check=True).stdout)
     return found
 
 
@@ -69,7 +69,7 @@ def test_list_has_all_runs_and_sweeps_with_what_they_gave(out: Path) -> None:
     runs = {entry["name"]: entry for entry in entries if entry["kind"] == "run"}
     slow, killed = (path.name.removesuffix(".incomplete") for path in (failed, interrupted))
     assert runs.keys() == finished_places(out).keys() | {slow, killed}
-    for _, row in walkers.load(out / "three").iterrows():
+    for _, row in walkers.load(out / "three").table().iterrows():
         entry, files = runs[Path(row["run"]).name], [path for path in Path(row["run"]).rglob("*") if path.is_file()]
         told = ("finished", row["velocity"], row["standard_error"], sum(path.stat().st_size for path in files))
         assert (entry["status"], entry["velocity"], entry["standard_error"], entry["size"]) == told
@@ -136,7 +136,7 @@ def test_what_a_case_gives_is_a_difference_and_what_follows_is_none(
 
 
 def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
-    table = walkers.load(out / "beads").set_index(["liquid.name", "dimers.radii[0]"])
+    table = walkers.load(out / "beads").table().set_index(["liquid.name", "dimers.radii[0]"])
     rows = [table.loc[("Si AK5", 0.3)], table.loc[("Si AK10", 0.3)]]
     names = [Path(row["run"]).name for row in rows]
     found = json.loads(call("compare", *names, "--json", check=True).stdout)
@@ -146,7 +146,7 @@ def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
     assert (velocity["first"], velocity["second"]) == (rows[0]["velocity"], rows[1]["velocity"])
     error = (rows[0]["standard_error"] ** 2 + rows[1]["standard_error"] ** 2) ** 0.5
     assert velocity["in_standard_errors"] == pytest.approx((rows[1]["velocity"] - rows[0]["velocity"]) / error)
-    of_first = walkers.find_run(rows[0]["run"]).walkers["sliding_2"]
+    of_first = walkers.load(rows[0]["run"]).walkers["sliding_2"]
     assert results["sliding_2"]["first_standard_error"] == pytest.approx(of_first.std() / 2**0.5)
     text = call("compare", *names, check=True).stdout
     assert "liquid.name" in text
@@ -163,7 +163,7 @@ def test_compare_takes_cases_and_says_what_was_not_run(out: Path) -> None:
 def test_compare_matches_the_points_of_two_sweeps(out: Path) -> None:
     """Whatever their order; one sweep has points that the other has not."""
     keys = ["drive.frequency", "drive.peak_acceleration"]
-    tables = [walkers.load(out / name).set_index(keys) for name in ("grid", "rough")]
+    tables = [walkers.load(out / name).table().set_index(keys) for name in ("grid", "rough")]
     found = json.loads(call("compare", "grid", "rough", "--json", check=True).stdout)
     assert found["parameters"] == {"contact.friction.bead_wall": [0.1, 0.2]}
     assert found["unmatched"] == [2, 0]
@@ -194,7 +194,9 @@ def test_clean_removes_leftovers_alone(out: Path) -> None:
 
 
 def test_clean_keeps_what_sweeps_need_unless_it_is_named(out: Path) -> None:
-    runs = {name: {Path(run).name for run in walkers.load(out / name)["run"]} for name in ("grid", "three", "beads")}
+    runs = {
+        name: {Path(run).name for run in walkers.load(out / name).table()["run"]} for name in ("grid", "three", "beads")
+    }
     own, before = _alone(), finished_places(out)
     assert "stays" in call("clean", "--finished", "--yes", check=True).stdout
     assert before.keys() - finished_places(out).keys() == {own}
@@ -205,14 +207,14 @@ def test_clean_keeps_what_sweeps_need_unless_it_is_named(out: Path) -> None:
     one = sorted(runs["three"])[0]
     told = call("clean", str(finished_places(out)[one]), "--yes", check=True).stdout
     assert "needed by the sweep three, which would make them again: 1" in told
-    assert walkers.load(out / "three")["status"].tolist().count("missing") == 1
+    assert walkers.load(out / "three").table()["status"].tolist().count("missing") == 1
 
 
 def test_clean_keeps_the_runs_of_sweeps_that_were_renamed_or_cannot_be_read(out: Path) -> None:
     shutil.copytree(out / "grid", out / "old")
     before = finished_places(out)
     call("clean", "grid", "rough", "three", "--yes", check=True)
-    runs = {Path(run).name for run in walkers.load(out / "old")["run"]}
+    runs = {Path(run).name for run in walkers.load(out / "old").table()["run"]}
     assert runs <= finished_places(out).keys() < before.keys()
     record = read_json(out / "old" / "sweep.json")
     write_json(out / "old" / "sweep.json", {key: value for key, value in record.items() if key != "points"})

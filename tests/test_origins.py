@@ -221,7 +221,7 @@ def test_names_and_what_no_law_asks_for_do_not_determine_a_run() -> None:
 def test_a_result_says_what_it_rests_on(run_directory: Callable[..., Path], tmp_path: Path) -> None:
     """The reference's case gives all of it: nobody measured them, so they are told all the same."""
     case = make_case(run={"cycles": 2, "settling_cycles": 0})
-    done = walkers.find_run(run_directory(case))
+    done = walkers.load(run_directory(case))
     told = {one["key"]: one for one in done.result["rests_on"]}
     assert told["contact.friction.bead_wall"]["origin"] == "given"
     assert told.keys() == library.unmeasured().keys()
@@ -239,7 +239,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert "as given contact.friction.bead_bead 0.3" in describe(spread)
     assert "too few points to say on what it depends" in describe(spread)
     assert spread.depends == {"velocity": {}}
-    table = walkers.load(spread.directory)
+    table = walkers.load(spread.directory).table()
     assert table["contact.friction.bead_wall"].between(0.1, 0.6).all()
     assert (table["liquid.viscosity_ratio"] > 1.0).all()
     band, speeds = spread.bands["velocity"], table["velocity"]

@@ -286,9 +286,9 @@ def test_modes_and_postures_are_told_apart(sources: Sources) -> None:
 
 def test_the_program_draws_what_is_asked_for(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("walkers.inputs.run_tables._MOST_CYCLES", 12)  # of 60: Fig. 4b would take them all
-    done = call("figures", "--only", "fig4", "-j", "1", check=True)
+    done = call("paper", "figures", "--only", "fig4", "-j", "1", check=True)
     assert done.stdout.splitlines() == ["figures/fig4.png", "figures/fig4.svg"]
-    done = call("figures", "--only", "fig4", "--format", "pdf", "-j", "1", check=True)
+    done = call("paper", "figures", "--only", "fig4", "--format", "pdf", "-j", "1", check=True)
     assert done.stdout.splitlines() == ["figures/fig4.pdf"]
 
 
@@ -306,7 +306,7 @@ KNOWN = {"friction_wall": 0.25, "friction_slide": 0.2, "friction_bead": 0.12, "l
 
 
 def test_speeds_that_are_fitted_are_those_of_the_theory_beside_the_engine() -> None:
-    """For a case with its bridges and friction the same velocity as `walkers theory` gives."""
+    """For a case with its bridges and friction the same velocity as `walkers show --theory` gives."""
     point = OBSERVATIONS["fig4a_velocity"].of[0]
     bare = model_terms.walkers_of_the_paper()[point]
     liquid = replace(bare.liquid, dynamic_viscosity=7.0 * bare.liquid.dynamic_viscosity)
@@ -344,7 +344,7 @@ def test_the_program_fits_each_term(in_folder: Path, monkeypatch: pytest.MonkeyP
     """As many searches as there are terms, and three more; here of a few walkers and trials."""
     monkeypatch.setattr(model_terms, "_CYCLES", 2)
     monkeypatch.setattr(model_terms, "fit", partial(fit, generations=1))
-    done = call("model-terms", check=True).stdout
+    done = call("paper", "terms", check=True).stdout
     assert done.splitlines()[-1] == "figures/model_terms.md"
     assert done.count("misfit") == len(TERMS) + 3
     table = Path("figures/model_terms.md").read_text()

@@ -225,7 +225,7 @@ def test_up_in_the_picture_is_up_against_gravity(motion: Motion) -> None:
 
 def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(filmed: Path, tmp_path: Path) -> None:
     path = tmp_path / "here" / "walk.mp4"
-    done = call("film", str(filmed), "--to", str(path), "--size", "360p", "--fps", "10", "--slowdown", "10")
+    done = call("render", "--film", str(filmed), "--to", str(path), "--size", "360p", "--fps", "10", "--slowdown", "10")
     assert (done.returncode, done.stdout.strip()) == (0, str(path))
     about, *read = imageio_ffmpeg.read_frames(str(path))
     assert (about["size"], about["fps"], len(read)) == ((640, 360), 10.0, 11)
@@ -234,7 +234,7 @@ def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(fil
     assert all(0.02 < one.mean() < 0.4 for one in ruby)
     assert (ruby[0] != ruby[-1]).mean() > 0.01
     options = ["--size", "160x90", "--fps", "20", "--slowdown", "10", "--until", "0.05 s", "--walker", "1"]
-    call("film", str(filmed), "--to", str(tmp_path / "walk.gif"), *options, check=True)
+    call("render", "--film", str(filmed), "--to", str(tmp_path / "walk.gif"), *options, check=True)
     film = Image.open(tmp_path / "walk.gif")
     assert (film.size, film.n_frames, film.info["duration"], film.info["loop"]) == ((160, 90), 11, 50, 0)
 
@@ -263,7 +263,7 @@ def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Bounda
 
 def test_ase_reads_the_extended_xyz(filmed: Path, motion: Motion, tmp_path: Path) -> None:
     path = tmp_path / "here" / "walk.xyz"
-    done = call("export", str(filmed), "--to", str(path), "--every", "4", check=True)
+    done = call("export", str(filmed), "--to", "xyz", "-o", str(path), "--every", "4", check=True)
     assert done.stdout.strip() == str(path)
     frames = read(path, ":")
     assert len(frames) == 41
@@ -285,7 +285,7 @@ def test_ase_reads_the_extended_xyz(filmed: Path, motion: Motion, tmp_path: Path
 
 def test_ase_reads_the_lammps_dump(filmed: Path, motion: Motion, tmp_path: Path) -> None:
     path = tmp_path / "walk.lammpstrj"
-    call("export", str(filmed), "--to", str(path), check=True)
+    call("export", str(filmed), "--to", "lammps", "-o", str(path), check=True)
     frames = read(path, ":", format="lammps-dump-text", units="si")  # ASE makes Å of m, and of the numbers as well
     assert len(frames) == len(motion.time)
     for frame in (0, 7, 160):
@@ -306,7 +306,7 @@ def test_ase_reads_the_lammps_dump(filmed: Path, motion: Motion, tmp_path: Path)
 def test_the_script_for_paraview_is_beside_its_files(filmed: Path, tmp_path: Path) -> None:
     folder = tmp_path / "vtk"
     for _ in range(2):  # a folder that it wrote may be written again
-        done = call("paraview", str(filmed), "--to", str(folder), check=True)
+        done = call("export", str(filmed), "--to", "paraview", "-o", str(folder), check=True)
     script = Path(done.stdout.strip())
     assert (script.parent, (folder / "walkers.pvd").is_file()) == (folder, True)
     compile(script.read_text(), script, "exec")
@@ -316,7 +316,9 @@ def test_pvpython_shows_spheres_bridges_and_floor(filmed: Path, tmp_path: Path) 
     program, screen = shutil.which("pvpython"), shutil.which("xvfb-run")
     if program is None or screen is None:
         pytest.skip("pvpython (Debian: paraview, python3-paraview) and xvfb-run (xvfb) are not both installed")
-    script = Path(call("paraview", str(filmed), "--to", str(tmp_path / "vtk"), check=True).stdout.strip())
+    script = Path(
+        call("export", str(filmed), "--to", "paraview", "-o", str(tmp_path / "vtk"), check=True).stdout.strip()
+    )
     script = script.parent.rename(tmp_path / "moved") / script.name  # the files are found beside it
     picture = tmp_path / "walkers.png"
     command = [screen, "-a", program, str(script), str(picture), "0.05"]

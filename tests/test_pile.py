@@ -276,8 +276,9 @@ def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
     text = segment_directories(lines)[1] / "bridges.walls.txt"
     text.write_text(text.read_text()[:-200])
     (lacking / "case.json").write_text('{"name": "pile-ci"}')
-    for command, place in (("plot", lacking), *(("vtk", one) for one in (gap, cut, said, lines, lacking))):
-        done = call(command, str(place))
+    vtk = "export --to vtk"
+    for command, place in (("plot", lacking), *((vtk, one) for one in (gap, cut, said, lines, lacking))):
+        done = call(*command.split(), str(place))
         assert done.returncode in (1, 2)
         assert len(done.stderr.splitlines()) == 1, done.stderr
     assert call("plot", str(cut)).returncode == 0  # figures are of the tables
@@ -376,7 +377,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
         return call(*command, check=True).stdout.strip()
 
     motion = read_motion(run)
-    assert "between beads, at rest" in told("result", str(run))
+    assert "between beads, at rest" in told("run", str(run))
     assert told("plot", str(run), "--to", "here") == "here/climb.png"
     assert spoilt(figures_of(run)["climb"]) == []
     for name, option in (("box", ("--images", "2")), ("row", ("--interval", "0.1 s"))):
@@ -385,13 +386,17 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
         across, up, _ = picture.dimensions
         edges = picture.point_data.active_scalars.reshape(up, across, -1)[..., :3]
         assert all((edge == 255).all() for edge in (edges[0], edges[-1], edges[:, 0], edges[:, -1]))  # nothing is cut
-    told("film", str(run), "--to", "one.gif", "--fps", "10", "--size", "64x64", "--until", "8 ms")  # within a frame
-    film = told("film", str(run), "--to", "here/box.mp4", "--fps", "10", "--size", "160x120", "--slowdown", "5")
+    told(
+        "render", "--film", str(run), "--to", "one.gif", "--fps", "10", "--size", "64x64", "--until", "8 ms"
+    )  # within a frame
+    film = told(
+        "render", "--film", str(run), "--to", "here/box.mp4", "--fps", "10", "--size", "160x120", "--slowdown", "5"
+    )
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(film)
     assert frames == int(50.0 * motion.time[-1]) + 1
     assert seconds == pytest.approx(5.0 * motion.time[-1], abs=0.1)
     assert "as defined" in told("climb", str(run), "--sensitivity")
-    reader = pv.get_reader(told("vtk", str(run), "--every", "4", "--to", "here/vtk"))
+    reader = pv.get_reader(told("export", str(run), "--to", "vtk", "--every", "4", "-o", "here/vtk"))
     driven = np.flatnonzero(motion.time >= 0.0)[::4]
     np.testing.assert_allclose(reader.time_values, motion.time[driven], atol=1e-12)
     beads, bridges, box = (pv.read(f"here/vtk/{name}_{driven[1]:06d}.vtp") for name in ("beads", "bridges", "boundary"))
@@ -401,7 +406,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     np.testing.assert_allclose(box.bounds, [-2e-3, 2e-3, -2e-3, 2e-3, 0.0, 20e-3], atol=1e-9)
     (in_folder / "pile-ci.toml").write_text(to_toml(document(run=HALF)))
     assert "60 beads" in told("run", "pile-ci.toml", "--out", str(run.parent))
-    assert "Not yet" in told("deck", "pile-ci")
+    assert "Not yet" in told("export", "pile-ci", "--to", "deck")
 
 
 def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
@@ -541,7 +546,7 @@ def test_a_climber_that_leaves_the_container_ends_the_run(tmp_path: Path) -> Non
     assert finished.result["driven"] == pytest.approx(3.2e-3 / 4.79e-3, abs=0.1)
     assert "over its walls" in read_json(finished.directory / MANIFEST_NAME)["ended"]
     assert "then climbers left the container" in finished.describe()
-    assert call("verify", str(finished.directory)).returncode == 0
+    assert call("check", "files", str(finished.directory)).returncode == 0
 
 
 def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tmp_path: Path) -> None:

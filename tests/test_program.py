@@ -2,19 +2,23 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from typer.main import get_command
 
 import walkers
 from tests.conftest import PROGRAM, SHORT, call, document, to_toml
-from walkers import find_run, load_case
+from walkers import load_case
 from walkers import run as run_case
+from walkers.commands import GROUPS
 from walkers.inputs.reading import shipped_cases
 from walkers.main import _program
 from walkers.physics.time_step import WALKER_FRACTIONS
@@ -62,16 +66,16 @@ def test_show_tells_what_follows_from_a_case() -> None:
 
 def test_from_a_case_file_to_a_deck_and_pictures(in_folder: Path) -> None:
     (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
-    printed = call("deck", "mine.toml", check=True).stdout
-    call("deck", "mine.toml", "--to", "deck", check=True)
+    printed = call("export", "mine.toml", "--to", "deck", check=True).stdout
+    call("export", "mine.toml", "--to", "deck", "-o", "deck", check=True)
     assert (in_folder / "deck" / "walker.lig").read_text() == printed
     assert (in_folder / "deck" / "bridges.txt").exists()
-    assert call("deck", "mine.toml", "--to", "deck").returncode == 2
+    assert call("export", "mine.toml", "--to", "deck", "-o", "deck").returncode == 2
     done = subprocess.run([PROGRAM, "run", "mine.toml"], capture_output=True, text=True, check=True)
     assert "toward the large bead" in done.stdout
     assert "(already run)" in call("run", "mine.toml", check=True).stdout
-    for command, last in (("plot", "work.png"), ("vtk", "walkers.pvd"), ("render", "walker.png")):
-        path = Path(call(command, "mine.toml", check=True).stdout.split()[-1])
+    for command, last in (("plot", "work.png"), ("export --to vtk", "walkers.pvd"), ("render", "walker.png")):
+        path = Path(call(*command.split(), "mine.toml", check=True).stdout.split()[-1])
         assert path.name == last
         assert path.exists()
 
@@ -97,15 +101,37 @@ def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch
     assert "\x1b" not in done.stderr
 
 
+@pytest.mark.parametrize("kind", ["walker", "cluster", "pile"])
+def test_a_new_case_runs_as_it_is_and_with_each_line_that_is_commented_out(kind: str, in_folder: Path) -> None:
+    assert call("new", "mine", "--kind", kind, check=True).stdout == "mine.toml\n"
+    short = ["--set", "run.duration=0.05s", "--set", "run.longest_settling=0s"] if kind == "pile" else []
+    assert "mine: 170 Hz" if kind == "pile" else "mm/s" in call("run", "mine", *short, check=True).stdout
+    text = Path("mine.toml").read_text()
+    table, tried = "", 0
+    for head, key, value in re.findall(r"(?m)^(?:(?:# )?\[+(\w+)\]+.*|# ([\w.]+) *= *(.+?)(?: *#.*)?)$", text):
+        table = {"clusters": "clusters[0]"}.get(head, head) or table
+        if key:
+            load_case("mine", {f"{table}.{key}": tomllib.loads(f"value = {value}")["value"]})
+            tried += 1
+    assert tried >= 3
+    call("new", "copy.toml", "--from", "climber", check=True)
+    assert Path("copy.toml").read_text() == shipped_cases()["climber"].read_text()
+
+
 # --- help, version, completion ----------------------------------------------------------------------------------------
 
 
 def test_help_names_every_command() -> None:
     shown = call("--help", check=True).stdout
     assert not set(shown) & set("╭│╰─"), "boxes are for terminals"
-    for command in (one.name for one in _program().registered_commands):
+    program = get_command(_program())
+    assert len(program.commands) == 16
+    for command, one in program.commands.items():
         assert f"\n  {command} " in shown
         assert call(command, "-h", check=True).stdout == call(command, "--help", check=True).stdout
+        assert all(call(command, part, "-h", check=True).stdout for part in getattr(one, "commands", ()))
+    headings = [line for line in shown.splitlines() if line.endswith(":") and not line.startswith(" ")]
+    assert headings == ["Options:", *(f"{heading}:" for heading in GROUPS.values())]
     for module in ("walkers", "walkers.main"):
         done = subprocess.run([sys.executable, "-m", module, "-h"], capture_output=True, text=True, check=True)
         assert done.stdout == shown
@@ -156,30 +182,31 @@ def test_shells_complete_commands_names_runs_and_sweeps(
     (tmp_path / "runs").symlink_to(looked_through)
     shutil.copy(looked_through.parent / "base.toml", tmp_path / "figure.toml")
     monkeypatch.chdir(tmp_path)
-    runs = {Path(run).name for run in walkers.load("runs/three")["run"]}
+    runs = {Path(run).name for run in walkers.load("runs/three").table()["run"]}
     assert completed("walkers comp") == ["compare"]
     assert completed("walkers run fig") == [*(name for name in shipped_cases() if name[:3] == "fig"), "figure.toml"]
     assert "fig2" in completed("walkers sweep fi")
-    assert runs <= set(completed("walkers result base-"))
+    assert runs <= set(completed("walkers run base-"))
+    assert {"engine", "fig1b"} <= set(completed("walkers check "))
     assert set(completed("walkers plot ")) >= runs | {"grid", "fig1b"}
     assert completed("walkers plot runs/th") == ["runs/three"]
-    assert completed("walkers table runs/g") == ["runs/grid"]
+    assert completed("walkers list runs/g") == ["runs/grid"]
     assert completed("walkers list --case ") == ["base"]
     assert completed("walkers list --status fa") == ["failed"]
-    assert completed("walkers result --out elsewhere base-") == []
+    assert completed("walkers run --out elsewhere base-") == []
 
 
 # --- what a word names ------------------------------------------------------------------------------------------------
 
 
 def test_a_folder_does_not_shadow_the_run_of_the_case_that_it_is_named_like(in_folder: Path) -> None:
-    call("deck", "fig1b", "--to", "fig1b", check=True)
+    call("export", "fig1b", "--to", "deck", "-o", "fig1b", check=True)
     place = run_case(load_case("fig1b", {"run.cycles": 6, "run.settling_cycles": 2}), in_folder / "short").directory
-    told = call("result", "fig1b")
+    told = call("plot", "fig1b")
     assert "no finished run in runs; first do: walkers run fig1b" in told.stderr
     engine, case = find_engine(), load_case("fig1b")
     shutil.copytree(place, run_place(case, engine, Path("runs")))
-    assert find_run("fig1b").directory == run_place(case, engine, Path("runs"))
+    assert walkers.load("fig1b").directory == run_place(case, engine, Path("runs"))
 
 
 # --- the package ------------------------------------------------------------------------------------------------------
@@ -211,6 +238,6 @@ def test_the_package_claims_one_name_and_exports_few_that_are_documented() -> No
     modules = "walkers.inputs, walkers.pipeline, walkers.postprocess.report.run, walkers.sweeps.report"
     wanted = "{'inputs', 'runner', 'sweeps', 'IPython'}"
     assert _python(f"import sys, {modules}; print(sorted({wanted} & set(sys.modules)))", "/") == "[]"
-    names = ["Run", "find_run", "load", "load_case", "plot_sweep", "report", "run", "sweep", "sweep_figure"]
+    names = ["FilmOptions", "Run", "Sweep", "load", "load_case", "run", "start", "sweep"]
     assert dir(walkers) == walkers.__all__ == names
     assert all(getattr(walkers, name).__doc__ for name in walkers.__all__)

@@ -82,7 +82,7 @@ def walked_report(walked_run: Path, once: Once) -> Path:
 @pytest.fixture(scope="session")
 def pile_report(pile_run: Path, once: Once) -> Path:
     """Asked for by the run's name in the folder of the runs."""
-    place = once("pile-report", lambda to: walkers.report(pile_run.name, to / "report.html", pile_run.parent))
+    place = once("pile-report", lambda to: walkers.load(pile_run.name, pile_run.parent).report(to / "report.html"))
     return place / "report.html"
 
 
@@ -102,7 +102,10 @@ def swept(once: Once) -> Path:
 @pytest.fixture(scope="session")
 def swept_report(swept: Path, once: Once) -> Path:
     """Asked for by the sweep's name in the folder of the runs."""
-    return once("swept-report", lambda to: walkers.report(swept.name, to / "report.html", swept.parent)) / "report.html"
+    return (
+        once("swept-report", lambda to: walkers.load(swept.name, swept.parent).report(to / "report.html"))
+        / "report.html"
+    )
 
 
 @pytest.mark.parametrize(
@@ -120,7 +123,7 @@ def test_numbers_of_a_report_are_the_results_and_parameters_say_whence(
     assert wanted <= check_numbers(page, current_result(directory))
     assert path.stat().st_size < LARGEST
     assert f"Written by granular-walkers {software().version}." in page.words
-    origins = walkers.find_run(directory).case.origins
+    origins = walkers.load(directory).case.origins
     assert len(origins) > 20
     for said in ("given", "library", "default", *(told for one in origins for told in (one.key, one.text))):
         assert said in page.words
@@ -222,7 +225,7 @@ def test_the_command_finds_what_a_name_means(walked_run: Path, swept: Path, tmp_
 
 def test_runs_show_themselves(walked_run: Path, tmp_path: Path) -> None:
     """In a notebook: a table that is the result, the parameters, and the pictures that were drawn."""
-    run, shown = walkers.find_run(walked_run), tmp_path / "shown.html"
+    run, shown = walkers.load(walked_run), tmp_path / "shown.html"
     shown.write_text(run._repr_html_(), "utf-8")
     assert "velocity.mean" in check_numbers(Page(shown), run.result)
     assert "<details>" in shown.read_text("utf-8")

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pytest
 
+import walkers
 from tests.conftest import (
     BRIEF,
     LONG,
@@ -30,7 +31,6 @@ from tests.conftest import (
     to_toml,
     wait_for,
 )
-from walkers import find_run
 from walkers import run as run_case
 from walkers.inputs import InputError
 from walkers.runner import FinishedRun, Progress, find_engine, finished_run, run_name
@@ -103,19 +103,46 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     assert manifest["engine"]["sha256"] == find_engine().sha256
     assert {"host", "started", "finished", "seconds"} <= set(manifest)
     by_hand = tmp_path / "byhand"
-    call("deck", _toml(tmp_path), "--to", str(by_hand), check=True)
+    call("export", _toml(tmp_path), "--to", "deck", "-o", str(by_hand), check=True)
     subprocess.run(["sh", "run.sh"], cwd=by_hand, check=True)
     assert (by_hand / "beads.bin").read_bytes() == (run.directory / FIRST_SEGMENT / "beads.bin").read_bytes()
 
 
-def test_a_run_is_found_by_its_directory_or_its_case(in_folder: Path) -> None:
+def test_a_run_is_found_by_its_directory_its_name_or_its_case_with_other_values_too(in_folder: Path) -> None:
     case_file = _toml(in_folder)
     first, second = (json.loads(call("run", case_file, "--json", check=True).stdout) for _ in range(2))
     assert (first["cached"], second["cached"]) == (False, True)
     assert first["velocity"] == second["velocity"]
     for named in (first["run"], Path(first["run"]).name, case_file):
-        assert find_run(named).directory == Path(first["run"])
-        assert f"{first['velocity']['mean'] * 1e3:.3f}" in call("result", str(named), check=True).stdout
+        assert walkers.load(named).directory == Path(first["run"])
+        assert f"{first['velocity']['mean'] * 1e3:.3f}" in call("run", str(named), check=True).stdout
+    setting = ("--set", "drive.frequency=70Hz")
+    assert f"first do: walkers run {case_file} --set drive.frequency=70Hz" in call("plot", case_file, *setting).stderr
+    slower = json.loads(call("run", first["run"], *setting, "--json", check=True).stdout)
+    for named in (first["run"], Path(first["run"]).name, case_file):
+        assert walkers.load(named, "runs", {"drive.frequency": "70 Hz"}).directory == Path(slower["run"])
+        assert json.loads(call("run", named, *setting, "--json", check=True).stdout)["cached"]
+        assert "70Hz" in call("show", named, *setting, check=True).stdout
+    assert walkers.run(case_file, "runs").directory == walkers.run(first["run"]).directory == Path(first["run"])
+
+
+def test_a_running_simulation_is_looked_at_stopped_and_continued(in_folder: Path) -> None:
+    case_file = _toml(in_folder, **LONG)
+    run = walkers.start(case_file)
+    wait_for(lambda: run.progress and run.progress.step > 2 * run.case.run.steps_per_cycle)
+    assert (run.status, walkers.load(case_file).status, len(engines_in(in_folder))) == ("running", "running", 1)
+    assert "running: " in call("list", check=True).stdout
+    frame = run.last_frame
+    assert (frame.position.shape, frame.time[0] > 0.0) == ((1, 2, 3), True)
+    assert f"{run.directory}: the run is running: " in call("plot", case_file).stderr
+    assert run.stop() == "interrupted"
+    assert engines_in(in_folder) == []
+    assert run.last_frame.time[0] >= frame.time[0]
+    refused = call("plot", f"{run.directory}.incomplete").stderr
+    assert f"the run is interrupted; continue it with: walkers run {run.directory}" in refused
+    stopped = call("run", str(run.directory), "--limit", "0.2")
+    assert (stopped.returncode, "time limit of 0.2 s" in stopped.stderr) == (1, True)
+    assert (run.status, "time limit of 0.2 s" in run.describe()) == ("failed", True)
 
 
 def test_damaged_tables_are_made_anew(tmp_path: Path) -> None:
@@ -128,7 +155,7 @@ def test_damaged_tables_are_made_anew(tmp_path: Path) -> None:
         if contents is not None:
             path.write_bytes(contents)
         assert run_case(case, tmp_path).result == result
-        find_run(outcome.directory)
+        walkers.load(outcome.directory)
         assert path.stat().st_size > 100
 
 
@@ -138,15 +165,15 @@ def test_a_run_without_its_description_is_told(run_directory: Callable[..., Path
         directory = Path(shutil.copytree(whole, tmp_path / name / whole.name))
         next(directory.rglob(name)).unlink()
         with pytest.raises(InputError, match="not a finished run" if name == "manifest.json" else name):
-            find_run(directory)
+            walkers.load(directory)
 
 
 def test_a_cut_dump_is_drawn_as_far_as_it_goes(tmp_path: Path) -> None:
     directory = run_case(make_case(run={"cycles": 8, "settling_cycles": 2}), tmp_path / "runs").directory
     dump = directory / FIRST_SEGMENT / "beads.bin"
     os.truncate(dump, dump.stat().st_size // 2)
-    for command in ("plot", "vtk", "result"):
-        done = call(command, str(directory), check=True)
+    for command in (("plot",), ("export", "--to", "vtk"), ("run",)):
+        done = call(*command, str(directory), check=True)
         assert "walkers: warning:" in done.stderr
         assert "is incomplete" in done.stderr
     os.truncate(dump, 1000)

@@ -47,13 +47,13 @@ def _table(units: dict[str, str], rows: list[list[Any]], axes: list[tuple[str, .
 
 
 def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_through: Path) -> None:
-    figure = walkers.sweep_figure(looked_through / "three")
+    figure = walkers.load(looked_through / "three").figure()
     first, second = _panels(figure)
     titles = [axes.get_title(loc="left") for axes in (first, second)]
     assert titles == ["(a) frequency = 60 Hz", "(b) frequency = 80 Hz"]
     assert (first.get_xlabel(), first.get_ylabel()) == ("peak acceleration (g)", "velocity (mm/s)")
     assert (first.get_ylim(), _legend(figure)) == (second.get_ylim(), ["0.1", "0.2"])
-    table = walkers.load(looked_through / "three")
+    table = walkers.load(looked_through / "three").table()
     for friction, (x, y, errors) in zip((0.1, 0.2), _drawn(second), strict=True):
         rows = table[(table["contact.friction.bead_wall"] == friction) & (table["drive.frequency"] == 80.0)]
         assert list(x) == [2.0, 4.0, 6.0]
@@ -65,34 +65,34 @@ def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_
 def test_what_goes_where_can_be_chosen(looked_through: Path) -> None:
     chosen = {"x": "frequency", "hue": "bead_wall", "panels": "none", "y": "sliding_2"}
     with pytest.warns(LeftOutWarning, match="not told apart: peak acceleration"):
-        figure = walkers.sweep_figure(looked_through / "three", **chosen)
+        figure = walkers.load(looked_through / "three").figure(**chosen)
     (axes,) = _panels(figure)
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("frequency (Hz)", "sliding 2 (mm/s)")
     # A column that follows from an axis stands for it.
-    (axes,) = _panels(walkers.sweep_figure(looked_through / "grid", x="gamma0", log="x"))
+    (axes,) = _panels(walkers.load(looked_through / "grid").figure(x="gamma0", log="x"))
     assert (axes.get_xlabel(), axes.get_xscale(), len(_drawn(axes))) == ("Γ0", "log", 2)
 
 
 def test_pairs_of_beads_are_shown_by_their_asymmetry_and_texts_as_categories(looked_through: Path) -> None:
     directory = looked_through / "beads"
-    figure = walkers.sweep_figure(directory)
+    figure = walkers.load(directory).figure()
     (axes,) = _panels(figure)
     assert axes.get_xlabel() == "asymmetry sin δ"
     assert _drawn(axes)[0][0] == pytest.approx([0.05 / 0.45, 0.2, 0.15 / 0.55])
     assert _legend(figure) == ["Si AK5", "Si AK10"]
-    figure = walkers.sweep_figure(directory, x="liquid.name")
+    figure = walkers.load(directory).figure(x="liquid.name")
     (axes,) = _panels(figure)
     assert [label.get_text() for label in axes.get_xticklabels()] == ["Si AK5", "Si AK10"]
     assert _legend(figure) == ["0.3/0.2 mm", "0.25/0.2 mm", "0.35/0.2 mm"]
     places = np.array([x for x, _, _ in _drawn(axes)])
     assert np.abs(places - [0.0, 1.0]).max() < 0.3, "symbols are beside their category"
     with pytest.raises(InputError, match="has no numbers"):
-        walkers.sweep_figure(directory, x="liquid.name", log="x")
+        walkers.load(directory).figure(x="liquid.name", log="x")
 
 
 def test_samples_have_a_panel_for_each_key(looked_through: Path) -> None:
     directory = looked_through / "sampled"
-    table, figure = walkers.load(directory), walkers.sweep_figure(directory)
+    table, figure = walkers.load(directory).table(), walkers.load(directory).figure()
     for axes, key in zip(_panels(figure), ("bead_wall", "bead_bead"), strict=True):
         assert axes.get_xlabel() == f"friction {key.replace('_', ' ')}"
         x, y, _ = _drawn(axes)[0]
@@ -136,17 +136,17 @@ def test_what_would_take_too_many_panels_is_not_told_apart() -> None:
 
 def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> None:
     directory = looked_through / "grid"
-    figure = walkers.sweep_figure(directory, theory=True)
+    figure = walkers.load(directory).figure(theory=True)
     (axes,) = _panels(figure)
     assert _legend(figure)[2:] == ["theory", "paper's fit, κ = 0.033 s/mm"]
     lines = {line.get_linestyle(): line for line in axes.lines if line.get_color() == "C1"}
-    table = walkers.load(directory)
+    table = walkers.load(directory).table()
     predicted = [predict(case_of(Path(run))) for run in table.loc[table["drive.frequency"] == 80.0, "run"]]
     for style, model in (("--", "viscous"), (":", "paper")):
         wanted = [one[model]["velocity"] * 1e3 for one in predicted]
         assert lines[style].get_ydata() == pytest.approx(wanted, rel=1e-6)  # type: ignore[arg-type]
     with pytest.warns(LeftOutWarning, match="6 of 6 points: the theory has no orientation_end"):
-        walkers.sweep_figure(directory, y="orientation_end", theory=True)
+        walkers.load(directory).figure(y="orientation_end", theory=True)
 
 
 def test_the_papers_friction_is_drawn_only_of_what_it_was_fitted_to() -> None:
@@ -171,15 +171,15 @@ def test_the_papers_friction_is_drawn_only_of_what_it_was_fitted_to() -> None:
 def test_points_that_are_not_finished_are_left_out_and_counted(looked_through: Path, tmp_path: Path) -> None:
     out = tmp_path / "runs"
     shutil.copytree(looked_through, out)
-    runs = walkers.load(out / "grid")["run"]
+    runs = walkers.load(out / "grid").table()["run"]
     shutil.rmtree(runs[0])
     with pytest.warns(LeftOutWarning, match="1 of 6 points left out: 1 missing"):
-        figure = walkers.sweep_figure(out / "grid")
+        figure = walkers.load(out / "grid").figure()
     assert [len(x) for x, _, _ in _drawn(_panels(figure)[0])] == [2, 3]
     for run in runs[1:]:
         shutil.rmtree(run)
     with pytest.raises(InputError, match=r"no point is finished \(6 missing\)"):
-        walkers.sweep_figure(out / "grid")
+        walkers.load(out / "grid").figure()
 
 
 def test_plot_writes_what_the_suffix_says(looked_through: Path, tmp_path: Path) -> None:

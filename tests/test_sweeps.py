@@ -1,6 +1,5 @@
 """Sweeps run by the real engine: shared decks, failures, resumption, tables."""
 
-import io
 import json
 import os
 import random
@@ -161,18 +160,19 @@ def test_the_table_of_a_sweep(sweep_file: Callable[..., str], monkeypatch: pytes
         velocity = json.loads((run.directory / "result.json").read_text())["velocity"]
         assert [row.velocity, row.smallest] == [velocity["mean"], velocity["smallest"]]
         assert row.gamma0 == pytest.approx(dimer_of(run.case).gamma0(run.case.drive.peak_acceleration))
-    read = pd.read_csv(io.StringIO(call("table", directory, "--csv", check=True).stdout))
+    call("list", directory, "--to", "table.csv", check=True)
+    read = pd.read_csv("table.csv")
     assert list(read["drive.peak_acceleration (g)"]) == [2.0, 4.0, 2.0, 4.0]
     np.testing.assert_array_equal(read["velocity (m/s)"], frame["velocity"])
-    contents = json.loads(call("table", directory, "--json", check=True).stdout)
+    contents = json.loads(call("list", directory, "--json", check=True).stdout)
     assert contents["units"]["velocity"] == "m/s"
     assert [point["amplitude"] for point in contents["points"]] == list(frame["amplitude"])
-    call("table", directory, "--to", "table.parquet", check=True)
+    call("list", directory, "--to", "table.parquet", check=True)
     table = pq.read_table("table.parquet")
     assert table.schema.field("velocity").metadata[b"unit"] == b"m/s"
     assert table.column("velocity").to_pylist() == list(frame["velocity"])
-    shown = call("table", directory, check=True).stdout
-    assert ("velocity (mm/s)" in shown, len(shown.splitlines())) == (True, 5)
+    shown = call("list", "test", check=True).stdout
+    assert ("velocity (mm/s)" in shown, len(shown.splitlines())) == (True, 7)
     monkeypatch.chdir(directory)
     assert Path(load(".")["run"][0]).is_dir()
     record = json.loads(Path("sweep.json").read_text())  # of before a column was added
@@ -187,8 +187,8 @@ def test_the_table_of_a_sweep(sweep_file: Callable[..., str], monkeypatch: pytes
 def test_a_column_of_numbers_and_words(sweep_file: Callable[..., str]) -> None:
     _sweep(sweep_file(text='[axes]\nrun.time_step = ["auto", "1 us"]'))
     shutil.rmtree(load("runs/test")["run"][1])
-    told = subprocess.run([PROGRAM, "table", "runs/test", "--parquet"], capture_output=True, check=True).stdout
-    table = pq.read_table(io.BytesIO(told))
+    call("list", "runs/test", "--to", "table.parquet", check=True)
+    table = pq.read_table("table.parquet")
     assert table.column("run.time_step").to_pylist() == ["auto", "1.0"]
     assert table.column("walkers_met").to_pylist() == [False, None], "truths stay truths where a point is missing"
 
@@ -220,7 +220,7 @@ def test_a_failing_point_does_not_stop_the_others(
     assert np.isnan(frame["velocity"][2])
     assert frame["reason"][2] == "BlowUp"
     assert (Path(frame["run"][2]) / "failure.json").exists()
-    status = call("status", "runs/test", check=True).stdout
+    status = call("list", "runs/test", check=True).stdout
     assert "5 points, 4 finished, 1 failed" in status
     assert "failed     point 2: blow-up" in status
     before = len(launches())
@@ -287,7 +287,7 @@ def test_what_somebody_else_is_making_is_waited_for(
             time.sleep(1.2)  # several times as long as a sweep waits for a lock
             assert not made.done()
             assert not list(out.glob("base-*/"))
-            assert "1 running" in call("status", "runs/test", check=True).stdout
+            assert "1 running" in call("list", "runs/test", check=True).stdout
         assert made.result(PATIENCE)[1] == []
     assert set(load("runs/test")["status"]) == {"finished"}
 
@@ -320,9 +320,12 @@ def test_two_sweeps_over_the_same_points_share_them(
     assert {run for _, run in runs} == made
     assert len(made) == len(runs) == 7
     assert len(set(launches())) == len(launches()) <= 7
-    told = call("status", "runs", check=True).stdout
-    assert "first: 5 points, 5 finished" in told
-    assert "second: 5 points, 5 finished" in told
+    told = call("list", check=True).stdout
+    assert [line.split()[:3] for line in told.splitlines()[1:3]] == [
+        ["first", "5", "finished"],
+        ["second", "5", "finished"],
+    ]
+    assert "not shown: 7 runs of sweeps (--all)" in told
 
 
 DESCENT = '[descend]\nfrom = "{}"\nto = "{}"\nstep = "{}"\nuntil_below = "0.002 mm/s"'

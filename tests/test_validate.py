@@ -1,4 +1,4 @@
-"""The second engine and the law of bridges against the literature: the pages of `walkers validate`."""
+"""The second engine and the law of bridges against the literature: the pages of `walkers check literature`."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_chapters(module: ModuleType, in_folder: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(benchmarks, "chapter", fail)
     monkeypatch.setattr(bridges, "chapter", fail)
     monkeypatch.setattr(module, "chapter", lambda out, *, quick=False: found)
-    done = call("validate", "benchmarks", "bridges", "--quick", "-j", "1", "--json")
+    done = call("check", "literature", "benchmarks", "bridges", "--quick", "-j", "1", "--json")
     assert (done.returncode, json.loads(done.stdout)["passed"]) == (1, False)
     (page,) = Path("runs/validation").glob("validation-quick-*.md")
     assert f"## {found.title}" in page.read_text()

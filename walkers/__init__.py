@@ -1,10 +1,8 @@
-"""Wet granular walkers, simulated with LIGGGHTS: the one public name of the project.
+"""Wet granular walkers, simulated with LIGGGHTS.
 
-`load_case` reads a case, `run` takes it to its result as ``walkers run`` does, `find_run` finds a finished run, `sweep`
-makes all points of a sweep, `load` gives its table, `plot_sweep` and `sweep_figure` its figure, `report` writes a file
-to mail. The folders of the project are packages below: `physics` (laws), `inputs` (cases), `templates` (decks),
-`runner` (run directories), `postprocess` (what runs mean), and on them `sweeps`, `check`, `theory`, `paper` and
-`calibration`.
+`load_case` reads a case. `run` and `sweep` run a case and a sweep as the commands do; `start` does not wait for the
+end. `load` finds runs and sweeps. They return a `Run` or a `Sweep`, whose methods plot, film, report and export.
+`FilmOptions` describes a film for `Run.film`.
 """
 
 from __future__ import annotations
@@ -16,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 from walkers.exporting import exporting
 
 if TYPE_CHECKING:
+    from walkers.handles import Run, Sweep
     from walkers.inputs.reading import load_case
-    from walkers.pipeline import Run, find_run, report, run, sweep
-    from walkers.plotting import plot_sweep, sweep_figure
-    from walkers.sweeps.table import load
+    from walkers.pipeline import load, run, start, sweep
+    from walkers.postprocess.films import FilmOptions
 
-__all__ = ["Run", "find_run", "load", "load_case", "plot_sweep", "report", "run", "sweep", "sweep_figure"]
+__all__ = ["FilmOptions", "Run", "Sweep", "load", "load_case", "run", "start", "sweep"]
 
 DEFAULT_OUT = Path("runs")
 RECORDS = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}
@@ -33,10 +31,10 @@ _PACKAGES = (
 _exported = exporting(
     "walkers",
     **{
-        "pipeline": ["Run", "find_run", "report", "run", "sweep"],
-        "plotting": ["plot_sweep", "sweep_figure"],
+        "handles": ["Run", "Sweep"],
+        "pipeline": ["load", "run", "start", "sweep"],
         "inputs.reading": ["load_case"],
-        "sweeps.table": ["load"],
+        "postprocess.films": ["FilmOptions"],
     },
 )
 

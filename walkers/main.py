@@ -17,6 +17,10 @@ from types import FrameType
 from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
+
+from walkers.commands import GROUPS, MOVED, SECTIONS
+from walkers.completion import offering
 
 _INTERRUPTED = 130
 _STDOUT = "standard output"
@@ -106,22 +110,61 @@ def _check_words(words: list[str]) -> None:
             check_utf8(word)
 
 
+class _Grouped(TyperGroup):
+    """The commands under the headings of `GROUPS`; one that is not there is refused with the one that is meant."""
+
+    def format_commands(self, _ctx: Any, formatter: Any) -> None:
+        """Write them below their headings."""
+        for heading in dict.fromkeys(GROUPS.values()):
+            names = sorted(self.commands, key=lambda name: name not in SECTIONS)
+            there = [name for name in names if getattr(self.commands[name], "rich_help_panel", "") == heading]
+            with formatter.section(heading):
+                formatter.write_dl([(name, self.commands[name].get_short_help_str(1000)) for name in there])
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that is named first."""
+        if args[0] not in self.commands and not ctx.resilient_parsing:
+            from walkers.inputs.errors import refused
+            from walkers.inputs.library import suggestion
+
+            now = f"; it is now: walkers {MOVED[args[0]]}" if args[0] in MOVED else suggestion(args[0], self.commands)
+            raise refused(args[0], f"no such command{now or '; walkers --help lists them'}")
+        return super().resolve_command(ctx, args)
+
+
+class _OrCase(TyperGroup):
+    """Commands of a command, one of which, CASE, is meant by any other word."""
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of a name."""
+        return super().get_command(ctx, cmd_name) or self.commands.get("CASE")
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Their names; where a shell completes them, the cases that may stand there."""
+        case = "CASE" in self.commands
+        return [*self.commands, *(offering("case")(ctx, "") if case and ctx.resilient_parsing else ())]
+
+
 def _program() -> typer.Typer:
-    """The program, whose commands are the public functions of modules."""
-    program = typer.Typer(
-        name="walkers",
-        help="Wet granular walkers, simulated with LIGGGHTS.",
-        no_args_is_help=True,
-        add_completion=True,
-        pretty_exceptions_enable=False,
-        rich_markup_mode=None,  # rich takes longer to load than all that most commands need
-        context_settings={"help_option_names": ["-h", "--help"]},
-    )
+    """The program, whose commands are the public functions of the modules of `GROUPS`."""
+    # Rich takes longer to load than all that most commands need.
+    plain: dict[str, Any] = {"no_args_is_help": True, "pretty_exceptions_enable": False, "rich_markup_mode": None}
+    plain["context_settings"] = {"help_option_names": ["-h", "--help"]}
+    program = typer.Typer(name="walkers", cls=_Grouped, help="Wet granular walkers, simulated with LIGGGHTS.", **plain)
     program.callback()(_options)
-    for place in ("walkers.commands.runs", "walkers.commands.studies"):
+    parts: dict[str, typer.Typer] = {}
+    for module, heading in GROUPS.items():
+        place = f"walkers.commands.{module}"
         for name, function in vars(import_module(place)).items():
-            if isfunction(function) and function.__module__ == place and not name.startswith("_"):
-                program.command(name.strip("_").replace("_", "-"), short_help=function.__doc__)(function)
+            if not isfunction(function) or function.__module__ != place or name.startswith("_"):
+                continue
+            section, _, command = name.strip("_").rpartition("_")
+            if section and section not in parts:
+                parts[section] = typer.Typer(cls=_OrCase, help=SECTIONS[section], **plain)
+                program.add_typer(parts[section], name=section, rich_help_panel=heading)
+            command = "CASE" if command == "case" else command
+            home = parts.get(section, program)
+            home.command(command, short_help=function.__doc__, rich_help_panel=heading)(function)
     return program
 
 

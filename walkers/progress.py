@@ -26,11 +26,7 @@ def progress_of(name: str) -> Iterator[Callable[[Progress], None]]:
     with _shown(name) as show:
 
         def advance(run: Progress) -> None:
-            rate = run.made / run.elapsed if run.elapsed else 0.0
-            doing = "coming to rest" if run.resting else f"{100 * run.step / run.steps:.0f} %"
-            left = f"{(run.steps - run.step) / rate:.0f} s left" if rate else "starting"
-            words = f"{doing}, {run.simulated:.3f} s simulated, {rate:.0f} steps/s, {left}"
-            show(run.steps, run.step, words, run.elapsed)
+            show(run.steps, run.step, str(run), run.elapsed)
 
         yield advance
 

@@ -15,7 +15,7 @@ import walkers
 from walkers.paper.published import FIG3_FIT
 from walkers.theory.prediction import motion_of
 
-table = walkers.sweep("fig3")
+table = walkers.sweep("fig3").table()
 print((1e3 * table[["radius_1", "radius_2", "velocity"]]).assign(sin_delta=table["sin_delta"]).to_string(index=False))
 
 # %%

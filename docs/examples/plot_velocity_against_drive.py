@@ -25,7 +25,7 @@ case = "fig1b"
 [axes]
 drive.peak_acceleration = { linspace = ["1 g", "9 g", 9] }
 """)
-table = walkers.sweep(file)
+table = walkers.sweep(file).table()
 print(table[["drive.peak_acceleration", "gamma0", "velocity", "rotation_1", "steady"]].to_string(index=False))
 
 # %%

@@ -88,7 +88,7 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
     contents = contents_of(directory, dumps=options.dumps)
     to = Path(f"{contents.name}.zip") if to is None else to
     if to.suffix != ".zip" or to.is_dir():
-        raise refused("--to", f"expected the name of a .zip file, not {to}")
+        raise refused("--output", f"expected the name of a .zip file, not {to}")
     metadata = json_bytes(describe_crate(contents, options.authors, options.licence))
     described = [item(METADATA_NAME, metadata), item(PREVIEW_NAME, _preview(contents, options))]
     sums = "".join(f"{one.sha256}  {one.place}\n" for one in [*contents.items, *described])
@@ -265,7 +265,7 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
     found = states(record)
     unfinished = sum(state.status not in ("finished", "not needed") for state in found)
     if unfinished:
-        told = f"{unfinished} of {len(found)} points are not finished; see: walkers status {directory}"
+        told = f"{unfinished} of {len(found)} points are not finished; see: walkers list {directory}"
         raise refused(directory, told)
     runs = list(dict.fromkeys(state.directory for state in found if state.directory is not None))
     name = name_of(record.directory.name)

@@ -1,4 +1,4 @@
-"""``walkers audit``: run the checks on an engine, two decks at a time, and tell what they gave."""
+"""``walkers check engine``: run the checks on an engine, two decks at a time, and tell what they gave."""
 
 from __future__ import annotations
 

@@ -21,11 +21,12 @@ from scipy.stats import ks_2samp
 from walkers.check.engine import TERMS, SecondEngine
 from walkers.check.kernels import FloatArray
 from walkers.check.report import Chapter, Line, Verdict
+from walkers.handles import Run
 from walkers.inputs import resolve_case
 from walkers.inputs.case import Case, settling_of
 from walkers.inputs.reading import load_case, read_toml, shipped_cases
 from walkers.inputs.text import rendered
-from walkers.pipeline import Run, run
+from walkers.pipeline import run
 from walkers.postprocess.gait import averages, walk
 from walkers.postprocess.motion import Group, Motion
 

@@ -1,6 +1,6 @@
 """What checks give: chapters of lines, each with what is expected, what was measured, and a verdict.
 
-``walkers validate`` makes a page of chapters.
+``walkers check literature`` makes a page of chapters.
 """
 
 from __future__ import annotations
@@ -190,7 +190,7 @@ def validate(
 
     for name in only:
         if name not in CHAPTERS:
-            raise refused("walkers validate", f"no chapter {name!r}; {expected_of(name, CHAPTERS)}")
+            raise refused("walkers check literature", f"no chapter {name!r}; {expected_of(name, CHAPTERS)}")
     names = tuple(name for name in CHAPTERS if name in only or not only)
     made: dict[str, Chapter] = {}
     works = Parallel(jobs, return_as="generator_unordered")

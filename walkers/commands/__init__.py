@@ -1,1 +1,27 @@
-"""The commands: the public functions of `runs` and `studies`, in the order of ``walkers --help``."""
+"""The commands: the public functions of the modules of `GROUPS`, in the order of ``walkers --help``.
+
+A function named ``check_engine`` is the command ``walkers check engine``.
+"""
+
+GROUPS = {"run": "Run", "look": "Look at results", "keep": "Keep and share", "check": "Check and calibrate"}
+"""The modules, with their headings in the help."""
+SECTIONS = {
+    "check": "Check the engine, the decks, a case by a second engine, or files; exit status 1 if something differs.",
+    "paper": "Compare with the published walker: the paper's figures and numbers, and further terms of its theory.",
+}
+"""Commands that have commands."""
+MOVED = {
+    "result": "run",
+    "theory": "show --theory",
+    "status": "list",
+    "table": "list",
+    "film": "render --film",
+    **{name: f"export --to {name}" for name in ("deck", "vtk", "paraview", "archive")},
+    "audit": "check engine",
+    "validate": "check literature",
+    "crosscheck": "check",
+    "verify": "check files",
+    "figures": "paper figures",
+    "model-terms": "paper terms",
+}
+"""What took the place of commands that were."""

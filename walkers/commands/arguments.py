@@ -13,30 +13,36 @@ from typer import Argument, Option
 from walkers.completion import names_of_cases, offering
 
 if TYPE_CHECKING:
+    from walkers.handles import Run as FoundRun
+    from walkers.handles import Sweep
     from walkers.inputs.case import Case as ResolvedCase
     from walkers.sweeps.scheduler import Options
 
-_CASE = "A case file, or the name of a shipped case such as fig1b."
-_RUN = "A run: its directory, its name in --out, or a case whose run is looked up there."
-_RUN_OR_SWEEP = "A run or a sweep: its directory, its name in --out, or a case."
-_SET = "Another value than the file's, such as drive.frequency=70Hz; repeatable."
+_CASE = "A case: its file, or the name of a shipped case such as fig1b; or a run of it, by its name or its folder."
+_RUN = "A run: its case (file or name), its name in --out, or its folder."
+_RUN_OR_SWEEP = "A run or a sweep: its case (file or name), its name in --out, or its folder."
+_SET = "Replace a value of the case, such as drive.frequency=70Hz; may be repeated."
 _AGE = "Only what is older than this, such as 7d or 12h."
 
-Case = Annotated[str, Argument(metavar="CASE", help=_CASE, autocompletion=offering("case"))]
+Case = Annotated[str, Argument(metavar="CASE", help=_CASE, autocompletion=offering("case", "run"))]
 Run = Annotated[str, Argument(metavar="RUN", help=_RUN, autocompletion=offering("case", "run"))]
 RunOrSweep = Annotated[
     str, Argument(metavar="RUN|SWEEP", help=_RUN_OR_SWEEP, autocompletion=offering("case", "run", "sweep"))
 ]
-Out = Annotated[Path, Option(help="Folder of the run directories.")]
+Out = Annotated[Path, Option(help="Folder of the runs.")]
 Set = Annotated[list[str] | None, Option("--set", metavar="KEY=VALUE", help=_SET)]
 EngineName = Annotated[str | None, Option(help="Name or path of the liggghts binary.")]
-AllowFailedAudit = Annotated[bool, Option("--allow-failed-audit", help="Run on an engine that failed its audit.")]
-Jobs = Annotated[int | None, Option("-j", "--jobs", min=1, help="Decks at once; all cores if left out.")]
+AllowFailedAudit = Annotated[
+    bool, Option("--allow-failed-audit", help="Run on an engine that failed walkers check engine.")
+]
+Jobs = Annotated[int | None, Option("-j", "--jobs", min=1, help="Decks that run at once; default: one per core.")]
 Json = Annotated[bool, Option("--json", help="Print JSON, SI units.")]
-Formats = Annotated[list[str] | None, Option("--format", help="Of the figures: png, svg or pdf; may be repeated.")]
-SweepColumn = Annotated[str | None, Option(help="Of sweeps: a column; velocity, of piles climbs if left out.")]
+Formats = Annotated[
+    list[str] | None, Option("--format", help="Format of the figures: png, svg or pdf; may be repeated.")
+]
+SweepColumn = Annotated[str | None, Option(help="Sweeps: column of the table; default: velocity, for piles climbs.")]
 CaseName = Annotated[
-    str | None, Option(metavar="NAME", help="Only what is of the case of this name.", autocompletion=names_of_cases)
+    str | None, Option(metavar="NAME", help="Only runs of the case with this name.", autocompletion=names_of_cases)
 ]
 OlderThan = Annotated[str | None, Option(metavar="AGE", help=_AGE)]
 
@@ -48,28 +54,54 @@ class By(TypedDict):
     allow_failed_audit: bool
 
 
-def load(case: str, settings: list[str] | None) -> ResolvedCase:
-    """A case with values put beside its file."""
+def changes_of(settings: list[str] | None) -> dict[str, Any]:
+    """The values given by ``--set``, by their keys."""
     from walkers.inputs.changes import settings_of
-    from walkers.inputs.reading import load_case
 
-    return load_case(case, settings_of(settings or ()))
+    return settings_of(settings or ())
+
+
+def load_case(case: str, settings: list[str] | None, out: Path) -> ResolvedCase:
+    """The case that was named, with values put beside its own."""
+    from walkers.finding import case_at
+
+    return case_at(case, out, changes_of(settings))[0]
+
+
+def load_run(run: str, settings: list[str] | None, out: Path) -> FoundRun:
+    """The finished run that was named, of the case with values put beside its own."""
+    from walkers.pipeline import load_run
+
+    return load_run(run, out, changes_of(settings))
+
+
+def load_any(what: str, settings: list[str] | None, out: Path) -> FoundRun | Sweep:
+    """The finished run or the sweep that was named."""
+    from walkers.pipeline import load_finished
+
+    return load_finished(what, out, changes_of(settings))
 
 
 def on_cores(jobs: int | None) -> Options:
-    """So many decks at once on this machine; None for as many as it has cores."""
+    """Options for a number of decks at once on this machine; None: one per core."""
     from walkers.sweeps.scheduler import Options
     from walkers.sweeps.site import cores_here
 
     return Options(jobs or cores_here())
 
 
-def refuse(option: str, wrong: bool, told: str) -> None:
-    """Refuse an option if something is wrong with it, and tell what."""
+def refuse(option: str, wrong: bool, why: str) -> None:
+    """Refuse an option if something is wrong with it, and say why."""
     from walkers.inputs.errors import refused
 
     if wrong:
-        raise refused(option, told)
+        raise refused(option, why)
+
+
+def refuse_given(options: dict[str, Any], why: str) -> None:
+    """Refuse the first of some options that was given, and say why."""
+    for option, value in options.items():
+        refuse(option, value not in (None, False, [], ()), why)
 
 
 def check_folder(option: str, folder: Path) -> None:

@@ -74,16 +74,22 @@ def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[
         raise InputError(source, [replace(one, value=value) for one, value in found]) from error
 
 
-def validated(model: type[File], document: Mapping[str, Any], source: str, whole: str = "a case") -> File:
+def validated(
+    model: type[File], document: Mapping[str, Any], source: str, whole: str = "a case", further: Sequence[Problem] = ()
+) -> File:
     """Nested tables as a kind of file; ``source`` and ``whole`` are what messages call it, and any of its kind.
 
-    Raises `InputError` with all that pydantic finds wrong.
+    Raises `InputError` with all that pydantic finds wrong, and with ``further`` problems.
     """
     try:
-        return model.model_validate(document, extra="forbid", context=WRITTEN)
+        file = model.model_validate(document, extra="forbid", context=WRITTEN)
     except ValidationError as error:
-        problems = dict.fromkeys(_problem_of(one, document, model, whole) for one in error.errors())
-        raise InputError(source, list(problems)) from error
+        found = {one.key: one for one in further}
+        found |= {one.key: one for one in (_problem_of(each, document, model, whole) for each in error.errors())}
+        raise InputError(source, list(found.values())) from error
+    if further:
+        raise InputError(source, further)
+    return file
 
 
 def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel], whole: str) -> Problem:

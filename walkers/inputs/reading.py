@@ -27,8 +27,8 @@ _COMMANDS = {
     "sweep": "a sweep: walkers sweep {}",
     "calibration": "a calibration: walkers calibrate {}",
     "library": "a library: cases beside it can name what is in it; walkers library prints it",
-    "case.json": "a run's directory: walkers result {}, or plot, render, vtk",
-    "sweep.json": "a sweep's directory: walkers table {}, or plot, status; its file goes to walkers sweep",
+    "case.json": "a run's directory: walkers run {}, or plot, render, export",
+    "sweep.json": "a sweep's directory: walkers list {}, or plot, report; its file goes to walkers sweep",
 }
 """What takes which kind of input."""
 
@@ -72,15 +72,7 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
     (0.0003, 0.00025)
     """
     path = find_input(case, "case")
-    document = read_case(path)
-    if changes:
-        from walkers.inputs.changes import changed
-        from walkers.inputs.messages import blaming, check_key
-
-        with blaming(str(case)):
-            for key in changes:
-                check_key(key)
-            document = changed(document, changes)
+    document = _changed(read_case(path), changes, str(case))
     return resolve_case(document, source=str(case), name=path.stem)
 
 
@@ -98,13 +90,43 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
     return document
 
 
+def with_changes(case: Case, changes: Mapping[str, Any] | None = None) -> Case:
+    """A case with values put in place of those that it was read with, as by `load_case`."""
+    if not changes:
+        return case
+    if not case.as_read:
+        raise refused(case.name, "was changed in Python: expected a case as it was read")
+    return resolve_case(_changed(case.document, changes, case.name), source=case.name, name=case.name)
+
+
+def _changed(document: Mapping[str, Any], changes: Mapping[str, Any] | None, source: str) -> Mapping[str, Any]:
+    """The tables of a case with changes, whose keys are checked."""
+    if not changes:
+        return document
+    from walkers.inputs.changes import changed
+    from walkers.inputs.messages import blaming, check_key
+
+    with blaming(source):
+        for key in changes:
+            check_key(key)
+        return changed(document, changes)
+
+
+def is_sweep_file(path: Path) -> bool:
+    """Whether a file is a sweep's."""
+    return path.is_file() and _kind_of(path) == "sweep"
+
+
 def find_input(name: str | Path, kind: str) -> Path:
-    """A file of a kind (case, sweep, calibration) by its path, or a shipped one by its name.
+    """A file of a kind (case, sweep, calibration) by its path, which may lack ``.toml``, or a shipped one by its name.
 
     Raises `InputError` if there is neither, or if it is known to be of another kind: with the command that takes it.
     """
     check_utf8(name)
     path, known = Path(name), shipped(kind)
+    with suppress(OSError):
+        if not path.exists() and str(name) not in known and Path(f"{name}.toml").is_file():
+            path = Path(f"{name}.toml")
     found = None if str(name) in known else _kind_of(path)
     if found not in (None, kind):
         raise refused(name, f"is {_COMMANDS[str(found)].format(name)}")
@@ -121,7 +143,8 @@ def find_input(name: str | Path, kind: str) -> Path:
     if offer := offered.get(str(name)):
         return _file_of(offer)
     names = [*known, *offered]
-    raise refused(name, f"no such file, nor a shipped {kind} ({', '.join(names)}){suggestion(str(name), names)}")
+    there = "no such file, run or sweep" if kind == "case" else "no such file"
+    raise refused(name, f"{there}, nor a shipped {kind} ({', '.join(names)}){suggestion(str(name), names)}")
 
 
 def _file_of(offer: Offer) -> Path:
@@ -176,6 +199,7 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     # Not above: that there is no such file is told before all that a case may say is built.
     from walkers.inputs.changes import changed
     from walkers.inputs.messages import blaming, check_key, validated
+    from walkers.inputs.missing import missing_keys
     from walkers.inputs.origins import Notes
     from walkers.inputs.resolving import resolve, supplied
     from walkers.inputs.schema import CaseFile
@@ -183,7 +207,7 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     notes = Notes()
     with blaming(source, document):
         tables = supplied(document, library_of(document, source), notes)
-        file = validated(CaseFile, tables, source)
+        file = validated(CaseFile, tables, source, further=missing_keys(tables))
         try:
             case = resolve(file, name, document, notes)
         except ArithmeticError as error:

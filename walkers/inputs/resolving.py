@@ -34,7 +34,6 @@ from walkers.physics.matter import DEFAULT_LAW, Liquid
 from walkers.physics.mixtures import MIXTURES
 from walkers.physics.units import ABSENT, TEMPERATURE, parse_quantity
 
-_EXAMPLES = {"opening": "120 deg", "width": "5.3 mm", "height": "5.3 mm"}
 _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the count that fills a height."""
 _OVERLAP = 0.01
@@ -147,8 +146,6 @@ def resolve(file: CaseFile, name: str, document: Mapping[str, Any], notes: Notes
     walkers = tuple(_walkers_of(key, table, boundary, notes) for key, table in file.walkers.items())
     mixture = _mixture_of(file.mixture, boundary) if file.mixture else None
     placed = Placed(tuple((*bead.at, bead.radius) for bead in file.placed)) if file.placed else None
-    if not (walkers or mixture or placed):
-        raise unusable("dimers", "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
     liquid, density = _liquid_of(file.liquid, notes), file.beads.density
     first = walkers[0].radii if walkers else ()
     dimer = Dimer((first[0], first[1]), density, liquid.surface_tension) if len(first) == 2 else None
@@ -183,12 +180,10 @@ def resolve(file: CaseFile, name: str, document: Mapping[str, Any], notes: Notes
 
 
 def _check_sizes(boundary: Boundary) -> None:
-    """Refuse a boundary that lacks a size of its shape, or has another's."""
-    for key, example in _EXAMPLES.items():
-        lacking, needed = getattr(boundary, key) == getattr(Boundary, key), key in SIZES[boundary.shape]
-        if lacking == needed:
-            missing = f'missing; expected such as "{example}"'
-            raise unusable(f"boundary.{key}", missing if needed else f"expected none of a {boundary.shape}")
+    """Refuse a boundary that has a size of another shape."""
+    for key in {key for sizes in SIZES.values() for key in sizes} - {*SIZES[boundary.shape]}:
+        if getattr(boundary, key) != getattr(Boundary, key):
+            raise unusable(f"boundary.{key}", f"expected none of a {boundary.shape}")
 
 
 def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
@@ -198,13 +193,9 @@ def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
         told = "expected either kinematic_viscosity or dynamic_viscosity, not both"
         raise unusable("liquid.dynamic_viscosity", told)
     if kinematic is not None:
-        if table.density is None:
-            raise unusable("liquid.density", "missing; a kinematic_viscosity needs the liquid's density")
+        assert table.density is not None
         dynamic = float(f"{kinematic * table.density:.15g}")
         notes.derived("liquid.dynamic_viscosity", dynamic, "from kinematic_viscosity and density")
-    if isnan(dynamic):
-        told = "missing; expected a liquid of the library by name, or this number"
-        raise unusable("liquid.dynamic_viscosity", told)
     if table.law not in LAWS:
         try:
             by_name(table.law)
@@ -247,10 +238,8 @@ def _radii(table: Walkers, notes: Notes) -> tuple[float, ...]:
             told = "expected either the radii or mean_radius and sin_delta, not both"
             raise unusable(f"dimers.{next(iter(given))}", told)
         return table.radii
-    if table.mean_radius is None or table.sin_delta is None:
-        examples = {"mean_radius": '"0.25 mm"', "sin_delta": "0.2"} if given else {"radii": '["0.3 mm", "0.2 mm"]'}
-        lacking = next(name for name in examples if name not in given)
-        raise unusable(f"dimers.{lacking}", f"missing; expected such as {examples[lacking]}")
+    assert table.mean_radius is not None
+    assert table.sin_delta is not None
     first, second = (float(f"{table.mean_radius * share:.15g}") for share in (1 + table.sin_delta, 1 - table.sin_delta))
     notes.derived("dimers.radii", (first, second), "from mean_radius and sin_delta")
     return first, second

@@ -57,16 +57,14 @@ def resolve_drive(table: DriveTable, boundary: Boundary, dimer: Dimer | None, no
 
 def _harmonic(table: HarmonicTable, key: str, boundary: Boundary, dimer: Dimer | None) -> Harmonic:
     acceleration, gamma0 = table.peak_acceleration, table.gamma0
-    if table.frequency is None:
-        raise unusable(f"{key}.frequency", 'missing; expected such as "80 Hz"')
     if gamma0 is not None and dimer is None:
         raise unusable(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")
     if gamma0 is not None and acceleration is not None:
         raise unusable(f"{key}.gamma0", "expected either peak_acceleration or gamma0, not both")
     if gamma0 is not None and dimer is not None:
         acceleration = dimer.peak_acceleration(gamma0)
-    if acceleration is None:
-        raise unusable(f"{key}.peak_acceleration", 'missing; expected it (such as "4 g") or gamma0')
+    assert table.frequency is not None
+    assert acceleration is not None
     axis = boundary.drive_axis if table.axis is None else table.axis
     try:
         direction = AXES[axis] if isinstance(axis, str) else unit_vector(axis)
@@ -192,8 +190,6 @@ def _cycles(table: RunTable, case: Case, cycles_per_sample: int) -> int:
     cycles: float = table.cycles or table.most_cycles or _MOST_CYCLES
     if table.duration is not None:
         cycles = table.duration * case.drive.frequency * (1.0 - 1e-12)
-    elif table.cycles is None and case.loose:
-        raise unusable("run.duration", 'missing; expected such as "4 s"')
     return ceil(cycles / cycles_per_sample) * cycles_per_sample
 
 

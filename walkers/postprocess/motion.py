@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +15,7 @@ from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive
 from walkers.postprocess.dump import BinaryDump, BoolArray, DumpError, FloatArray, IntArray, NoNumberError, local_frames
-from walkers.runner.directory import SEGMENT_NAME, case_of, layout_of, segment_directories
+from walkers.runner.directory import SEGMENT_NAME, SEGMENTS, case_of, drive_from, layout_of, segment_directories
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
@@ -291,7 +292,7 @@ def _opened(segment: Path) -> tuple[dict[str, Any], Layout, BinaryDump]:
     path = segment / SEGMENT_NAME
     try:
         record = read_json(path)
-        record = {name: record[name] for name in ("begin", "end", "drive_from")}
+        record = {name: record[name] for name in ("begin", "end", "drive_from", "root_mean_square_velocity")}
         path = segment
         layout = layout_of(segment)
         return record, layout, BinaryDump(segment / layout.bead_dump, layout.bead_columns)
@@ -319,6 +320,36 @@ def _motion(case: Case, segments: dict[Path, tuple[dict[str, Any], Layout, Binar
         steps += dump.steps[begin:].tolist()
         frames += [(segment, number) for number in range(begin, len(data))]
     data = np.concatenate(stacks) if len(stacks) > 1 else stacks[0]
+    return _of_frames(case, segments, data, steps, frames)
+
+
+def read_last_frame(directory: Path) -> Motion:
+    """The last complete frame of a run directory, also of the segment that is being made; `DumpError` if none is."""
+    case, new = case_of(directory), sorted((directory / SEGMENTS).glob("*.new"))
+    whole = [(path, *_opened(path)) for path in segment_directories(directory)]
+    records = [record for _, record, _, _ in whole]
+    found = [(path, layout, dump) for path, _, layout, dump in whole]
+    with suppress(OSError, ValueError, KeyError, TypeError):  # which has not begun to write
+        found += [
+            (path, layout := layout_of(path), BinaryDump(path / layout.bead_dump, layout.bead_columns)) for path in new
+        ]
+    for path, layout, dump in reversed(found):
+        if number := len(dump):
+            record = {"end": case.run.steps, "drive_from": drive_from(case, records)}
+            frame, steps = dump.frame(number - 1)[None], [int(dump.steps[-1])]
+            return _of_frames(case, {path: (record, layout, dump)}, frame, steps, [(path, number - 1)])
+    raise DumpError(f"{directory}: no frame is complete yet")
+
+
+def _of_frames(
+    case: Case,
+    segments: dict[Path, tuple[dict[str, Any], Layout, BinaryDump]],
+    data: FloatArray,
+    steps: list[int],
+    frames: list[tuple[Path, int]],
+) -> Motion:
+    """The motion of frames, shape (frames, beads, columns), each of a step, in segments."""
+    record, layout, dump = segments[frames[-1][0]]
     cycles = record["end"] // case.run.steps_per_cycle if case.run.until_steady else case.run.cycles
     # Before the drive has begun it is as if it would with the next frame.
     starts = [one["drive_from"] for one, _, _ in segments.values() if one["drive_from"] is not None]

@@ -149,7 +149,7 @@ def _check_replaceable(place: Path) -> None:
     elif place.exists():
         held = "it is a file"
     if held:
-        expected = "expected a new or empty folder, or one that an earlier walkers vtk wrote"
+        expected = "expected a new or empty folder, or one that walkers export wrote before"
         raise refused(place, f"{expected}; {held}")
 
 

@@ -20,25 +20,28 @@ from walkers.runner.files import beside
 _COLUMNS = ("id", "type", "mol", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
 _FORMAT = "%d %d %d" + " %.10g" * 10
 _MM = 1e3
+SUFFIXES = {"xyz": (".xyz", ".extxyz"), "lammps": (".lammpstrj",)}
+"""Of the names of files, by their forms."""
 
 
-def write_trajectory(directory: Path, destination: Path, *, every: int = 1) -> Path:
+def write_trajectory(directory: Path, destination: Path, form: str, *, every: int = 1) -> Path:
     """Write the motion of a run's beads while it is driven, one of so many samples.
 
     Parameters
     ----------
     destination
-        The file to write: ``.xyz`` or ``.extxyz`` for extended XYZ, ``.lammpstrj`` for a LAMMPS text dump.
+        The file to write, whose name ends in one of `SUFFIXES`.
+    form
+        ``xyz`` for extended XYZ, ``lammps`` for a LAMMPS text dump.
 
     Raises
     ------
     InputError
-        If the name says none of these formats.
+        If the name ends otherwise.
     """
-    write = {".xyz": _write_xyz, ".extxyz": _write_xyz, ".lammpstrj": _write_lammps}.get(destination.suffix.lower())
-    if write is None or destination.is_dir():
-        expected = f"{destination}: expected the name of a .xyz, .extxyz or .lammpstrj file"
-        raise refused("--to", expected)
+    if destination.suffix.lower() not in SUFFIXES[form] or destination.is_dir():
+        raise refused("--output", f"{destination}: expected the name of a {' or '.join(SUFFIXES[form])} file")
+    write = {"xyz": _write_xyz, "lammps": _write_lammps}[form]
     motion = read_motion(directory).driven.select(slice(None, None, every))
     destination.parent.mkdir(parents=True, exist_ok=True)
     box = box_of(motion)

@@ -152,6 +152,22 @@ def finished_places(out: Path) -> dict[str, Path]:
     return {place.name: place for place in places if not place.name.endswith((UNFINISHED, REPLACED))}
 
 
+def drive_from(case: Case, done: Iterable[Mapping[str, Any]]) -> int | None:
+    """Step at which the drive begins, given the records of the segments that are whole; None if that is not known yet.
+
+    It is the end of the first segment that leaves the beads at rest, or that is the last in which they may come to it.
+    """
+    if not case.run.rests:
+        return 0
+    for segment in done:
+        if segment["drive_from"] is not None:
+            return int(segment["drive_from"])
+        at_rest = segment["root_mean_square_velocity"] < case.run.settled_below
+        if at_rest or segment["end"] * case.run.time_step >= case.run.longest_settling:
+            return int(segment["end"])
+    return None
+
+
 # --- writing ----------------------------------------------------------------------------------------------------------
 
 
@@ -250,6 +266,7 @@ def _lock(file: Path, end: float) -> int | None:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(descriptor), file.stat()):
+                    os.ftruncate(descriptor, 0)  # nobody has asked us to stop
                     return descriptor
         except BlockingIOError:
             if time.monotonic() > end:
@@ -269,3 +286,15 @@ def is_locked(place: Path) -> bool:
     except BlockingIOError:
         return True
     return False
+
+
+def ask_to_stop(place: Path) -> None:
+    """Ask whoever makes a run to stop: by a word in the lock file, which goes with the lock."""
+    if is_locked(place):
+        with suppress(FileNotFoundError), _lock_file(place).open("r+b") as file:
+            file.write(b"stop")
+
+
+def is_to_stop(descriptor: int) -> bool:
+    """Whether somebody asks to stop the run whose lock file one has open."""
+    return os.fstat(descriptor).st_size > 0

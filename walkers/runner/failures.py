@@ -139,7 +139,7 @@ class AuditFailed(EngineFailure):
     def __init__(self, failures: Sequence[str]) -> None:
         super().__init__(
             f"this engine failed its audit in {len(failures)} line(s), first: {failures[0]}; "
-            "see it with: walkers audit (--allow-failed-audit runs all the same)"
+            "see it with: walkers check engine (--allow-failed-audit runs all the same)"
         )
 
 

@@ -40,6 +40,8 @@ jobs, has heard nothing of an engine that was stopped too."""
 _CHUNK_BYTES = 1 << 20
 """Read of the engine's output at once; a line is shorter."""
 _SPARE_BYTES = 64 * 1024
+_TAIL_BYTES = 16 * 1024
+"""Of a log, in which a status line is."""
 _TEMPORARY_BYTES = 16_000_000
 """In TMPDIR, of mpirun and its processes: with 6 MB they wait for each other without end."""
 _STATUS_LINE = re.compile(rb"^ *(\d+) +(\d+) +(\S+)((?: +[-+.\w]+){6}) *$", re.MULTILINE)
@@ -61,6 +63,17 @@ class Progress:
     elapsed: float
     made: int = 0
     resting: bool = False
+
+    @property
+    def share(self) -> str:
+        """How much of the drive is done."""
+        return "coming to rest" if self.resting else f"{100 * self.step / self.steps:.0f} %"
+
+    def __str__(self) -> str:
+        """How much is done, how fast, and how long the rest takes."""
+        rate = self.made / self.elapsed if self.elapsed else 0.0
+        left = f"{(self.steps - self.step) / rate:.0f} s left" if rate else "starting"
+        return f"{self.share}, {self.simulated:.3f} s simulated, {rate:.0f} steps/s, {left}"
 
 
 @dataclass(frozen=True)
@@ -118,6 +131,14 @@ def launch(
             if not starts:
                 raise
             time.sleep(_PAUSE_SECONDS)
+
+
+def last_step(log: Path) -> int:
+    """The step of the last status line in the log of an engine; 0 where there is none."""
+    with log.open("rb") as output:
+        output.seek(max(0, log.stat().st_size - _TAIL_BYTES))
+        lines = _STATUS_LINE.findall(output.read())
+    return int(lines[-1][0]) if lines else 0
 
 
 def check_room(folder: Path, needed: int) -> None:

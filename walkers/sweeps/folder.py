@@ -36,6 +36,7 @@ from walkers.runner.directory import (
 )
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
+from walkers.sweeps.making import progress_at
 from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
@@ -45,6 +46,7 @@ from walkers.sweeps.table import (
     result_columns,
     states,
     unfinished_state,
+    worst_status,
 )
 
 Order = Literal["name", "status", "velocity", "age", "size"]
@@ -136,7 +138,10 @@ def _run(path: Path, now: float) -> Entry | None:
         state = unfinished_state(path.with_name(name), path)
         status = "interrupted" if state.status == "missing" else state.status
         age = max(now - newest, 0.0)
-        return Entry(name, case_name, status, path, age, size, parameters, state.reason, state.message)
+        reason = state.reason
+        if status == "running" and (progress := progress_at(path.with_name(name))):
+            reason = progress.share
+        return Entry(name, case_name, status, path, age, size, parameters, reason, state.message)
     given: dict[str, Any] = {}
     with suppress(OSError, ValueError, AttributeError, TypeError):
         result = recorded_result(path)
@@ -170,12 +175,11 @@ def _sweep(path: Path, runs: Sequence[Entry], now: float) -> Entry | None:
     except InputError:
         return None
     points = dict(Counter(state.status for state in states(record)))
-    worst = {"running": "running", "missing": "interrupted", "failed": "failed"}
     named = set(record.runs)
     return Entry(
         name=path.name,
         case=record.runs[0].rpartition("-")[0] if record.runs else "",
-        status=next((status for found, status in worst.items() if points.get(found)), "finished"),
+        status=worst_status(points),
         directory=path,
         age=_age(path / RECORD_NAME, now),
         size=sum(run.size for run in runs if run.name in named),
@@ -256,8 +260,17 @@ def as_json(entries: Sequence[Entry]) -> list[dict[str, Any]]:
     return rows
 
 
-def as_text(entries: Sequence[Entry]) -> str:
-    """Entries as text: sweeps, then the runs of each case with a column for each key by which they differ; mm/s."""
+def members(entries: Sequence[Entry]) -> list[Entry]:
+    """The runs of sweeps."""
+    named = {run for entry in entries for run in entry.runs}
+    return [entry for entry in entries if entry.name in named]
+
+
+def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
+    """Entries as text: sweeps, then the runs of each case with a column for each key by which they differ; mm/s.
+
+    The last line has the number of runs of sweeps that are left out.
+    """
     sweeps = [entry for entry in entries if entry.is_sweep]
     runs = [entry for entry in entries if not entry.is_sweep]
     rows = [["sweep", "points", "age", "size", "case", "varies (values)"]]
@@ -279,7 +292,9 @@ def as_text(entries: Sequence[Entry]) -> str:
             rows.append([run.name, status, result, age_text(run.age), bytes_text(run.size), *values])
         blocks.append(aligned(rows))
     total = [*counted({"sweep": len(sweeps)}), f"{len(runs)} run{'' if len(runs) == 1 else 's'}"]
-    return "\n\n".join([*blocks, f"{', '.join(total)}, {bytes_text(sum(run.size for run in runs))}"])
+    size = bytes_text(sum(entry.size for entry in entries))
+    more = f"; not shown: {hidden} runs of sweeps (--all)" if hidden else ""
+    return "\n\n".join([*blocks, f"{', '.join(total)}, {size}{more}"])
 
 
 def with_error(value: float, error: float) -> str:
@@ -355,7 +370,7 @@ def _own_files(directory: Path) -> list[Path]:
 
 def plan_cleaning(
     out: Path,
-    given: Sequence[str] = (),
+    given: Sequence[Path] = (),
     *,
     finished: bool = False,
     case: str | None = None,
@@ -363,7 +378,7 @@ def plan_cleaning(
 ) -> Cleaning:
     """See what may go; nothing is removed.
 
-    That is what is ``given``, runs and sweeps by names or directories: these go with those of their runs that no other
+    That is what is ``given``, runs and sweeps by their directories: these go with those of their runs that no other
     sweep has. Else it is what is interrupted or failed, and if so wanted finished runs that no sweep has. Of all that
     only what `select` leaves. `InputError` if there is no such thing, or if it may be of a sweep that cannot be read.
     """
@@ -375,7 +390,7 @@ def plan_cleaning(
     for sweep in entries:
         for run in sweep.runs:
             sweeps_of.setdefault(run, []).append(sweep.name)
-    wanted = [entry for name in given for entry in _found(name, entries)]
+    wanted = [entry for place in given for entry in _found(place, entries)]
     going = {entry.name for entry in wanted if entry.is_sweep}
     # With sweeps go those of their runs that no other sweep has.
     wanted += [one for one in entries if one.name in sweeps_of and going.issuperset(sweeps_of[one.name])]
@@ -401,14 +416,14 @@ def plan_cleaning(
     return Cleaning(remove, stale, told)
 
 
-def _found(name: str, entries: Sequence[Entry]) -> list[Entry]:
-    """The entries of a name or directory."""
-    path = Path(name).resolve()
-    found = [one for one in entries if name in (one.name, one.directory.name) or path == one.directory.resolve()]
+def _found(place: Path, entries: Sequence[Entry]) -> list[Entry]:
+    """The entries of a place, finished or not."""
+    place = place.resolve()
+    found = [one for one in entries if place == one.directory.resolve()]
+    found = found or [one for one in entries if place == one.place.resolve()]
     if not found:
-        told = "no run or sweep in the folder of runs (see walkers list; another folder is given by --out)"
-        raise refused(name, told)
-    return [one for one in found if name == one.directory.name] or found
+        raise refused(place, "no run or sweep in the folder of runs (see walkers list; --out names another folder)")
+    return found
 
 
 def clean(cleaning: Cleaning) -> dict[Path, str]:

@@ -32,7 +32,11 @@ from walkers.runner.directory import (
     SEGMENT_NAME,
     SEGMENTS,
     FinishedRun,
+    case_of,
+    drive_from,
     finished_run,
+    is_to_stop,
+    layout_of,
     locked,
     move_into_place,
     recover,
@@ -45,10 +49,11 @@ from walkers.runner.directory import (
 )
 from walkers.runner.failures import AuditFailed, BeadsOverTheTop, UnauditedEngineWarning
 from walkers.runner.files import fsync_path, link_or_copy, read_json, settle, write_json
-from walkers.runner.launch import EngineReport, Progress, check_room, launch
+from walkers.runner.launch import EngineReport, Progress, check_room, last_step, launch
 from walkers.runner.manifest import write_manifest
 from walkers.runner.provenance import look_ahead
 from walkers.templates.deck import (
+    DECK_NAME,
     OUTPUT_NAME,
     PREVIOUS_RESTART_NAME,
     RESTART_NAME,
@@ -78,7 +83,7 @@ def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
     """Refuse an engine whose audit failed (`AuditFailed`), unless told otherwise; warn of one that never had one."""
     audit = read_audit(engine.sha256)
     if audit is None:
-        message = "this engine was never audited; prove what it computes with: walkers audit"
+        message = "this engine was never audited; check what it computes with: walkers check engine"
         warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
     elif not audit.passed and not allow_failed_audit:
         raise AuditFailed(audit.failures)
@@ -132,7 +137,7 @@ def make_runs(
         if len(missing) == 1:
             ((place, case),) = missing.items()
             with open_locked(case, engine, place, locks, anew=force) as opened:
-                opened.make(on_progress=on_progress, time_limit=time_limit)
+                opened.make(on_progress=_stopping(on_progress, *locks), time_limit=time_limit)
                 tabulate(opened.directory)
                 runs[place.name] = opened.finish()
         elif missing:
@@ -142,6 +147,39 @@ def make_runs(
                     runs |= _make_together(left, cycles, out, engine, locks, on_progress, time_limit)
                 left = {name: case for name, case in left.items() if name not in runs}
     return Made(runs, found, busy)
+
+
+def _stopping(tell: _Tell | None, lock: int) -> _Tell:
+    """What is called with the progress and stops the engine where somebody asks for that (`walkers.Run.stop`)."""
+
+    def advance(progress: Progress) -> None:
+        if is_to_stop(lock):
+            raise Stopped("the run was stopped; walkers run continues it")
+        if tell is not None:
+            tell(progress)
+
+    return advance
+
+
+def progress_at(place: Path) -> Progress | None:
+    """How far the run of a place is, as its files say; None if they do not: it shares a deck, or has just begun.
+
+    The wall time is that of its segment.
+    """
+    directory = unfinished(place)
+    try:
+        case = case_of(directory)
+        done = [_read_segment(path) for path in segment_directories(directory)]
+        (folder,) = (directory / SEGMENTS).glob("*.new")
+        steps = layout_of(folder).steps if case.run.until_steady else case.run.steps
+        begin = int(done[-1]["end"]) if done else 0
+        start = drive_from(case, done)
+        step = max(begin, last_step(folder / OUTPUT_NAME))
+        seconds = time.time() - (folder / DECK_NAME).stat().st_mtime
+    except (OSError, ValueError, KeyError, TypeError, WalkersError):
+        return None
+    driven = 0 if start is None else step - start
+    return Progress(driven, steps, step * case.run.time_step, seconds, step - begin, start is None)
 
 
 def _are_steady(directory: Path) -> bool:
@@ -193,7 +231,7 @@ class OpenRun:
                 try:
                     self._make(segment, render(case, segment), tell, time_limit)
                 except BeadsOverTheTop as over:
-                    begun_at = self._drive_from()
+                    begun_at = drive_from(self.case, self.done)
                     if not case.boundary.closed or begun_at is None or segment.begin <= begun_at:
                         raise
                     # A climber left the container: that ends the experiment, and spoils nothing of what was before.
@@ -208,21 +246,10 @@ class OpenRun:
         """The segment that is to be made next, of the run or an attempt at it; None after the last one."""
         if not self.done:
             return first_segment(case)
-        begin, start = int(self.done[-1]["end"]), self._drive_from()
+        begin, start = int(self.done[-1]["end"]), drive_from(self.case, self.done)
         if start is None:
             return Segment(begin, begin + settling_steps(case), None)
         return next_segment(case, Segment(begin, begin, start))
-
-    def _drive_from(self) -> int | None:
-        """Step at which the drive begins: the end of the first segment that leaves the beads at rest, or the last."""
-        run = self.case.run
-        for segment in self.done:
-            if segment["drive_from"] is not None:
-                return int(segment["drive_from"])
-            at_rest = segment["root_mean_square_velocity"] < run.settled_below
-            if at_rest or segment["end"] * run.time_step >= run.longest_settling:
-                return int(segment["end"])
-        return None
 
     def _make(self, segment: Segment, deck: Deck, tell: Callable[[int], None] | None, time_limit: float | None) -> None:
         folder, number = self.directory / SEGMENTS, len(self.done)
@@ -253,7 +280,7 @@ class OpenRun:
         """Write the manifest, last, and move the directory to its place."""
         wall_seconds, loop_seconds = (sum(one[name] for one in self.done) for name in ("wall_seconds", "loop_seconds"))
         report = EngineReport(self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"]))
-        start = self._drive_from() or 0
+        start = drive_from(self.case, self.done) or 0
         rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
         settling = {"drive_from": start, "settled": rest[-1] if rest else None, "segments": len(self.done)}
         settling |= {"ended": self.ended} if self.ended else {}

@@ -232,6 +232,13 @@ def states(record: SweepRecord) -> list[PointState]:
     return found
 
 
+def worst_status(points: Iterable[str]) -> str:
+    """The status of a sweep whose points have these: running, else interrupted, else failed, if one is."""
+    found = set(points)
+    worst = {"running": "running", "missing": "interrupted", "failed": "failed"}
+    return next((status for one, status in worst.items() if one in found), "finished")
+
+
 def unfinished_state(place: Path, directory: Path) -> PointState:
     """What has become of a run that is not finished, or is made anew, in a directory."""
     if is_locked(place):
@@ -447,16 +454,6 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
     return _with_units(pd.DataFrame(rows), described)
 
 
-def sweeps_in(directory: Path) -> list[Path]:
-    """The sweep's directory itself, or those in a folder; `InputError` if there is none."""
-    if (directory / RECORD_NAME).exists():
-        return [directory]
-    found = sorted(path.parent for path in directory.glob(f"*/{RECORD_NAME}"))
-    if not found:
-        raise refused(directory, f"neither a sweep's directory (with a {RECORD_NAME}) nor a folder of such")
-    return found
-
-
 def describe_status(directory: Path) -> str:
     """Numbers of points by what has become of them, failures with their reasons, and the thresholds of descents."""
     record = read_record(directory)
@@ -470,5 +467,4 @@ def describe_status(directory: Path) -> str:
         lines.append(f"             and {len(failed) - _MOST_FAILURES} more")
     if record.descent is not None:
         lines += [f"  {line}" for line in short_text(thresholds(directory)).splitlines()]
-    lines.append(f"  table      walkers table {directory}")
     return "\n".join(lines)

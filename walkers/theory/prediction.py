@@ -81,7 +81,7 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
 
 
 def predict(case: Case) -> dict[str, Any]:
-    """Everything that ``walkers theory`` prints, SI units; None where the model does not hold, with the reason.
+    """Everything that ``walkers show --theory`` prints, SI units; None where the model does not hold, with the reason.
 
     Errors as for `check_applies`.
     """

@@ -1,0 +1,209 @@
+"""Commands that check the program, compare with the paper, calibrate, and show what comes with the program."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+from typer import Argument, Option
+
+import walkers
+from walkers import DEFAULT_OUT
+from walkers.commands.arguments import (
+    AllowFailedAudit,
+    By,
+    EngineName,
+    Formats,
+    Jobs,
+    Json,
+    Out,
+    Set,
+    changes_of,
+    check_folder,
+    load_case,
+    on_cores,
+    print_as,
+    print_lines,
+    refuse,
+    tell,
+)
+
+if TYPE_CHECKING:
+    from walkers.check.report import Chapter
+    from walkers.inputs.case import Case as Resolved
+
+_FILES = "A run or a sweep (folder, name in --out, or case), or an archive."
+_NAME = "A material, a liquid, a bridge law, a case, a sweep or a calibration."
+_CALIBRATION = "A calibration file, or a shipped calibration such as ruby."
+
+
+def check_engine(
+    only: list[str] | None = Option(None, help="Name of a check; may be repeated."),
+    quick: bool = Option(False, "--quick", help="Leave out the checks that take longest."),
+    as_json: Json = False,
+    engine: EngineName = None,
+) -> int:
+    """Compare forces of the engine and its contact model with a second engine and exact formulas."""
+    from walkers.check.audit import record, run_audit, selected
+    from walkers.inputs.errors import refused
+    from walkers.runner.binary import find_engine
+    from walkers.runner.failures import EngineMissing
+
+    checks = selected(only or (), quick=quick)
+    try:
+        binary = find_engine(engine)
+    except EngineMissing as missing:
+        if engine is None:
+            raise
+        raise refused("--engine", str(missing)) from missing
+    report = run_audit(checks, engine=binary, on_done=_tell_seconds)
+    print_as(as_json, report.as_dict, report.as_text)
+    if not only:
+        try:
+            record(report, quick=quick)
+        except OSError as error:
+            warnings.warn(f"the outcome cannot be kept: {error}", stacklevel=1)
+    return 1 if report.failures else 0
+
+
+def check_literature(
+    chapters: list[str] | None = Argument(None, metavar="CHAPTER", help="benchmarks, bridges, crosscheck."),
+    quick: bool = Option(False, "--quick", help="Of each chapter the part that takes seconds."),
+    out: Out = DEFAULT_OUT,
+    to: Path | None = Option(None, help="Folder of the page; default: OUT/validation."),
+    jobs: int | None = Option(None, "-j", "--jobs", min=1, help="Chapters at once; default: one per core."),
+    as_json: Json = False,
+) -> int:
+    """Compare decks and laws with published benchmarks and exact solutions, and write a page with the results."""
+    from walkers.check.report import as_dict, validate
+
+    check_folder("--out", out)
+    folder, cores = to or out / "validation", on_cores(jobs).workers
+    check_folder("--to", folder)
+    made = validate(out, folder, only=chapters or (), quick=quick, jobs=cores, on_done=_tell_seconds)
+    print_as(as_json, lambda: as_dict(made.chapters), lambda: "\n".join(map(str, made.files)))
+    tell(*(f"not as expected: {statement}" for statement in made.failed))
+    return 1 if made.failed else 0
+
+
+def _tell_seconds(chapter: Chapter) -> None:
+    tell(f"{chapter.name} ({chapter.seconds:.1f} s)")
+
+
+def check_files(what: str = Argument(metavar="PATH", help=_FILES), settings: Set = None, out: Out = DEFAULT_OUT) -> int:
+    """Compare the files of a run, a sweep or an archive with their recorded checksums."""
+    from walkers.archive.verification import verify
+    from walkers.finding import find
+
+    found = verify(find(what, out, changes_of(settings)).path)
+    print_lines(one.describe() for one in found)
+    return 0 if all(one.passed for one in found) else 1
+
+
+def check_case(
+    context: typer.Context,
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    cycles: int | None = Option(None, help="Cycles of the drive; default: those of the case."),
+    without: list[str] | None = Option(None, metavar="TERM", help="Leave out a term, such as friction."),
+    seeds: int = Option(1, min=1, help="Piles: number of starts, for the statistics."),
+    as_json: Json = False,
+    engine: EngineName = None,
+    allow_failed_audit: AllowFailedAudit = False,
+) -> int:
+    """Run CASE with the engine and with a second one, written from the published formulas, and compare."""
+    from walkers.check.crosscheck import crosscheck, shortened
+    from walkers.check.engine import TERMS
+    from walkers.check.report import as_dict
+    from walkers.inputs.errors import refused
+    from walkers.progress import progress_of
+
+    loaded = load_case(str(context.info_name), settings, out)
+    check_folder("--out", out)
+    refuse("--seeds", seeds > 1 and loaded.mixture is None, "is for piles: walkers and placed beads have one start")
+    for term in without or ():
+        refuse(f"--without {term}", term not in TERMS, f"expected one of {', '.join(TERMS)}")
+    try:
+        loaded = loaded if cycles is None else shortened(loaded, cycles)
+    except ValueError as error:
+        raise refused("--cycles", str(error)) from error
+
+    def make(one: Resolved, folder: Path) -> walkers.Run:
+        with progress_of(one.name) as advance:
+            return walkers.run(one, folder, engine=engine, progress=advance, allow_failed_audit=allow_failed_audit)
+
+    found = crosscheck(loaded, out, without or (), seeds=seeds, make=make)
+    chapter = found.chapter()
+    print_as(as_json, lambda: as_dict([chapter], case=loaded.name, without=list(found.without)), chapter.as_text)
+    if not as_json:
+        tell(*(f"{loaded.name}: differs: {line.what}" for line in chapter.failures))
+    return 1 if chapter.failures else 0
+
+
+def library(name: str | None = Argument(None, metavar="[NAME]", help=_NAME)) -> None:
+    """List materials, liquids, friction, bridge laws, cases, sweeps and calibrations; or print one with its sources."""
+    from walkers.inputs.catalogue import catalogue, describe, describe_one
+
+    found = catalogue()
+    print(describe_one(found, name) if name else describe(found))
+
+
+def paper_figures(
+    out: Out = DEFAULT_OUT,
+    to: Path = Option(Path("figures"), help="Folder of the figures."),
+    only: list[str] | None = Option(None, help="Name of a figure, or comparison; may be repeated."),
+    formats: Formats = None,
+    jobs: Jobs = None,
+    engine: EngineName = None,
+    allow_failed_audit: AllowFailedAudit = False,
+) -> int:
+    """Draw the paper's figures with engine, theory and published values; missing runs are made first."""
+    from walkers.paper.make import FORMATS, make_figures
+    from walkers.progress import progress_of_sweep
+
+    how = By(engine=engine, allow_failed_audit=allow_failed_audit)
+    wanted, shown = only or (), formats or FORMATS
+    made = make_figures(out, to, on_cores(jobs), only=wanted, formats=shown, progress_of=progress_of_sweep, **how)
+    for name, failures in made.failures.items():
+        tell(*(f"{name}: point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
+    tell(*(f"{figure} is left out: {reason}" for figure, reason in made.left_out.items()))
+    print_lines(made.files)
+    if made.compared:
+        print(f"{made.agree} of {made.compared} published numbers agree: {to / 'comparison.md'}")
+    return 1 if made.failures or made.left_out else 0
+
+
+def paper_terms(to: Path = Option(Path("figures"), help="Folder of the table.")) -> None:
+    """Fit the theory to the published numbers with each further term; no engine is needed."""
+    from walkers.paper.model_terms import PAGE_NAME, try_model_terms
+
+    check_folder("--to", to)
+    print_lines(f"misfit {one.misfit:5.1f}, {one.met:2d} met: {one.name}" for one in try_model_terms(to))
+    print(to / PAGE_NAME)
+
+
+def calibrate(
+    calibration: str = Argument(metavar="CALIBRATION", help=_CALIBRATION),
+    out: Out = DEFAULT_OUT,
+    to: Path | None = Option(None, help="Folder of tables and figures; default: OUT/NAME."),
+    jobs: Jobs = None,
+    engine: EngineName = None,
+    allow_failed_audit: AllowFailedAudit = False,
+) -> int:
+    """Calibrate unknown parameters to published numbers; an interrupted calibration continues."""
+    from walkers.calibration.calibrate import calibrate
+    from walkers.calibration.report import write_outcome
+    from walkers.inputs.calibration import load_calibration
+    from walkers.progress import progress_of_sweep
+
+    read = load_calibration(calibration)
+    check_folder("--out", out)
+    folder = to or out / read.name
+    check_folder("--to", folder)
+    how = By(engine=engine, allow_failed_audit=allow_failed_audit)
+    found = calibrate(read, out, on_cores(jobs), progress_of=progress_of_sweep, **how)
+    tell(*(f"{name}: {len(failures)} points failed" for name, failures in found.failures.items()))
+    print_lines(write_outcome(found, folder))
+    return 0  # a set whose run fails is an outcome: it counts as far off

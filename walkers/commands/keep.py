@@ -1,0 +1,144 @@
+"""Commands that give runs away and remove them."""
+
+from __future__ import annotations
+
+import sys
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, Literal
+
+import typer
+from typer import Argument, Option
+
+from walkers import DEFAULT_OUT
+from walkers.commands.arguments import (
+    CaseName,
+    OlderThan,
+    Out,
+    RunOrSweep,
+    Set,
+    changes_of,
+    check_folder,
+    load_case,
+    load_run,
+    refuse,
+    refuse_given,
+    tell,
+)
+from walkers.completion import offering
+
+_FORM = (
+    "deck: the LIGGGHTS deck of the case. vtk: .vtp files and a .pvd. paraview: the same with a script that shows it. "
+    "xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an RO-Crate (.zip) to publish."
+)
+_OUTPUT = "File or folder to write; default: in the folder of the run; an archive here; a deck is printed."
+_EVERY = "vtk, paraview, xyz, lammps: write one of this many samples; default: one per cycle, all for xyz and lammps."
+_AS_PLACED = "vtk, paraview: leave independent walkers where the deck has them, not side by side."
+_WITHOUT_DUMPS = "archive: leave out the dumps of the engine; tables and results stay."
+_LICENCE = "archive: CC-BY-4.0 (default), CC0-1.0, CC-BY-SA-4.0 or BSD-3-Clause."
+_ANY = offering("case", "run", "sweep")
+_RUNS = "Runs and sweeps, by case, name in --out or folder."
+
+
+def export(
+    what: RunOrSweep,
+    form: Literal["deck", "vtk", "paraview", "xyz", "lammps", "archive"] = Option(..., "--to", help=_FORM),
+    output: Path | None = Option(None, "-o", "--output", help=_OUTPUT),
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    every: int | None = Option(None, min=1, help=_EVERY),
+    as_placed: bool = Option(False, "--as-placed", help=_AS_PLACED),
+    vtu: bool = Option(False, "--vtu", help="vtk: also write the beads as .vtu."),
+    colour: str | None = Option(None, help="paraview: array that colours the beads; default: walker, else speed."),
+    start: bool = Option(False, "--open", help="paraview: start ParaView with it."),
+    without_dumps: bool = Option(False, "--without-dumps", help=_WITHOUT_DUMPS),
+    author: list[str] | None = Option(None, help="archive: name of an author; may be repeated."),
+    orcid: list[str] | None = Option(None, help="archive: ORCIDs of the authors, in their order."),
+    licence: str | None = Option(None, help=_LICENCE),
+) -> None:
+    """Write a run for other programs: LIGGGHTS deck, VTK, ParaView, XYZ, LAMMPS dump, or an archive to publish."""
+    given = {
+        "--every": (every, ("vtk", "paraview", "xyz", "lammps")),
+        "--as-placed": (as_placed, ("vtk", "paraview")),
+        "--vtu": (vtu, ("vtk",)),
+        **{"--colour": (colour, ("paraview",)), "--open": (start, ("paraview",))},
+        **{"--without-dumps": (without_dumps, ("archive",)), "--licence": (licence, ("archive",))},
+        **{"--author": (author, ("archive",)), "--orcid": (orcid, ("archive",))},
+    }
+    for option, (value, forms) in given.items():
+        if form not in forms:
+            refuse_given({option: value}, f"is for --to {', '.join(forms)}")
+    if form == "deck":
+        from walkers.handles import export_deck
+        from walkers.templates.deck import RUN_NAME, render_deck
+
+        case = load_case(what, settings, out)
+        if output is None:
+            print(render_deck(case).text, end="")
+        else:
+            print(f"{export_deck(case, output)}    run it there with: sh {RUN_NAME}")
+        return
+    if form == "archive":
+        from walkers.archive.crate import Author
+        from walkers.archive.writing import ArchiveOptions, write_archive
+        from walkers.finding import NOT_A_RUN, find
+
+        refuse("--orcid", len(orcid or ()) > len(author or ()), "expected an --author for each")
+        authors = [Author(name, number) for name, number in zip_longest(author or (), orcid or ())]
+        place = find(what, out, changes_of(settings))
+        refuse(what, place.kind not in ("run", "sweep"), NOT_A_RUN.get(place.kind, ""))
+        print(write_archive(place.path, output, ArchiveOptions(not without_dumps, authors, licence or "CC-BY-4.0")))
+        return
+    found = load_run(what, settings, out)
+    wrong = as_placed and not found.case.apart
+    refuse("--as-placed", wrong, "is for independent walkers: these stand where they are")
+    print(written := found.export(form, output, **_options(form, every, as_placed, vtu, colour)))
+    if start:
+        from walkers.postprocess.paraview import open_paraview
+
+        open_paraview(written)
+
+
+def _options(form: str, every: int | None, as_placed: bool, vtu: bool, colour: str | None) -> dict[str, Any]:
+    """What the function that writes a form takes."""
+    if form in ("xyz", "lammps"):
+        return {"every": every or 1}
+    own = {"vtu": vtu} if form == "vtk" else {"colour": colour}
+    return {"every": every, "as_placed": as_placed, **own}
+
+
+def clean(
+    runs: list[str] | None = Argument(None, metavar="RUN|SWEEP", help=_RUNS, autocompletion=_ANY),
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    finished: bool = Option(False, "--finished", help="Also finished runs, except those of sweeps."),
+    case: CaseName = None,
+    older_than: OlderThan = None,
+    dry_run: bool = Option(False, "--dry-run", help="Print what would be removed; remove nothing."),
+    yes: bool = Option(False, "--yes", "-y", help="Do not ask."),
+) -> int:
+    """Remove interrupted and failed runs, or the given runs and sweeps, after asking; never a running one."""
+    from walkers.finding import find
+    from walkers.runner.directory import UNFINISHED
+    from walkers.sweeps.folder import clean, plan_cleaning
+
+    check_folder("--out", out)
+    refuse("--finished", finished and bool(runs), "has no meaning with given runs")
+    refuse("--set", bool(settings) and not runs, "expected a case beside")
+    changes = changes_of(settings)
+    given = [
+        folder if (folder := out / Path(one).name).suffix == UNFINISHED else find(one, out, changes).path
+        for one in runs or ()
+    ]
+    plan = plan_cleaning(out, given, finished=finished, case=case, older_than=older_than)
+    print(plan.as_text())
+    if dry_run or not (plan.remove or plan.locks):
+        return 0
+    if not yes:
+        refuse("--yes", not sys.stdin.isatty(), "expected: there is no terminal to ask at")
+        if not typer.confirm("remove them?"):
+            print("nothing removed")
+            return 0
+    left = clean(plan)
+    tell(*(f"{directory}: {why}" for directory, why in left.items()))
+    return 1 if left else 0

@@ -1,0 +1,250 @@
+"""Commands that look at results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from typer import Argument, Option
+
+import walkers
+from walkers import DEFAULT_OUT
+from walkers.commands.arguments import (
+    CaseName,
+    Formats,
+    Json,
+    OlderThan,
+    Out,
+    Run,
+    RunOrSweep,
+    Set,
+    SweepColumn,
+    changes_of,
+    load_any,
+    load_run,
+    print_as,
+    print_lines,
+    refuse,
+    refuse_given,
+    tell,
+)
+from walkers.completion import offering
+
+_ANY = offering("case", "run", "sweep")
+_LISTED = "A sweep, by its name or folder: print the status of its points and its table."
+_SWEEPS = offering("sweep")
+_ALL = "Also the runs of the sweeps."
+_WHERE = 'Only runs with this value, such as "drive.frequency=80 Hz"; may be repeated.'
+_TABLE = "Write the table of the sweep to this file (.csv, .parquet, .json), units included."
+_WITHIN = "Count climbs until this time, s of drive; default: until the first run without a climb ends."
+_THRESHOLDS = "Print the number of climbs for other definitions of a climb instead."
+_PILES = "Piles: sweeps, folders of runs, or runs (or their cases)."
+_NULL = "Runs in which nothing can climb: print their false climbs beside; may be repeated."
+_INTERVAL = "Pictures: time between them, as '2 s' or 'T/4' (T: a cycle); default: evenly over the run."
+_SLOWDOWN = "Film: this many times slower than in reality; default: a film of 5 to 10 s."
+
+
+def list_(
+    sweep: str | None = Argument(None, metavar="SWEEP", help=_LISTED, autocompletion=_SWEEPS),
+    out: Out = DEFAULT_OUT,
+    every: bool = Option(False, "--all", help=_ALL),
+    case: CaseName = None,
+    status: Literal["finished", "running", "interrupted", "failed"] | None = Option(
+        None, help="Only runs and sweeps with this status."
+    ),
+    older_than: OlderThan = None,
+    where: list[str] | None = Option(None, metavar="KEY=VALUE", help=_WHERE),
+    sort: Literal["name", "status", "velocity", "age", "size"] = Option(
+        "name", help="Order; the fastest, youngest or largest first."
+    ),
+    reverse: bool = Option(False, "--reverse", help="Reverse the order."),
+    to: Path | None = Option(None, help=_TABLE),
+    as_json: Json = False,
+) -> None:
+    """List runs and sweeps with velocity or climbs, status, age and size; or the points of one sweep, as a table."""
+    from walkers.sweeps import folder
+
+    if sweep is not None:
+        given = {"--case": case, "--status": status, "--older-than": older_than, "--where": where, "--all": every}
+        refuse_given({**given, "--sort": sort != "name", "--reverse": reverse}, "is for folders, not for a sweep")
+        _list_points(sweep, out, to, as_json)
+        return
+    refuse("--to", to is not None, "expected a sweep, whose table is written")
+    found = folder.inventory(out)
+    hidden = [] if every or where else folder.members(found)
+    shown = folder.select(found, case=case, status=status, older_than=older_than, where=where or ())
+    shown = folder.ordered([one for one in shown if one not in hidden], sort, reverse=reverse)
+    print_as(as_json, lambda: folder.as_json(shown), lambda: folder.as_text(shown, hidden=len(hidden)))
+
+
+def _list_points(sweep: str, out: Path, to: Path | None, as_json: bool) -> None:
+    from walkers.pipeline import load_sweep
+    from walkers.sweeps import table
+
+    found = load_sweep(sweep, out)
+    if to is not None:
+        table.write_table_file(found.table(), to)
+        print(to)
+    elif as_json:
+        print(table.encoded(found.table(), "json").decode(), end="")
+    else:
+        print(found.describe())
+
+
+def plot(
+    run: RunOrSweep,
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    to: Path | None = Option(None, help="Runs: folder of the figures. Sweeps: file (.png, .pdf, .svg)."),
+    x: str | None = Option(None, help="Sweeps: a key that varies, or a column of the table."),
+    y: SweepColumn = None,
+    hue: str | None = Option(None, help="Sweeps: key or column shown by colours; or none."),
+    panels: str | None = Option(None, help="Sweeps: key or column shown by panels; or none."),
+    log_x: bool = Option(False, "--logx", help="Sweeps: logarithmic x."),
+    log_y: bool = Option(False, "--logy", help="Sweeps: logarithmic y."),
+    theory: bool = Option(False, "--theory", help="Sweeps: also draw what the theory predicts."),
+    formats: Formats = None,
+) -> None:
+    """Plot a run (path, turning and gait of walkers, climbs of piles) or a column of a sweep's table."""
+    found = load_any(run, settings, out)
+    if isinstance(found, walkers.Sweep):
+        refuse("--format", bool(formats), "is for runs: a sweep's figure has the format of --to's name")
+        log = "x" * log_x + "y" * log_y
+        print_lines(found.plot(to, x=x, y=y, hue=hue, panels=panels, log=log, theory=theory))
+        return
+    given = {"--x": x, "--y": y, "--hue": hue, "--panels": panels, "--logx": log_x, "--logy": log_y, "--theory": theory}
+    refuse_given(given, "is for sweeps")
+    print_lines(found.plot(to, formats or ["png"]))
+
+
+def render(
+    run: Run,
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    to: Path | None = Option(None, help="File: .png; films: .mp4 or .gif. Default: in the folder of the run."),
+    walker: int | None = Option(None, min=0, help="Number of the walker to show; default: the first, or the whole."),
+    images: int | None = Option(None, min=1, max=20, help="Pictures: how many; default: 6."),
+    interval: str | None = Option(None, help=_INTERVAL),
+    film: bool = Option(False, "--film", help="Render a film instead of pictures."),
+    size: str | None = Option(None, help="Film: 360p, 480p, 720p, 1080p, or pixels as 1280x720; default: 720p."),
+    fps: int | None = Option(None, min=1, max=60, help="Film: frames per second; default: 25."),
+    slowdown: float | None = Option(None, min=0.05, max=10000.0, help=_SLOWDOWN),
+    begin: str | None = Option(None, "--from", help="Film: physical time of the first frame, as '0.1 s'."),
+    end: str | None = Option(None, "--until", help="Film: physical time of the last frame."),
+) -> None:
+    """Render pictures of a run at several times, or a film of it with --film."""
+    from walkers.postprocess.films import FilmOptions, parse_size, parse_time
+    from walkers.postprocess.series import render_series, seconds_apart
+    from walkers.progress import progress_of_film
+
+    of_films = {"--size": size, "--fps": fps, "--slowdown": slowdown, "--from": begin, "--until": end}
+    if film:
+        refuse_given({"--images": images, "--interval": interval}, "is for pictures, not for --film")
+    else:
+        refuse_given(of_films, "is for --film")
+    refuse("--interval", interval is not None and walker is not None, "is for pictures of the whole")
+    found = load_run(run, settings, out)
+    if film:
+        options = FilmOptions(
+            size=parse_size(size or "720p"),
+            fps=fps or 25,
+            slowdown=slowdown,
+            walker=walker,
+            begin=parse_time("--from", begin) if begin else 0.0,
+            end=parse_time("--until", end) if end else None,
+        )
+        with progress_of_film(found.case.name) as advance:
+            path = found.film(to, options, on_progress=advance)
+        print(path)
+        return
+    number = images or 6
+    if walker is not None:
+        count = sum(make.replicates for make in found.case.walkers)
+        refuse("--walker", not count, "the run has none")
+        refuse("--walker", walker >= count, f"expected less than {count}, the run's number of walkers")
+        print_lines(render_series(found.directory, to, images=number, walker=walker))
+    elif interval is not None:
+        apart = seconds_apart(interval, found.directory)
+        print_lines(render_series(found.directory, to, images=number, apart=apart))
+    else:
+        print_lines(found.render(to, images=number))
+
+
+def report(
+    what: RunOrSweep,
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    to: Path | None = Option(None, help="The HTML file; default: report.html in the folder of the run or sweep."),
+) -> None:
+    """Write one HTML file to mail: parameters, results, plots, and a 3-D view of the motion."""
+    from walkers.postprocess.report.page import check_report
+
+    if to is not None:
+        check_report(to)
+    print(load_any(what, settings, out).report(to))
+
+
+def compare(
+    first: RunOrSweep,
+    second: RunOrSweep,
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    y: SweepColumn = None,
+    as_json: Json = False,
+) -> None:
+    """Print the differences of two runs or cases, in parameters and results; or of two sweeps, point by point."""
+    from walkers.finding import placed
+    from walkers.pipeline import find_side
+    from walkers.sweeps.comparison import compare_runs, compare_sweeps
+
+    changes = changes_of(settings)
+    there = {one: placed(one, out) for one in (first, second)}
+    sweeps = {one: place.path for one, place in there.items() if place and place.kind == "sweep"}
+    if sweeps.keys() == there.keys():
+        refuse("--set", bool(changes), "is for runs and cases")
+        found = compare_sweeps(sweeps[first], sweeps[second], y)
+    else:
+        for one in sweeps:
+            refuse(one, True, "is a sweep, to be compared with another sweep")
+        refuse("--y", y is not None, "is for sweeps")
+        found = compare_runs(find_side(first, out, changes), find_side(second, out, changes))
+    print_as(as_json, lambda: found.contents, lambda: found.text)
+
+
+def climb(
+    what: list[str] = Argument(metavar="WHAT", help=_PILES, autocompletion=_ANY),
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    within: float | None = Option(None, min=1e-9, help=_WITHIN),
+    thresholds: bool = Option(False, "--sensitivity", help=_THRESHOLDS),
+    null: list[str] | None = Option(None, help=_NULL),
+    to: Path | None = Option(None, help="Write the figure (.png, .svg, .pdf) or the table (.csv) into this file."),
+    as_json: Json = False,
+) -> None:
+    """Print how often, how soon and how fast clusters climb in piles: rates with exact intervals, by conditions."""
+    from walkers.finding import find
+    from walkers.postprocess.drawing import FORMATS, check_place
+    from walkers.sweeps import climbing
+    from walkers.sweeps.climbing_figure import write_climbs
+
+    if to is not None:
+        check_place(to, *(f".{form}" for form in FORMATS), ".csv")
+    changes = changes_of(settings)
+    places = [find(one, out, changes).path for one in what]
+    conditions = climbing.conditions_in(places)
+    tell(*(f"warning: {left}" for place in places if (left := climbing.unfinished_points(place))))
+    lines: list[str] = []
+    found: list[dict[str, Any]] = []
+    if thresholds or null:
+        refuse_given({"--within": within, "--to": to}, "has no meaning with --sensitivity or --null")
+        nulls = climbing.conditions_in([find(one, out).path for one in null]) if null else []
+        named = [(one.label, one) for one in conditions] + [(f"null: {one.label}".rstrip(), one) for one in nulls]
+        for label, one in named:
+            found.append({"condition": label, "thresholds": climbing.sensitivity(one.runs)})
+            lines += filter(None, [label, climbing.describe_sensitivity(found[-1]["thresholds"])])
+    else:
+        found = [climbing.summarise(one, within) for one in conditions]
+        lines += map(climbing.describe, found)
+        if to is not None:
+            write_climbs(conditions, found, to)
+    print_as(as_json, lambda: found, lambda: "\n".join(lines))

@@ -1,0 +1,181 @@
+"""Commands that prepare and run simulations."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Literal
+
+from typer import Argument, Option
+
+import walkers
+from walkers import DEFAULT_OUT
+from walkers.commands.arguments import (
+    AllowFailedAudit,
+    By,
+    Case,
+    EngineName,
+    Jobs,
+    Json,
+    Out,
+    Set,
+    changes_of,
+    check_folder,
+    load_case,
+    on_cores,
+    print_as,
+    print_lines,
+    refuse,
+    tell,
+)
+from walkers.completion import offering
+
+_MANY = 10_000
+"""Points of a sweep that take seconds to be resolved."""
+_NAME = "Name of the case: NAME.toml is written."
+_FROM = "A shipped case to copy instead, such as pile-small (walkers library)."
+_OFFERED = offering("case", "run")
+_CASES = "Case files, names of shipped cases, or runs by their names or folders."
+_LIMIT = "Stop a run (of a pile: a segment) after this many seconds."
+_SPREAD = "Also run with values drawn from the ranges of what is not known: a band."
+_SWEEP_FILE = "A sweep file, or a shipped sweep such as fig2."
+
+
+def new(
+    name: str = Argument(metavar="NAME", help=_NAME),
+    kind: Literal["walker", "cluster", "pile"] = Option("walker", help="What the case simulates."),
+    source: str | None = Option(None, "--from", metavar="CASE", help=_FROM, autocompletion=offering("case")),
+) -> None:
+    """Write a commented case file to begin with."""
+    from walkers.inputs.beginning import write_case
+
+    refuse("--kind", source is not None and kind != "walker", "has no meaning with --from")
+    print(write_case(Path(name), kind, source))
+
+
+def show(
+    case: Case,
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    theory: bool = Option(
+        False, "--theory", help="Print what the theory predicts instead, beside the result of the run if there is one."
+    ),
+    as_json: Json = False,
+) -> None:
+    """Show every value of a case and its source, the forces, the time step and the predicted run time."""
+    loaded = load_case(case, settings, out)
+    if not theory:
+        from walkers.runner.summary import describe, summarise
+
+        summary = summarise(loaded)
+        print_as(as_json, lambda: summary, lambda: describe(summary))
+        return
+    from walkers.inputs.errors import InputError, Problem
+    from walkers.pipeline import load_run
+    from walkers.runner.failures import EngineMissing
+    from walkers.theory import prediction
+
+    try:
+        predicted = prediction.predict(loaded)
+    except ValueError as error:
+        key, _, why = str(error).partition(": ")
+        raise InputError(case, [Problem(key, None, why)]) from error
+    found: dict[str, Any] | None = None
+    with suppress(InputError, EngineMissing):  # not run yet, or never to be run here
+        found = load_run(loaded, out).result
+    print_as(as_json, lambda: {**predicted, "engine": found}, lambda: prediction.describe(predicted, found))
+
+
+def run(
+    cases: list[str] = Argument(metavar="CASE", help=_CASES, autocompletion=_OFFERED),
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    force: bool = Option(False, "--force", help="Run again even if the run exists."),
+    as_json: Json = False,
+    limit: float | None = Option(None, min=0.0, help=_LIMIT),
+    spread: bool = Option(False, "--spread", help=_SPREAD),
+    points: int | None = Option(None, min=2, max=4096, help="Number of runs of --spread; default: 32."),
+    engine: EngineName = None,
+    allow_failed_audit: AllowFailedAudit = False,
+) -> int:
+    """Run cases and print their results; a run that exists is printed, an interrupted one continued."""
+    from walkers.finding import case_at
+    from walkers.pipeline import finished_at
+    from walkers.progress import progress_of, progress_of_sweep
+    from walkers.runner.failures import EngineFailure
+    from walkers.runner.summary import notes
+
+    refuse("--points", points is not None and not spread, "is for --spread")
+    # A mistake in the last file shows before the first run starts.
+    loaded = [case_at(case, out, changes_of(settings)) for case in cases]
+    there = [None if settings or force else finished_at(case, out) for case in cases]
+    check_folder("--out", out)
+    if spread:
+        from walkers.sweeps.spread import POINTS, describe, run_spread, spread_sweep
+
+        for case, _ in loaded:  # and so does a range that its key does not take
+            list(spread_sweep(case, points or POINTS, engine).cases())
+    failed, how = False, By(engine=engine, allow_failed_audit=allow_failed_audit)
+    for (case, folder), found in zip(loaded, there, strict=True):
+        tell(*(f"{case.name}: {note}" for note in notes(case) if found is None))
+        try:
+            with progress_of(case.name) as advance:
+                done = found or walkers.run(case, folder, force=force, progress=advance, time_limit=limit, **how)
+        except EngineFailure as failure:
+            tell(f"{case.name}: {failure}")
+            failed = True
+            continue
+        band = None
+        if spread:
+            with progress_of_sweep(f"{case.name}, spread") as advance_sweep:
+                options = on_cores(None)
+                band = run_spread(case, folder, options, points=points or POINTS, on_progress=advance_sweep, **how)
+            failed |= bool(band.failures)
+        if as_json:
+            ranges = {"spread": band.as_dict()} if band else {}
+            print(json.dumps({**done.result, **ranges, "run": str(done.directory), "cached": done.cached}))
+        else:
+            print_lines([done.describe(), *([describe(band, done.result)] if band else [])])
+    return 1 if failed else 0
+
+
+def sweep(
+    sweep: str = Argument(metavar="SWEEP", help=_SWEEP_FILE, autocompletion=offering("sweep file")),
+    settings: Set = None,
+    out: Out = DEFAULT_OUT,
+    jobs: Jobs = None,
+    site: Path | None = Option(None, help="A site file: run on that cluster instead."),
+    dry_run: bool = Option(False, "--dry-run", help="Print what would be run, and the cost; write nothing."),
+    retries: int = Option(0, min=0, help="Number of times a failed point is tried again."),
+    limit: float | None = Option(None, min=0.0, help="Stop an engine after this many seconds."),
+    engine: EngineName = None,
+    allow_failed_audit: AllowFailedAudit = False,
+) -> int:
+    """Run the missing points of a sweep, on all cores or on a cluster; exit status 1 if a point failed."""
+    from dataclasses import replace
+
+    from walkers.inputs.sweep import load_sweep
+    from walkers.postprocess.analysis import lines_of_rest, rests_on
+    from walkers.progress import progress_of_sweep
+    from walkers.sweeps.scheduler import plan_sweep, run_sweep
+    from walkers.sweeps.site import load_site
+    from walkers.sweeps.table import describe_status
+
+    loaded = load_sweep(sweep, changes_of(settings))
+    check_folder("--out", out)
+    refuse("--jobs", jobs is not None and site is not None, "the site file sets how many decks run at once")
+    if len(loaded.rows) > _MANY:
+        tell(f"{loaded.name}: resolving {len(loaded.rows)} points, about 2,000 per second")
+    options = replace(on_cores(jobs), site=load_site(site) if site else None, retries=retries, time_limit=limit)
+    if dry_run:
+        print(plan_sweep(loaded, out, options, engine).as_text())
+        return 0
+    with progress_of_sweep(loaded.name) as advance:
+        how = By(engine=engine, allow_failed_audit=allow_failed_audit)
+        record, failures = run_sweep(loaded, out.resolve() if site else out, options, on_progress=advance, **how)
+    tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
+    print(f"{describe_status(record.directory)}\n  table      walkers list {record.directory}")
+    same = [one for one in next(loaded.cases()).origins if one.key not in loaded.keys]  # what varies is in the table
+    print_lines(lines_of_rest(rests_on(same)))
+    return 1 if failures else 0

@@ -1,0 +1,186 @@
+"""What a user calls a run, a sweep or a case, and what there is of it: in this way all commands find things."""
+
+from __future__ import annotations
+
+import shlex
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from walkers import DEFAULT_OUT, RECORDS
+from walkers.inputs.errors import WalkersError, refused
+from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped_cases, with_changes
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import (
+    CASE_NAME,
+    UNFINISHED,
+    FinishedRun,
+    case_of,
+    finished_run,
+    is_locked,
+    is_run_name,
+    layout_of,
+    run_place,
+    unfinished,
+)
+
+if TYPE_CHECKING:
+    from walkers.inputs.case import Case
+
+NOT_A_RUN = {
+    "folder": "not a finished run: expected a folder with a manifest.json",
+    "calibration": "a calibration's outcome: its report is calibration.md",
+    "sweep": "is a sweep: expected one of its runs; walkers list, plot, report and compare take sweeps",
+    "archive": "an archive: unpack it and give a run or a sweep in it; walkers check files takes it as it is",
+}
+
+
+class Place(NamedTuple):
+    """Where something is that a user named; what it is (of `RECORDS`, ``archive`` or ``folder``); by which case.
+
+    A run need not be finished: its place is where it belongs.
+    """
+
+    path: Path
+    kind: str
+    case: Case | None = None
+
+
+def placed(name: str | Path, out: Path = DEFAULT_OUT) -> Place | None:
+    """What there is of a name, as a path or in a folder of runs, but for the runs of cases.
+
+    A folder shadows no shipped case by its name alone.
+    """
+    path = Path(name)
+    with suppress(OSError):  # a name that no file system takes
+        for place in (path, out / path):
+            for kind, file in RECORDS.items():
+                if (place / file).is_file():
+                    return Place(place, kind)
+            bare = place.parent / place.name.removesuffix(UNFINISHED)
+            if is_run_name(bare.name) and _is_begun(bare):
+                return Place(bare, "run")
+        if (out / path.stem / RECORDS["sweep"]).is_file() and is_sweep_file(path):
+            return Place(out / path.stem, "sweep")
+        if path.suffix == ".zip" and path.is_file():
+            return Place(path, "archive")
+        if path.is_dir() and str(name) not in shipped_cases():
+            return Place(path, "folder")
+    return None
+
+
+def files_of(place: Path) -> Path:
+    """Where the files of a run are, finished or not."""
+    return place if finished_run(place) else unfinished(place)
+
+
+def _is_begun(place: Path) -> bool:
+    """Whether a run that is not finished is being made, or was interrupted, whose place this is."""
+    return (unfinished(place) / CASE_NAME).is_file() or is_locked(place)
+
+
+def case_at(
+    what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
+) -> tuple[Case, Path]:
+    """The case that a user names, and the folder in which its run belongs.
+
+    Parameters
+    ----------
+    what
+        A case: resolved, a file, or a shipped one by its name. Or a run, by its name in ``out`` or its directory: then
+        its case, whose run belongs beside it.
+    out
+        Folder of the run directories.
+    changes
+        Values put in place of the case's, by dotted keys.
+    """
+    out = Path(out)
+    if not isinstance(what, (str, Path)):
+        return with_changes(what, changes), out
+    there = placed(what, out)
+    if there and there.kind in RECORDS and there.kind != "run":
+        find_input(there.path, "case")
+        raise refused(what, NOT_A_RUN[there.kind])
+    if there is None or there.kind != "run":
+        return load_case(what, changes), out
+    with _told(there.path, "the case of the run cannot be read"):
+        case = case_of(files_of(there.path))
+    return with_changes(case, changes), there.path.parent
+
+
+def find(what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None) -> Place:
+    """Find what a user names: the one way in which all commands do. Nothing in it is read or made anew.
+
+    Parameters
+    ----------
+    what
+        A run or a sweep: its directory, or its name in ``out``; a case (resolved, file or shipped name), whose run
+        with the installed engine is looked up; a sweep file; anything else of `RECORDS`, a zip file or a folder.
+    out
+        Folder of the run directories.
+    changes
+        Values in place of those of the case, or of the run's case, by dotted keys: the run with these.
+
+    Raises
+    ------
+    InputError
+        If there is no such thing.
+    runner.EngineFailure
+        If a case is given and there is no engine to look its run up for.
+    """
+    if not changes and isinstance(what, (str, Path)) and (there := placed(what, Path(out))):
+        return there
+    case, folder = case_at(what, out, changes)
+    place = run_place(case, find_engine(), folder)
+    if finished_run(place) or _is_begun(place):
+        return Place(place, "run", case)
+    name = what if isinstance(what, (str, Path)) else case.name
+    settings = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in (changes or {}).items()]
+    raise refused(name, f"no finished run in {folder}; first do: walkers run {' '.join([str(name), *settings])}")
+
+
+# --- checking ---------------------------------------------------------------------------------------------------------
+
+
+class IncompleteRunWarning(UserWarning):
+    """The dump of a finished run is shorter than its layout says: somebody cut it since."""
+
+
+def check_run(directory: Path, *, dumps: bool = True) -> None:
+    """Refuse a finished run that cannot be read; its tables are made anew if need be."""
+    from walkers.postprocess.analysis import current_result
+
+    run = FinishedRun(directory)
+    for name in ("manifest", "case", "layout"):
+        with _told(directory, f"the run's {name}.json cannot be read"):
+            getattr(run, name)
+    if dumps:
+        _check_dumps(run)
+    with _told(directory, "the run cannot be read"):
+        current_result(directory)
+
+
+@contextmanager
+def _told(directory: Path, message: str) -> Iterator[None]:
+    """Turn what a damaged file leads to into one message of bad input."""
+    try:
+        yield
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, WalkersError) as error:
+        raise refused(directory, f"{message} ({error})") from error
+
+
+def _check_dumps(run: FinishedRun) -> None:
+    """Refuse a run without a dump that no archive left out; warn of one that was cut."""
+    left_out = run.manifest.get("left_out", ())  # of an archive
+    for segment in run.segments:
+        layout = layout_of(segment)
+        dump = segment / layout.bead_dump
+        if dump.relative_to(run.directory).as_posix() in left_out:
+            continue
+        if not dump.is_file():
+            raise refused(run.directory, f"the run's {layout.bead_dump} is missing")
+        if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
+            told = f"{dump} is incomplete: what is drawn or written ends early"
+            warnings.warn(told, IncompleteRunWarning, stacklevel=5)

@@ -1,0 +1,357 @@
+"""Runs and sweeps as Python sees them: what they gave, and what can be made of them."""
+
+from __future__ import annotations
+
+import base64
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from walkers.finding import files_of
+from walkers.inputs.errors import refused
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import FAILURE_NAME, ask_to_stop, case_of, finished_run, is_locked, unfinished
+from walkers.runner.files import read_json
+
+if TYPE_CHECKING:
+    import k3d
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from walkers.inputs.case import Case
+    from walkers.inputs.origins import Origin
+    from walkers.postprocess.films import FilmOptions
+    from walkers.postprocess.motion import Motion
+    from walkers.runner.launch import Progress
+
+Export = Literal["deck", "vtk", "paraview", "xyz", "lammps", "archive"]
+
+
+class Pictures(list[Path]):
+    """Paths of pictures; a notebook shows the pictures themselves."""
+
+    def _repr_html_(self) -> str:
+        """The PNGs, one below the other; of other files the names."""
+        shown = []
+        for path in self:
+            if path.suffix.lower() == ".png" and path.is_file():
+                source = f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"
+                shown.append(f'<img src="{source}" alt="{escape(path.stem)}" style="max-width:100%">')
+            else:
+                shown.append(f"<p>{escape(str(path))}</p>")
+        return "\n".join(shown)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run: finished, or being made, interrupted or failed. `InputError` if a result is asked for before it is there.
+
+    Attributes
+    ----------
+    directory
+        The run directory. A run that is not finished is in the folder of this name with ``.incomplete`` appended.
+    cached
+        Whether it was there before.
+    origins
+        Where the values of the case come from by which it was asked for; None: of that by which it was made. The same
+        numbers may once have been given and once be the library's.
+    """
+
+    directory: Path
+    cached: bool = True
+    origins: tuple[Origin, ...] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Take the name of a directory for the directory."""
+        object.__setattr__(self, "directory", Path(self.directory))
+
+    @property
+    def status(self) -> str:
+        """``finished``, ``running``, ``interrupted`` or ``failed``."""
+        from walkers.sweeps.table import unfinished_state
+
+        if finished_run(self.directory):
+            return "finished"
+        status = unfinished_state(self.directory, unfinished(self.directory)).status
+        return "interrupted" if status == "missing" else status
+
+    @property
+    def progress(self) -> Progress | None:
+        """How far a run is that is being made, by whatever process; None if its files do not say."""
+        from walkers.sweeps.making import progress_at
+
+        return progress_at(self.directory) if is_locked(self.directory) else None
+
+    @property
+    def last_frame(self) -> Motion:
+        """The last complete frame of its motion, of a run that is being made too."""
+        from walkers.postprocess.motion import read_last_frame
+
+        return read_last_frame(self._files)
+
+    def stop(self, patience: float = 30.0) -> str:
+        """Stop it if it is being made, whichever process makes it; its status then, after at most ``patience`` seconds.
+
+        Its complete segments stay: ``walkers run`` continues with them. A point that a sweep makes in a deck with
+        others goes on.
+        """
+        ask_to_stop(self.directory)
+        end = time.monotonic() + patience
+        while is_locked(self.directory) and time.monotonic() < end:
+            time.sleep(0.05)
+        return self.status
+
+    @property
+    def finished_directory(self) -> Path:
+        """Its directory; `InputError` if it is not finished."""
+        if finished_run(self.directory) is None:
+            raise refused(self.directory, f"the run is {self._state}")
+        return self.directory
+
+    @property
+    def _files(self) -> Path:
+        """Where its files are now."""
+        return files_of(self.directory)
+
+    @property
+    def _state(self) -> str:
+        """What has become of an unfinished run, and what to do."""
+        if (status := self.status) == "running":
+            return f"running{f': {progress}' if (progress := self.progress) else ''}"
+        failure = self._files / FAILURE_NAME
+        told = f": {read_json(failure).get('message')}" if failure.is_file() else ""
+        return f"{status}{told}; continue it with: walkers run {self.directory}"
+
+    @property
+    def case(self) -> Case:
+        """The resolved case."""
+        return case_of(self._files)
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The result, SI units."""
+        from walkers.postprocess.analysis import current_result, rests_on
+
+        result = current_result(self.finished_directory)
+        return result if self.origins is None else {**result, "rests_on": rests_on(self.origins)}
+
+    @property
+    def motion(self) -> Motion:
+        """Places, velocities and spins of all beads, as arrays; of an unfinished run those of its whole segments."""
+        from walkers.postprocess.motion import read_motion
+
+        return read_motion(self._files)
+
+    @property
+    def trajectory(self) -> pd.DataFrame:
+        """One row per sample and walker, SI units."""
+        return self.table("trajectory")
+
+    @property
+    def walkers(self) -> pd.DataFrame:
+        """One row per walker, SI units."""
+        return self.table("walkers")
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table of the run, see `walkers.postprocess.read_table`."""
+        from walkers.postprocess.tables import read_table
+
+        return read_table(self.finished_directory, name)
+
+    def describe(self) -> str:
+        """The result in a few lines: mm, mm/s, degrees; of an unfinished run how far it is."""
+        from walkers.postprocess.analysis import describe_result
+
+        if finished_run(self.directory) is None:
+            return f"{self.directory.name}: {self._state}"
+        return describe_result(self.directory, self.result, cached=self.cached)
+
+    def _repr_html_(self) -> str:
+        """The result in a notebook: a table with errors and units, warnings, the parameters folded in."""
+        from walkers.postprocess.report.run import result_html
+
+        if finished_run(self.directory) is None:
+            return f"<p>{escape(self.describe())}</p>"
+        return result_html(self.directory, self.result, self.origins)
+
+    def plot(self, to: str | Path | None = None, formats: Sequence[str] = ("png",)) -> Pictures:
+        """Draw its figures, see `walkers.postprocess.analysis.plot_run`: a list of paths, which a notebook shows."""
+        from walkers.postprocess.analysis import plot_run
+
+        return Pictures(plot_run(self.finished_directory, _path(to), formats))
+
+    def render(self, to: str | Path | None = None, *, images: int = 6) -> Pictures:
+        """Render pictures of it, see `walkers.postprocess.series.render_run`: paths, which a notebook shows."""
+        from walkers.postprocess.series import render_run
+
+        return Pictures(render_run(self.finished_directory, _path(to), images=images))
+
+    def film(
+        self,
+        to: str | Path | None = None,
+        options: FilmOptions | None = None,
+        *,
+        on_progress: Callable[[int, int], None] | None = None,
+    ) -> Path:
+        """Film it, see `walkers.postprocess.films.render_film`."""
+        from walkers.postprocess.films import render_film
+
+        return render_film(self.finished_directory, _path(to), options, on_progress=on_progress)
+
+    def view(self, *, height: int = 480) -> k3d.Plot:
+        """Its beads in three dimensions, for a notebook, so many pixels high.
+
+        Examples
+        --------
+        >>> len(walkers.run("fig1b", tmp).view().objects)  # twelve beads, the floor, the lines on it
+        14
+        """
+        from walkers.postprocess.report.player import player_of
+
+        return player_of(self.finished_directory, height=height).plot
+
+    def report(self, to: str | Path | None = None) -> Path:
+        """Write one HTML file to mail, see `walkers.postprocess.report.run.report_run`.
+
+        Examples
+        --------
+        >>> walkers.run("fig1b", tmp).report(tmp / "fig1b.html").name
+        'fig1b.html'
+        """
+        from walkers.postprocess.report.run import report_run
+
+        return report_run(self.finished_directory, _path(to), self.origins)
+
+    def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
+        """Write it for other programs.
+
+        Parameters
+        ----------
+        form
+            ``vtk`` or ``paraview`` (`walkers.postprocess.paraview`), ``xyz`` or ``lammps``
+            (`walkers.postprocess.trajectory_files`), ``archive`` (`walkers.archive.writing`), ``deck`` (`export_deck`).
+        to
+            The file, or the folder of ``vtk``, ``paraview`` and ``deck``; in the run directory if None, ``archive`` and
+            ``deck`` in the current folder.
+        options
+            What these functions take, such as ``every``; of an archive the fields of `ArchiveOptions`.
+
+        Examples
+        --------
+        >>> walkers.run("fig1b", tmp).export("xyz", tmp / "walk.xyz", every=20).name
+        'walk.xyz'
+        """
+        from walkers.archive.writing import ArchiveOptions, write_archive
+        from walkers.postprocess.paraview import write_paraview, write_vtk
+        from walkers.postprocess.trajectory_files import SUFFIXES, write_trajectory
+
+        place = _path(to)
+        if form == "deck":
+            return export_deck(self.case, place or Path(f"{self.directory.name}-deck"))
+        if form == "archive":
+            return write_archive(self.finished_directory, place, ArchiveOptions(**options))
+        if form in SUFFIXES:
+            place = place or self.finished_directory / f"trajectory{SUFFIXES[form][0]}"
+            return write_trajectory(self.finished_directory, place, form, **options)
+        write = {"vtk": write_vtk, "paraview": write_paraview}[form]
+        return write(self.finished_directory, destination=place, **options)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep: its points, each with a run, and the table of what they gave.
+
+    Attributes
+    ----------
+    directory
+        Of the sweep; the runs of its points are beside it.
+    """
+
+    directory: Path
+
+    def __post_init__(self) -> None:
+        """Refuse what is no sweep."""
+        from walkers.sweeps.table import read_record
+
+        object.__setattr__(self, "directory", Path(self.directory))
+        read_record(self.directory)
+
+    @property
+    def status(self) -> str:
+        """``finished``, ``running``, ``failed`` (some points) or ``interrupted`` (points are missing)."""
+        from walkers.sweeps.table import read_record, states, worst_status
+
+        return worst_status(state.status for state in states(read_record(self.directory)))
+
+    @property
+    def runs(self) -> list[Run]:
+        """The run of each point, finished or not."""
+        from walkers.sweeps.table import read_record
+
+        record = read_record(self.directory)
+        return [Run(record.out / name) for name in record.runs]
+
+    def table(self) -> pd.DataFrame:
+        """One row per point, see `walkers.sweeps.table.load`."""
+        from walkers.sweeps.table import load
+
+        return load(self.directory)
+
+    def describe(self) -> str:
+        """Numbers of points by status, why points failed, and the table: mm/s."""
+        from walkers.sweeps.table import describe_status, short_text
+
+        return f"{describe_status(self.directory)}\n\n{short_text(self.table())}"
+
+    def _repr_html_(self) -> str:
+        """The table in a notebook."""
+        return str(self.table()._repr_html_())  # type: ignore[operator]
+
+    def figure(self, **choices: Any) -> Figure:
+        """A figure of its table, to be changed or shown, see `walkers.plotting.sweep_figure`."""
+        from walkers.plotting import sweep_figure
+
+        return sweep_figure(self.directory, **choices)
+
+    def plot(self, to: str | Path | None = None, **choices: Any) -> Pictures:
+        """Draw its table into a file, see `walkers.plotting.plot_sweep`."""
+        from walkers.plotting import plot_sweep
+
+        return Pictures([plot_sweep(self.directory, to, **choices)])
+
+    def report(self, to: str | Path | None = None) -> Path:
+        """Write one HTML file to mail, see `walkers.sweeps.report.report_sweep`."""
+        from walkers.sweeps.report import report_sweep
+
+        return report_sweep(self.directory, _path(to))
+
+    def export(self, form: Export = "archive", to: str | Path | None = None, **options: Any) -> Path:
+        """Pack it with its runs into an ``archive``, see `Run.export`; there is no other form."""
+        from walkers.archive.writing import ArchiveOptions, write_archive
+
+        if form != "archive":
+            raise refused(self.directory, f"is a sweep: expected one of its runs for {form}, or archive")
+        return write_archive(self.directory, _path(to), ArchiveOptions(**options))
+
+
+def _path(to: str | Path | None) -> Path | None:
+    return None if to is None else Path(to)
+
+
+def export_deck(case: Case, folder: Path) -> Path:
+    """Write the deck of a case, its files and ``run.sh`` into a new folder, to be run by hand; the deck's path."""
+    from walkers.runner.binary import plugin_of, run_script
+    from walkers.runner.directory import write_deck
+    from walkers.templates.deck import DECK_NAME, RUN_NAME, render_deck
+
+    made, plugin = render_deck(case), plugin_of(find_engine())
+    try:
+        folder.mkdir(parents=True)
+    except OSError as error:
+        raise refused(folder, f"expected a new folder ({error.strerror})") from error
+    write_deck(made, folder)
+    (folder / RUN_NAME).write_text(run_script(plugin, made.layout.ranks), encoding="utf-8")
+    return folder / DECK_NAME
