@@ -130,7 +130,7 @@ def run(
             found = {"spread": band.as_dict()} if band else {}
             print(json.dumps({**done.result, **found, "run": str(done.directory), "cached": done.cached}))
         else:
-            print_lines([done.describe(), *([describe(band, done.result)] if band else [])])
+            print_lines([done.describe(), *([describe(band)] if band else [])])
     return 1 if failed else 0
 
 

@@ -71,7 +71,7 @@ def sweep(
 
     from walkers.inputs.changes import settings_of
     from walkers.inputs.sweep import load_sweep
-    from walkers.postprocess.analysis import lines_of_rest, rests_on
+    from walkers.postprocess.uncertainty import lines_of_rest, rests_on
     from walkers.progress import progress_of_sweep
     from walkers.sweeps.scheduler import plan_sweep, run_sweep
     from walkers.sweeps.site import load_site
