@@ -14,7 +14,7 @@ SHOWN_UNITS = {
     "share": ("%", 100.0),
 }
 """For units of a result, those that are shown, and how many of them one is."""
-NOISE = {"mm/s": 1e-4, "mm": 1e-6, "°": 1e-3, "deg": 1e-3, "%": 1e-3, "nJ": 1e-6}
+NOISE = {"": 1e-9, "mm/s": 1e-4, "mm": 1e-6, "°": 1e-3, "deg": 1e-3, "%": 1e-3, "nJ": 1e-6}
 """In the units that are shown: what is smaller is rounding, and printed as 0."""
 _LARGEST_WRITTEN_OUT = 1e7
 

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.axes import Range, ranges_of, sampled, unit_cube, unit_of, written
 from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
-from walkers.inputs.errors import refused
+from walkers.inputs.errors import refused, unusable
 from walkers.inputs.library import unmeasured
+from walkers.inputs.messages import blaming
 from walkers.inputs.origins import Origin
 from walkers.inputs.readable import kind_of
 from walkers.inputs.rounding import SHOWN_UNITS, rounded
@@ -96,7 +97,8 @@ def _range_of(one: Origin) -> dict[str, list[Any]]:
     except ValueError:  # one that the case leaves to the program, such as a time step
         return {name: [low, high]}
     if not ends.low * (1.0 - 1e-9) <= own <= ends.high * (1.0 + 1e-9):
-        raise refused(f"uncertain.{one.key}", f"expected a range that holds the case's own value, {one.text}")
+        told = f"expected a range that holds the case's own value, {one.text}"
+        raise unusable(f"uncertain.{one.key}", told, [low, high])
     return {name: [low, written(min(max(own, ends.low), ends.high), ends.unit), high]}
 
 
@@ -114,7 +116,8 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
     if not varied:
         told = "nothing here is uncertain: say ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
         raise refused(case.name, told)
-    ranges = {one.key: _range_of(one) for one in varied}
+    with blaming(case.name, case.document):
+        ranges = {one.key: _range_of(one) for one in varied}
 
     def likeness(seed: int) -> float:
         cube = unit_cube("sobol", len(varied), points, seed)
