@@ -163,7 +163,7 @@ def test_a_quick_audit_leaves_the_long_checks_out() -> None:
 
 def test_runs_name_the_audit_of_their_engine(own_cache: Path) -> None:
     case = make_case(run=SHORT)
-    with pytest.warns(UnauditedEngineWarning, match="walkers audit"):
+    with pytest.warns(UnauditedEngineWarning, match="walkers check engine"):
         unaudited = run_case(case, own_cache / "a")
     assert _audit_of(unaudited) is None
     with warnings.catch_warnings():  # it is said once
@@ -240,4 +240,4 @@ def test_the_program(own_cache: Path, in_folder: Path) -> None:
     assert not list(own_cache.rglob("audits/*.json")), "a part of the audit is no audit"
     (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
     told = call("run", "mine.toml", check=True).stderr
-    assert told.count("walkers audit") == 1
+    assert told.count("walkers check engine") == 1

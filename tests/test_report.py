@@ -214,7 +214,7 @@ def test_words_and_numbers() -> None:
     assert {unit: (one.text, one.unit) for unit, one in shown.items() if one} == told
     case = make_case()
     assert "glass, Si AK5; 80 Hz" in caption(case)
-    assert "liquid of 19.2 mN/m and 4.6 mPa s; 80 Hz" in caption(replace(case, liquid=replace(case.liquid, name=None)))
+    assert "liquid of 19.2 mN/m; 80 Hz" in caption(replace(case, liquid=replace(case.liquid, name=None)))
     tilted = replace(case, boundary=replace(case.boundary, tilt=pi / 3.0))
     assert caption(tilted).endswith("plane tilted by 60°, right is up")
     aside = replace(tilted, boundary=replace(tilted.boundary, uphill=pi / 2.0))

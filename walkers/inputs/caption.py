@@ -37,11 +37,8 @@ def conditions(case: Case) -> str:
 
 
 def liquid_text(case: Case) -> str:
-    """The name of the liquid of a case, or its surface tension and viscosity if it has none."""
-    liquid = case.liquid
-    return liquid.name or (
-        f"liquid of {liquid.surface_tension * 1e3:.4g} mN/m and {liquid.dynamic_viscosity * 1e3:.4g} mPa s"
-    )
+    """The name of the liquid of a case; its surface tension if it has none."""
+    return case.liquid.name or f"liquid of {case.liquid.surface_tension * 1e3:.4g} mN/m"
 
 
 def radii_text(radii: Sequence[float]) -> str:

@@ -50,6 +50,7 @@ def _shipped(name: str) -> dict[str, Any]:
 
 
 def _determinants(case: Case) -> dict[str, Any]:
-    """What the numerical error depends on: all that determines a run but its length and its sampling."""
+    """What the numerical error depends on: all that determines a run but its length, room and sampling."""
     found = case.determinants()
-    return {**found, "run": found["run"]["time_step"]}
+    makes = [{**one, "spacing": one["spacing"] if one["meet"] else None} for one in found["walkers"]]
+    return {**found, "walkers": makes, "run": found["run"]["time_step"]}

@@ -47,6 +47,7 @@ def with_decimals(value: float, decimals: int) -> str:
     """
     if not isfinite(value):
         return "-"
+    value = float(f"{value:.{DIGITS}g}")
     size = floor(log10(abs(value))) if value else 0
     decimals = min(decimals, max(0, DIGITS - 1 - size))
     text = f"{round(value, min(decimals, DIGITS - 1 - size)):.{decimals}f}"
