@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 import shutil
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -165,6 +166,9 @@ def test_runs_name_the_audit_of_their_engine(own_cache: Path) -> None:
     with pytest.warns(UnauditedEngineWarning, match="walkers check engine"):
         unaudited = run_case(case, own_cache / "a")
     assert _audit_of(unaudited) is None
+    with warnings.catch_warnings():  # it is said once
+        warnings.simplefilter("error", UnauditedEngineWarning)
+        run_case(make_case(run={**SHORT, "cycles": 3}), own_cache / "a")
     kept = record(run_audit(["stock"]), quick=True)
     assert kept is not None
     audited = run_case(case, own_cache / "b")

@@ -71,8 +71,8 @@ def test_list_has_all_runs_and_sweeps_with_what_they_gave(out: Path) -> None:
     assert runs.keys() == finished_places(out).keys() | {slow, killed}
     for _, row in walkers.load(out / "three").table().iterrows():
         entry, files = runs[Path(row["run"]).name], [path for path in Path(row["run"]).rglob("*") if path.is_file()]
-        told = ("finished", row["velocity"], row["standard_error"], sum(path.stat().st_size for path in files))
-        assert (entry["status"], entry["velocity"], entry["standard_error"], entry["size"]) == told
+        told = ("finished", row["velocity"], sum(path.stat().st_size for path in files))
+        assert (entry["status"], entry["velocity"], entry["size"]) == told
     assert (runs[slow]["status"], runs[slow]["reason"]) == ("failed", "TimeLimitExceeded")
     assert runs[killed]["status"] == "interrupted"
     with locked([out / killed]):
@@ -144,13 +144,14 @@ def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
     results = {one["quantity"]: one for one in found["results"]}
     velocity = results["velocity"]
     assert (velocity["first"], velocity["second"]) == (rows[0]["velocity"], rows[1]["velocity"])
-    error = (rows[0]["standard_error"] ** 2 + rows[1]["standard_error"] ** 2) ** 0.5
-    assert velocity["in_standard_errors"] == pytest.approx((rows[1]["velocity"] - rows[0]["velocity"]) / error)
+    assert (velocity["first_scatter"], velocity["second_scatter"]) == (rows[0]["scatter"], rows[1]["scatter"])
+    assert velocity["numerical_error"] is None
     of_first = walkers.load(rows[0]["run"]).walkers["sliding_2"]
-    assert results["sliding_2"]["first_standard_error"] == pytest.approx(of_first.std() / 2**0.5)
+    assert results["sliding_2"]["first_scatter"] == pytest.approx(of_first.std())
     text = call("compare", *names, check=True).stdout
     assert "liquid.name" in text
     assert "velocity (mm/s)" in text
+    assert "the numerical error is not measured for this case" in text
 
 
 def test_compare_takes_cases_and_says_what_was_not_run(out: Path) -> None:

@@ -19,6 +19,7 @@ from walkers.inputs.origins import Origin
 from walkers.inputs.reading import resolve_case
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.gait import SEPARATED
+from walkers.postprocess.uncertainty import SPREAD_NAME, band_of, band_text
 from walkers.runner.files import read_json
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.spread import describe, run_spread, spread_sweep
@@ -241,13 +242,27 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert spread.depends == {"velocity": {}}
     table = walkers.load(spread.directory).table()
     assert table["contact.friction.bead_wall"].between(0.1, 0.6).all()
-    assert (table["liquid.viscosity_ratio"] > 1.0).all()
+    assert (table["liquid.viscosity_ratio"] > 1.0).sum() == 2  # half of the draws: the case's own is the median
+    assert (table["liquid.contact_angle"] == 0.0).sum() == 2  # its own is the end of what is possible
     band, speeds = spread.bands["velocity"], table["velocity"]
     speeds = speeds[~(table["separated_fraction"] > SEPARATED)]
     assert (band.smallest, band.median, band.largest) == (speeds.min(), speeds.median(), speeds.max())
     assert band.high - band.low > 1e-4  # m/s
     assert sum(spread.counts.values()) == 4 == band.points + spread.counts["separated"]
     assert (speeds > 2e-5).sum() == spread.counts["forward"]
+    # The headline has the band from now on, which holds it; before it was said what is not known.
+    done = walkers.run(case, runs_folder)
+    low, high = band_of({"bands": read_json(spread.directory / SPREAD_NAME)["bands"]}, "velocity", None) or (0.0, 0.0)
+    assert (low, high) == (band.low, band.high)
+    own = done.result["velocity"]["mean"]
+    assert f"({band_text((min(low, own), max(high, own)), 'm/s')}, 5 to 95 %" in done.describe()
+    assert "not known" not in done.describe()
+    unspread = walkers.run(resolve_case({**GLASS, "run": {"cycles": 5}}, name="guessed"), runs_folder)
+    assert "not known: volume fraction, viscosity ratio, contact angle, friction, restitution" in " ".join(
+        unspread.describe().split()
+    )
+    with pytest.raises(InputError, match=r"uncertain.contact.restitution.*: expected a range that holds"):
+        spread_sweep(resolve_case({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside"))
     # A case of which all is given has none.
     with pytest.raises(InputError, match="nothing here is uncertain"):
         run_spread(resolve_case(REFERENCE), runs_folder, Options(2))

@@ -6,6 +6,7 @@ import re
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
+from math import nan, pi
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,15 @@ from scipy.spatial.transform import Rotation
 
 import walkers
 from tests.conftest import call, document, make_case, to_toml
+from walkers.inputs.caption import caption
+from walkers.inputs.rounding import rounded, with_decimals
 from walkers.inputs.sweep import expand
 from walkers.postprocess import read_motion
-from walkers.postprocess.analysis import current_result, number_of, rounded
+from walkers.postprocess.analysis import current_result, number_of
 from walkers.postprocess.motion import gathered
 from walkers.postprocess.report.page import LARGEST, overhead
 from walkers.postprocess.report.player import cameras_of, player_of
-from walkers.postprocess.report.run import report_run, summary_of
+from walkers.postprocess.report.run import report_run
 from walkers.postprocess.scene import camera_axes
 from walkers.runner.provenance import software
 from walkers.sweeps.report import report_sweep
@@ -111,7 +114,7 @@ def swept_report(swept: Path, once: Once) -> Path:
 @pytest.mark.parametrize(
     ("name", "wanted"),
     [
-        ("walked", {"velocity.mean", "velocity.standard_error", "rotation.bead_2", "orientation_end.largest"}),
+        ("walked", {"velocity.mean", "velocity.scatter", "rotation.bead_2", "orientation_end.largest"}),
         ("pile", {"surface.end", "brazil_nut.end", "coordination.rest.contacts", "beads", "driven"}),
     ],
 )
@@ -204,15 +207,21 @@ def test_long_runs_are_thinned_out_and_say_so(walked_run: Path, pile_run: Path) 
 
 
 def test_words_and_numbers() -> None:
-    """Numbers have the digits that their errors leave, in units that one reads; a liquid without a name has none."""
-    given = [(1.38173201, 4.9e-5), (1.38173201, 0.31), (1234.5678, 20.0), (0.0012345678,), (6,)]
-    assert [rounded(*one) for one in given] == ["1.381732", "1.38", "1235", "0.001235", "6"]
+    """Numbers have four digits at most, in units that one reads; a liquid without a name is told by its numbers."""
+    given = [(1.38173201,), (1234.5678,), (-87654.3,), (0.0012345678,), (-3.2e-15, "mm/s"), (6,), (1e-12,), (nan,)]
+    assert [rounded(*one) for one in given] == ["1.382", "1235", "-87650", "0.001235", "0", "6", "0", "-"]
+    given = [(18.18654, 3), (1.08, 3), (-2e-6, 3), (99.99951, 3), (-179.957, 2), (0.0, 1)]
+    assert [with_decimals(*one) for one in given] == ["18.19", "1.080", "0", "100.0", "-180.0", "0"]
     shown = {unit: number_of({"a": 0.25}, "a", unit) for unit in ("m", "m/s", "rad", "share")}
     told = {"m": ("250", "mm"), "m/s": ("250", "mm/s"), "rad": ("14.32", "°"), "share": ("25", "%")}
     assert {unit: (one.text, one.unit) for unit, one in shown.items() if one} == told
     case = make_case()
-    assert "glass, Si AK5; 80 Hz" in summary_of(case)
-    assert "glass; 80 Hz" in summary_of(replace(case, liquid=replace(case.liquid, name=None)))
+    assert "glass, Si AK5; 80 Hz" in caption(case)
+    assert "liquid of 19.2 mN/m; 80 Hz" in caption(replace(case, liquid=replace(case.liquid, name=None)))
+    tilted = replace(case, boundary=replace(case.boundary, tilt=pi / 3.0))
+    assert caption(tilted).endswith("plane tilted by 60°, right is up")
+    aside = replace(tilted, boundary=replace(tilted.boundary, uphill=pi / 2.0))
+    assert caption(aside).endswith("plane tilted by 60°, up is at 90° from x toward y")
 
 
 def test_the_command_finds_what_a_name_means(walked_run: Path, swept: Path, tmp_path: Path) -> None:

@@ -96,7 +96,7 @@ def test_a_result_of_before_is_made_anew_if_it_can_be(
     copy = tmp_path / directory.name
     shutil.copytree(directory, copy)
     known = read_result(copy)
-    assert known["analyses"] == {"walking": Walking.version, "work": 1}
+    assert known["analyses"] == {"walking": Walking.version, "work": 2}
     lacking = {key: value for key, value in known.items() if key not in ("separated_fraction", "analyses")}
     for old in ({**lacking, "analyses": {"walking": Walking.version - 1}}, lacking):
         write_json(copy / RESULT_NAME, old)
@@ -167,8 +167,8 @@ def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
     result, walkers = read_result(directory), read_table(directory, "walkers")
     for name, of in (("velocity", walkers), ("right_facing", walkers[walkers["facing"] == 1])):
         velocity = of["velocity"]
-        expected = [len(velocity), velocity.mean(), velocity.min(), velocity.max(), velocity.sem()]
-        found = [result[name][what] for what in ("n", "mean", "smallest", "largest", "standard_error")]
+        expected = [len(velocity), velocity.mean(), velocity.min(), velocity.max(), velocity.std()]
+        found = [result[name][what] for what in ("n", "mean", "smallest", "largest", "scatter")]
         assert found == pytest.approx(expected)
     assert result["axial_velocity"]["left_facing"] < 0 < result["axial_velocity"]["right_facing"]
     assert (result["right_facing"]["n"], result["steady"], result["walkers_met"]) == (3, 6, False)
@@ -203,12 +203,13 @@ def test_tables_have_units_and_meanings(directory: Path, name: str) -> None:
     )
 
 
-def test_a_single_walker_has_the_error_of_its_fit(run_directory: Callable[..., Path]) -> None:
+def test_a_single_walker_has_no_scatter(run_directory: Callable[..., Path]) -> None:
     directory = run_directory()
-    result, walkers = read_result(directory), read_table(directory, "walkers")
-    assert result["velocity"]["standard_error"] == walkers["standard_error"][0]
-    assert result["left_facing"] == {"n": 0, "mean": None, "smallest": None, "largest": None, "standard_error": None}
+    result = read_result(directory)
+    assert result["velocity"]["scatter"] is None
+    assert result["left_facing"] == {"n": 0, "mean": None, "smallest": None, "largest": None, "scatter": None}
     assert "left none" in describe_result(directory, result)
+    assert "scatter" not in describe_result(directory, result)
     unsettled = run_directory(run={"cycles": 6, "settling_cycles": 0})
     result = read_result(unsettled)
     assert result["steady"] == 0

@@ -1,4 +1,4 @@
-"""Runs that end when their walkers are steady: what they give, when they go on, and that company does not matter."""
+"""Runs that end when velocities are constant: what they give, when they go on, and that company does not matter."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from walkers.inputs import load_case, resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.drive import AXES
 from walkers.inputs.errors import InputError, Stopped
-from walkers.postprocess.gait import are_steady, walk
+from walkers.postprocess.gait import are_constant, walk
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
 from walkers.runner import find_engine
@@ -27,7 +27,7 @@ from walkers.templates.scene import sharing_key
 
 
 def _until_steady(**changes: Any) -> Case:
-    """The reference walker with `document`'s changes, driven until it is steady."""
+    """The reference walker with `document`'s changes, driven until its velocity is constant."""
     tables = {**document(**changes), "run": {**changes.get("run", {})}}
     return resolve_case(tables, name="test")
 
@@ -57,7 +57,7 @@ def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(runs_folder: Path
     long = run_case(full, runs_folder)
     assert (short.result["cycles"], short.result["settling_cycles"], short.result["ended_early"]) == (12, 4, True)
     assert (long.result["cycles"], long.result["settling_cycles"], long.result["ended_early"]) == (60, 20, False)
-    assert "6 of 6 steady after 12 cycles" in short.describe()
+    assert "6 of 6 steady (halves within 5 %); ended after 12 cycles (constant within 0.2 %)" in short.describe()
     speeds = [one.result["velocity"]["mean"] for one in (short, long)]
     assert speeds[0] == pytest.approx(speeds[1], rel=0.005)
     # Until then the two are the same run.
@@ -90,7 +90,7 @@ def test_a_walker_that_turns_ever_faster_is_not_steady_however_even_its_speed(tm
     (group,) = read_motion(directory).groups
     found = walk(group)
     assert np.abs(found.first_half - found.second_half).max() < 0.002 * np.abs(found.velocity).max()
-    assert not are_steady(directory)
+    assert not are_constant(directory)
 
 
 def test_what_settles_slowly_runs_in_full_and_numbers_are_obeyed() -> None:

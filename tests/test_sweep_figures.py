@@ -58,7 +58,7 @@ def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_
         rows = table[(table["contact.friction.bead_wall"] == friction) & (table["drive.frequency"] == 80.0)]
         assert list(x) == [2.0, 4.0, 6.0]
         assert y == pytest.approx(rows["velocity"].to_numpy() * 1e3)
-        assert errors == pytest.approx(rows["standard_error"].to_numpy() * 1e3)
+        assert errors == pytest.approx(rows["scatter"].to_numpy() * 1e3)
         assert (errors > 0.0).all()
 
 
@@ -163,8 +163,11 @@ def test_the_papers_friction_is_drawn_only_of_what_it_was_fitted_to() -> None:
     assert np.isfinite(predicted[MODEL]).all()
     assert predicted[PAPER][0] == pytest.approx(predict(ours)["paper"]["velocity"])
     assert np.isnan(predicted[PAPER][1:]).all()
-    told = "is one of ruby on level chromium-coated glass or glass in Si AK5 or Si AK10"
-    assert reasons == {f"the {PAPER}, {told}": 3}
+    told = "the fit is to ruby on level chromium-coated glass or glass in Si AK5 or Si AK10"
+    assert reasons == {f"{PAPER}: {told}": 3}
+    assert [predict(one)["paper"] | {"friction": 0.0} for one in others] == [
+        {"friction": 0.0, "velocity": None, "reason": told}
+    ] * 3
     assert list(predicted_column(others, "velocity")[0]) == [MODEL]
 
 

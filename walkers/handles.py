@@ -133,7 +133,8 @@ class Run:
     @property
     def result(self) -> dict[str, Any]:
         """The result, SI units."""
-        from walkers.postprocess.analysis import current_result, rests_on
+        from walkers.postprocess.analysis import current_result
+        from walkers.postprocess.uncertainty import rests_on
 
         result = current_result(self.finished_directory)
         return result if self.origins is None else {**result, "rests_on": rests_on(self.origins)}

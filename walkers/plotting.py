@@ -82,8 +82,8 @@ def sweep_figure(
     Returns
     -------
     Figure
-        Means with their standard errors where the table has them. What a key has for a unit in the sweep's file, its
-        axis has; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. What is left out is told in a
+        Means; bars are the scatter over copies where the table has it. What a key has for a unit in the sweep's file,
+        its axis has; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. What is left out is told in a
         `LeftOutWarning`.
 
     Raises
@@ -113,11 +113,14 @@ def _figure_of(
         _tell(f"not told apart: {'; '.join(laid_out.untold)}")
     predicted: dict[str, FloatArray] = {}
     if theory:
-        from walkers.theory.prediction import predicted_column
+        from walkers.theory.prediction import outside_of_the_paper, predicted_column
 
-        predicted, reasons = predicted_column([case_of(Path(run)) for run in done["run"]], column)
+        cases = [case_of(Path(run)) for run in done["run"]]
+        predicted, reasons = predicted_column(cases, column)
         for reason, number in reasons.items():
             _tell(f"not drawn at {number} of {len(done)} points: {reason}")
+        if predicted and (beyond := [told for case in cases if (told := outside_of_the_paper(case))]):
+            _tell(f"{len(beyond)} of {len(done)} points are {beyond[0]}" + (", …" if len(beyond) > 1 else ""))
     return draw(laid_out, drawn_column(done, column, predicted), title=table.attrs["title"], log=log)
 
 

@@ -17,6 +17,7 @@ from typing import IO
 from walkers.archive.crate import METADATA_NAME
 from walkers.inputs.errors import refused, shortened
 from walkers.inputs.text import printable
+from walkers.postprocess.uncertainty import SPREAD_NAME
 from walkers.runner.directory import CASE_NAME, SEGMENTS
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
@@ -119,7 +120,8 @@ def _verify_sweep(directory: Path) -> list[Verification]:
     ]
     runs = [state.directory for state in found if state.directory and state.status == "finished"]
     there = [name for name in _files_below(directory) if name != RECORD_NAME and not name.startswith(f"{PARSL}/")]
-    beside = (f"{record.name}.toml", "table.parquet")  # of an archive: nothing is read from them
+    # Bands are texts' only; the others are of an archive: nothing is read from them.
+    beside = (SPREAD_NAME, f"{record.name}.toml", "table.parquet")
     files = _compared(record.name, {}, {}, there, lambda name: _made_since(name) or name in beside)
     points = replace(files, intact=len(runs), told={**files.told, "missing": lacking}, of_points=True)
     return [points, *map(_verify_run, dict.fromkeys(runs))]

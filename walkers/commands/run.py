@@ -136,7 +136,7 @@ def run(
             ranges = {"spread": band.as_dict()} if band else {}
             print(json.dumps({**done.result, **ranges, "run": str(done.directory), "cached": done.cached}))
         else:
-            print_lines([done.describe(), *([describe(band, done.result)] if band else [])])
+            print_lines([done.describe(), *([describe(band)] if band else [])])
     return 1 if failed else 0
 
 
@@ -156,7 +156,7 @@ def sweep(
     from dataclasses import replace
 
     from walkers.inputs.sweep import load_sweep
-    from walkers.postprocess.analysis import lines_of_rest, rests_on
+    from walkers.postprocess.uncertainty import lines_of_rest, rests_on
     from walkers.progress import progress_of_sweep
     from walkers.sweeps.scheduler import plan_sweep, run_sweep
     from walkers.sweeps.site import load_site

@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from math import isfinite, log, prod
+from math import isfinite, prod
 from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.changes import Value, flatten
@@ -24,6 +24,30 @@ if TYPE_CHECKING:
 MOST_POINTS = 1_000_000
 _SPACINGS = ("linspace", "geomspace")
 _DISTRIBUTIONS = ("uniform", "loguniform")
+
+
+@dataclass(frozen=True)
+class Range:
+    """Between which ends a number is drawn, in a unit (None: a plain number), uniformly or of its magnitude.
+
+    With a ``median``, half of the draws are below it and half above, each half spread over its side of the range.
+    """
+
+    low: float
+    high: float
+    unit: str | None
+    logarithmic: bool
+    median: float | None = None
+
+    def at(self, shares: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """The numbers below which these shares of the draws are."""
+        import numpy as np
+
+        quantiles = np.array([self.low, self.high] if self.median is None else [self.low, self.median, self.high])
+        known = np.linspace(0.0, 1.0, len(quantiles))
+        if self.logarithmic:
+            return np.asarray(np.exp(np.interp(shares, known, np.log(quantiles))))
+        return np.asarray(np.interp(shares, known, quantiles))
 
 
 @dataclass(frozen=True)
@@ -74,9 +98,9 @@ def values_of(key: str, axis: object) -> list[Value]:
 def _range(key: str, given: list[Value], *, positive: bool) -> tuple[float, float, str | None]:
     """Both ends of a range and their unit."""
     unit = unit_of(key, given)
-    first, last = (number_of(key, end) for end in given)
-    if positive and not (first > 0 and last > 0):
-        raise unusable(key, "expected two values above zero", given)
+    first, *_, last = numbers = [number_of(key, one) for one in given]
+    if positive and min(numbers) <= 0:
+        raise unusable(key, "expected values above zero", given)
     return first, last, unit
 
 
@@ -168,36 +192,34 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
     points
         How many; a power of two suits Sobol's sequence.
     ranges
-        For each key ``{ uniform = [low, high] }`` or ``{ loguniform = [low, high] }``.
+        See `ranges_of`.
     """
-    import numpy as np
-
-    ends = ends_of(ranges)
+    ends = ranges_of(ranges)
     if not ends:
         raise unusable("sample.ranges", "expected keys and their ranges", dict(ranges))
     columns = {}
     shares = unit_cube(method, len(ends), points, seed).T
-    for share, (key, (low, high, unit, logarithmic)) in zip(shares, ends.items(), strict=True):
-        numbers = np.exp(log(low) + share * log(high / low)) if logarithmic else low + share * (high - low)
-        columns[key] = [written(float(number), unit) for number in numbers]
+    for share, (key, one) in zip(shares, ends.items(), strict=True):
+        columns[key] = [written(float(number), one.unit) for number in one.at(share)]
     return Axis.of(columns)
 
 
-def ends_of(ranges: Mapping[str, Any]) -> dict[str, tuple[float, float, str | None, bool]]:
-    """Both ends of the ranges of several keys, their unit, and whether they are of magnitudes.
+def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
+    """The ranges of several keys, as ``{ uniform = [low, high] }`` or ``{ loguniform = [low, high] }``.
 
-    Raises `InputError` if one is no ``{ uniform = [low, high] }`` or ``{ loguniform = [low, high] }``.
+    A number between the two is the median: ``{ uniform = [low, median, high] }``. Raises `InputError` for others.
     """
-    ends = {}
+    found = {}
     for key, given in flatten(ranges, is_axis).items():
         kind = next(iter(given)) if isinstance(given, Mapping) and len(given) == 1 else ""
-        if kind not in _DISTRIBUTIONS or not (isinstance(given[kind], list) and len(given[kind]) == 2):
+        if kind not in _DISTRIBUTIONS or not (isinstance(given[kind], list) and len(given[kind]) in (2, 3)):
             raise unusable(key, "expected { uniform = [low, high] } or { loguniform = [low, high] }", given)
-        low, high, unit = _range(key, given[kind], positive=kind == "loguniform")
-        if low >= high:
+        *_, unit = _range(key, given[kind], positive=kind == "loguniform")
+        low, *median, high = (number_of(key, one) for one in given[kind])
+        if low >= high or not all(low <= one <= high for one in median):
             raise unusable(key, "expected the smaller value first", given)
-        ends[key] = (low, high, unit, kind == "loguniform")
-    return ends
+        found[key] = Range(low, high, unit, kind == "loguniform", *median)
+    return found
 
 
 def unit_cube(method: str, dimensions: int, points: int, seed: int) -> npt.NDArray[np.float64]:

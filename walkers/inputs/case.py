@@ -26,7 +26,7 @@ _SLOWEST_STEP = 4e-5  # s a bead: thirty times what it takes with two beads alon
 _LOG_BYTES = 64e6  # walkers write some 50 kB, a segment of a pile as much …
 _LOG_BYTES_PER_CYCLE = 1e4  # … and a cycle some 500 bytes
 FIRST_ATTEMPTS = (12, 24)
-"""Cycles after which it is asked whether walkers are steady. After 36 hardly any are that were not after 24."""
+"""Cycles after which it is asked whether velocities are constant. After 36 hardly any are that were not after 24."""
 BOUNDS = ("silence", "log_limit")
 """Of `Run`: upon these depends whether a run ends, not what it gives."""
 
@@ -36,6 +36,13 @@ _TOLD = ("document", "told")
 def settling_of(cycles: int) -> int:
     """Cycles that walkers are given to settle, of so many, where a case does not say: a third, at most 20."""
     return min(20, cycles // 3)
+
+
+CONSTANT = 0.002
+"""Share within which the velocities of the halves of a walker's cycles agree where a run ends early: they are constant.
+
+A walker is called steady at a looser criterion, that of `walkers.postprocess.gait.walk`.
+"""
 
 
 @dataclass(frozen=True)
@@ -55,7 +62,7 @@ class Run:
     settling_cycles: int
     """Of the cycles, those before velocities are measured."""
     until_steady: bool
-    """Whether fewer do if the walkers are steady after them (`walkers.postprocess.gait.are_steady`)."""
+    """Whether fewer do if velocities are constant after them (`walkers.postprocess.gait.are_constant`)."""
     samples_per_cycle: int
     cycles_per_sample: int
     samples_per_bridge_sample: int
@@ -96,7 +103,7 @@ class Run:
         return (*(cycles for cycles in fewer if cycles < self.cycles), self.cycles)
 
     def for_cycles(self, cycles: int) -> Run:
-        """The same for so many cycles at a stretch, of a run that ends when its walkers are steady."""
+        """The same for so many cycles at a stretch, of a run that ends when its velocities are constant."""
         if not self.until_steady:
             return self
         settling = settling_of(cycles)
@@ -187,7 +194,7 @@ class Case:
         return replace(self, name=name).read_from(self.document, self.told)
 
     def for_cycles(self, cycles: int) -> Case:
-        """The same for so many cycles at a stretch, of a case whose run ends when its walkers are steady."""
+        """The same for so many cycles at a stretch, of a case whose run ends when its velocities are constant."""
         return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.told)
 
     @property
@@ -212,7 +219,7 @@ class Case:
 
     @property
     def duration(self) -> float:
-        """How long it is shaken, s; what runs until it is steady, at most."""
+        """How long it is shaken, s; what runs until velocities are constant, at most."""
         return self.run.cycles / self.drive.frequency
 
     @property

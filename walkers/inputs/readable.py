@@ -22,6 +22,7 @@ READABLE_UNITS: Mapping[str, tuple[str, float]] = {
     "Pa*s": ("mPa*s", 1e-3),
     "Pa": ("MPa", 1e6),
     "kg/m^3": ("g/cm^3", 1e3),
+    "J": ("nJ", 1e-9),
 }
 """For SI units the unit in which the field states such quantities, and what it is in the SI unit."""
 _NOT_COMPARED = ("name", "title", "document", "origins", *(f"run.{bound}" for bound in BOUNDS))
@@ -54,7 +55,7 @@ def readable(key: str, value: Any) -> str:
     """A value of `flattened` in the usual unit, such as ``4 g`` or ``0.3/0.2 mm``; a dash for none."""
     if value is None:
         return "-"
-    kind = _kinds().get(key.rpartition(".")[2])
+    kind = kind_of(key)
     if kind is None or isinstance(value, str):
         return _number(value, 1.0)
     unit, size = readable_unit(kind.unit) if kind is not units.TIME else ("us", 1e-6)
@@ -66,6 +67,11 @@ def readable(key: str, value: Any) -> str:
 def readable_unit(unit: str) -> tuple[str, float]:
     """The unit in which the field states what has such an SI unit, and what it is in the SI unit."""
     return READABLE_UNITS.get(unit, (unit, 1.0))
+
+
+def kind_of(key: str) -> Kind | None:
+    """What kind of quantity the numbers of a key of a case are, such as ``dimers.radii[0]``; None for pure numbers."""
+    return _kinds().get(key.rpartition(".")[2].partition("[")[0])
 
 
 @cache
@@ -129,7 +135,7 @@ def _is(key: str, value: Any, wanted: str) -> bool:
         return True
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return str(value).lower() == wanted.lower()
-    kind = _kinds().get(key.rpartition(".")[2])
+    kind = kind_of(key)
     with suppress(ValueError):
         return isclose(units.parse_quantity(wanted, kind) if kind else float(wanted), value, rel_tol=1e-6)
     return False

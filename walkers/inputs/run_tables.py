@@ -5,10 +5,11 @@ from __future__ import annotations
 from math import ceil, inf
 
 from walkers.inputs.boundary import Boundary
-from walkers.inputs.case import Case, Run, settling_of
+from walkers.inputs.case import CONSTANT, Case, Run, settling_of
 from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector, waveform
 from walkers.inputs.errors import unusable
 from walkers.inputs.origins import Notes
+from walkers.inputs.rounding import percent
 from walkers.inputs.schema import DriveTable, HarmonicTable, RunTable
 from walkers.physics.dimer import Dimer
 from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
@@ -124,7 +125,7 @@ def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
 
 def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
     often = run.samples_per_cycle if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
-    cycles = f"until steady, at most {run.cycles}" if run.until_steady else run.cycles
+    cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}" if run.until_steady else run.cycles
     whence = "from the duration" if table.duration else "walkers are looked at after 12 and 24"
     silence = run.longest_silence(case.count)
     notes.default("run.samples_per_cycle", often)
@@ -194,7 +195,7 @@ def _cycles(table: RunTable, case: Case, cycles_per_sample: int) -> int:
 
 
 def _until_steady(table: RunTable, case: Case, cycles_per_sample: int) -> bool:
-    """Whether a run may end when its walkers are steady: not one that says how long it is, and in which parts.
+    """Whether a run may end when its velocities are constant: not one that says how long it is, and in which parts.
 
     Raises `InputError` if a case asks for what cannot be, or for its contrary as well.
     """
@@ -202,7 +203,9 @@ def _until_steady(table: RunTable, case: Case, cycles_per_sample: int) -> bool:
     asked += ["most_cycles"] if table.most_cycles is not None else []
     given = [key for key in ("cycles", "duration", "settling_cycles", "segment") if getattr(table, key) is not None]
     if given and asked:
-        raise unusable(f"run.{given[0]}", f"expected none where run.{asked[0]} lets walkers run until steady")
+        raise unusable(
+            f"run.{given[0]}", f"expected none where run.{asked[0]} lets walkers run until their velocity is constant"
+        )
     if asked and not case.apart:
         raise unusable(f"run.{asked[0]}", "expected run.duration: only walkers apart can be steady")
     if not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:

@@ -15,7 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from walkers.inputs.axes import ends_of, is_axis
+from walkers.inputs.axes import is_axis, ranges_of
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.changes import flatten
@@ -52,11 +52,14 @@ def _ranges(value: object) -> object:
         return value
     try:
         ranges = {key: one if is_axis(one) else {"uniform": one} for key, one in flatten(value, is_axis).items()}
-        ends_of(ranges)
+        found = ranges_of(ranges)
     except InputError as error:
         (problem,) = error.problems
         told = problem.expected.replace("{ uniform = [low, high] }", "[low, high]")
         raise ValueError(f"{problem.key}: {told}") from error
+    for key, one in found.items():
+        if one.median is not None:
+            raise ValueError(f"{key}: expected [low, high]: the case's own value is the median")
     return ranges
 
 
@@ -168,10 +171,10 @@ class RunTable(Table):
     """``[run]``: the time step, the length of the run and what is recorded.
 
     The length is given by ``cycles`` or as a ``duration``, the sampling by ``samples_per_cycle`` or
-    ``frames_per_second``. Left out, or ``cycles = "auto"``, walkers run until they are steady, for 60 cycles
-    (``most_cycles``) of 20 samples at most, a third of them, at most 20, to settle; loose beads have a duration, are
-    recorded 60 times a second, and rest before the drive (``settled_below``, ``longest_settling``). An engine that says
-    nothing for ``silence``, or more than ``log_limit``, is ended: no numbers depend on these two.
+    ``frames_per_second``. Left out, or ``cycles = "auto"``, walkers run until their velocities are constant, for 60
+    cycles (``most_cycles``) of 20 samples at most, a third of them, at most 20, to settle; loose beads have a duration,
+    are recorded 60 times a second, and rest before the drive (``settled_below``, ``longest_settling``). An engine that
+    says nothing for ``silence``, or more than ``log_limit``, is ended: no numbers depend on these two.
     """
 
     time_step: Annotated[units.Time | None, AUTO] = None

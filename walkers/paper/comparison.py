@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from walkers.inputs import numerical
 from walkers.inputs.loads import dimer_of
+from walkers.inputs.reading import load_case
 from walkers.inputs.text import rendered
 from walkers.paper.maps import paper_drives
 from walkers.paper.published import (
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
 
 AGREES = 0.15
 """A number within this share of the published one agrees with it, where the paper gives no spread."""
+_CASES = ("fig1b", "fig4a", "fig4b")
+"""Of the paper's figures, whose numerical error is known."""
 _SMALL = 0.05
 """mm/s: where the published value is zero, a number within this agrees with it."""
 
@@ -203,5 +207,10 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
         if not row["agrees"]:
             reasons.setdefault(row["why"], []).append(row["what"])
     engine, others = (count(rows, measured=measured) for measured in (True, False))
+    errors = {name: numerical.numerical_error(load_case(name)) for name in _CASES}
+    shares = {
+        name: 100.0 * one["total"] / numerical.measured()[name]["velocity"] for name, one in errors.items() if one
+    }
     shown = {"engine": engine, "others": others, "tolerance": AGREES, "rows": rows, "reasons": reasons}
+    shown |= {"numerical": shares, "stiffer": numerical.STIFFER}
     return rendered("walkers.paper", "comparison.md.j2", **shown)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from walkers.inputs.caption import liquid_text, radii_text
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive, Harmonic
 from walkers.inputs.errors import WalkersError
@@ -172,9 +173,8 @@ def of_asymmetry(case: Case, sin_delta: float, gamma0: float) -> Case:
 
 def described(case: Case) -> str:
     """Radii, drive and liquid of a case in a few words, for titles."""
-    radii = "/".join(f"{radius * 1e3:g}" for radius in case.walkers[0].radii)
     drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration / GRAVITY:.3g} g"
-    return f"R = {radii} mm, {drive}, {case.liquid.name}"
+    return f"R = {radii_text(case.walkers[0].radii)} mm, {drive}, {liquid_text(case)}"
 
 
 # --- the sweeps that figures are made from ----------------------------------------------------------------------------

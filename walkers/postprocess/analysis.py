@@ -7,21 +7,21 @@ figures, and sweeps of columns, follows from what it declares.
 from __future__ import annotations
 
 import errno
-import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
-from math import degrees, floor, isfinite, log10, nan
+from math import nan
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from walkers.inputs.caption import conditions
 from walkers.inputs.case import Case
-from walkers.inputs.library import unmeasured
-from walkers.inputs.origins import Origin
+from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.postprocess.drawing import check_formats, save_figure
+from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known, rests_on, with_bands
 from walkers.runner.directory import SEGMENTS, case_of
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, FileChanged, check_unchanged, forget_tables, record_tables
@@ -34,13 +34,8 @@ if TYPE_CHECKING:  # how far a sweep is can be told without numpy
     from walkers.postprocess.tables import Columns
 
 RESULT_NAME = "result.json"
-_WIDTH = 110
 Described = Mapping[str, tuple[str, str]]
 """From the names of columns to their units and meanings."""
-_UNITS = {"J": ("nJ", 1e9), "m/s": ("mm/s", 1e3), "m": ("mm", 1e3), "rad": ("°", degrees(1.0)), "share": ("%", 100.0)}
-"""For units of the result, those that are shown, and how many of them one is."""
-_DIGITS = 4
-"""Significant, of a number without an error; with one, so many that two digits of the error are seen."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +45,8 @@ class Quantity:
     Attributes
     ----------
     path, error
-        Where a result has it, such as ``surface.end``, and its standard error; at the path of a mean over replicates
-        are its error, smallest and largest.
+        Where a result has it, such as ``surface.end``, and its standard error; at the path of a mean over copies are
+        their scatter, smallest and largest.
     label
         Of its row in reports, if it has one.
     unit
@@ -82,40 +77,35 @@ class Quantity:
         """What a report has of it."""
         keys = [self.path, self.error]
         if number_of(result, f"{self.path}.n") is not None:
-            keys = [f"{self.path}.{what}" for what in ("mean", "standard_error", "smallest", "largest")]
-        error = number_of(result, keys[1], self.unit)
-        doubt = None if error is None else error.value
-        return Row(
-            self.label, *(number_of(result, key, self.unit, None if key == self.error else doubt) for key in keys)
-        )
+            keys = [f"{self.path}.{what}" for what in ("mean", "scatter", "smallest", "largest")]
+        return Row(self.label, *(number_of(result, key, self.unit) for key in keys))
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number at a place in a result, such as ``velocity.mean``, SI; the unit in which it is shown, and its factor.
-
-    An error gives its digits: its standard error, or that of the number beside which it stands; None if unknown.
-    """
+    """A number at a place in a result, such as ``velocity.mean``, SI; the unit in which it is shown, and its factor."""
 
     key: str
     value: float
     unit: str = ""
     factor: float = 1.0
-    error: float | None = None
 
     @property
     def text(self) -> str:
         """The number in its unit, without it."""
-        return rounded(self.value * self.factor, None if self.error is None else self.error * self.factor)
+        return rounded(self.value * self.factor, self.unit)
 
 
 @dataclass(frozen=True)
 class Row:
-    """What it is called, its number, its standard error, and the smallest and largest of those that it is of."""
+    """What it is called, its number, and of several copies their scatter, the smallest and the largest.
+
+    The scatter is a standard deviation, or the standard error of a single number that has one (`Quantity`).
+    """
 
     name: str
     value: Number | None
-    error: Number | None = None
+    scatter: Number | None = None
     smallest: Number | None = None
     largest: Number | None = None
 
@@ -126,34 +116,20 @@ class Row:
 
     @property
     def text(self) -> str:
-        """The number with its standard error, if that shows, and its unit."""
-        value, error = ("" if one is None else one.text for one in (self.value, self.error))
-        return f"{value}{f' ± {error}' if error and 'e-' not in error else ''} {self.unit}".rstrip()
+        """The number and its unit."""
+        return f"{'' if self.value is None else self.value.text} {self.unit}".rstrip()
 
 
-def rounded(value: float, error: float | None = None) -> str:
-    """A number with the digits that its error leaves (two of the error's), or four."""
-    if isinstance(value, (bool, int)):
-        return str(value)
-    if not isfinite(value):
-        return "-"
-    if error and isfinite(error):
-        decimals = max(0, 1 - floor(log10(abs(error))))
-        if decimals <= 9:
-            return f"{value:.{decimals}f}"
-    return f"{value:.{_DIGITS}g}"
-
-
-def number_of(result: Mapping[str, Any], key: str, unit: str = "", error: float | None = None) -> Number | None:
+def number_of(result: Mapping[str, Any], key: str, unit: str = "") -> Number | None:
     """The number at a place in a result; None where it has none."""
     value: Any = result
     for part in key.split("."):
         value = value[int(part)] if isinstance(value, list) else value.get(part) if isinstance(value, dict) else None
         if value is None:
             return None
-    shown, factor = _UNITS.get(unit, (unit, 1.0))
+    shown, factor = SHOWN_UNITS.get(unit, (unit, 1.0))
     # A whole number stays one.
-    return Number(key, value, shown, 1 if factor == 1.0 else factor, error)
+    return Number(key, value, shown, 1 if factor == 1.0 else factor)
 
 
 class Measured:
@@ -216,10 +192,17 @@ class Analysis(ABC):
         """What it finds, in the order of reports; of an empty result, with all that have a column."""
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
-        """What it found, as text: here the numbers that reports have, with their errors, in mm, mm/s, degrees."""
+        """What it found, as text: here the numbers that reports have, in mm, mm/s, degrees."""
         rows = (one.row(result) for one in self.quantities(result) if one.label)
         told = [f"{one.name} {one.text}" for one in rows if one.value is not None]
         return [f"  {self.name:10} {'; '.join(told) or '-'}"]
+
+    def uncertainty(self, result: Mapping[str, Any]) -> list[str]:
+        """What its main numbers are uncertain by, in sentences: here the band of a spread, or what is not known."""
+        if not self.headlines:
+            return []
+        units = {name: self.columns[name][0] for name in self.headlines}
+        return [told] if (told := bands_text(result, units, self.row(result))) else not_known(result["rests_on"])
 
     @property
     def columns(self) -> Described:
@@ -319,7 +302,7 @@ def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
         "analyses": {one.name: one.version for one in analyses_of(case)},
         "frequency": case.drive.frequency,
         "peak_acceleration": case.drive.peak_acceleration,
-        "drive": case.drive.described(),
+        "drive": conditions(case),
         "goes_uphill": case.goes_uphill,
         "truncated": motion.truncated,
         "rests_on": rests_on(case.origins),
@@ -418,48 +401,12 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     return result
 
 
-def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
-    """What a result rests on that nobody measured, and what the case calls uncertain.
-
-    Each has a ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``library``, ``calibrated`` or
-    ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.
-    """
-    return [
-        {
-            "key": one.key,
-            "value": one.text,
-            "origin": one.origin,
-            "range": list(one.range) if one.range else None,  # as it is read from a file
-            "logarithmic": one.logarithmic,
-            "guessed": one.guessed,
-        }
-        for one in origins
-        if one.key in unmeasured() or one.range is not None
-    ]
-
-
-def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What a result rests on (`rests_on`) as text: guessed, only said by the case, calibrated."""
-
-    def listed(head: str, chosen: Iterable[Mapping[str, Any]]) -> list[str]:
-        told = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
-        wrapper = textwrap.TextWrapper(_WIDTH, f"  {head:10} ", " " * 13, break_on_hyphens=False)
-        return wrapper.wrap(told) if told else []
-
-    lines = listed("guessed", [one for one in rests if one["guessed"]])
-    if lines:
-        lines.append("             the result is worth what these are; a band instead: walkers run CASE --spread")
-    whence = {"as given": "given", "calibrated": "calibrated", "library": "own library", "package": "package"}
-    for head, origin in whence.items():
-        lines += listed(head, [one for one in rests if not one["guessed"] and one["origin"] == origin])
-    return lines
-
-
 def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool = False) -> str:
     """The result of a run (as `tabulate` returns it) in a few lines: mm, mm/s, degrees.
 
     Where it was ``cached``, it says that it was there before.
     """
+    result = with_bands(directory, result)
     lines = [line for one in analyses_in(result) for line in one.lines(result)]
     lines = lines or [f"{result['case']}: {result['drive']}"]
     if cached:
@@ -472,6 +419,11 @@ def warnings_of(result: Mapping[str, Any]) -> list[str]:
     """What a reader of a result should know."""
     warnings = [warning for one in analyses_in(result) for warning in one.warnings(result)]
     return [*warnings, "the dump ends within a frame"] if result["truncated"] else warnings
+
+
+def uncertainty_of(result: Mapping[str, Any]) -> list[str]:
+    """What the main numbers of a result are uncertain by, in sentences."""
+    return [sentence for one in analyses_in(result) for sentence in one.uncertainty(result)]
 
 
 def quantities_of(result: Mapping[str, Any]) -> list[Row]:

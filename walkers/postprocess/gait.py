@@ -1,4 +1,4 @@
-"""How walkers walk: velocities, rotation and sliding, orientation, contacts, posture; and whether they are steady.
+"""How walkers walk: velocities, rotation and sliding, orientation, contacts, posture; steady, constant or not.
 
 Velocities are along the walker's heading, from the small bead to the large one, relative to the substrate. With e the
 heading, z the normal of the substrate and ω a bead's angular velocity, the rotation velocity R ω·(z × e) is the paper's
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from walkers.inputs.case import CONSTANT
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, read_motion
@@ -36,12 +37,11 @@ SEPARATED = 0.1
 """Share of the time beyond which beads that no bridge can hold together are no walker."""
 ASTRAY = np.pi / 4.0
 """rad; a walker that ends farther from where it was to face has left the axis."""
-AGREEING = 0.002
-"""Share by which the velocities of the halves of a steady walker's cycles may differ."""
 _LEAST_SPEED = 2e-6
 """m/s; what velocities may differ by however slow the walkers are."""
 _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
-"""A steady walker turns by less rad in a cycle, and not by so much more than before; or by so much of what it did."""
+"""rad; at constant velocity a walker turns by less in a cycle, and not by so much more than before; or by at most this
+share of what it did."""
 _PARTLY = np.linspace(-0.95, -0.1, 9)
 _LASTING = np.linspace(0.1, 0.9, 9)
 _MODELS = np.array(
@@ -331,23 +331,23 @@ def came_near(centre: FloatArray, near: float) -> bool:
     return False
 
 
-def are_steady(directory: Path) -> bool:
-    """Whether the walkers of a run, made or being made, walk as they would go on to: they need no more cycles.
+def are_constant(directory: Path) -> bool:
+    """Whether velocities of a run, made or being made, are constant: its walkers need no more cycles.
 
     After a third of the cycles, at most 20, the velocities of both halves of the others agree, and no walker turns ever
-    faster. Of 362 dimers of the shipped sweeps that ran for 60 cycles, those that are steady so after 12, 24 … had
+    faster. Of 362 dimers of the shipped sweeps that ran for 60 cycles, those that are constant so after 12, 24 … had
     speeds within 0.2 % of the final ones; by their velocities alone some were 4 % off (they had begun to turn, faster
     and faster).
     """
-    return all(_is_steady(group) for group in read_motion(directory).groups)
+    return all(_is_constant(group) for group in read_motion(directory).groups)
 
 
-def _is_steady(group: Group) -> bool:
+def _is_constant(group: Group) -> bool:
     found, run = walk(group), group.case.run
     turned = np.abs(np.diff(group.orientation[:: run.samples_per_cycle][run.settled_strobes :], axis=0))
     before, after = turned[: len(turned) // 2].max(axis=0), turned[len(turned) // 2 :].max(axis=0)
     little = (after < _LITTLE) & (after < before + _NO_FASTER)
-    allowed = max(AGREEING * float(np.abs(found.velocity).max()), _LEAST_SPEED)
+    allowed = max(CONSTANT * float(np.abs(found.velocity).max()), _LEAST_SPEED)
     agree = np.abs(found.first_half - found.second_half).max() <= allowed
     return bool(agree and np.all(little | (after < _FADING * before)))
 

@@ -35,7 +35,7 @@ class Motion:
     Attributes
     ----------
     case
-        Of the run; if it was driven until its walkers were steady, with the cycles that it took.
+        Of the run; if it was driven until its velocities were constant, with the cycles that it took.
     time : ndarray, shape (F,)
         s, from the begin of the drive; negative while the beads come to rest.
     position, velocity, spin : ndarray, shape (F, N, 3)
@@ -49,7 +49,7 @@ class Motion:
         Segment and number of each frame within it, for the bridges.
     truncated, ended_early
         Whether the dump ends within a frame; whether the run ended before the most cycles that it may take, for its
-        walkers were steady.
+        velocities were constant.
     mean_spin : ndarray, shape (F, N, 3), or None
         Angular velocity averaged over all steps since the frame before (nothing in the first frame), of walkers.
     """

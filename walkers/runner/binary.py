@@ -16,6 +16,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.resources import files
@@ -206,6 +207,16 @@ def read_audit(engine: str) -> AuditRecord | None:
         except (OSError, ValueError, KeyError, TypeError):
             continue
     return min(known, key=lambda record: record.passed, default=None)
+
+
+def is_new(engine: str) -> bool:
+    """Whether a binary is asked about for the first time with this user's cache; it is not from then on."""
+    place = _record_of(engine, "seen")
+    with suppress(OSError):  # a cache that cannot be written: it is new each time
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.open("x").close()
+        return True
+    return not place.exists()
 
 
 def write_audit(record: AuditRecord) -> None:

@@ -9,9 +9,10 @@ from math import ceil, isfinite, pi
 from typing import Any
 
 from walkers.inputs.bodies import Walkers
-from walkers.inputs.case import Case
+from walkers.inputs.case import CONSTANT, Case
 from walkers.inputs.library import Known, library_of
 from walkers.inputs.loads import contact_loads, dimer_of
+from walkers.inputs.rounding import percent
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import printable
 from walkers.physics.capillary import capillary_force_limit_at_wall
@@ -31,7 +32,7 @@ _FASTEST_CLIMB = 12e-3
 _GAIN_PER_RANK = 0.9
 _RESTING_SEGMENTS = 3
 _TRIED_AGAIN = (1.0, 0.17, 0.08)
-"""Share of the runs that end when their walkers are steady that are made a first, a second and a third time."""
+"""Share of the runs that end when their velocities are constant that are made a first, a second and a third time."""
 
 
 def predicted_seconds(case: Case, walkers: int | None = None) -> float:
@@ -231,7 +232,7 @@ def _text_of_run(step: dict[str, Any], run: dict[str, Any]) -> list[str]:
     seconds = run["predicted_seconds"]
     cost = f"{seconds:.1f} s" if seconds < 120.0 else f"{seconds / 60.0:.1f} min"
     segments = f" in {run['segments']} segments" if run["segments"] > 1 else ""
-    most = "until steady, at most " if run["until_steady"] else ""
+    most = f"until the velocity is constant within {percent(CONSTANT)}, at most " if run["until_steady"] else ""
     lines.append(
         f"run        {most}{run['steps']} steps, {run['simulated_seconds']:.4g} s simulated{segments}, "
         f"{run['samples']} samples, about {cost}"

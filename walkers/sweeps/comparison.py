@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import hypot, isfinite, nan, sqrt
+from math import hypot, isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.errors import refused
 from walkers.inputs.readable import differing, flattened, readable, readable_unit
+from walkers.inputs.rounding import percent, rounded
+from walkers.postprocess.uncertainty import band_of, band_text, not_known, with_bands
 from walkers.runner.directory import case_of
-from walkers.sweeps.folder import aligned, with_error
+from walkers.sweeps.folder import aligned
 from walkers.sweeps.table import (
     ERRORS,
     default_column,
@@ -32,7 +34,11 @@ if TYPE_CHECKING:
     from walkers.inputs.case import Case
 
 _SIDES = ("first", "second")
-_SPREADS = ("smallest", "largest", "standard_error")  # columns of a sweep's table that are errors rather than results
+_SPREADS = ("smallest", "largest", "scatter")  # columns of a sweep's table that are no results
+_VELOCITIES = ("velocity", "right_facing", "left_facing")
+"""Columns whose scatter the result has, and whose numerical error is that of the velocity."""
+_UPHILL = {"right_facing": "facing up", "left_facing": "facing down"}
+"""What columns are called of walkers on a slope that the drive axis goes up."""
 _FIRST_MAKE = ("rotation", "sliding", "open")
 _OF_ALL = ("orientation_end", "separated_fraction")
 """Columns that are means over walkers: of the first make, or of all. (Axial velocities are of two headings.)"""
@@ -56,18 +62,25 @@ class Comparison:
 
 
 def _pair(
-    quantity: str, unit: str, values: Sequence[float], errors: Sequence[float]
+    quantity: str, unit: str, values: Sequence[float], scatters: Sequence[float], numerical: float = nan
 ) -> tuple[dict[str, Any], list[str]]:
-    """A quantity of both sides, with standard errors: as JSON, SI units, and as cells of a text, in usual units."""
-    difference, error = values[1] - values[0], hypot(*errors)
-    share = difference / error if error > 0.0 else nan
-    names = ("first", "second", "first_standard_error", "second_standard_error", "difference", "in_standard_errors")
-    numbers = zip(names, (*values, *errors, difference, share), strict=True)
+    """A quantity of both sides as JSON, SI units, and as cells of a text, in usual units.
+
+    Beside the difference are the scatters over copies, and the numerical error of the difference where it is known.
+    """
+    difference = values[1] - values[0]
+    names = ("first", "second", "first_scatter", "second_scatter", "difference", "numerical_error")
+    numbers = zip(names, (*values, *scatters, difference, numerical), strict=True)
     contents = {"quantity": quantity, "unit": unit, **{name: one if isfinite(one) else None for name, one in numbers}}
     usual, size = readable_unit(unit)
-    told = [with_error(value / size, one / size) for value, one in zip(values, errors, strict=True)]
-    told += [f"{one:+.3g}" if isfinite(one) else "-" for one in (difference / size, share)]
-    return contents, [with_unit(quantity, usual), *told]
+    told = [rounded(value / size, usual) for value in (*values, difference)]
+    told[2] = told[2] if told[2][:1] == "-" or told[2] == "0" else f"+{told[2]}"
+    both = " and ".join(_two_digits(one / size, usual) for one in scatters if isfinite(one))
+    return contents, [with_unit(quantity, usual), *told, both or "-", _two_digits(numerical / size, usual)]
+
+
+def _two_digits(value: float, unit: str) -> str:
+    return rounded(float(f"{value:.2g}"), unit)
 
 
 def compare_runs(first: Side, second: Side) -> Comparison:
@@ -79,7 +92,8 @@ def compare_runs(first: Side, second: Side) -> Comparison:
     pairs = [] if not_run else _pairs([side.directory for side in sides if side.directory])
     text = [told or "the cases are the same"]
     if apart := [cells for one, cells in pairs if one["first"] != one["second"]]:
-        text.append(aligned([["result", *names, "difference", "in standard errors"], *apart]))
+        text.append(aligned([["result", *names, "difference", "scatter of copies", "numerical error"], *apart]))
+        text += _told_errors([side.directory for side in sides if side.directory], names)
     if same := [one["quantity"] for one, _ in pairs if one["first"] == one["second"]]:
         text.append(f"the same in both: {', '.join(same)}")
     text += [f"{name}: no finished run; the parameters alone are compared" for name in not_run]
@@ -104,31 +118,69 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     """All numbers that the analyses give of two runs."""
     results = [result_in(run) for run in runs]
     rows = [row_of(result) for result in results]
-    errors = [_errors(run, result) for run, result in zip(runs, results, strict=True)]
+    scatters = [_scatters(run, result) for run, result in zip(runs, results, strict=True)]
+    numerical = hypot(*map(_numerical_error, results))
     units = result_columns([name for result in results for name in result["analyses"]])
-    pairs = []
+    uphill, pairs = all(result.get("goes_uphill") for result in results), []
     for name, (unit, _) in units.items():
         values = [_number_of(row.get(name)) for row in rows]
         if name not in _SPREADS and any(map(isfinite, values)):
-            pairs.append(_pair(name, unit, values, [known.get(name, nan) for known in errors]))
+            error = numerical if name in _VELOCITIES else nan
+            one, cells = _pair(name, unit, values, [known.get(name, nan) for known in scatters], error)
+            if uphill and name in _UPHILL:
+                cells[0] = cells[0].replace(name, _UPHILL[name])
+            pairs.append((one, cells))
     return pairs
 
 
-def _errors(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
-    """Standard errors of columns: as the result has them, and of means over walkers from the table of the walkers."""
+def _scatters(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
+    """Standard deviations of columns over copies: as the result has them, or of the table of the walkers."""
     if "velocity" not in result:
         return {}
     from walkers.postprocess.tables import read_table
 
-    known = ("velocity", "right_facing", "left_facing")
-    errors = {name: _number_of(result[name]["standard_error"]) for name in known}
+    scatters = {name: _number_of(result[name]["scatter"]) for name in _VELOCITIES}
     walkers = read_table(run, "walkers")
     for name in walkers.columns:
         of_first = name.rpartition("_")[0] in _FIRST_MAKE
         rows = walkers[walkers["make"] == 0] if of_first else walkers
         if len(rows) > 1 and (of_first or name in _OF_ALL):
-            errors[name] = float(rows[name].std(ddof=1)) / sqrt(len(rows))
-    return errors
+            scatters[name] = float(rows[name].std(ddof=1))
+    return scatters
+
+
+def _numerical_error(result: Mapping[str, Any]) -> float:
+    """Of the velocity, m/s; NaN if it is not known."""
+    return float((result.get("numerical_error") or {}).get("total", nan))
+
+
+def _told_errors(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
+    """Sentences: what the difference of two velocities is against their numerical errors, and against their bands."""
+    results = [with_bands(run, result_in(run)) for run in runs]
+    if not all("velocity" in result for result in results):
+        return []
+    errors, own = [_numerical_error(one) for one in results], [_number_of(one["velocity"]["mean"]) for one in results]
+    lines, total = [], hypot(*errors)
+    if isfinite(total) and total > 0.0:
+        times = abs(own[1] - own[0]) / total
+        told = "less than" if times < 1.0 else f"{_two_digits(times, '')} times"
+        shares = " and ".join(
+            f"{percent(float(f'{error / abs(value):.2g}'))} of {name}"
+            for name, error, value in zip(names, errors, own, strict=True)
+            if value
+        )
+        lines.append(f"the velocities differ by {told} their numerical error ({shares})")
+    lines += [
+        f"{name}: the numerical error is not measured for this case"
+        for name, error in zip(names, errors, strict=True)
+        if not isfinite(error)
+    ]
+    for name, one, value in zip(names, results, own, strict=True):
+        if band := band_of(one, "velocity", value):
+            lines.append(f"{name}: {band_text(band, 'm/s')} over the ranges of what nobody measured (5 to 95 %)")
+        else:
+            lines += [f"{name}: {sentence}" for sentence in not_known(one["rests_on"])]
+    return ["\n".join(lines)] if lines else []
 
 
 def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comparison:
@@ -152,13 +204,14 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
     parameters, told = _different([case_of(Path(both[f"run_{side}"].iloc[0])) for side in _SIDES], names)
     points, lines = [], []
     for row in both.to_dict("records"):
-        of_sides = [[_number_of(row.get(f"{name}_{side}")) for side in _SIDES] for name in (column, ERRORS.get(column))]
-        one, (quantity, *cells) = _pair(column, tables[0].attrs["units"][column], *of_sides)
+        names_of = (column, ERRORS.get(column))
+        values, scatters = ([_number_of(row.get(f"{name}_{side}")) for side in _SIDES] for name in names_of)
+        one, (quantity, *cells) = _pair(column, tables[0].attrs["units"][column], values, scatters)
         at = dict(zip(records[0].units, records[0].values[row["point_first"]], strict=True))
         points.append({"point": at, **one})
-        lines.append([*map(value_text, at.values()), *cells])
+        lines.append([*map(value_text, at.values()), *cells[:-1]])
     unmatched = [len(table) - len(both) for table in tables]
-    heads = [*keys[0], *(f"{name}: {quantity}" for name in names), "difference", "in standard errors"]
+    heads = [*keys[0], *(f"{name}: {quantity}" for name in names), "difference", "scatter of copies"]
     unit, size = readable_unit(tables[0].attrs["units"][column])
     largest = max((one["difference"] or 0.0 for one in points), key=abs)
     line = f"{len(both)} points in both; largest difference {largest / size:+.3g} {unit}".rstrip()

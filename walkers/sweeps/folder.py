@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from math import inf, isfinite, nan
+from math import inf
 from operator import attrgetter
 from pathlib import Path
 from stat import S_ISDIR
@@ -23,7 +23,9 @@ from typing import Any, Literal
 
 from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, differing, flattened, has_key, readable
+from walkers.inputs.rounding import rounded
 from walkers.physics.units import Kind, parse_quantity
+from walkers.postprocess.uncertainty import SPREAD_NAME
 from walkers.runner.directory import (
     CASE_NAME,
     REPLACED,
@@ -79,7 +81,6 @@ class Entry:
     reason: str | None = None
     message: str | None = None
     velocity: float | None = None
-    standard_error: float | None = None
     climbs: int | None = None
     points: Mapping[str, int] | None = None
     runs: Sequence[str] = ()
@@ -146,8 +147,7 @@ def _run(path: Path, now: float) -> Entry | None:
     with suppress(OSError, ValueError, AttributeError, TypeError):
         result = recorded_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
-        given = {"velocity": velocity.get("mean"), "standard_error": velocity.get("standard_error")}
-        given["climbs"] = None if climbs is None else len(climbs)
+        given = {"velocity": velocity.get("mean"), "climbs": None if climbs is None else len(climbs)}
     return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
 
 
@@ -249,7 +249,7 @@ def as_json(entries: Sequence[Entry]) -> list[dict[str, Any]]:
     """Entries as JSON objects, SI units; ``varies`` has, of a run, the values by which runs of its case differ."""
     keys = {case: keys for case, _, keys in _varied([entry for entry in entries if not entry.is_sweep])}
     common = ("name", "case", "status", "age", "size")
-    of_runs = ("reason", "message", "velocity", "standard_error", "climbs")
+    of_runs = ("reason", "message", "velocity", "climbs")
     rows = []
     for entry in entries:
         shown = entry.parameters if entry.is_sweep else keys[entry.case]
@@ -287,7 +287,7 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
             status = f"{run.status}: {run.reason}" if run.reason else run.status
             result = "-" if run.climbs is None else f"{run.climbs} climb{'' if run.climbs == 1 else 's'}"
             if run.velocity is not None:
-                result = f"{with_error(1e3 * run.velocity, 1e3 * (run.standard_error or nan))} mm/s"
+                result = f"{rounded(1e3 * run.velocity, 'mm/s')} mm/s"
             values = [readable(key, run.parameters.get(key)) for key in varied]
             rows.append([run.name, status, result, age_text(run.age), bytes_text(run.size), *values])
         blocks.append(aligned(rows))
@@ -295,13 +295,6 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
     size = bytes_text(sum(entry.size for entry in entries))
     more = f"; not shown: {hidden} runs of sweeps (--all)" if hidden else ""
     return "\n\n".join([*blocks, f"{', '.join(total)}, {size}{more}"])
-
-
-def with_error(value: float, error: float) -> str:
-    """A number with its standard error, if that is known; a dash for none."""
-    if not isfinite(value):
-        return "-"
-    return f"{value:.4g} ± {error:.1g}" if isfinite(error) else f"{value:.4g}"
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> str:
@@ -359,12 +352,12 @@ class Cleaning:
 
 
 def _own_files(directory: Path) -> list[Path]:
-    """What the project wrote into a sweep's directory: record, Parsl's logs, report and figures of default names."""
+    """What the project wrote into a sweep's directory: record, logs, bands, report and figures of default names."""
     record = read_record(directory)
     columns = {*record.units, *derived_columns(record.analyses), *result_columns(record.analyses)}
     names = {"report.html", *(f"{column}.png" for column in columns)}
     pages = [path for path in directory.iterdir() if path.name in names and path.is_file() and not path.is_symlink()]
-    known = [path for path in (directory / RECORD_NAME, directory / PARSL) if path.exists()]
+    known = [path for path in (directory / RECORD_NAME, directory / PARSL, directory / SPREAD_NAME) if path.exists()]
     return [*known, *(path for path in pages if _MARK in path.read_bytes())]
 
 

@@ -24,7 +24,7 @@ from typing import Any
 from walkers.inputs.case import Case
 from walkers.inputs.errors import Stopped, WalkersError
 from walkers.postprocess.analysis import tabulate
-from walkers.runner.binary import Engine, read_audit
+from walkers.runner.binary import Engine, is_new, read_audit
 from walkers.runner.directory import (
     CASE_NAME,
     FAILURE_NAME,
@@ -80,12 +80,12 @@ class DamagedSegment(WalkersError):
 
 
 def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
-    """Refuse an engine whose audit failed (`AuditFailed`), unless told otherwise; warn of one that never had one."""
+    """Refuse an engine whose audit failed (`AuditFailed`), unless told otherwise; warn once of one that had none."""
     audit = read_audit(engine.sha256)
-    if audit is None:
-        message = "this engine was never audited; check what it computes with: walkers check engine"
+    if audit is None and is_new(engine.sha256):
+        message = "this engine was never audited; check what it computes with: walkers check engine (said once)"
         warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
-    elif not audit.passed and not allow_failed_audit:
+    elif audit is not None and not audit.passed and not allow_failed_audit:
         raise AuditFailed(audit.failures)
 
 
@@ -182,10 +182,10 @@ def progress_at(place: Path) -> Progress | None:
     return Progress(driven, steps, step * case.run.time_step, seconds, step - begin, start is None)
 
 
-def _are_steady(directory: Path) -> bool:
-    from walkers.postprocess.gait import are_steady  # numpy is loaded while the engine runs
+def _are_constant(directory: Path) -> bool:
+    from walkers.postprocess.gait import are_constant  # numpy is loaded while the engine runs
 
-    return are_steady(directory)
+    return are_constant(directory)
 
 
 # --- one run ----------------------------------------------------------------------------------------------------------
@@ -239,7 +239,7 @@ class OpenRun:
                     self.ended = f"{over.lost} bead(s) left the container over its walls in the next segment"
                     return
                 made += segment.end - segment.begin
-            if cycles < self.case.run.cycles and _are_steady(self.directory):
+            if cycles < self.case.run.cycles and _are_constant(self.directory):
                 return
 
     def _next_segment(self, case: Case) -> Segment | None:
@@ -362,7 +362,7 @@ def _make_together(
     on_progress: _Tell | None,
     time_limit: float | None,
 ) -> dict[str, FinishedRun]:
-    """Make runs of so many cycles by one deck; those finished whose walkers are steady, or that take no more cycles.
+    """Make runs of so many cycles by one deck; those of constant velocities, or that take no more cycles.
 
     Whatever else there is of them goes: what fails together is to be made apart.
     """
@@ -385,7 +385,7 @@ def _make_together(
             folder = incomplete / DECK_FOLDER
             report = launch(deck, folder, engine, on_step=tell, time_limit=time_limit, keep_open=locks)
             _part(incomplete, tried, deck, report)
-            done = [name for name in cases if cycles >= cases[name].run.cycles or _are_steady(incomplete / name)]
+            done = [name for name in cases if cycles >= cases[name].run.cycles or _are_constant(incomplete / name)]
             shared = {"first": first, "runs": len(done), "walkers": len(deck.layout.walkers)}
             own: dict[str, Any] = {"started": started, "drive_from": 0, "segments": 1, "shared_deck": shared}
             for name in done:

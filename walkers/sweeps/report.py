@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.inputs.readable import readable_unit
-from walkers.postprocess.analysis import rounded
+from walkers.inputs.rounding import rounded
 from walkers.postprocess.report.page import (
     COLOURS,
     LARGEST,
@@ -91,15 +91,12 @@ def _table(frame: pd.DataFrame) -> dict[str, Any]:
     results = [name for name in _SHOWN if name in frame and name not in varied and frame[name].notna().any()]
     shown = {name: (units[name], 1.0) for name in varied} | {name: readable_unit(units[name]) for name in results}
     heads = [with_unit(name if name in varied else name.replace("_", " "), unit) for name, (unit, _) in shown.items()]
-    rows = [
-        [_cell(row[name], size, row.get(ERRORS.get(name, ""))) for name, (_, size) in shown.items()]
-        for _, row in frame.iterrows()
-    ]
+    rows = [[_cell(row[name], size, unit or "") for name, (unit, size) in shown.items()] for _, row in frame.iterrows()]
     return {"head": heads, "rows": rows}
 
 
-def _cell(value: Any, size: float, error: Any) -> dict[str, Any]:
-    """A cell of the table: a number with its error, or a text."""
+def _cell(value: Any, size: float, unit: str) -> dict[str, Any]:
+    """A cell of the table: a number, or a text."""
     if isinstance(value, (bool, np.bool_, str)):
         return {"text": str(value), "value": None}
     if value is None or not isfinite(value):
@@ -107,11 +104,7 @@ def _cell(value: Any, size: float, error: Any) -> dict[str, Any]:
     number = float(value)
     if number.is_integer() and size == 1.0:
         return {"text": f"{number:g}", "value": number}
-    if error is None or not isfinite(error):
-        return {"text": rounded(number / size), "value": number}
-    of_unit = error / size
-    told = {"text": rounded(number / size, of_unit), "error": rounded(of_unit, of_unit)}
-    return {**told, "value": number, "error_value": float(error)}
+    return {"text": rounded(number / size, unit), "value": number}
 
 
 def _overview(frame: pd.DataFrame) -> Model | None:
@@ -125,7 +118,8 @@ def _overview(frame: pd.DataFrame) -> Model | None:
     others = [name for name in varied if name != x]
     unit, size = readable_unit(units[result])
     label = with_unit(result, unit)
-    plot = new_plot(f"{label} against {x}, with the standard error", with_unit(x, units[x]), label, height=380)
+    bars = ", bars: scatter of the copies" if result in ERRORS else ""
+    plot = new_plot(f"{label} against {x}{bars}", with_unit(x, units[x]), label, height=380)
     known = frame[frame[result].notna()].sort_values(x, kind="stable")
     apart = known[others].astype(str).agg(", ".join, axis=1) if others else known["point"].map(lambda _: "")
     names = list(dict.fromkeys(apart.sort_index()))

@@ -8,19 +8,24 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.axes import sampled, unit_cube, unit_of
+from walkers.inputs.axes import Range, ranges_of, sampled, unit_cube, unit_of, written
 from walkers.inputs.case import Case
-from walkers.inputs.errors import refused
+from walkers.inputs.errors import refused, unusable
 from walkers.inputs.library import unmeasured
+from walkers.inputs.messages import blaming
 from walkers.inputs.origins import Origin
-from walkers.inputs.readable import readable_unit
+from walkers.inputs.readable import kind_of
+from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.inputs.sweep import Sweep, settings_in
+from walkers.physics.units import parse_quantity
 from walkers.postprocess.analysis import analyses, analyses_of
 from walkers.postprocess.gait import SEPARATED
+from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import run_name
+from walkers.runner.directory import run_place
+from walkers.runner.files import write_json
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
-from walkers.sweeps.table import load, row_of
+from walkers.sweeps.table import load
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +37,6 @@ _SEEDS = range(1, 65)
 do by 0.7, and which of two values matters could not be told."""
 _LEAST_PER_VALUE = 3  # points for each value that is drawn, below which ranks are chance
 _AT_REST = 2e-5  # m/s: below, walkers are at rest, as in the sweeps that look for the threshold of motion
-_DIGITS = 5  # after the point, of what is shown: less than 1e-5 mm/s is 0
 _WORDS = {
     "forward": "walk toward the large bead",
     "backward": "walk toward the small one",
@@ -78,10 +82,30 @@ class Spread:
         return told
 
 
+def _range_of(one: Origin) -> dict[str, list[Any]]:
+    """The range of a value as a sweep's sampler takes it: the case's own value is the median.
+
+    So a result is in the middle of what its guesses make of it, wherever in their ranges these are.
+    """
+    name, (low, high) = "loguniform" if one.logarithmic else "uniform", one.range or (None, None)
+    ends: Range = ranges_of({one.key: {name: [low, high]}})[one.key]
+    kind = kind_of(one.key)
+    try:
+        unit = parse_quantity(f"1 {ends.unit}", kind) if kind and ends.unit else 1.0
+        own = (parse_quantity(one.text, kind) if kind and ends.unit else float(one.text)) / unit
+    except ValueError:  # one that the case leaves to the program, such as a time step
+        return {name: [low, high]}
+    if not ends.low * (1.0 - 1e-9) <= own <= ends.high * (1.0 + 1e-9):
+        told = f"expected a range that holds the case's own value, {one.text}"
+        raise unusable(f"uncertain.{one.key}", told, [low, high])
+    return {name: [low, written(min(max(own, ends.low), ends.high), ends.unit), high]}
+
+
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
     """A sweep over all that is uncertain in a case: Sobol's sequence, scrambled so that its columns are least alike.
 
-    `InputError` if nothing in it is, or the case was changed after it was read.
+    The case's own values are the medians of what is drawn. `InputError` if nothing in the case is uncertain, a range
+    does not hold the case's own value, or the case was changed after it was read.
     """
     import numpy as np
 
@@ -91,7 +115,8 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
     if not varied:
         told = "nothing here is uncertain: say ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
         raise refused(case.name, told)
-    ranges = {one.key: {"loguniform" if one.logarithmic else "uniform": list(one.range or ())} for one in varied}
+    with blaming(case.name, case.document):
+        ranges = {one.key: _range_of(one) for one in varied}
 
     def likeness(seed: int) -> float:
         cube = unit_cube("sobol", len(varied), points, seed)
@@ -100,7 +125,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
     seed = min(_SEEDS, key=likeness) if len(varied) > 1 else _SEEDS[0]
     axis = sampled("sobol", points, seed, ranges)
     return Sweep(
-        name=f"{run_name(case, find_engine(engine))}-spread",
+        name=spread_of(run_place(case, find_engine(engine), Path())).name,
         title=f"{case.title or case.name}: what nobody measured, over its ranges",
         source=case.name,
         case_name=case.name,
@@ -120,10 +145,10 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
 def run_spread(
     case: Case, out: Path, options: Options, *, points: int = POINTS, engine: str | None = None, **how: Any
 ) -> Spread:
-    """Run a case with all that nobody measured drawn from its ranges.
+    """Run a case with all that nobody measured drawn from its ranges, and write the bands beside the sweep's record.
 
     The case is as it was read from a file: its own values say what is uncertain. All else is as of
-    `walkers.sweeps.scheduler.run_sweep`.
+    `walkers.sweeps.scheduler.run_sweep`. Texts and reports of the case's run have the bands from then on.
 
     Notes
     -----
@@ -141,7 +166,7 @@ def run_spread(
         counts = {"forward": int((speeds > _AT_REST).sum()), "backward": int((speeds < -_AT_REST).sum())}
         counts |= {"at_rest": int((speeds.abs() <= _AT_REST).sum()), "separated": len(table) - len(together)}
     shown = [name for one in analyses_of(case) for name in one.headlines if name in one.columns]
-    return Spread(
+    spread = Spread(
         directory=record.directory,
         varied=tuple(one for one in case.origins if one.range is not None),
         held=tuple(one for one in case.origins if one.key in unmeasured() and one.range is None),
@@ -150,6 +175,8 @@ def run_spread(
         counts=counts,
         failures=tuple(failures),
     )
+    write_json(record.directory / SPREAD_NAME, {**spread.as_dict(), "directory": record.name})
+    return spread
 
 
 def _band(values: pd.Series[float]) -> Band:
@@ -166,26 +193,24 @@ def _ranks(table: pd.DataFrame, name: str, keys: tuple[str, ...]) -> dict[str, f
     return dict(sorted(certain.items(), key=lambda one: -abs(one[1])))
 
 
-def describe(spread: Spread, result: Mapping[str, Any] | None = None) -> str:
-    """A spread in a few lines: mm, mm/s; with the result of the case itself, whether that lies outside the band."""
-    own = row_of(result) if result else {}
+def describe(spread: Spread) -> str:
+    """A spread in a few lines: mm, mm/s."""
     units = {key: unit for one in analyses() for key, (unit, _) in one.columns.items()}
     points = max((band.points for band in spread.bands.values()), default=0)
-    lines = [f"  spread     over {points} points, each of these drawn from its range by itself:"]
-    lines += [f"             {one.key} {one.range[0]} to {one.range[1]}" for one in spread.varied if one.range]
+    lines = [f"  spread     {points} draws, each value from its range by itself, half of them below the case's own:"]
+    lines += [
+        f"             {one.key} {one.range[0]} to {one.range[1]}, own {one.text}" for one in spread.varied if one.range
+    ]
     if spread.held:
         told = ", ".join(f"{one.key} {one.text}" for one in spread.held)
         lines.append(f"    as given {told}: to be drawn too, they need ranges in [uncertain]")
     for name, band in spread.bands.items():
-        unit, size = readable_unit(units[name])
-        low, middle, high, smallest, largest = (f"{round(one / size, _DIGITS):.3g}" for one in astuple(band)[:5])
+        unit, factor = SHOWN_UNITS.get(units[name], (units[name], 1.0))
+        low, middle, high, smallest, largest = (
+            rounded(float(f"{one * factor:.3g}"), unit) for one in astuple(band)[:5]
+        )
         ends = f"{low} to {high} {unit} (5 to 95 %), median {middle}; smallest {smallest}, largest {largest}"
         lines.append(f"    {name:9}{ends}")
-        value = own.get(name)
-        if value is not None and not band.low <= value <= band.high:
-            side = "above" if value > band.high else "below"
-            told = f"the case's own lies {side} that: some of its values stand at the end of their ranges"
-            lines.append(f"{'':13}{told}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
         told = f"depends most on {ranks} (rank correlation)" if ranks else "on none of them clearly"
         if band.points < _LEAST_PER_VALUE * len(spread.varied):

@@ -26,6 +26,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem, WalkersError, refused
 from walkers.inputs.library import suggestion
+from walkers.inputs.rounding import DIGITS, NOISE
 from walkers.postprocess.analysis import RESULT_NAME, Described, analyses, analyses_in, analyses_of, current_result
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, finished_run, is_locked, run_place, unfinished
@@ -56,12 +57,12 @@ STATE = {
 }
 RESULTS = ("velocity", "climbs")
 """What is shown of a sweep if nothing else is asked for, the first that the table has."""
-ERRORS = {"velocity": "standard_error"}
-"""Columns with the standard errors of others."""
+ERRORS = {"velocity": "scatter"}
+"""Columns with the scatter of others over copies."""
 FORMATS = ("csv", "parquet", "json")
 _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
-    *("standard_error", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2", "open_3"),
+    *("scatter", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2", "open_3"),
     *("separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
 }
 """Columns that a table to look at leaves out."""
@@ -411,9 +412,10 @@ def short_text(frame: pd.DataFrame) -> str:
     units = dict(frame.attrs.get("units", {}))
     for name in shown.columns:
         if units.get(name) == "m/s":
-            shown[name], units[name] = shown[name].astype(float) * 1e3, "mm/s"
+            speeds = shown[name].astype(float) * 1e3
+            shown[name], units[name] = speeds.mask(speeds.abs() < NOISE["mm/s"], 0.0), "mm/s"
     shown.columns = pd.Index([with_unit(name, units.get(name)) for name in shown.columns])
-    return str(shown.to_string(index=False, float_format=lambda value: f"{value:.4g}", na_rep="-"))
+    return str(shown.to_string(index=False, float_format=lambda value: f"{value:.{DIGITS}g}", na_rep="-"))
 
 
 def thresholds(directory: str | Path) -> pd.DataFrame:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from math import hypot, pi
+from math import hypot, nan, pi
 from typing import Any
 
 import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
+from walkers.inputs.rounding import with_decimals
+from walkers.physics.units import ACCELERATION_OF_ONE_G
 from walkers.theory.mathieu import Alignment, alignment, largest_stable_v, time_to_turn, turning_rate
 from walkers.theory.motion import Friction, Motion, Walker, walk
 from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, FloatArray, detachment, mean_velocity
@@ -21,11 +23,14 @@ GROWS = 0.05
 """A rate, 1/s, above which small angles to the axis grow: half as large again in ten seconds."""
 _TRIALS = 33
 _ROUNDS = 3
-MODEL, PAPER = "theory", f"paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
+MODEL = "theory: Coulomb friction and drag"
+PAPER = f"theory: paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
 """Coulomb friction with the resistance of bridges (`motion_of`); the paper's own model, of what its friction was fitted
 to (`walkers.theory.quasistatic.mean_velocity`)."""
 _BEADS, _BOUNDARIES, _LIQUIDS = "ruby", ("chromium-coated glass", "glass"), ("Si AK5", "Si AK10")
 """Of the paper's walkers on a level substrate (its Figs. 2 to 4)."""
+LARGEST_GAMMA0, LARGEST_ACCELERATION, FREQUENCIES = 3.5, 98.0, (60.0, 90.0)
+"""Up to which Γ0 and peak acceleration (m/s²), and at which frequencies (Hz), the paper measured velocities."""
 
 
 def motion_of(*cases: Case, viscous: bool = True) -> Motion:
@@ -88,20 +93,52 @@ def predict(case: Case) -> dict[str, Any]:
     dimer = dimer_of(case)
     gamma0 = dimer.gamma0(case.drive.peak_acceleration)
     end = detachment(dimer.sin_delta)
-    linear = float(mean_velocity(gamma0, dimer.sin_delta))
+    linear, reason = nan, why_not_the_paper(case)
+    if reason is None:
+        linear = float(mean_velocity(gamma0, dimer.sin_delta))
+        reason = None if np.isfinite(linear) else f"{CONTACTS[int(end.contact)]} would open"
     return {
         "gamma0": gamma0,
         "sin_delta": dimer.sin_delta,
         "paper": {
             "friction": FRICTION_OF_THE_PAPER,
             "velocity": _number(linear),
-            "reason": None if np.isfinite(linear) else f"{CONTACTS[int(end.contact)]} would open",
+            "reason": reason,
         },
         "coulomb": _told(case, viscous=False),
         "viscous": _told(case, viscous=True),
         "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},
         "alignment": alignment_of(case),
+        "outside": outside_of_the_paper(case),
     }
+
+
+def why_not_the_paper(case: Case) -> str | None:
+    """Why the paper's fit, of a friction that was fitted to its walkers, says nothing of a case; None if it does."""
+    same = case.material == _BEADS and case.boundary.material in _BOUNDARIES and case.liquid.name in _LIQUIDS
+    if same and case.axial_gravity == 0.0:
+        return None
+    return f"the fit is to {_BEADS} on level {' or '.join(_BOUNDARIES)} in {' or '.join(_LIQUIDS)}"
+
+
+def outside_of_the_paper(case: Case) -> str | None:
+    """A sentence on how a case is outside the range in which the paper measured velocities; None if it is within.
+
+    Of a case that is no dimer's nothing is said.
+    """
+    drive, (low, high) = case.drive, FREQUENCIES
+    if not case.walkers or len(case.walkers[0].radii) != 2:
+        return None
+    gamma0 = dimer_of(case).gamma0(drive.peak_acceleration)
+    found = {
+        f"Γ0 = {gamma0:.3g} (measured up to {LARGEST_GAMMA0:g})": gamma0 > LARGEST_GAMMA0,
+        f"{drive.peak_acceleration / ACCELERATION_OF_ONE_G:.3g} g "
+        f"(up to {LARGEST_ACCELERATION / ACCELERATION_OF_ONE_G:g} g)": drive.peak_acceleration
+        > (1.0 + 1e-9) * LARGEST_ACCELERATION,
+        f"{drive.frequency:g} Hz ({low:g} to {high:g} Hz)": not low <= drive.frequency <= high,
+    }
+    beyond = [told for told, outside in found.items() if outside]
+    return f"outside the paper's measurements: {', '.join(beyond)}; no model is tested there" if beyond else None
 
 
 def _told(case: Case, *, viscous: bool) -> dict[str, Any]:
@@ -165,7 +202,8 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
     paper, end, mathieu = prediction["paper"], prediction["detachment"], prediction["alignment"]
     lines = [
         f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}",
-        f"  paper's model, κ = {paper['friction'] * 1e-3:g} s/mm      {_speed(paper)}",
+        *([f"  {prediction['outside']}"] if prediction["outside"] else []),
+        f"  paper's fit, κ = {paper['friction'] * 1e-3:g} s/mm        {_speed(paper)}",
         f"  Coulomb friction               {_speed(prediction['coulomb'])}{_details(prediction['coulomb'])}",
         f"  Coulomb friction and drag      {_speed(prediction['viscous'])}{_details(prediction['viscous'])}",
     ]
@@ -211,12 +249,14 @@ def describe_alignment(found: dict[str, Any]) -> list[str]:
 
 
 def _speed(model: dict[str, Any]) -> str:
-    return f"{model['velocity'] * 1e3:8.3f} mm/s" if model["velocity"] is not None else f"none: {model['reason']}"
+    if model["velocity"] is None:
+        return f"    none: {model['reason']}"
+    return f"{with_decimals(model['velocity'] * 1e3, 3):>8} mm/s"
 
 
 def _details(model: dict[str, Any]) -> str:
-    rotation = ", ".join(f"{value * 1e3:.2f}" for value in model["rotation"])
-    told = f"; beads rotate at {rotation}, large one slides at {model['sliding'][0] * 1e3:.2f}"
+    rotation = ", ".join(with_decimals(value * 1e3, 2) for value in model["rotation"])
+    told = f"; beads rotate at {rotation}, large one slides at {with_decimals(model['sliding'][0] * 1e3, 2)}"
     gamma = model.get("threshold")
     return told + (f"; moves from Γc = {gamma:.3f}" if gamma is not None else "")
 
@@ -254,12 +294,10 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
     reasons += Counter({"a contact opens, or the motion does not repeat itself": int(np.sum(~known))})
     for place in able if is_velocity else ():
         case, dimer = cases[place], dimer_of(cases[place])
-        same = case.material == _BEADS and case.boundary.material in _BOUNDARIES and case.liquid.name in _LIQUIDS
-        if same and case.axial_gravity == 0.0:
-            paper[place] = mean_velocity(dimer.gamma0(case.drive.peak_acceleration), dimer.sin_delta)
+        if why := why_not_the_paper(case):
+            reasons[f"{PAPER}: {why}"] += 1
         else:
-            of = f"{_BEADS} on level {' or '.join(_BOUNDARIES)} in {' or '.join(_LIQUIDS)}"
-            reasons[f"the {PAPER}, is one of {of}"] += 1
+            paper[place] = mean_velocity(dimer.gamma0(case.drive.peak_acceleration), dimer.sin_delta)
     found = {MODEL: model, PAPER: paper}
     return {name: one for name, one in found.items() if np.isfinite(one).any()}, dict(reasons)
 
@@ -271,5 +309,5 @@ def _why_not(case: Case, column: str) -> str | None:
     except ValueError as error:
         return str(error).partition(": ")[2]
     if case.axial_gravity != 0.0 and column != "right_facing":
-        return "on a slope the theory is one of walkers that go up it (right_facing)"
+        return "on a slope the theory is one of walkers that face up (column right_facing)"
     return None

@@ -34,6 +34,7 @@ from walkers.postprocess.clusters import (
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
 from walkers.postprocess.tables import Columns, columns_of, columns_of_rows
+from walkers.postprocess.uncertainty import wrapped
 
 if TYPE_CHECKING:
     from walkers.postprocess.figures import Panel
@@ -250,7 +251,7 @@ class Pile(Analysis):
                 + (f"; over the rim, at {result['rim'] * 1e3:g} mm" if climb["height"] > result["rim"] else "")
                 + ("" if climb["out_of_pile"] else "; it has hung on a wall since the pouring")
             )
-        return lines
+        return lines + wrapped(self.uncertainty(result))
 
     def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
         """Cluster and track of each bead, the liquid in its bridges (m³), and whether it climbs."""

@@ -1,7 +1,8 @@
 """The analysis of walkers: their tables, their velocities, rotation and sliding, their orientation.
 
-The result follows the paper's protocol: each velocity is the mean over replicates, its error bar the largest minus the
-smallest, with the walkers that face left and right also apart.
+The result follows the paper's protocol: each velocity is the mean over copies, its error bar the largest minus the
+smallest, with the walkers that face left and right also apart. The copies differ only in how they start: their scatter
+says how alike they are, not what the velocity is uncertain by.
 """
 
 from __future__ import annotations
@@ -10,18 +11,22 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from math import degrees, nan, sqrt
+from math import degrees, nan
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from walkers.inputs.case import Case
+from walkers.inputs.caption import radii_text
+from walkers.inputs.case import CONSTANT, Case
 from walkers.inputs.loads import contact_loads, dimer_of
+from walkers.inputs.numerical import STIFFER, numerical_error
+from walkers.inputs.rounding import percent, with_decimals
 from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.gait import (
     POSTURES,
     SEPARATED,
+    STEADY_DIFFERENCE,
     STEADY_SPEED,
     Gait,
     averages,
@@ -35,6 +40,7 @@ from walkers.postprocess.gait import (
 )
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
+from walkers.postprocess.uncertainty import band_of, band_text, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -88,7 +94,7 @@ class WalkerRows:
     standard_error: Annotated[FloatArray, "m/s", "of the fit of the velocity"]
     first_half: Annotated[FloatArray, "m/s", "velocity in the first half of the fitted cycles"]
     second_half: Annotated[FloatArray, "m/s", "velocity in the second half of the fitted cycles"]
-    steady: Annotated[BoolArray, "", "whether the two halves agree"]
+    steady: Annotated[BoolArray, "", f"whether the two halves agree within {percent(STEADY_DIFFERENCE)}"]
     axial_velocity: Annotated[FloatArray, "m/s", "mass centre along the drive axis"]
     lateral_velocity: Annotated[FloatArray, "m/s", "mass centre across the drive axis"]
     orientation_mean: Annotated[FloatArray, "rad", "mean orientation after the settling cycles"]
@@ -127,7 +133,7 @@ class Walking(Analysis):
 
     order = 0
     name = "walking"
-    version = 5
+    version = 6
     tables: ClassVar[Mapping[str, type]] = {"trajectory": Trajectory, "walkers": WalkerRows, "bridges": BridgeRows}
     headlines = ("velocity",)
     derived: ClassVar[Described] = {
@@ -163,6 +169,7 @@ class Walking(Analysis):
             "cycles": case.run.cycles,
             "settling_cycles": case.run.settling_cycles,
             "ended_early": motion.ended_early,
+            "numerical_error": numerical_error(case),
             "posture": _posture(groups, tables["walkers"]) if case.goes_uphill else None,
             **{name: known.get(name) for name in ("gamma0", "sin_delta")},
         }
@@ -190,7 +197,8 @@ class Walking(Analysis):
         yield Quantity("velocity.smallest", "", "m/s", "smallest", "velocity of the slowest walker")
         told = "velocity of the fastest walker; the paper's error bar is largest minus smallest"
         yield Quantity("velocity.largest", "", "m/s", "largest", told)
-        yield Quantity("velocity.standard_error", "", "m/s", "standard_error", "of the velocity")
+        told = "standard deviation of the velocities of the copies: how alike they are, no error of the mean"
+        yield Quantity("velocity.scatter", "", "m/s", "scatter", told)
         for name, way in (("right", first), ("left", second)):
             label = f"velocity of those that started facing {way}"
             told = f"mean velocity of the walkers that started facing {name}"
@@ -215,8 +223,9 @@ class Walking(Analysis):
         yield Quantity("orientation_end", "orientation at the end", "rad", "orientation_end", told)
         for number, make in enumerate(result.get("makes", [])):
             yield Quantity(f"makes.{number}.velocity", f"velocity of those of {_radii(make)} mm", "m/s")
-        yield Quantity("walkers", "walkers", column="walkers", meaning="replicates")
-        yield Quantity("steady", "of them steady", column="steady", meaning="how many of them are steady")
+        yield Quantity("walkers", "walkers", column="walkers", meaning="copies")
+        label = f"of them steady: halves within {percent(STEADY_DIFFERENCE)}"
+        yield Quantity("steady", label, column="steady", meaning=f"how many of the walkers are {label[8:]}")
         told = "how many of them turned by more than 90 degrees"
         yield Quantity("turned_round", "of them turned round by more than 90°", column="turned_round", meaning=told)
         told = "on a slope: how many of them end as they were to face, and tilt no more"
@@ -224,7 +233,7 @@ class Walking(Analysis):
         yield from (Quantity(f"posture.{one}", f"walkers that are {one}") for one in POSTURES[1:])
         yield Quantity("cycles", "cycles driven", column="cycles", meaning="driven, those to settle among them")
         yield Quantity("settling_cycles", "of them to settle")
-        told = "whether that was less than it might have been, for the walkers were steady"
+        told = f"whether the run was ended early: all velocities were constant within {percent(CONSTANT)}"
         yield Quantity("ended_early", column="ended_early", meaning=told)
         yield Quantity("walkers_met", column="walkers_met", meaning="whether two of them came near each other")
         yield Quantity("gamma0", "dimensionless peak force Γ0")
@@ -233,16 +242,18 @@ class Walking(Analysis):
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Velocities, rotation, sliding and orientation of all walkers, and velocities of each make."""
         end, names, open_ones = result["orientation_end"], result["contacts"], result["open"]
-        drive = result["drive"]
+        drive, told = result["drive"], bool(_band(result)) and not result["turned_round"]  # the band, by the headline
         if None not in (result["gamma0"], result["sin_delta"]):
             drive += f", Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}"
         beads = ", ".join(f"bead {place} {_speed(one)}" for place, one in enumerate(result["rotation"].values(), 1))
         sliding = ", ".join(f"{name} {_speed(result['sliding'][contact])}" for contact, name in names.items())
         lines = [
             *(_of_turned(result, drive) if result["turned_round"] else _of_walkers(result, drive)),
+            *wrapped(self.uncertainty(result)[told:]),
+            *_of_sides(result),
             f"  rotation   {beads} mm/s",
             f"  sliding    {sliding} mm/s",
-            f"  orientation at the end {degrees(end['smallest']):.2f}° to {degrees(end['largest']):.2f}°",
+            f"  orientation at the end {_angle(end['smallest'])}° to {_angle(end['largest'])}°",
         ]
         if any(open_ones.values()):
             shares = ", ".join(f"{name} {100 * open_ones[contact]:.1f} %" for contact, name in names.items())
@@ -252,11 +263,16 @@ class Walking(Analysis):
             for one in result.get("makes", [])
         ]
 
+    def uncertainty(self, result: Mapping[str, Any]) -> list[str]:
+        """Of the velocity: what nobody measured, the numerical error; and how alike the copies are."""
+        return [*super().uncertainty(result), _numerical(result), *_scatter(result)]
+
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What makes the velocity doubtful."""
         warnings = []
-        if result["steady"] < result["walkers"]:
-            warnings.append("some walkers are not steady: the velocity depends on the length of the run")
+        if lacking := result["walkers"] - result["steady"]:
+            told = f"{lacking} of {result['walkers']} walkers are not steady"
+            warnings.append(f"{told}: the velocity depends on the length of the run")
         if (share := result["separated_fraction"] or 0.0) > SEPARATED:
             told = f"for {100.0 * share:.0f} % of the time"
             warnings.append(f"beads of walkers are farther apart than a bridge reaches {told}")
@@ -354,18 +370,17 @@ def _bridge_rows(motion: Motion, bridges: Bridges, contact_of: Mapping[tuple[int
     )
 
 
-def spread(values: FloatArray, error_of_one: float = nan) -> dict[str, Any]:
-    """Mean, extremes and standard error of the mean over replicates (of a single one: that of its fit)."""
+def spread(values: FloatArray) -> dict[str, Any]:
+    """Mean, extremes and scatter (standard deviation) over copies; a single one has no scatter."""
     count = len(values)
     if count == 0:
-        return {"n": 0, "mean": None, "smallest": None, "largest": None, "standard_error": None}
-    error = float(np.std(values, ddof=1)) / sqrt(count) if count > 1 else error_of_one
+        return {"n": 0, "mean": None, "smallest": None, "largest": None, "scatter": None}
     return {
         "n": count,
         "mean": float(values.mean()),
         "smallest": float(values.min()),
         "largest": float(values.max()),
-        "standard_error": error if np.isfinite(error) else None,
+        "scatter": float(np.std(values, ddof=1)) if count > 1 else None,
     }
 
 
@@ -385,7 +400,7 @@ def _summary(walkers: Columns) -> dict[str, Any]:
         return {f"{named}_{name.rpartition('_')[2]}": _mean(walkers[name]) for name in columns}
 
     return {
-        "velocity": spread(velocity, float(walkers["standard_error"][0])),
+        "velocity": spread(velocity),
         "right_facing": spread(velocity[facing > 0]),
         "left_facing": spread(velocity[facing < 0]),
         "kept_heading": spread(velocity[~turned]),
@@ -436,39 +451,76 @@ def walkers_met(groups: Iterable[Group]) -> bool:
 def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     """How fast walkers are that kept their heading."""
     velocity = result["velocity"]
-    error, count = velocity["standard_error"], velocity["n"]
-    of_what = f"over {count} walkers" if count > 1 else "of the fit"
-    doubt = f" (standard error {_speed(error)} {of_what})" if error is not None else ""
     toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
     first, second = ways(uphill=result["goes_uphill"])
-    sides = right, left = result["right_facing"], result["left_facing"]
-    headline = f"{_speed(velocity['mean'])} mm/s, positive {toward}{doubt}"
+    sides = result["right_facing"], result["left_facing"]
+    headline = f"{_speed(velocity['mean'])} mm/s{_band(result)}, positive {toward}"
     if all(side["n"] for side in sides):
         one, other = (side["mean"] for side in sides)
         if abs(one - other) > max(SAME * max(abs(one), abs(other)), STEADY_SPEED):  # the mean over both is no walker's
-            headline = f"facing {first} {_speed(one)}, facing {second} {_speed(other)} mm/s, positive {toward}"
-    told_right, told_left = (f"{_speed(side['mean'])} ({side['n']})" if side["n"] else "none" for side in (right, left))
-    return [
-        *_headlines(result, drive),
-        f"  velocity   {headline}",
-        f"    smallest {_speed(velocity['smallest'])}, largest {_speed(velocity['largest'])}; {_steady(result)}",
-        f"    started facing {first} {told_right}, {second} {told_left}",
-    ]
+            both = f"facing {first} {_speed(one)}, facing {second} {_speed(other)} mm/s"
+            headline = f"{both}{_band(result)}, positive {toward}"
+    return [*_headlines(result, drive), f"  velocity   {headline}"]
+
+
+def _of_sides(result: Mapping[str, Any]) -> list[str]:
+    """How fast walkers are that started facing either way, and how many are steady."""
+    if result["turned_round"]:
+        return []
+    first, second = ways(uphill=result["goes_uphill"])
+    right, left = (
+        f"{_speed(side['mean'])} mm/s ({side['n']})" if side["n"] else "none"
+        for side in (result["right_facing"], result["left_facing"])
+    )
+    return [f"    started facing {first} {right}, {second} {left}; {_steady(result)}"]
 
 
 def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
     """What became of walkers of which some turned by more than 90°: a velocity along their heading says nothing."""
     axial, kept, tilted = result["axial_velocity"], result["kept_heading"], result["goes_uphill"]
     first, second = ways(uphill=tilted)
+    right, left = (
+        "none" if speed is None else f"{_speed(speed)} mm/s" for speed in (axial["right_facing"], axial["left_facing"])
+    )
     round_ones = f"{result['turned_round']} of {result['walkers']} turned round"
     return [
         *_headlines(result, drive, f"{round_ones}, axial velocity {_speed(axial['mean'])} mm/s"),
         f"  axial velocity, positive {'up' if tilted else 'to the right'}: started facing {first} "
-        f"{_speed(axial['right_facing'])}, {second} {_speed(axial['left_facing'])} mm/s; {_steady(result)}",
+        f"{right}, {second} {left}; {_steady(result)}",
         f"  velocity   {_speed(kept['mean'])} mm/s along the heading, of the {kept['n']} that kept it"
         if kept["n"]
         else "  velocity   none: no walker kept its heading",
     ]
+
+
+def _band(result: Mapping[str, Any]) -> str:
+    """The band of the velocity, if a spread was run."""
+    band = band_of(result, "velocity", result["velocity"]["mean"])
+    return f" ({band_text(band, 'm/s')}, 5 to 95 % over what nobody measured)" if band else ""
+
+
+def _numerical(result: Mapping[str, Any]) -> str:
+    """The numerical error of the velocity, mm/s and shares of the velocity."""
+    error, own = result["numerical_error"], abs(result["velocity"]["mean"] or 0.0)
+    harder = f"{STIFFER:g} times Young's modulus"
+    if error is None:
+        return f"numerical error: not measured for this case; run it at half the time step and with {harder}"
+    if own < STEADY_SPEED:
+        return f"numerical error {_error(error['total'])} (measured for this case: half the time step, {harder})"
+    half_step, stiffer, total = (100.0 * error[name] / own for name in ("half_step", "stiffer", "total"))
+    parts = f"half the time step {half_step:+.2g} %, {harder} {stiffer:+.2g} %"
+    return f"numerical error {total:.2g} % (measured for this case: {parts})"
+
+
+def _scatter(result: Mapping[str, Any]) -> list[str]:
+    """How alike the copies are, if there are several."""
+    velocity, count = result["velocity"], result["velocity"]["n"]
+    if count < 2 or result["turned_round"]:
+        return []
+    what = "walkers" if result["meet"] or "makes" in result else "copies"
+    low, high = _speed(velocity["smallest"]), _speed(velocity["largest"])
+    ends = "" if low == high else f"; {low} to {high} mm/s"
+    return [f"scatter of the {count} {what} {_error(velocity['scatter'])} (standard deviation{ends})"]
 
 
 def _headlines(result: Mapping[str, Any], drive: str, level: str = "") -> list[str]:
@@ -480,7 +532,7 @@ def _headlines(result: Mapping[str, Any], drive: str, level: str = "") -> list[s
 def _told_posture(summary: Mapping[str, Any]) -> str:
     """Angles in degrees: "upright to the end, within 0.1°"."""
     count = sum(summary[name] for name in POSTURES)
-    within = "" if summary["ends_within"] is None else f", within {degrees(summary['ends_within']):.1f}°"
+    within = "" if summary["ends_within"] is None else f", within {max(degrees(summary['ends_within']), 0.1):.1f}°"
     first, last = (f"{time:.2f}" for time in summary["turned_at"] or (nan, nan))
     when = f" after {first} s" if first == last else f" after {first} to {last} s"
     told = {
@@ -500,16 +552,27 @@ def _told_posture(summary: Mapping[str, Any]) -> str:
 
 def _radii(make: Mapping[str, Any]) -> str:
     """Of the beads of a make, mm."""
-    return "/".join(f"{radius * 1e3:g}" for radius in make["radii"])
+    return radii_text(make["radii"])
 
 
 def _steady(result: Mapping[str, Any]) -> str:
-    cycles = f" after {result['cycles']} cycles" if result.get("ended_early") else ""
-    return f"{result['steady']} of {result['walkers']} steady{cycles}"
+    """How many are steady, and why the run ended, each with its criterion."""
+    told = f"{result['steady']} of {result['walkers']} steady (halves within {percent(STEADY_DIFFERENCE)})"
+    if result.get("ended_early"):
+        told += f"; ended after {result['cycles']} cycles (constant within {percent(CONSTANT)})"
+    return told
 
 
 def _speed(value: float | None) -> str:
-    """A speed in m/s as text in mm/s: three decimals, or its order of magnitude where these would all be zero."""
-    if value is None:
-        return "-"
-    return f"{value * 1e3:.3f}" if abs(value) >= 5e-7 or value == 0.0 else f"{value * 1e3:.1e}"
+    """A speed in m/s as text in mm/s: three decimals at most."""
+    return "-" if value is None else with_decimals(value * 1e3, 3)
+
+
+def _error(value: float) -> str:
+    """An error of a speed in m/s as text, in mm/s."""
+    return f"{told} mm/s" if (told := _speed(value)) != "0" else "below 0.001 mm/s"
+
+
+def _angle(value: float | None) -> str:
+    """An angle in rad as text in degrees: two decimals at most."""
+    return "-" if value is None else with_decimals(degrees(value), 2)

@@ -46,6 +46,7 @@ class Working(Analysis):
     """What the drive spends on walkers."""
 
     name = "work"
+    version = 2
     tables: ClassVar[Mapping[str, type]] = {"work": Work}
 
     def applies(self, case: Case) -> bool:

@@ -136,7 +136,7 @@ def with_legend(plot: Figure) -> Figure:
 
 
 def error_bars(plot: Figure, x: Sequence[Any] | FloatArray, y: FloatArray, error: FloatArray) -> None:
-    """Whiskers of one standard error."""
+    """Whiskers as long as an error to either side."""
     from bokeh.models import ColumnDataSource
     from bokeh.models.annotations import Whisker
 

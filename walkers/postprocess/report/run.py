@@ -6,12 +6,22 @@ import base64
 from pathlib import Path
 from typing import Any
 
+from walkers.inputs.caption import caption
 from walkers.inputs.case import Case
 from walkers.inputs.changes import dotted
 from walkers.inputs.origins import Origin, text_of
-from walkers.postprocess.analysis import Measured, analyses_in, analyses_of, current_result, quantities_of, warnings_of
+from walkers.postprocess.analysis import (
+    Measured,
+    analyses_in,
+    analyses_of,
+    current_result,
+    quantities_of,
+    uncertainty_of,
+    warnings_of,
+)
 from walkers.postprocess.report.page import NAME, check_report, drawn, fill, packed_plots, write_page
 from walkers.postprocess.report.player import MOST_PLACES, player_of
+from walkers.postprocess.uncertainty import with_bands
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
@@ -34,7 +44,7 @@ class RunReport:
         run = Measured(directory)
         case = run.motion.case
         self.id, self.name, self.title = section, directory.resolve().name, case.title or case.name
-        self.shown = shown_of(case, current_result(directory), origins)
+        self.shown = shown_of(case, with_bands(directory, current_result(directory)), origins)
         self.manifest = read_json(directory / MANIFEST_NAME)
         self.player = player_of(run.motion, places=places)
         self.carried = {f"player-{section}": base64.b64encode(self.player.plot.get_binary_snapshot(9)).decode()}
@@ -65,21 +75,8 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None)
     return write_page(path, run.title, fill("run.html.j2", run=run), run.carried)
 
 
-def summary_of(case: Case) -> str:
-    """What is run, in a sentence."""
-    bodies = []
-    for make in case.walkers:
-        radii = " / ".join(f"{radius * 1e3:g}" for radius in make.radii)
-        bodies.append(f"{make.replicates} walkers of R = {radii} mm")
-    if case.loose:
-        bodies.append(f"{case.count - sum(make.count for make in case.walkers)} loose beads")
-    boundary = f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"
-    liquid = f", {case.liquid.name}" if case.liquid.name else ""
-    return f"{', '.join(bodies)} {boundary} of {case.boundary.material}{liquid}; {case.drive.described()}."
-
-
 def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dict[str, Any]:
-    """Of a result the warnings and quantities; of a case a summary, the parameters, and those that are guessed.
+    """Of a result the warnings, quantities, and what these are uncertain by; of a case a summary and the parameters.
 
     Of runs that did not keep where their values come from, the parameters are in SI units.
     """
@@ -90,7 +87,8 @@ def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dic
     said = ((key, value) for key, value in dotted(case.as_dict()) if value not in (None, "", [], ()))
     as_run = [{"key": key, "text": text_of(value)} for key, value in said]
     return {
-        "summary": summary_of(case),
+        "summary": f"{caption(case)}.",
+        "uncertainty": uncertainty_of(result),
         "warnings": warnings_of(result),
         "quantities": quantities_of(result),
         "guessed": [one for one in parameters if one["guessed"]],
@@ -100,6 +98,7 @@ def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dic
 
 def result_html(directory: Path, result: dict[str, Any], origins: Origins = None) -> str:
     """A result as a piece of HTML: a table with errors and units, warnings, and the parameters folded in."""
+    result = with_bands(directory, result)
     headline = next((line for one in analyses_in(result) for line in one.lines(result)), result["case"])
     shown = shown_of(case_of(directory), result, origins)
     return fill("result.html.j2", headline=headline, shown=shown, run=directory.name)

@@ -1,0 +1,140 @@
+"""What a velocity is uncertain by: numerical errors as measured, ranges about what is guessed; and what is printed."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import walkers
+from tests.conftest import make_case
+from walkers.inputs import library, load_case, resolve_case
+from walkers.inputs.axes import ranges_of
+from walkers.inputs.errors import InputError
+from walkers.inputs.numerical import STIFFER, measured, numerical_error
+from walkers.inputs.readable import kind_of
+from walkers.physics.units import parse_quantity
+from walkers.pipeline import find_side
+from walkers.sweeps.comparison import compare_runs
+from walkers.theory.prediction import describe, outside_of_the_paper, predict
+
+
+def test_numerical_errors_are_those_of_the_shipped_cases_alone() -> None:
+    for name, of_case in measured().items():
+        found = numerical_error(load_case(name))
+        assert found is not None
+        assert found["total"] == pytest.approx(np.hypot(of_case["half_step"], of_case["stiffer"]))
+    longer = load_case("fig1b", {"run.cycles": 30})
+    assert numerical_error(longer.renamed("other")) == numerical_error(load_case("fig1b"))
+    assert numerical_error(load_case("fig1b", {"contact.friction.bead_wall": 0.2})) is None
+    assert numerical_error(load_case("fig1b", {"run.time_step": "1 us"})) is None
+
+
+def test_the_numerical_error_is_what_a_shorter_step_and_harder_beads_change(runs_folder: Path) -> None:
+    case, known = load_case("fig1b"), measured()["fig1b"]
+    step, modulus = case.run.time_step, case.contact.youngs_modulus
+    harder = {
+        "run.time_step": f"{0.5e6 * step / STIFFER**0.5:.9g} us",
+        "contact.youngs_modulus": f"{STIFFER * modulus * 1e-6:g} MPa",
+    }
+    changes = [{}, {"run.time_step": f"{0.5e6 * step:.9g} us"}, harder]
+    own, half, stiff = (walkers.run(load_case("fig1b", one), runs_folder).result["velocity"]["mean"] for one in changes)
+    assert own == pytest.approx(known["velocity"], rel=1e-3)
+    assert half - own == pytest.approx(known["half_step"], abs=1e-6)
+    assert stiff - half == pytest.approx(known["stiffer"], rel=0.02)
+
+
+def test_what_is_usual_lies_within_its_range() -> None:
+    """Strictly, but for a contact angle of 0°, the end of what is possible."""
+    numbers = {key: (one.usual, one.range) for key, one in library.unmeasured().items() if one.usual}
+    for pair in library.surface_pairs():
+        calibrated = library.surface_pair(*pair)
+        numbers |= {f"contact.{key} of {pair}": (one, one.range) for key, one in calibrated.items() if one.range}
+    assert len(numbers) > 15
+    for key, (known, ends) in numbers.items():
+        assert known is not None
+        assert ends is not None
+        kind = kind_of(key) if key == "liquid.contact_angle" else None
+        low, high = (parse_quantity(one, kind) if kind else one for one in ends)
+        assert low < known.value < high or (key == "liquid.contact_angle" and known.value == low == 0.0), key
+
+
+@pytest.mark.parametrize(
+    ("given", "quartiles"),
+    [
+        ({"uniform": [0.0, 4.0]}, [1.0, 2.0, 3.0]),
+        ({"uniform": [0.0, 1.0, 4.0]}, [0.5, 1.0, 2.5]),
+        ({"loguniform": [0.01, 1.0, 100.0]}, [0.1, 1.0, 10.0]),
+        ({"uniform": ["0 deg", "0 deg", "60 deg"]}, [0.0, 0.0, 30.0]),
+    ],
+)
+def test_half_of_the_draws_are_below_the_median(given: dict[str, list[object]], quartiles: list[float]) -> None:
+    (one,) = ranges_of({"key": given}).values()
+    np.testing.assert_allclose(one.at(np.array([0.25, 0.5, 0.75])), quartiles)
+
+
+@pytest.mark.parametrize("given", [[1.0, 3.0, 2.0], [1.0, 0.5, 2.0], [1.0, 1.2, 1.5, 2.0], [2.0, 1.0]])
+def test_a_median_is_between_the_ends(given: list[float]) -> None:
+    with pytest.raises(InputError, match="expected"):
+        ranges_of({"key": {"uniform": given}})
+
+
+def test_people_read_four_digits_and_each_number_by_its_name(runs_folder: Path) -> None:
+    told = walkers.run(load_case("fig1b"), runs_folder).describe()
+    assert "±" not in told
+    assert "standard error" not in told
+    lines = [line for line in told.splitlines() if not line.startswith("  run ")]
+    numbers = re.findall(r"(?<![\w.])\d+\.?\d*(?:e-?\d+)?", "\n".join(lines))
+    assert len(numbers) > 30
+    assert not [one for one in numbers if len(one.partition("e")[0].replace(".", "").strip("0")) > 4]
+    assert "numerical error 2.2 % (measured for this case: half the time step -0.03 %" in told
+    assert "scatter of the 6 copies 0.001 mm/s (standard deviation; 1.079 to 1.082 mm/s)" in told
+
+
+def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> None:
+    tables = {
+        "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2, "facing": "up"},
+        "beads": {"material": "ruby"},
+        "liquid": {"surface_tension": "20 mN/m", "kinematic_viscosity": "5 mm^2/s", "density": "0.9 g/cm^3"},
+        "boundary": {"material": "glass", "tilt": "20 deg"},
+        "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
+        "contact": {"rolling_friction": 0.0},
+        "run": {"cycles": 4},
+    }
+    case = resolve_case(tables, name="steep")
+    done = walkers.run(case, tmp_path)
+    told = done.describe()
+    assert "plane tilted by 20°, right is up" in told
+    assert "started facing up" in told
+    page = done.report(tmp_path / "report.html").read_text("utf-8")
+    assert "liquid of 20 mN/m; 80 Hz" in page
+    assert "plane tilted by 20°" in page
+    gentle = resolve_case({**tables, "boundary": {"material": "glass", "tilt": "10 deg"}}, name="gentle")
+    walkers.run(gentle, tmp_path)
+    first, second = (find_side(walkers.find_run(one, tmp_path).directory) for one in (case, gentle))
+    text = compare_runs(first, second).text
+    assert "facing up (mm/s)" in text
+    assert "right_facing" not in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({}, None),
+        ({"drive.peak_acceleration": "40 g"}, "Γ0 = 3.81 (measured up to 3.5), 40 g (up to 10 g)"),
+        ({"drive.frequency": "170 Hz"}, "170 Hz (60 to 90 Hz)"),
+    ],
+)
+def test_theory_says_where_the_paper_measured_nothing(changes: dict[str, str], told: str | None) -> None:
+    case = load_case("fig1b", changes)
+    found = outside_of_the_paper(case)
+    assert found is None if told is None else told in (found or "")
+    assert ("outside the paper's measurements" in describe(predict(case), None)) == (told is not None)
+
+
+def test_theory_says_nothing_of_the_papers_fit_to_other_beads() -> None:
+    case = make_case(liquid={"name": "ethylene glycol"})
+    told = describe(predict(case), None)
+    assert re.search(r"paper's fit, κ = 0.033 s/mm\s+none: the fit is to ruby on level", told)

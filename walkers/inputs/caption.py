@@ -1,0 +1,46 @@
+"""The words of a case in headlines, titles and captions: its bodies, surfaces, liquid, drive and tilt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees
+
+from walkers.inputs.case import Case
+
+
+def caption(case: Case) -> str:
+    """A case in a line: what is on which surface with which liquid, how it is driven, and how it is tilted.
+
+    Examples
+    --------
+    >>> from walkers.inputs import load_case
+    >>> caption(load_case("fig4a"))
+    '6 walkers of R = 0.6 / 0.3 mm on a plane of glass, Si AK5; 80 Hz, a0 = 19.6 m/s²'
+    """
+    bodies = [f"{make.replicates} walkers of R = {radii_text(make.radii)} mm" for make in case.walkers]
+    if case.loose:
+        bodies.append(f"{case.count - sum(make.count for make in case.walkers)} loose beads")
+    boundary = f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"
+    return f"{', '.join(bodies)} {boundary} of {case.boundary.material}, {liquid_text(case)}; {conditions(case)}"
+
+
+def conditions(case: Case) -> str:
+    """The drive of a case and, unless it is level, its tilt and where up is: ``…, plane tilted by 90°, right is up``.
+
+    Pictures have the drive axis to the right: what faces right goes up where that is the steepest way up.
+    """
+    told = [case.drive.described()]
+    if case.boundary.tilted:
+        up = "right is up" if case.goes_uphill else f"up is at {degrees(case.boundary.uphill):.4g}° from x toward y"
+        told += [case.boundary.tilted, up]
+    return ", ".join(told)
+
+
+def liquid_text(case: Case) -> str:
+    """The name of the liquid of a case; its surface tension if it has none."""
+    return case.liquid.name or f"liquid of {case.liquid.surface_tension * 1e3:.4g} mN/m"
+
+
+def radii_text(radii: Sequence[float]) -> str:
+    """Radii (m) in mm, without the unit: ``0.6 / 0.3``."""
+    return " / ".join(f"{radius * 1e3:g}" for radius in radii)

@@ -1,0 +1,59 @@
+"""Numbers as they are printed for people: at most four significant digits, in the usual units."""
+
+from __future__ import annotations
+
+from math import degrees, floor, isfinite, log10
+
+DIGITS = 4
+"""Significant, of any number that is printed for people; JSON and tables have all of them."""
+SHOWN_UNITS = {
+    "J": ("nJ", 1e9),
+    "m/s": ("mm/s", 1e3),
+    "m": ("mm", 1e3),
+    "rad": ("°", degrees(1.0)),
+    "share": ("%", 100.0),
+}
+"""For units of a result, those that are shown, and how many of them one is."""
+NOISE = {"": 1e-9, "mm/s": 1e-4, "mm": 1e-6, "°": 1e-3, "deg": 1e-3, "%": 1e-3, "nJ": 1e-6}
+"""In the units that are shown: what is smaller is rounding, and printed as 0."""
+_LARGEST_WRITTEN_OUT = 1e7
+
+
+def rounded(value: float, unit: str = "") -> str:
+    """A number for people: at most four significant digits; 0 for what is rounding in a unit; a dash for none.
+
+    Examples
+    --------
+    >>> rounded(18.18654, "mm/s"), rounded(-3.2e-15, "mm/s"), rounded(123456.0)
+    ('18.19', '0', '123500')
+    """
+    if isinstance(value, (bool, int)):
+        return str(value)
+    if not isfinite(value):
+        return "-"
+    if abs(value) < NOISE.get(unit, 0.0):
+        return "0"
+    text = f"{value:.{DIGITS}g}"
+    return f"{float(text):.0f}" if 10**DIGITS <= abs(value) < _LARGEST_WRITTEN_OUT else text
+
+
+def with_decimals(value: float, decimals: int) -> str:
+    """A number with so many decimals, fewer where it would have more than four significant digits; 0 if all are zero.
+
+    Examples
+    --------
+    >>> with_decimals(1.08, 3), with_decimals(18.18654, 3), with_decimals(-2e-6, 3)
+    ('1.080', '18.19', '0')
+    """
+    if not isfinite(value):
+        return "-"
+    value = float(f"{value:.{DIGITS}g}")
+    size = floor(log10(abs(value))) if value else 0
+    decimals = min(decimals, max(0, DIGITS - 1 - size))
+    text = f"{round(value, min(decimals, DIGITS - 1 - size)):.{decimals}f}"
+    return "0" if float(text) == 0.0 else text
+
+
+def percent(share: float) -> str:
+    """A share in per cent."""
+    return f"{100.0 * share:.{DIGITS}g} %"

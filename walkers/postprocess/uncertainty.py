@@ -1,0 +1,118 @@
+"""What a result is uncertain by: what nobody measured, and the band of the result over its ranges."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from walkers.inputs.library import unmeasured
+from walkers.inputs.origins import Origin
+from walkers.inputs.rounding import SHOWN_UNITS, rounded
+from walkers.runner.files import read_json
+
+SPREAD_NAME = "spread.json"
+"""In the directory of a spread (`spread_of`): its bands."""
+_OVER = "over the ranges of what nobody measured"
+_WIDTH = 110
+
+
+def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
+    """What a result rests on that nobody measured, and what the case calls uncertain.
+
+    Each has a ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``library``, ``calibrated`` or
+    ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.
+    """
+    return [
+        {
+            "key": one.key,
+            "value": one.text,
+            "origin": one.origin,
+            "range": list(one.range) if one.range else None,  # as it is read from a file
+            "logarithmic": one.logarithmic,
+            "guessed": one.guessed,
+        }
+        for one in origins
+        if one.key in unmeasured() or one.range is not None
+    ]
+
+
+def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What a result rests on (`rests_on`) as text: guessed, only said by the case, calibrated."""
+
+    def listed(head: str, chosen: Iterable[Mapping[str, Any]]) -> list[str]:
+        told = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
+        wrapper = textwrap.TextWrapper(_WIDTH, f"  {head:10} ", " " * 13, break_on_hyphens=False)
+        return wrapper.wrap(told) if told else []
+
+    lines = listed("guessed", [one for one in rests if one["guessed"]])
+    whence = {"as given": "given", "calibrated": "calibrated", "library": "own library", "package": "package"}
+    for head, origin in whence.items():
+        lines += listed(head, [one for one in rests if not one["guessed"] and one["origin"] == origin])
+    return lines
+
+
+def wrapped(sentences: Iterable[str]) -> list[str]:
+    """Sentences as indented lines of a text."""
+    wrapper = textwrap.TextWrapper(_WIDTH, "    ", "      ", break_on_hyphens=False)
+    tied = (re.sub(r"(?<=\d) (?=[%a-z])", "\u00a0", sentence) for sentence in sentences)  # a number and its unit
+    return [line.replace("\u00a0", " ") for sentence in tied for line in wrapper.wrap(sentence)]
+
+
+def not_known(rests: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A sentence on what a result rests on (`rests_on`) and is known as a range only; none where nothing is."""
+    names = [
+        one["key"].partition(".")[2].partition(".bead_")[0].replace("_", " ")
+        for one in rests
+        if one["range"] is not None
+    ]
+    if not names:
+        return []
+    return [f"not known: {', '.join(dict.fromkeys(names))}; run with --spread for the band over their ranges"]
+
+
+def spread_of(directory: Path) -> Path:
+    """The directory of the spread of a run (`walkers.sweeps.spread`), whether it is there or not."""
+    return directory.with_name(f"{directory.name}-spread")
+
+
+def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
+    """A result with the ``bands`` of its quantities, if a spread of the run is beside it."""
+    try:
+        bands = read_json(spread_of(directory.resolve()) / SPREAD_NAME)["bands"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return dict(result)
+    return {**result, "bands": bands}
+
+
+def band_of(result: Mapping[str, Any], name: str, own: float | None) -> tuple[float, float] | None:
+    """Both ends of the band of a quantity, SI, between which the result itself is; None if there is no band.
+
+    A spread draws what nobody measured on either side of the case's own values, so that the case's own result is in the
+    band. Where it is not, as few draws have it by chance, the band goes up to it.
+    """
+    band = (result.get("bands") or {}).get(name)
+    if band is None:
+        return None
+    ends = [band["low"], band["high"], *([own] if own is not None and isfinite(own) else [])]
+    return min(ends), max(ends)
+
+
+def band_text(band: tuple[float, float], unit: str) -> str:
+    """Both ends of a band in the usual unit, to three digits: ``0.489 to 5.83 mm/s``."""
+    shown, factor = SHOWN_UNITS.get(unit, (unit, 1.0))
+    low, high = (rounded(float(f"{end * factor:.3g}"), shown) for end in band)
+    return f"{low} to {high} {shown}".rstrip()
+
+
+def bands_text(result: Mapping[str, Any], units: Mapping[str, str], own: Mapping[str, Any]) -> str:
+    """The bands of quantities of these units, whose own values are known, in a sentence; nothing if there is none."""
+    bands = {name: band for name in units if (band := band_of(result, name, own.get(name)))}
+    if not bands:
+        return ""
+    told = "; ".join(f"{name} {band_text(band, units[name])}" for name, band in bands.items())
+    points = max(result["bands"][name]["points"] for name in bands)
+    return f"{told} {_OVER} (5 to 95 % of {points} draws)"
