@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, cos, inf, isinf, pi, sin, sqrt
+from math import ceil, cos, degrees, inf, isinf, pi, sin, sqrt
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
@@ -146,6 +146,11 @@ class Boundary:
     def bare(self) -> bool:
         """Whether it is a floor without any side walls."""
         return self.shape == "plane"
+
+    @property
+    def tilted(self) -> str:
+        """How it is tilted, in words: ``plane tilted by 60°``; empty if it is level."""
+        return f"{self.shape} tilted by {degrees(self.tilt):.4g}°" if self.tilt else ""
 
     @property
     def drive_axis(self) -> Literal["x", "z"]:

@@ -238,6 +238,27 @@ class Group:
         return unwrapped
 
 
+def even_frames(motion: Motion, count: int) -> list[int]:
+    """Frames through the drive, equally far apart from its first: ``count``, or fewer if they end nearer to its end.
+
+    At the same phase of the drive, if there are as many cycles, or walkers would seem to go back.
+    """
+    start, cycle = motion.first_driven, motion.case.run.samples_per_cycle
+    last = len(motion.time) - 1 - start
+    every, steps = (cycle, last // cycle) if last // cycle >= count - 1 else (1, last)
+    if count < 2 or steps < 2:
+        return [start + every * step for step in range(min(count, steps + 1))]
+    counts = range(count, max(2, count // 2 + 1) - 1, -1)
+    parts = min(counts, key=lambda number: (steps % max(1, min(steps, number - 1)), -number)) - 1
+    between = max(1, steps // parts)
+    return [start + every * between * part for part in range(min(parts, steps) + 1)]
+
+
+def decimals_of(interval: float) -> int:
+    """Decimals with which even times (s) an interval (s) apart are printed, so that they look even."""
+    return next((places for places in range(2, 6) if abs(round(interval, places) - interval) <= 0.01 * interval), 6)
+
+
 def gathered(motion: Motion, lane: float = 2.0) -> Motion:
     """Independent walkers near each other, to be looked at: on parallel lanes so many lengths apart.
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from walkers.inputs.errors import refused
 from walkers.inputs.readable import readable_unit
-from walkers.postprocess.drawing import letter_panels, new_figure, plain_text, styled
+from walkers.postprocess.drawing import UNSEEN, errors_seen, letter_panels, new_figure, plain_text, styled
 from walkers.sweeps.table import ERRORS, find_name, value_text, varied_columns, with_unit
 
 if TYPE_CHECKING:
@@ -323,7 +323,7 @@ def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, col
         is_course = x.is_number and not x.is_sample and x.keys[0] not in _SEEDS
         joined = is_course and len(set(places[rows])) == len(rows) > 1
         y, errors = drawn.values[rows], drawn.errors[rows]
-        bars: Any = errors if np.isfinite(errors).any() else None
+        bars: Any = errors if np.isfinite(errors).any() and errors_seen(drawn.errors, drawn.values) else None
         line = "-" if joined and not drawn.theory else "none"
         axes.errorbar(places[rows] + aside, y, yerr=bars, capsize=2, lw=0.9, ls=line, **look)
         for model, values in enumerate(drawn.theory.values()):
@@ -390,6 +390,9 @@ def _legend(figure: Figure, grid: npt.NDArray[Any], colours: _Colours, drawn: Dr
     lines = {line.get_linestyle() for axes in grid.flat for line in axes.lines}
     for number, model in enumerate(drawn.theory):
         handles.append(Line2D([], [], label=model, **_model_look(number, _MODELS[number][0] in lines, "0.3")))
+    if np.isfinite(drawn.errors).any() and not errors_seen(drawn.errors, drawn.values):
+        title = f"{title}; {UNSEEN}" if title else UNSEEN
+        handles = handles or [Line2D([], [], ls="none", label=" ")]
     if handles:
         longest = max(len(str(handle.get_label())) for handle in handles)
         columns = max(1, min(len(handles), int(13.0 * figure.get_figwidth() / (longest + 6))))

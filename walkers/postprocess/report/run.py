@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,8 @@ def summary_of(case: Case) -> str:
     if case.loose:
         bodies.append(f"{case.count - sum(make.count for make in case.walkers)} loose beads")
     boundary = f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"
+    if case.boundary.tilt:
+        boundary += f" tilted by {degrees(case.boundary.tilt):.4g}°,"
     liquid = f", {case.liquid.name}" if case.liquid.name else ""
     return f"{', '.join(bodies)} {boundary} of {case.boundary.material}{liquid}; {case.drive.described()}."
 
