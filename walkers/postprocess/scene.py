@@ -178,11 +178,12 @@ class Scene:
 
 
 def path_of(motion: Motion, begin: int = 0) -> FloatArray:
-    """The way of the middle of the beads since a frame, averaged over a cycle of the drive, mm, shape (F, 3)."""
-    from scipy.ndimage import uniform_filter1d
+    """The way of the middle of the beads since a frame, smoothed over a cycle of the drive, mm, shape (F, 3)."""
+    from scipy.signal import savgol_filter
 
     middle = 1e3 * motion.position.mean(axis=1)
-    smooth: FloatArray = uniform_filter1d(middle, motion.case.run.samples_per_cycle, axis=0, mode="nearest")
+    frames = 2 * (min(motion.case.run.samples_per_cycle, len(middle) - 1) // 2) + 1
+    smooth = savgol_filter(middle, frames, 1, axis=0) if frames > 1 else middle
     way: FloatArray = smooth - smooth[begin]
     return way
 
