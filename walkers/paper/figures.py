@@ -232,7 +232,7 @@ def _draw_cycles(axes: Axes, trajectory: Group) -> None:
     values = [motion.velocity[last, 0], motion.rotation[last, 0, 0], motion.rotation[last, 0, 1]]
     for (_, _, marker, colour, ms), series, line in zip(_SERIES, values, theory_of_cycles(trajectory), strict=True):
         axes.plot(np.arange(len(series)) / samples, series * 1e3, marker, color=colour, ms=ms, mfc="none", mew=0.8)
-        axes.plot(np.arange(len(line)) / (len(line) - 1) * _CYCLES, line * 1e3, color=colour, lw=0.9)
+        axes.plot(np.arange(len(line)) / (len(line) - 1) * _CYCLES, line * 1e3, color=colour, lw=0.36 * ms)
     axes.axhline(0.0, color="0.4", lw=0.6)
     axes.set(xlabel="time (cycles of the drive)", ylabel=r"velocity; beads: $-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)")
 

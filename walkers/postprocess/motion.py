@@ -23,6 +23,7 @@ FLOOR = 0
 """Number of the floor among the walls of a container; the others are the side walls."""
 LEAST_SAMPLES = 8
 """A cycle, with which frames show what happens within one."""
+_LEFT_OUT = 0.02  # of a run, beyond the last of several even times
 _OF_FRAMES = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin")
 _OF_BEADS = ("position", "velocity", "spin", "mean_spin")
 
@@ -239,19 +240,20 @@ class Group:
 
 
 def even_frames(motion: Motion, count: int) -> list[int]:
-    """Frames through the drive, equally far apart from its first: ``count``, or fewer if they end nearer to its end.
+    """Frames through the drive, equally far apart from its first: ``count``, or fewer if these end nearer to its end.
 
     At the same phase of the drive, if there are as many cycles, or walkers would seem to go back.
     """
     start, cycle = motion.first_driven, motion.case.run.samples_per_cycle
     last = len(motion.time) - 1 - start
     every, steps = (cycle, last // cycle) if last // cycle >= count - 1 else (1, last)
-    if count < 2 or steps < 2:
-        return [start + every * step for step in range(min(count, steps + 1))]
-    counts = range(count, max(2, count // 2 + 1) - 1, -1)
-    parts = min(counts, key=lambda number: (steps % max(1, min(steps, number - 1)), -number)) - 1
-    between = max(1, steps // parts)
-    return [start + every * between * part for part in range(min(parts, steps) + 1)]
+    most = min(count - 1, steps)
+    parts = range(most, most // 2, -1)
+    if not parts:
+        return [start]
+    nearly = [number for number in parts if steps % number <= _LEFT_OUT * steps]
+    number = nearly[0] if nearly else min(parts, key=lambda number: steps % number)
+    return [start + every * (steps // number) * part for part in range(number + 1)]
 
 
 def decimals_of(interval: float) -> int:

@@ -90,7 +90,7 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
             part.model_matrix = _series(shown, back)
     if motion.case.boundary.tilted and motion.case.gravity:
         boundary.append(_gravity(scene))
-        captions.append(f"{motion.case.boundary.tilted.capitalize()}; the arrow points the way of gravity.")
+        captions.append(f"{motion.case.boundary.tilted.capitalize()}; the arrow shows the direction of gravity.")
     for part in [*boundary, *beads]:
         plot += part
     plot.fps_meter, plot.camera = False, next(iter(cameras.values()))
@@ -123,13 +123,13 @@ def cameras_of(motion: Motion, path: FloatArray | None = None) -> dict[str, list
 
 
 def _gravity(scene: Scene) -> Any:
-    """An arrow the way of gravity, at the right edge of the first view."""
+    """An arrow the way of gravity, at the left edge of the first view: on the right a wall would hide it."""
     import k3d
 
     long = 0.3 * scene.height(_ASPECT)
-    right = max(float(scene.high[0] - scene.low[0]) / 2.0, 0.4 * _ASPECT * scene.height(_ASPECT))
+    side = max(float(scene.high[0] - scene.low[0]) / 2.0, 0.4 * _ASPECT * scene.height(_ASPECT))
     down = -against_gravity(scene.motion)
-    origin = scene.camera(0.0)[1] + right * scene.axes[0] - long / 2.0 * down
+    origin = scene.camera(0.0)[1] - side * scene.axes[0] - long / 2.0 * down
     look = {"color": 0x1D2429, "head_size": 1.7 * long, "line_width": 0.04 * long}
     ends = [one[None].astype(np.float32) for one in (origin, long * down)]
     return k3d.vectors(*ends, name="gravity", **look)
