@@ -16,7 +16,7 @@ from walkers.inputs.loads import dimer_of
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, series_look, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import averages, distance_walked, fit_slopes, gait, walk, ways
-from walkers.postprocess.motion import Group, decimals_of, even_frames
+from walkers.postprocess.motion import Group, even_frames, even_labels
 from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
             along, across = way[:, place] @ group.drive_axis, way[:, place] @ group.across_axis
             paths.append(Line(-across, along, **look) if uphill else Line(along, across, **look))
     begin = walked[-1].x[settled]
-    names = ("across it (mm)", "uphill (mm)") if uphill else ("along the drive axis (mm)", "across it (mm)")
+    names = ("across the slope (mm)", "uphill (mm)") if uphill else ("along the drive axis (mm)", "across it (mm)")
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
     return [
         Panel(
@@ -140,8 +140,8 @@ def velocity_panel(case: Case, walkers: Columns) -> Panel:
             continue
         number = walkers["walker"][these]
         lines.append(Line(number, velocity[these], label, colour, marker, width=0.0, error=error[these]))
-    title = "Velocity of each walker, standard error of its fit"
-    return Panel(title, "number of the walker", "velocity (mm/s)", lines, zero=True, least=_LEAST_SPEED)
+    names = ("Velocity of each walker", "number of the walker", "velocity (mm/s)")
+    return Panel(*names, lines, zero=True, least=_LEAST_SPEED)
 
 
 def gait_panels(group: Group) -> list[Panel]:
@@ -342,7 +342,7 @@ def _draw_strobe(axes: Axes, group: Group) -> None:
     """
     from matplotlib.patches import Circle
 
-    radii, uphill, tilt = group.radii * 1e3, group.case.goes_uphill, group.case.boundary.tilt
+    radii, uphill = group.radii * 1e3, group.case.goes_uphill
     shown = even_frames(group.motion, _SHOWN - 3 * uphill)
     position = group.position[shown, 0] @ np.stack([group.drive_axis, group.across_axis], axis=-1) * 1e3
     middle = position.mean(axis=1)
@@ -355,8 +355,7 @@ def _draw_strobe(axes: Axes, group: Group) -> None:
         place = (along[row, bead], across[row, bead])
         look: dict[str, Any] = {"fc": "0.45" if bead == 0 else "0.75", "ec": "0.2", "lw": 0.6}
         axes.add_patch(Circle((-place[1], place[0]) if uphill else place, float(radii[bead]), **look))
-    decimals = decimals_of(float(group.time[shown[-1]] - group.time[shown[0]]) / max(len(shown) - 1, 1))
-    told = [f"{time:.{decimals}f} s" for time in group.time[shown]]
+    told = even_labels(group.time[shown])
     if long:
         told = [f"{time}\n{one:.1f} mm" for time, one in zip(told, way, strict=True)]
     edges = float((along - radii).min() - radii.max()), float((along + radii).max() + radii.max())
@@ -365,9 +364,8 @@ def _draw_strobe(axes: Axes, group: Group) -> None:
     if uphill:
         axes.set(xlim=(-ends[1], -ends[0]), ylim=edges, ylabel=name if long else "uphill (mm)")
         axes.set_xticks(pitch * np.arange(len(shown)), told, rotation=90)
-        part = "g" if tilt > 1.57 else f"g sin {np.degrees(tilt):.4g}°"
         arrow: dict[str, Any] = {"arrowprops": {"arrowstyle": "-|>", "color": "black"}, "fontsize": 7, "ha": "center"}
-        axes.annotate(part, (1.1, 0.2), (1.1, 0.7), "axes fraction", **arrow)
+        axes.annotate(group.case.boundary.pull, (1.1, 0.2), (1.1, 0.7), "axes fraction", **arrow)
     else:
         axes.set(xlim=edges, ylim=ends, yticks=[], xlabel=name)
         for row, time in enumerate(told):

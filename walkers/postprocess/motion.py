@@ -251,14 +251,17 @@ def even_frames(motion: Motion, count: int) -> list[int]:
     parts = range(most, most // 2, -1)
     if not parts:
         return [start]
+    exact = [number for number in parts[:2] if steps % number == 0]
     nearly = [number for number in parts if steps % number <= _LEFT_OUT * steps]
-    number = nearly[0] if nearly else min(parts, key=lambda number: steps % number)
+    number = [*exact, *nearly, min(parts, key=lambda number: steps % number)][0]
     return [start + every * (steps // number) * part for part in range(number + 1)]
 
 
-def decimals_of(interval: float) -> int:
-    """Decimals with which even times (s) an interval (s) apart are printed, so that they look even."""
-    return next((places for places in range(2, 6) if abs(round(interval, places) - interval) <= 0.01 * interval), 6)
+def even_labels(time: FloatArray) -> list[str]:
+    """Even times (s) with as many decimals as show that they are even."""
+    between = float(time[-1] - time[0]) / max(len(time) - 1, 1)
+    decimals = next((places for places in range(2, 6) if abs(round(between, places) - between) <= 0.01 * between), 6)
+    return [f"{one:.{decimals}f} s" for one in time]
 
 
 def gathered(motion: Motion, lane: float = 2.0) -> Motion:

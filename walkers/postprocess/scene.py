@@ -37,7 +37,7 @@ _ROUNDS = ((10, 72), (100, 30), (500, 18))  # cells around a ball where beads ar
 _SIDES = 64  # of the prism that a round wall is drawn as
 _BEYOND = 6.0  # extent of the floor over that of the picture: it has no end
 _ELEVATION_OF_ONE, _ELEVATION = radians(35.0), radians(60.0)
-"""Of the camera above a floor: with one walker that is seen from its side, and with several."""
+"""Of the camera above a floor: with one walker that is seen from its side, and otherwise."""
 _LONG, _ABOUT = 1.5, 1.4
 """The camera follows beads where a view of their whole path would be larger by the first factor than one of the beads;
 the extent of the picture then, over what the path does not need."""
@@ -108,7 +108,8 @@ class Scene:
     ) -> Scene:
         """A view of all that beads reach in some frames, and of the width and the floor of a container.
 
-        ``share`` is the extent of the picture over that; options are ``shaken``, ``rolling`` and ``path``.
+        ``share`` is the extent of the picture over that; options are ``shaken``, ``rolling`` and ``path``, with which
+        the view is of the beads alone.
         """
         seen = motion.position[frames]
         if options.get("shaken", True):
@@ -117,7 +118,7 @@ class Scene:
             seen = seen - 1e-3 * path[frames, None]
         seen, radius = 1e3 * seen @ axes.T, 1e3 * motion.radius[:, None]
         low, high = (seen - radius).min(axis=(0, 1)), (seen + radius).max(axis=(0, 1))
-        if motion.case.boundary.closed:
+        if motion.case.boundary.closed and path is None:
             half = 1e3 * motion.case.boundary.width / 2.0
             low[:2], high[0] = np.minimum(low[:2], [-half, 0.0]), max(high[0], half)
         wider = (share - 1.0) / 2.0 * (high - low)
@@ -128,8 +129,6 @@ class Scene:
 
         ``aspect`` is the width of the picture over its height; the others are those of `around`.
         """
-        if self.motion.case.boundary.closed:
-            return self
         path = path_of(self.motion, frames.start or 0)
         options = {"shaken": self.shaken, "rolling": self.rolling, "path": path}
         near = Scene.around(self.motion, self.axes, _ABOUT * share, frames, **options)
@@ -213,7 +212,7 @@ def camera_axes(motion: Motion) -> FloatArray:
     uphill = np.array([cos(boundary.uphill), sin(boundary.uphill), 0.0])
     if boundary.closed:
         return axes_toward(np.array([0.0, -1.0, 0.0]), against_gravity(motion))
-    sideways = not boundary.tilt or abs(uphill @ along) > 0.5
+    sideways = boundary.bare and (not boundary.tilt or abs(uphill @ along) > 0.5)
     elevation = _ELEVATION_OF_ONE if len(motion.walkers) == 1 and sideways else _ELEVATION
     across = np.cross([0.0, 0.0, 1.0], uphill if boundary.tilt else along)
     toward = np.array([0.0, 0.0, sin(elevation)]) - cos(elevation) * across
@@ -387,12 +386,29 @@ class Window:
 
     def _walls(self, wide: float) -> list[pv.Actor]:
         """Walls, of which those that would hide the beads are left out; their edges nearer, lest walls hide them."""
-        walls = mesh_of(walls_of(self._scene.motion)).scale(1e3).clean(tolerance=1e-6, absolute=True)
+        faces = [1e3 * corners for corners in walls_of(self._scene.motion)]
+        walls = mesh_of(faces).clean(tolerance=1e-6, absolute=True)
         drawn = self._plotter.add_mesh(walls, color=_WALL, lighting=False)
         drawn.prop.culling = "back"
         edges = walls.extract_feature_edges(feature_angle=30.0, manifold_edges=False, non_manifold_edges=False)
         edges.translate(1e-2 * wide * self._scene.axes[2], inplace=True)
-        return [drawn, self._plotter.add_mesh(edges, color=_EDGE, line_width=2, lighting=False)]
+        parts = [drawn, self._plotter.add_mesh(edges, color=_EDGE, line_width=2, lighting=False)]
+        if self._scene.path is not None:
+            marks = self._marks(faces, round_below(wide / 8.0))
+            parts.append(self._plotter.add_mesh(marks, color=_LINES, line_width=2, lighting=False))
+        return parts
+
+    def _marks(self, faces: Sequence[FloatArray], step: float) -> pv.PolyData:
+        """Lines on the walls behind the beads, across the way of the camera, by which it is seen to move."""
+        import pyvista as pv
+
+        axis, toward = int(np.argmax(np.ptp(self._scene.path, axis=0))), self._scene.axes[2]
+        behind = [one for one in faces if np.cross(one[1] - one[0], one[2] - one[1]) @ toward > 0.0]
+        walls, along = mesh_of(behind), np.eye(3)[axis]
+        low, high = walls.bounds[2 * axis : 2 * axis + 2]
+        places = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
+        lines = pv.merge([walls.slice(normal=along, origin=place * along) for place in places])
+        return lines.translate(1e-2 * step * toward)
 
 
 class _Copies:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from math import ceil, degrees
+from math import ceil
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ from walkers.inputs.errors import refused
 from walkers.physics.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.motion import Group, Motion, decimals_of, even_frames, gathered, read_motion
+from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, gathered, read_motion
 from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, plan_axes
 from walkers.runner.directory import case_of
 
@@ -123,7 +123,7 @@ def _views(motion: Motion, frames: Sequence[int]) -> Figure:
     window = Window(scene, _pixels(right - left, high - low))
     figure, panels = _panels(len(frames), right - left, high - low)
     names = ("x", "height") if sideways else ("across the slope", "uphill") if boundary.tilt else ("x", "y")
-    for panel, frame, time in zip(panels, frames, _times(motion, frames), strict=True):
+    for panel, frame, time in zip(panels, frames, even_labels(motion.time[frames]), strict=True):
         panel.imshow(window.picture(frame), extent=(left, right, low, high), interpolation="antialiased")
         panel.set_title(time)
         panel.set_xlabel(f"{names[0]} (mm)")
@@ -139,12 +139,6 @@ def _views(motion: Motion, frames: Sequence[int]) -> Figure:
     return figure
 
 
-def _times(motion: Motion, frames: Sequence[int]) -> list[str]:
-    """When frames are, with as many decimals as tell how far they are apart."""
-    between = float(motion.time[frames[-1]] - motion.time[frames[0]]) / max(len(frames) - 1, 1)
-    return [f"{motion.time[frame]:.{decimals_of(between)}f} s" for frame in frames]
-
-
 def _strips(motion: Motion, frames: Sequence[int]) -> Figure:
     """One walker at several times on strips of the floor, each with its time; on a long walk with its way too."""
     axes, radius = plan_axes(motion, np.array(motion.case.drive_axis)), 1e3 * motion.radius[:, None]
@@ -153,7 +147,7 @@ def _strips(motion: Motion, frames: Sequence[int]) -> Figure:
     half, extent = (np.abs(place - middle[:, None]) + radius).max(axis=(0, 1)), np.ptp(middle, axis=0)
     still = extent.max() < _STILL * half.max()
     along = int(motion.case.boundary.tilt > 0.0 if still else extent[1] > extent[0])  # strips are upright, or level
-    path, times = middle - middle[0], _times(motion, frames)
+    path, times = middle - middle[0], even_labels(motion.time[frames])
     if long := bool(extent[along] > _LONG * 2.0 * half[along]):
         times = [f"{time}\n{np.linalg.norm(way):.1f} mm" for time, way in zip(times, path, strict=True)]
     else:
@@ -218,8 +212,8 @@ def _describe_strips(figure: Figure, panels: Sequence[Axes], case: Case, times: 
     else:
         panels[-1].set_xlabel("across the slope (mm)" if tilted else "along the drive axis (mm)")
     if tilted and case.gravity:
-        place, part = 1.0 - 0.45 / wide, f"g sin {degrees(case.boundary.tilt):.4g}°"
-        figure.text(place, 0.56, "g" if part == "g sin 90°" else part, ha="center")
+        place = 1.0 - 0.45 / wide
+        figure.text(place, 0.56, case.boundary.pull, ha="center")
         how: dict[str, Any] = {"xycoords": "figure fraction", "arrowprops": {"arrowstyle": "-|>", "lw": 1.5, "fc": "k"}}
         panels[0].annotate("", (place, 0.36), (place, 0.55), **how)
 

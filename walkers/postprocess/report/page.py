@@ -89,7 +89,7 @@ def drawn(panel: Panel) -> Figure:
     told = [line.error for line in panel.lines if line.error is not None]
     values = np.concatenate([[0.0] if panel.zero else [], *(line.y for line in panel.lines)])
     seen = bool(told) and errors_seen(np.concatenate(told), values)
-    title = f"{panel.title}; {UNSEEN}" if told and not seen else panel.title
+    title = panel.title + (", with standard errors" if seen else f"; {UNSEEN}" if told else "")
     options: dict[str, Any] = {"y_range": panel.limits} if panel.limits else {}
     scale = "log" if panel.log else "linear"
     plot = new_plot(title, panel.x, panel.y.replace("\n", " "), y_axis_type=scale, **options)
