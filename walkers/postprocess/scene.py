@@ -394,21 +394,22 @@ class Window:
         edges.translate(1e-2 * wide * self._scene.axes[2], inplace=True)
         parts = [drawn, self._plotter.add_mesh(edges, color=_EDGE, line_width=2, lighting=False)]
         if self._scene.path is not None:
-            marks = self._marks(faces, round_below(wide / 8.0))
+            marks = self._marks(faces, int(np.argmax(np.ptp(self._scene.path, axis=0))), round_below(wide / 8.0))
             parts.append(self._plotter.add_mesh(marks, color=_LINES, line_width=2, lighting=False))
         return parts
 
-    def _marks(self, faces: Sequence[FloatArray], step: float) -> pv.PolyData:
-        """Lines on the walls behind the beads, across the way of the camera, by which it is seen to move."""
+    def _marks(self, faces: Sequence[FloatArray], axis: int, step: float) -> pv.PolyData:
+        """Lines on the walls behind the beads, across the axis of the camera's way, by which it is seen to move."""
         import pyvista as pv
 
-        axis, toward = int(np.argmax(np.ptp(self._scene.path, axis=0))), self._scene.axes[2]
+        toward = self._scene.axes[2]
         behind = [one for one in faces if np.cross(one[1] - one[0], one[2] - one[1]) @ toward > 0.0]
         walls, along = mesh_of(behind), np.eye(3)[axis]
         low, high = walls.bounds[2 * axis : 2 * axis + 2]
         places = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
-        lines = pv.merge([walls.slice(normal=along, origin=place * along) for place in places])
-        return lines.translate(1e-2 * step * toward)
+        lines: pv.PolyData = pv.merge([walls.slice(normal=along, origin=place * along) for place in places])
+        lines.translate(1e-2 * step * toward, inplace=True)
+        return lines
 
 
 class _Copies:
