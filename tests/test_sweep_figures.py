@@ -62,7 +62,7 @@ def test_error_bars_that_symbols_would_hide_are_left_out_and_the_legend_says_so(
 def test_axes_do_not_magnify_rounding() -> None:
     table = _table({"dimers.angle": "deg"}, [[-30.0], [-3.2e-15], [30.0]], [("dimers.angle",)])
     for values in ([1e-3, 1e-3 * (1.0 + 1e-9), 1e-3], [3.2e-18, -3.2e-18, 0.0]):
-        shown = table.assign(velocity=values)
+        shown = table.assign(velocity=values, standard_error=0.0)
         shown.attrs["units"] = {**table.attrs["units"], "velocity": "m/s"}
         (panel,) = _panels(draw(layout_of(shown, shown), drawn_column(shown, "velocity")))
         assert np.ptp(panel.get_ylim()) > 0.1
