@@ -120,6 +120,12 @@ def test_a_sweep_opens_its_runs(swept_report: Path, visit: Callable[..., Page]) 
     page = visit(swept_report)
     assert page.evaluate("window.hostile") is None
     assert page.locator("h1").text_content() == HOSTILE
+    page.set_viewport_size({"width": 1000, "height": 420})
+    assert (
+        page.evaluate("(({scrollWidth, clientWidth}) => scrollWidth - clientWidth)(document.querySelector('.wide'))")
+        == 0
+    )
+    page.set_viewport_size({"width": 480, "height": 420})
     page.locator("table.sweep a").nth(2).click()
     page.wait_for_selector("#point-2 .scene[data-ready]")
     assert page.locator("section:visible").get_attribute("id") == "point-2"

@@ -24,6 +24,7 @@ from walkers.postprocess import Group, Motion, read_motion, read_table
 from walkers.postprocess.analysis import figures_of, plot_run
 from walkers.postprocess.drawing import series_look, styled
 from walkers.postprocess.films import FilmOptions, film_times
+from walkers.postprocess.motion import even_frames, even_labels
 from walkers.postprocess.paraview import write_paraview, write_vtk
 from walkers.postprocess.scene import Scene, Window, camera_axes, mesh_of, walls_of
 from walkers.postprocess.series import render_series
@@ -221,6 +222,34 @@ def test_up_in_the_picture_is_up_against_gravity(motion: Motion) -> None:
         assert right @ gravity == pytest.approx(0.0, abs=1e-9)
         assert up @ gravity < 0.0
         assert toward[2] > 0.5  # nobody looks from below
+
+
+@pytest.mark.parametrize(("lengths", "follows"), [(0.0, False), (0.5, False), (40.0, True)])
+def test_the_camera_follows_a_walker_that_walks_far(lengths: float, follows: bool, motion: Motion) -> None:
+    """Its beads are as large in the picture as without the way, and in the middle of it."""
+    one = motion.of_walkers(motion.walkers[:1])
+    way = lengths * one.case.walkers[0].length * one.time / one.time[-1]
+    far = replace(one, position=one.position + way[:, None, None] * np.array(one.case.drive_axis))
+    scene = Scene.around(far, camera_axes(far), 1.2, shaken=False).following(1.5, 1.2)
+    assert (scene.path is not None) == follows
+    if follows:
+        assert np.linalg.norm(scene.moved(len(far.time) - 1)) == pytest.approx(1e3 * way[-1], rel=0.05)
+    window = Window(scene, (300, 200))
+    pictures = [window.picture(frame).astype(int) for frame in (0, len(far.time) - 1)]
+    window.close()
+    for picture in pictures:
+        ruby = picture[..., 0] > 1.3 * picture[..., 1]
+        assert ruby.mean() > 0.07
+        assert not ruby[:, [0, -1]].any()
+
+
+def test_times_of_pictures_are_even(motion: Motion) -> None:
+    for count, expected in {2: 2, 5: 5, 6: 5, 9: 9}.items():  # of eight cycles
+        time = motion.time[even_frames(motion, count)]
+        assert len(time) == expected
+        np.testing.assert_allclose(np.diff(time), time[-1] / (expected - 1), rtol=1e-9)
+    assert even_labels(np.array([0.0, 0.125])) == ["0.000 s", "0.125 s"]
+    assert even_labels(np.array([0.0, 0.15])) == ["0.00 s", "0.15 s"]
 
 
 def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(filmed: Path, tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from tests.conftest import call, document, make_case, to_toml
 from walkers.inputs.caption import caption
 from walkers.inputs.rounding import rounded, with_decimals
 from walkers.inputs.sweep import expand
-from walkers.postprocess import read_motion
+from walkers.postprocess import read_motion, read_table
 from walkers.postprocess.analysis import current_result, number_of
 from walkers.postprocess.motion import gathered
 from walkers.postprocess.report.page import LARGEST, overhead
@@ -172,10 +172,11 @@ def test_a_sweeps_report_says_which_runs_it_leaves_out(swept: Path, swept_report
 
 
 def test_the_player_shows_the_motion(walked_run: Path) -> None:
-    """Each bead is where the motion has it, turned as its spins turned it, to 0.1 µm."""
-    motion, player = gathered(read_motion(walked_run), lane=1.25).driven, player_of(walked_run)
+    """Each bead of the first walker is where the motion has it, turned as its spins turned it, to 0.1 µm."""
+    motion, player = gathered(read_motion(walked_run)).driven, player_of(walked_run)
+    motion = motion.of_walkers(motion.walkers[:1])
     beads = [one for one in player.plot.objects if one.name.startswith("bead")]
-    assert len(beads) == len(motion.radius) == 4
+    assert len(beads) == len(motion.radius) == 2
     assert (player.begin, player.end) == (motion.time[0], motion.time[-1])
     across = np.cross([0.0, 0.0, 1.0], motion.case.drive_axis)
     settled = motion.case.run.settling_cycles * motion.case.run.samples_per_cycle
@@ -187,8 +188,8 @@ def test_the_player_shows_the_motion(walked_run: Path) -> None:
         turned = Rotation.from_matrix(matrices[[settled, -1], :3, :3] / (1e3 * motion.radius[number]))
         way = motion.walkers[number // 2].facing * float((turned[1] * turned[0].inv()).as_rotvec() @ across)
         rolled[number % 2].append(way * motion.radius[number] / (motion.time[-1] - motion.time[settled]))
-    rotation = current_result(walked_run)["rotation"]
-    for bead, key in enumerate(("bead_1", "bead_2")):
+    rotation = read_table(walked_run, "walkers").iloc[0]
+    for bead, key in enumerate(("rotation_1", "rotation_2")):
         assert np.mean(rolled[bead]) == pytest.approx(rotation[key], rel=0.01, abs=2e-6)
     weightless = replace(motion, case=replace(motion.case, gravity=0.0))  # is seen as the floor lies
     assert cameras_of(weightless) == cameras_of(motion)
@@ -199,7 +200,7 @@ def test_long_runs_are_thinned_out_and_say_so(walked_run: Path, pile_run: Path) 
     player = player_of(walked_run, places=200)
     beads = [one for one in player.plot.objects if one.name.startswith("bead")]
     assert sum(len(one.model_matrix) for one in beads) <= 200
-    assert any("are shown" in caption or "is shown" in caption for caption in player.captions)
+    assert any("instants shown" in caption for caption in player.captions)
     pile, motion = player_of(pile_run), read_motion(pile_run).driven
     points = next(one for one in pile.plot.objects if one.name == "beads")
     np.testing.assert_allclose(points.positions[f"{motion.time[-1]:.6f}"], 1e3 * motion.position[-1], atol=1e-3)

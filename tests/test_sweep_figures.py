@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 import walkers
@@ -16,8 +17,9 @@ from tests.conftest import call
 from walkers.inputs.errors import InputError
 from walkers.inputs.reading import load_case
 from walkers.plotting import LeftOutWarning
+from walkers.postprocess.drawing import UNSEEN
 from walkers.runner.directory import case_of
-from walkers.sweeps.figure import factors_of, layout_of
+from walkers.sweeps.figure import draw, drawn_column, factors_of, layout_of
 from walkers.theory.prediction import MODEL, PAPER, predict, predicted_column
 
 
@@ -44,6 +46,27 @@ def _table(units: dict[str, str], rows: list[list[Any]], axes: list[tuple[str, .
     table = pd.DataFrame(rows, columns=list(units)).assign(point=range(len(rows)))
     table.attrs |= {"units": units, "meanings": dict.fromkeys(units, "varied"), "axes": axes}
     return table
+
+
+@pytest.mark.parametrize(("error", "bars"), [(2e-4, 3), (2e-6, 0)])
+def test_error_bars_that_symbols_would_hide_are_left_out_and_the_legend_says_so(error: float, bars: int) -> None:
+    table = _table({"drive.frequency": "Hz"}, [[60.0], [70.0], [80.0]], [("drive.frequency",)])
+    table = table.assign(velocity=[1e-3, 2e-3, 3e-3], standard_error=error)
+    table.attrs["units"] |= {"velocity": "m/s", "standard_error": "m/s"}
+    figure = draw(layout_of(table, table), drawn_column(table, "velocity"))
+    (panel,) = _panels(figure)
+    assert sum(len(one.get_segments()) for one in panel.collections if isinstance(one, LineCollection)) == bars
+    assert [legend.get_title().get_text() for legend in figure.legends] == ([] if bars else [UNSEEN])
+
+
+def test_axes_do_not_magnify_rounding() -> None:
+    table = _table({"dimers.angle": "deg"}, [[-30.0], [-3.2e-15], [30.0]], [("dimers.angle",)])
+    for values in ([1e-3, 1e-3 * (1.0 + 1e-9), 1e-3], [3.2e-18, -3.2e-18, 0.0]):
+        shown = table.assign(velocity=values, standard_error=0.0)
+        shown.attrs["units"] = {**table.attrs["units"], "velocity": "m/s"}
+        (panel,) = _panels(draw(layout_of(shown, shown), drawn_column(shown, "velocity")))
+        assert np.ptp(panel.get_ylim()) > 0.1
+        assert [label.get_text() for label in panel.get_xticklabels()] == ["-30", "0", "30"]
 
 
 def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_through: Path) -> None:

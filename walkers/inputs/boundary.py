@@ -153,6 +153,11 @@ class Boundary:
         return f"{self.shape} tilted by {degrees(self.tilt):.4g}°" if self.tilt else ""
 
     @property
+    def pull(self) -> str:
+        """The part of gravity down a slope, in words: ``g sin 60°``; of a wall ``g``."""
+        return "g" if self.tilt > 1.57 else f"g sin {degrees(self.tilt):.4g}°"
+
+    @property
     def drive_axis(self) -> Literal["x", "z"]:
         """Along which it is shaken if a case does not say."""
         return "z" if self.closed else "x"

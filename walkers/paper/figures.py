@@ -13,7 +13,15 @@ from walkers.inputs.loads import dimer_of
 from walkers.paper import published
 from walkers.paper.comparison import evaluate
 from walkers.paper.published import GRAVITY, OBSERVATIONS, Sources, described, driven, of_asymmetry, of_radii, shipped
-from walkers.postprocess.drawing import ONE_COLUMN, TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
+from walkers.postprocess.drawing import (
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    errors_seen,
+    legend_below,
+    letter_panels,
+    new_figure,
+    styled,
+)
 from walkers.postprocess.gait import gait
 from walkers.postprocess.series import top_view
 from walkers.sweeps.table import thresholds
@@ -37,11 +45,11 @@ _FINE = 61
 _CYCLES = 2
 """Of Fig. 4."""
 _SERIES = (
-    ("walker", "velocity", "s", "#c4473a"),
-    ("large bead", "rotation_1", "o", "#111111"),
-    ("small bead", "rotation_2", "^", "#1f5fa8"),
+    ("walker", "velocity", "s", "#c4473a", 7.5),
+    ("large bead", "rotation_1", "o", "#111111", 5.0),
+    ("small bead", "rotation_2", "^", "#1f5fa8", 2.5),
 )
-"""Of Fig. 4: name, column of a sweep's table, marker and colour."""
+"""Of Fig. 4: name, column of a sweep's table, marker, colour and size: none hides another."""
 _PUBLISHED_DASHES = (0, (6, 2, 1, 2))
 
 
@@ -72,17 +80,22 @@ def fig1b(sources: Sources) -> Figure:
     return figure
 
 
-def _errorbars(axes: Axes, x: pd.Series[float], rows: pd.DataFrame, **look: Any) -> None:
-    """Means with bars from the smallest to the largest of the walkers, as in the paper."""
+def _errorbars(axes: Axes, x: pd.Series[float], rows: pd.DataFrame, *, seen: bool, **look: Any) -> None:
+    """Means, with bars from the smallest to the largest of the walkers, as in the paper, if these are to be seen."""
     mean, low, high = (rows[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
-    axes.errorbar(x, mean, yerr=[mean - low, high - mean], mfc="none", **look)
+    axes.errorbar(x, mean, yerr=[mean - low, high - mean] if seen else None, mfc="none", **look)
+
+
+def _range_seen(rows: pd.DataFrame) -> bool:
+    """Whether the range of the walkers' velocities is anywhere larger than a symbol."""
+    return errors_seen((rows["largest"] - rows["smallest"]) / 2.0, rows["velocity"])
 
 
 @styled
 def fig2(sources: Sources) -> Figure:
     """Velocity against peak acceleration at four frequencies, dry friction alone, and the threshold of motion."""
     table, case = sources.finished("fig2"), shipped()
-    dimer = dimer_of(case)
+    dimer, seen = dimer_of(case), _range_seen(table)
     rows = [["engine", "dry"], ["engine", "threshold"]]
     figure, axes = new_figure(TWO_COLUMNS, 4.8, mosaic=rows, width_ratios=[1.5, 1.0], height_ratios=[1.4, 1.0])
     engine, dry = axes["engine"], axes["dry"]
@@ -93,7 +106,7 @@ def fig2(sources: Sources) -> Figure:
         there, name = table[table["frequency"] == frequency], f"{frequency:g} Hz"
         line: dict[str, Any] = {"color": f"C{number}", "ls": _DASHES[number % len(_DASHES)]}
         symbol = {"fmt": _MARKERS[frequency], "color": line["color"], "ms": 4, "lw": 0.7, "mew": 0.8}
-        _errorbars(engine, there["peak_acceleration"] / GRAVITY, there, label=name, **symbol)
+        _errorbars(engine, there["peak_acceleration"] / GRAVITY, there, seen=seen, label=name, **symbol)
         cases = driven(case, frequency, peaks)
         engine.plot(peaks / GRAVITY, motion_of(*cases).velocity * 1e3, lw=0.9, **line)
         dry.plot(peaks / GRAVITY, motion_of(*cases, viscous=False).velocity * 1e3, label=name, **line)
@@ -114,7 +127,8 @@ def fig2(sources: Sources) -> Figure:
     above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
     engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction, bridges")
     engine.plot([], [], color="0.45", lw=2.0, marker="*", ms=8, label="paper's fit, κ = 0.033 s/mm")
-    legend_below(engine, ncols=3, title="symbols: engine, mean and range of 6 walkers; in (c) of 2")
+    told = "mean and range of 6 walkers" if seen else "mean of 6 walkers, their range is smaller"
+    legend_below(engine, ncols=3, title=f"symbols: engine, {told}; in (c) of 2")
     legend_below(dry, ncols=4, columnspacing=1.0, handlelength=1.8, handletextpad=0.4)
     _threshold(axes["threshold"], sources)
     letter_panels((engine, dry, axes["threshold"]))
@@ -161,7 +175,9 @@ def fig3(sources: Sources) -> Figure:
     pairs = list(zip(table["radius_1"], table["radius_2"], strict=True))
     same = motion_of(*[of_radii(case, radii, gamma0) for radii in pairs]).velocity * 1e3
     axes.plot(table["sin_delta"], same, "x", color="0.1", ms=6, label="Coulomb friction, bridges, these beads")
-    _errorbars(axes, table["sin_delta"], table, fmt="s", color="C2", ms=5, label="engine")
+    seen = _range_seen(table)
+    told = "engine, mean and range" if seen else "engine, mean (the range is smaller than the symbol)"
+    _errorbars(axes, table["sin_delta"], table, seen=seen, fmt="s", color="C2", ms=5, label=told)
     # The beads stand above the axes, where they meet no symbol; upright, for some asymmetries are nearly the same.
     above = axes.secondary_xaxis("top")
     above.set_xticks(table["sin_delta"], [f"{one * 1e3:g}/{other * 1e3:g}" for one, other in pairs], rotation=90)
@@ -194,13 +210,13 @@ def fig4(sources: Sources) -> Figure:
             for name, column, *_ in _SERIES:
                 paper = f", published {known[name]:g}" if name in known else ""
                 means[name].append(f"({letter}) {row[column] * 1e3:.2f}{paper}")
-        for name, _, _, colour in _SERIES:
+        for name, _, _, colour, _ in _SERIES:
             if name in known:
                 panel.axhline(known[name], color=colour, ls=_PUBLISHED_DASHES, lw=1.0)
     letter_panels(axes)
     handles = [
-        Line2D([], [], ls="", marker=marker, ms=4, mfc="none", color=colour, label=f"{name}: {'; '.join(means[name])}")
-        for name, _, marker, colour in _SERIES
+        Line2D([], [], ls="", marker=marker, ms=ms, mfc="none", color=colour, label=f"{name}: {'; '.join(means[name])}")
+        for name, _, marker, colour, ms in _SERIES
     ]
     handles.append(Line2D([], [], color="0.3", lw=0.9, label="lines: Coulomb friction and drag"))
     handles.append(Line2D([], [], color="0.3", lw=1.0, ls=_PUBLISHED_DASHES, label="published means"))
@@ -214,9 +230,9 @@ def _draw_cycles(axes: Axes, trajectory: Group) -> None:
     samples = run.samples_per_cycle
     last = slice((run.cycles - _CYCLES) * samples, run.cycles * samples + 1)
     values = [motion.velocity[last, 0], motion.rotation[last, 0, 0], motion.rotation[last, 0, 1]]
-    for (_, _, marker, colour), series, line in zip(_SERIES, values, theory_of_cycles(trajectory), strict=True):
-        axes.plot(np.arange(len(series)) / samples, series * 1e3, marker, color=colour, ms=4, mfc="none", mew=0.8)
-        axes.plot(np.arange(len(line)) / (len(line) - 1) * _CYCLES, line * 1e3, color=colour, lw=0.9)
+    for (_, _, marker, colour, ms), series, line in zip(_SERIES, values, theory_of_cycles(trajectory), strict=True):
+        axes.plot(np.arange(len(series)) / samples, series * 1e3, marker, color=colour, ms=ms, mfc="none", mew=0.8)
+        axes.plot(np.arange(len(line)) / (len(line) - 1) * _CYCLES, line * 1e3, color=colour, lw=0.36 * ms)
     axes.axhline(0.0, color="0.4", lw=0.6)
     axes.set(xlabel="time (cycles of the drive)", ylabel=r"velocity; beads: $-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)")
 

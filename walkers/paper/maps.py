@@ -308,6 +308,9 @@ def fig_zoo(sources: Sources) -> Figure:
     first = axes.flat[0]
     first.plot([-0.5, 0.5], [-1.75, -1.75], color="0.1", lw=1.5, solid_capstyle="butt")
     first.annotate("1 mm", (0.0, -1.75), (0, -3), textcoords="offset points", ha="center", va="top", fontsize=7)
+    first.annotate("g", (-1.3, 0.0), (-1.3, 1.4), ha="center", fontsize=8, arrowprops={"arrowstyle": "-|>", "fc": "k"})
+    tilted = sources.trajectory(entries[0][0]["run"].iloc[0]).case.boundary.tilted
+    figure.suptitle(f"{tilted}: up is against gravity, speeds are positive upward; dotted: at the start")
     return figure
 
 

@@ -26,6 +26,9 @@ _STYLE = Path(__file__).parent / "style.mplstyle"
 _DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)))
 _MARKERS = "os^Dv"
 _MAKER = "granular-walkers"
+_LEAST_ERROR = 0.02  # of the range of values, about half of the height of a symbol
+UNSEEN = "error bars are smaller than the symbols"
+"""What is said where error bars are left out."""
 _Given = ParamSpec("_Given")
 _Drawn = TypeVar("_Drawn")
 
@@ -79,6 +82,14 @@ def series_look(number: int) -> dict[str, Any]:
         "marker": _MARKERS[number % len(_MARKERS)],
         "markerfacecolor": "none",
     }
+
+
+def errors_seen(errors: Any, values: Any) -> bool:
+    """Whether error bars are longer than the symbols of points whose values are drawn from edge to edge."""
+    import numpy as np
+
+    known, shown = np.asarray(errors)[np.isfinite(errors)], np.asarray(values)[np.isfinite(values)]
+    return bool(len(known) and known.max() > _LEAST_ERROR * np.ptp(shown))
 
 
 def legend_below(axes: Axes, **options: Any) -> Legend:

@@ -16,7 +16,7 @@ from walkers.inputs.loads import dimer_of
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, series_look, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import averages, distance_walked, fit_slopes, gait, walk, ways
-from walkers.postprocess.motion import Group
+from walkers.postprocess.motion import Group, even_frames, even_labels
 from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:
@@ -26,9 +26,11 @@ if TYPE_CHECKING:
 MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """How events are marked (`walkers.postprocess.clusters.Event`)."""
-_MARKERS = "so^vD"
 _HEIGHT = 1.6  # inches of a panel
-_GREY, _OTHERS = "#5b6770", "#c78a2c"
+_LEAST_DISTANCE, _LEAST_ANGLE, _LEAST_SPEED = 0.01, 0.1, 0.01
+"""mm, ° and mm/s that axes show at least: rounding is no motion."""
+_SHOWN, _LONG = 8, 4.0  # images of a walker; lengths of a walker from which on they are centred on it
+_GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#c78a2c"
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ class Panel:
     """A plot: title, labels of its axes, lines from the lowest to the uppermost, and what is grey behind them.
 
     ``band`` are two lines of the same x with grey between them, ``settled`` the x up to which it is grey, ``log`` says
-    that y is logarithmic, ``zero`` that a figure shows where y is zero, ``height`` how high it is there, over others.
+    that y is logarithmic, ``zero`` that it is shown where y is zero, ``least`` the smallest range of y that is shown,
+    ``height`` how high it is in a figure, over others.
     """
 
     title: str
@@ -66,12 +69,34 @@ class Panel:
     log: bool = False
     zero: bool = False
     height: float = 1.0
+    least: float = 0.0
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """What y is to go from and to, where what is shown of it would be less than is to be; else None."""
+        shown = [np.zeros(int(self.zero)), *(np.asarray(line.y)[np.isfinite(line.y)] for line in self.lines)]
+        values = np.concatenate(shown)
+        if not len(values) or np.ptp(values) >= self.least:
+            return None
+        middle = float(values.max() + values.min()) / 2.0
+        return middle - self.least / 2.0, middle + self.least / 2.0
+
+
+def nested_widths(count: int, largest: float = 3.0) -> list[float]:
+    """Widths of lines (points), the lowest first, so that of those that coincide each is seen."""
+    return [1.1] if count < 2 else np.linspace(min(1.1 + 2.2 * (count - 1), largest), 1.1, count).tolist()
+
+
+def told_velocity(value: float) -> str:
+    """A velocity (mm/s) with three digits, but no more than three decimals: a smaller one is none."""
+    return "0" if abs(value) < 5e-4 else f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.3f}"
 
 
 def walk_panels(groups: list[Group]) -> list[Panel]:
     """Distance walked, orientation, and paths from above, of all walkers, once a cycle."""
-    case = groups[0].case
-    strobe, settled, facing = case.run.samples_per_cycle, case.run.settled_strobes, ways(uphill=case.goes_uphill)
+    case, uphill = groups[0].case, groups[0].case.goes_uphill
+    strobe, settled, facing = case.run.samples_per_cycle, case.run.settled_strobes, ways(uphill=uphill)
+    widths = nested_widths(sum(len(group.walkers) for group in groups))
     walked: list[Line] = []
     turned: list[Line] = []
     paths: list[Line] = []
@@ -81,16 +106,27 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
         way = (group.mass_centre[::strobe] - group.mass_centre[0]) * 1e3
         for place, walker in enumerate(group.walkers):
             number = walker.walker
-            told = f"{number}: {facing[int(walker.facing < 0)]}, {slope[place] * 1e3:.3g} mm/s"
-            look = (told if number < MOST_NAMED else "", number)
-            walked.append(Line(time, distance[:, place] * 1e3, *look))
-            turned.append(Line(time, np.degrees(group.orientation[::strobe, place]), *look))
-            paths.append(Line(way[:, place] @ group.drive_axis, way[:, place] @ group.across_axis, *look))
+            told = f"{number}: {facing[int(walker.facing < 0)]}, {told_velocity(slope[place] * 1e3)} mm/s"
+            look: dict[str, Any] = {"label": told if number < MOST_NAMED else "", "colour": number}
+            look["width"] = widths[len(walked)]
+            walked.append(Line(time, distance[:, place] * 1e3, **look))
+            turned.append(Line(time, np.degrees(group.orientation[::strobe, place]), **look))
+            along, across = way[:, place] @ group.drive_axis, way[:, place] @ group.across_axis
+            paths.append(Line(-across, along, **look) if uphill else Line(along, across, **look))
     begin = walked[-1].x[settled]
+    names = ("across the slope (mm)", "uphill (mm)") if uphill else ("along the drive axis (mm)", "across it (mm)")
+    seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
     return [
-        Panel("Distance along the heading; grey: settling", "time (s)", "distance walked (mm)", walked, settled=begin),
-        Panel("Orientation", "time (s)", "orientation ψ (°)", turned, settled=begin),
-        Panel("Paths of the mass centres, seen from above", "along the drive axis (mm)", "across it (mm)", paths),
+        Panel(
+            "Distance along the heading; grey: settling",
+            "time (s)",
+            "distance walked (mm)",
+            walked,
+            settled=begin,
+            least=_LEAST_DISTANCE,
+        ),
+        Panel("Orientation", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE),
+        Panel(f"Paths of the mass centres, {seen}", *names, paths, least=_LEAST_DISTANCE),
     ]
 
 
@@ -100,9 +136,12 @@ def velocity_panel(case: Case, walkers: Columns) -> Panel:
     for way, told in zip((1, -1), ways(uphill=case.goes_uphill), strict=True):
         label, colour, marker = f"started facing {told}", int(way < 0), "o" if way > 0 else "s"
         these = walkers["facing"] == way
+        if not these.any():
+            continue
         number = walkers["walker"][these]
         lines.append(Line(number, velocity[these], label, colour, marker, width=0.0, error=error[these]))
-    return Panel("Velocity of each walker, standard error of its fit", "number of the walker", "velocity (mm/s)", lines)
+    names = ("Velocity of each walker", "number of the walker", "velocity (mm/s)")
+    return Panel(*names, lines, zero=True, least=_LEAST_SPEED)
 
 
 def gait_panels(group: Group) -> list[Panel]:
@@ -120,12 +159,18 @@ def gait_panels(group: Group) -> list[Panel]:
     names = ["walker", *(f"bead {bead + 1}" for bead in range(motion.rotation.shape[-1]))]
     values = 1e3 * np.column_stack([motion.velocity[last, 0], motion.rotation[last, 0]])
     means = 1e3 * np.array([walk(group).velocity[0], *averages(group).rotation[0]])
+    labels = [f"{name} (mean {told_velocity(mean)} mm/s)" for name, mean in zip(names, means, strict=True)]
+    widths, colours = nested_widths(len(names), 6.0), [_PALE, *range(1, len(names))]
     lines = [
-        Line(phase, values[:, number], f"{name} (mean {means[number]:.2f} mm/s)", number, _MARKERS[number % 5])
-        for number, name in enumerate(names)
+        Line(phase, values[:, number], labels[number], colours[number], width=widths[number])
+        for number in range(len(names))
     ]
-    x = "time (cycles of the drive), the last two"
-    panels = [Panel(f"walker {first.walker}", x, "velocity; beads:\n−R dφ/dt (mm/s)", lines, zero=True, height=2.5)]
+    x, title = (
+        "time (cycles of the drive), the last two",
+        f"walker {first.walker}; a bead rolls without sliding where its curve is on the walker's",
+    )
+    y = "velocity; beads:\n−R dφ/dt (mm/s)"
+    panels = [Panel(title, x, y, lines, zero=True, height=2.5, least=_LEAST_SPEED)]
     shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
     if np.any(shaken):  # faster than its walkers by far: in their panel it would make them all flat
         line = Line(phase, first.facing * shaken * 1e3, colour=_GREY, dashed=True)
@@ -229,7 +274,7 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
         axes[name].set_xlabel(panel.x)
         for number, line in enumerate(axes[name].lines):
             # Marks of walkers that do the same stand beside each other.
-            line.set(**series_look(number), markevery=(number % 6, 6), linewidth=0.9)
+            line.set(**series_look(number), markevery=(0.02 * (number % 6), 0.12), linewidth=0.9)
     axes["walked"].set_title("grey: settling")
     letter_panels(axes.values())
     more = f" (the first {MOST_NAMED})" if sum(len(group.walkers) for group in groups) > MOST_NAMED else ""
@@ -273,6 +318,8 @@ def _draw(axes: Axes, panel: Panel) -> None:
         axes.axhline(0.0, color="0.4", lw=0.6)
     if panel.log:
         axes.set_yscale("log", nonpositive="mask")
+    if panel.limits:
+        axes.set_ylim(panel.limits)
     axes.set_ylabel(panel.y)
 
 
@@ -283,31 +330,46 @@ def _title(case: Case) -> str:
         shown = f"R = {'; '.join(makes)} mm"
         if len(case.walkers[0].radii) == 2:
             gamma0 = f" ($\\Gamma_0$ = {dimer_of(case).gamma0(case.drive.peak_acceleration):.3g})"
-    return f"{plain_text(case.title or case.name)}\n{shown}, {case.drive.described()}{gamma0}"
+    tilted = f", {case.boundary.tilted}" if case.boundary.tilted else ""
+    return f"{plain_text(case.title or case.name)}\n{shown}{tilted}, {case.drive.described()}{gamma0}"
 
 
 def _draw_strobe(axes: Axes, group: Group) -> None:
-    """The first walker from above, its beads to scale, at eight times (as in Fig. 1b of the paper).
+    """The first walker seen along the normal of the floor, its beads to scale, at several times (Fig. 1b of the paper).
 
-    Rows are even: the way along the drive axis and the orientation are shown, not the drift across the axis.
+    Images are even: the way along the drive axis and the orientation are shown, not the drift across it. Uphill is up;
+    on a long walk each image is in the middle.
     """
     from matplotlib.patches import Circle
 
-    strobe, radii = group.case.run.samples_per_cycle, group.radii * 1e3
-    position = group.position[::strobe, 0] @ np.stack([group.drive_axis, group.across_axis], axis=-1) * 1e3
+    radii, uphill = group.radii * 1e3, group.case.goes_uphill
+    shown = even_frames(group.motion, _SHOWN - 3 * uphill)
+    position = group.position[shown, 0] @ np.stack([group.drive_axis, group.across_axis], axis=-1) * 1e3
     middle = position.mean(axis=1)
-    shown = np.unique(np.linspace(0, len(position) - 1, 8).round().astype(int))
-    extent = max(float(np.ptp(position[..., 1], axis=1).max()), 0.6 * float(radii.max()))
-    pitch = 2.0 * float(radii.max()) + extent
-    along = position[shown, :, 0] - middle[0, 0]
-    across = position[shown, :, 1] - middle[shown, 1:] - pitch * np.arange(len(shown))[:, None]
-    for row, frame in enumerate(shown):
-        for bead, size in enumerate(radii):
-            place, shade = (along[row, bead], across[row, bead]), "0.45" if bead == 0 else "0.75"
-            axes.add_patch(Circle(place, size, fc=shade, ec="0.2", lw=0.6))
-        beside: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "fontsize": 7, "va": "center"}
-        axes.annotate(f"{group.time[frame * strobe]:.2f} s", (1.01, -row * pitch), **beside)
+    way, extent = middle[:, 0] - middle[0, 0], np.ptp(position, axis=1).max(axis=0) + 2.0 * float(radii.max())
+    long = float(np.ptp(way)) > _LONG * extent[0]
+    pitch = max(float(extent[1]), 2.6 * float(radii.max())) + 0.1
+    along = position[..., 0] - (middle[:, :1] if long else middle[0, 0])
+    across = position[..., 1] - middle[:, 1:] - pitch * np.arange(len(shown))[:, None]
+    for row, bead in np.ndindex(along.shape):
+        place = (along[row, bead], across[row, bead])
+        look: dict[str, Any] = {"fc": "0.45" if bead == 0 else "0.75", "ec": "0.2", "lw": 0.6}
+        axes.add_patch(Circle((-place[1], place[0]) if uphill else place, float(radii[bead]), **look))
+    told = even_labels(group.time[shown])
+    if long:
+        told = [f"{time}\n{one:.1f} mm" for time, one in zip(told, way, strict=True)]
     edges = float((along - radii).min() - radii.max()), float((along + radii).max() + radii.max())
-    axes.set(xlim=edges, ylim=(-pitch * (len(shown) - 0.4), 0.6 * pitch), aspect="equal")
-    axes.set(xlabel="along the drive axis (mm)", yticks=[], title="walker 0, time downward")
+    ends = -pitch * (len(shown) - 0.4), 0.6 * pitch
+    title, name = f"walker {group.walkers[0].walker}", "from its middle (mm)" if long else "along the drive axis (mm)"
+    if uphill:
+        axes.set(xlim=(-ends[1], -ends[0]), ylim=edges, ylabel=name if long else "uphill (mm)")
+        axes.set_xticks(pitch * np.arange(len(shown)), told, rotation=90)
+        arrow: dict[str, Any] = {"arrowprops": {"arrowstyle": "-|>", "color": "black"}, "fontsize": 7, "ha": "center"}
+        axes.annotate(group.case.boundary.pull, (1.1, 0.2), (1.1, 0.7), "axes fraction", **arrow)
+    else:
+        axes.set(xlim=edges, ylim=ends, yticks=[], xlabel=name)
+        for row, time in enumerate(told):
+            axes.annotate(time, (1.01, -row * pitch), xycoords=("axes fraction", "data"), fontsize=7, va="center")
+    axes.set(aspect="equal", title=title)
+    axes.set_anchor("N")
     axes.grid(visible=False)

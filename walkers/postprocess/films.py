@@ -1,7 +1,8 @@
 """Films of runs: beads that are seen to roll, with the physical time, the slow motion and a scale in the picture.
 
-The camera rests in the laboratory, so that the boundary is seen to shake; films whose pictures are half a cycle apart
-or more show one phase of the drive, as a stroboscope does.
+The camera rests in the laboratory, so that the boundary is seen to shake; where the path of the beads is long it moves
+along with them. Films whose pictures are half a cycle apart or more show one phase of the drive, as a stroboscope does.
+On a tilted boundary an arrow points down, the way of gravity.
 """
 
 from __future__ import annotations
@@ -82,11 +83,14 @@ def render_film(
     motion = _shown(read_motion(directory).driven, options.walker)
     times = film_times(motion, options)
     count, frames = len(times.time), slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
-    window = Window(Scene.around(motion, camera_axes(motion), _AROUND, frames, rolling=True), options.size)
-    write = _captions(motion, times, window.pixels_per_mm, options.size)
+    wide, tall = options.size
+    whole = Scene.around(motion, camera_axes(motion), _AROUND, frames, rolling=True)
+    scene = whole.following(wide / tall, _AROUND, frames)
+    window = Window(scene, options.size)
+    write = _captions(scene, times, window.pixels_per_mm, options.size)
 
     def picture(number: int) -> Picture:
-        return write(window.picture(times.frame[number]), times.time[number])
+        return write(window.picture(times.frame[number]), number)
 
     def pictures() -> Iterator[Picture]:
         for number in range(count):
@@ -195,29 +199,38 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
 
 
 def _captions(
-    motion: Motion, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
-) -> Callable[[Picture, float], Picture]:
-    """What writes time, slow motion, the drive and a scale bar into a picture."""
+    scene: Scene, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
+) -> Callable[[Picture, int], Picture]:
+    """What writes time, way, slow motion, drive, tilt, a scale bar and the way of gravity into a picture."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
 
-    (wide, tall), edge = size, max(_LEAST_LETTERS, size[1] // _LETTERS)
+    (wide, tall), edge, case = size, max(_LEAST_LETTERS, size[1] // _LETTERS), scene.motion.case
     # Pillow's own letters have no × and no ².
     font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
     large, small = (ImageFont.truetype(font, round(share * edge)) for share in (1.2, 0.85))
     # All pictures may be of one frame, where frames are rarer than pictures.
     decimals = max(0, ceil(-log10(float(np.diff(times.time).max(initial=0.0)) or 1.0) - 1e-9))
     speed = told_speed(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
-    drive = f"{motion.case.drive.frequency:g} Hz, {motion.case.drive.peak_acceleration:.3g} m/s²"
+    drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration:.3g} m/s²"
     bar = round_below(wide / 5.0 / pixels_per_mm)
     left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
 
-    def written(picture: Picture, time: float) -> Picture:
+    def written(picture: Picture, number: int) -> Picture:
         page = Image.fromarray(picture)
         draw = ImageDraw.Draw(page)
-        draw.text((edge, edge), f"{time:.{decimals}f} s", "black", large, anchor="lt")
+        draw.text((edge, edge), f"{times.time[number]:.{decimals}f} s", "black", large, anchor="lt")
         draw.text((edge, 2.8 * edge), speed, "#333333", small, anchor="lt")
+        if scene.path is not None:
+            way = float(np.linalg.norm(scene.moved(times.frame[number])))
+            draw.text((edge, 4.3 * edge), f"{way:.1f} mm from the start", "#333333", small, anchor="lt")
         draw.text((edge, level), drive, "#333333", small, anchor="ls")
+        if case.boundary.tilted and case.gravity:
+            draw.text((edge, level - 1.5 * edge), case.boundary.tilted, "#333333", small, anchor="ls")
+            tip = 5.5 * edge
+            draw.line([right, edge, right, tip - edge], "black", thick)
+            draw.polygon([right - 0.4 * edge, tip - edge, right + 0.4 * edge, tip - edge, right, tip], "black")
+            draw.text((right - 0.8 * edge, 3.0 * edge), "g", "black", large, anchor="rm")
         draw.rectangle([left, level - thick, right, level], "black")
         draw.text(((left + right) / 2.0, level - 1.5 * thick), f"{bar:g} mm", "black", small, anchor="md")
         return np.asarray(page)

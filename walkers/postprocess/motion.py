@@ -24,6 +24,7 @@ FLOOR = 0
 """Number of the floor among the walls of a container; the others are the side walls."""
 LEAST_SAMPLES = 8
 """A cycle, with which frames show what happens within one."""
+_LEFT_OUT = 0.02  # of a run, beyond the last of several even times
 _OF_FRAMES = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin")
 _OF_BEADS = ("position", "velocity", "spin", "mean_spin")
 
@@ -237,6 +238,31 @@ class Group:
         angle = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis))
         unwrapped: FloatArray = np.unwrap(angle, axis=0)
         return unwrapped
+
+
+def even_frames(motion: Motion, count: int) -> list[int]:
+    """Frames through the drive, equally far apart from its first: ``count``, or fewer if these end nearer to its end.
+
+    At the same phase of the drive, if there are as many cycles, or walkers would seem to go back.
+    """
+    start, cycle = motion.first_driven, motion.case.run.samples_per_cycle
+    last = len(motion.time) - 1 - start
+    every, steps = (cycle, last // cycle) if last // cycle >= count - 1 else (1, last)
+    most = min(count - 1, steps)
+    parts = range(most, most // 2, -1)
+    if not parts:
+        return [start]
+    exact = [number for number in parts[:2] if steps % number == 0]
+    nearly = [number for number in parts if steps % number <= _LEFT_OUT * steps]
+    number = [*exact, *nearly, min(parts, key=lambda number: steps % number)][0]
+    return [start + every * (steps // number) * part for part in range(number + 1)]
+
+
+def even_labels(time: FloatArray) -> list[str]:
+    """Even times (s) with as many decimals as show that they are even."""
+    between = float(time[-1] - time[0]) / max(len(time) - 1, 1)
+    decimals = next((places for places in range(2, 6) if abs(round(between, places) - between) <= 0.01 * between), 6)
+    return [f"{one:.{decimals}f} s" for one in time]
 
 
 def gathered(motion: Motion, lane: float = 2.0) -> Motion:

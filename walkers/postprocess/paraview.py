@@ -232,6 +232,7 @@ def _script(motion: Motion, colour: str, folder: Path) -> str:
         rounds=48 if len(motion.radius) < 100 else 24,
         neck=_NECK * float(motion.radius.min()),
         closed=motion.case.boundary.closed,
+        tilted=motion.case.boundary.tilted,
         camera=(1e-3 * place).tolist(),
         middle=(1e-3 * middle).tolist(),
         up=up.tolist(),

@@ -37,9 +37,10 @@ _ROUNDS = ((10, 72), (100, 30), (500, 18))  # cells around a ball where beads ar
 _SIDES = 64  # of the prism that a round wall is drawn as
 _BEYOND = 6.0  # extent of the floor over that of the picture: it has no end
 _ELEVATION_OF_ONE, _ELEVATION = radians(35.0), radians(60.0)
-"""From which a level floor is seen: with one walker on it, and with several."""
-_STEEP, _ASIDE = pi / 4.0, radians(25.0)
-"""The tilt of a wall that is seen from its normal, and how far aside from it."""
+"""Of the camera above a floor: with one walker that is seen from its side, and otherwise."""
+_LONG, _ABOUT = 1.5, 1.4
+"""The camera follows beads where a view of their whole path would be larger by the first factor than one of the beads;
+the extent of the picture then, over what the path does not need."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,8 @@ class Scene:
 
     ``axes`` are unit vectors to the right in the picture, up, and toward the camera, as rows; ``low`` and ``high`` what
     the camera takes in along them, mm. It rests in the laboratory if the boundary is seen ``shaken``, else on the
-    boundary. ``rolling`` beads are two-coloured where it is known how they roll.
+    boundary. ``rolling`` beads are two-coloured where it is known how they roll. ``path`` is how far the camera has
+    moved along in each frame, mm, shape (F, 3); None if it rests.
     """
 
     motion: Motion
@@ -98,25 +100,48 @@ class Scene:
     high: FloatArray
     shaken: bool = True
     rolling: bool = False
+    path: FloatArray | None = None
 
     @classmethod
     def around(
-        cls, motion: Motion, axes: FloatArray, share: float = 1.0, frames: slice = slice(None), **options: bool
+        cls, motion: Motion, axes: FloatArray, share: float = 1.0, frames: slice = slice(None), **options: Any
     ) -> Scene:
         """A view of all that beads reach in some frames, and of the width and the floor of a container.
 
-        ``share`` is the extent of the picture over that; options are ``shaken`` and ``rolling``.
+        ``share`` is the extent of the picture over that; options are ``shaken``, ``rolling`` and ``path``, with which
+        the view is of the beads alone.
         """
         seen = motion.position[frames]
         if options.get("shaken", True):
             seen = seen + motion.substrate[frames, None]
+        if (path := options.get("path")) is not None:
+            seen = seen - 1e-3 * path[frames, None]
         seen, radius = 1e3 * seen @ axes.T, 1e3 * motion.radius[:, None]
         low, high = (seen - radius).min(axis=(0, 1)), (seen + radius).max(axis=(0, 1))
-        if motion.case.boundary.closed:
+        if motion.case.boundary.closed and path is None:
             half = 1e3 * motion.case.boundary.width / 2.0
             low[:2], high[0] = np.minimum(low[:2], [-half, 0.0]), max(high[0], half)
         wider = (share - 1.0) / 2.0 * (high - low)
         return cls(motion, axes, low - wider, high + wider, **options)
+
+    def following(self, aspect: float, share: float = 1.0, frames: slice = slice(None)) -> Scene:
+        """The same, or where the path of the beads is long a view of the beads with which the camera moves along.
+
+        ``aspect`` is the width of the picture over its height; the others are those of `around`.
+        """
+        path = path_of(self.motion, frames.start or 0)
+        options = {"shaken": self.shaken, "rolling": self.rolling, "path": path}
+        near = Scene.around(self.motion, self.axes, _ABOUT * share, frames, **options)
+        return near if self.height(aspect) > _LONG * near.height(aspect) else self
+
+    def moved(self, frame: float) -> FloatArray:
+        """How far the camera has moved along in a frame, or between two, mm."""
+        if self.path is None:
+            return np.zeros(3)
+        number, last = int(frame), len(self.path) - 1
+        begin, end = self.path[number], self.path[min(number + 1, last)]
+        moved: FloatArray = begin + (frame - number) * (end - begin)
+        return moved
 
     def height(self, aspect: float) -> float:
         """Of the picture, mm, whose width is so many times that."""
@@ -151,6 +176,17 @@ class Scene:
         return np.stack([darker, plain + _PALE * (255.0 - plain)])
 
 
+def path_of(motion: Motion, begin: int = 0) -> FloatArray:
+    """The way of the middle of the beads since a frame, smoothed over a cycle of the drive, mm, shape (F, 3)."""
+    from scipy.signal import savgol_filter
+
+    middle = 1e3 * motion.position.mean(axis=1)
+    frames = 2 * (min(motion.case.run.samples_per_cycle, len(middle) - 1) // 2) + 1
+    smooth = savgol_filter(middle, frames, 1, axis=0) if frames > 1 else middle
+    way: FloatArray = smooth - smooth[begin]
+    return way
+
+
 def against_gravity(motion: Motion) -> FloatArray:
     """A unit vector against gravity in the boundary's frame; without gravity its normal."""
     against = -np.array(motion.case.gravity_vector)
@@ -168,20 +204,28 @@ def axes_toward(toward: FloatArray, upward: FloatArray) -> FloatArray:
 def camera_axes(motion: Motion) -> FloatArray:
     """The `axes_toward` the camera of films, in the boundary's frame.
 
-    Containers are seen from the side, floors from above and from the right of the drive axis, steep walls from a little
-    aside; up in the picture is up against gravity.
+    Containers are seen from the side. Floors are seen from above, from the right of the drive axis or, where they are
+    tilted, of the way uphill. Up in the picture is up against gravity.
     """
     case = motion.case
-    across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
-    uphill = np.array([cos(case.boundary.uphill), sin(case.boundary.uphill), 0.0])
-    if case.boundary.closed:
-        toward = np.array([0.0, -1.0, 0.0])
-    elif case.boundary.tilt < _STEEP:
-        elevation = _ELEVATION_OF_ONE if len(motion.walkers) == 1 else _ELEVATION
-        toward = np.array([0.0, 0.0, sin(elevation)]) - cos(elevation) * across
-    else:
-        toward = np.array([0.0, 0.0, cos(_ASIDE)]) + sin(_ASIDE) * np.cross(uphill, [0.0, 0.0, 1.0])
+    boundary, along = case.boundary, np.array(case.drive_axis)
+    uphill = np.array([cos(boundary.uphill), sin(boundary.uphill), 0.0])
+    if boundary.closed:
+        return axes_toward(np.array([0.0, -1.0, 0.0]), against_gravity(motion))
+    sideways = boundary.bare and (not boundary.tilt or abs(uphill @ along) > 0.5)
+    elevation = _ELEVATION_OF_ONE if len(motion.walkers) == 1 and sideways else _ELEVATION
+    across = np.cross([0.0, 0.0, 1.0], uphill if boundary.tilt else along)
+    toward = np.array([0.0, 0.0, sin(elevation)]) - cos(elevation) * across
     return axes_toward(toward, against_gravity(motion))
+
+
+def plan_axes(motion: Motion, along: FloatArray) -> FloatArray:
+    """The `axes_toward` the normal of a floor; up in the picture is uphill, on a level floor to the left of a way."""
+    boundary = motion.case.boundary
+    upward = np.cross([0.0, 0.0, 1.0], along)
+    if boundary.tilt:
+        upward = np.array([cos(boundary.uphill), sin(boundary.uphill), 0.0])
+    return axes_toward(np.array([0.0, 0.0, 1.0]), upward)
 
 
 def walls_of(motion: Motion) -> list[FloatArray]:
@@ -284,7 +328,8 @@ class Window:
         tall = scene.height(size[0] / size[1])
         wide = max(tall, tall * size[0] / size[1])
         self.pixels_per_mm = size[1] / tall
-        self._plotter.camera_position = [*scene.camera(10.0 * tall)]
+        self._place, self._middle, up = scene.camera(10.0 * tall)
+        self._plotter.camera_position = [self._place, self._middle, up]
         self._plotter.camera.parallel_projection, self._plotter.camera.parallel_scale = True, tall / 2.0
         self._around = self._floor(wide) if self._bare else self._walls(wide)
         self._plotter.camera.clipping_range = (0.1 * tall, 40.0 * wide)
@@ -314,6 +359,8 @@ class Window:
             self._shadows.move(1e3 * place * [1.0, 1.0, 0.0] + shift)
         for actor in self._around:
             actor.position = tuple(shift)
+        moved = self._scene.moved(frame)
+        self._plotter.camera.position, self._plotter.camera.focal_point = self._place + moved, self._middle + moved
         self._plotter.render()  # a screenshot does so the first time only
         return np.array(self._plotter.screenshot(return_img=True), dtype=np.uint8)
 
@@ -325,9 +372,12 @@ class Window:
         """A floor with lines, by which it is seen to move."""
         import pyvista as pv
 
-        half, middle = _BEYOND * wide / 2.0, self._scene.camera(0.0)[1] * [1.0, 1.0, 0.0]
-        floor = pv.Plane(center=middle - [0.0, 0.0, 2e-3 * wide], i_size=2.0 * half, j_size=2.0 * half)
-        lines = pv.line_segments_from_points(floor_lines(middle - half, middle + half, round_below(wide / 8.0)))
+        path = np.zeros((1, 3)) if self._scene.path is None else self._scene.path
+        half, middle = _BEYOND * wide / 2.0, self._middle * [1.0, 1.0, 0.0]
+        low, high = middle + path.min(axis=0) - half, middle + path.max(axis=0) + half
+        size, centre = high - low, (low + high) / 2.0 * [1.0, 1.0, 0.0]
+        floor = pv.Plane(center=centre - [0.0, 0.0, 2e-3 * wide], i_size=size[0], j_size=size[1])
+        lines = pv.line_segments_from_points(floor_lines(low, high, round_below(wide / 8.0)))
         lines.translate([0.0, 0.0, -1e-3 * wide], inplace=True)
         return [
             self._plotter.add_mesh(floor, color=_GROUND, lighting=False),
@@ -336,12 +386,30 @@ class Window:
 
     def _walls(self, wide: float) -> list[pv.Actor]:
         """Walls, of which those that would hide the beads are left out; their edges nearer, lest walls hide them."""
-        walls = mesh_of(walls_of(self._scene.motion)).scale(1e3).clean(tolerance=1e-6, absolute=True)
+        faces = [1e3 * corners for corners in walls_of(self._scene.motion)]
+        walls = mesh_of(faces).clean(tolerance=1e-6, absolute=True)
         drawn = self._plotter.add_mesh(walls, color=_WALL, lighting=False)
         drawn.prop.culling = "back"
         edges = walls.extract_feature_edges(feature_angle=30.0, manifold_edges=False, non_manifold_edges=False)
         edges.translate(1e-2 * wide * self._scene.axes[2], inplace=True)
-        return [drawn, self._plotter.add_mesh(edges, color=_EDGE, line_width=2, lighting=False)]
+        parts = [drawn, self._plotter.add_mesh(edges, color=_EDGE, line_width=2, lighting=False)]
+        if self._scene.path is not None:
+            marks = self._marks(faces, int(np.argmax(np.ptp(self._scene.path, axis=0))), round_below(wide / 8.0))
+            parts.append(self._plotter.add_mesh(marks, color=_LINES, line_width=2, lighting=False))
+        return parts
+
+    def _marks(self, faces: Sequence[FloatArray], axis: int, step: float) -> pv.PolyData:
+        """Lines on the walls behind the beads, across the axis of the camera's way, by which it is seen to move."""
+        import pyvista as pv
+
+        toward = self._scene.axes[2]
+        behind = [one for one in faces if np.cross(one[1] - one[0], one[2] - one[1]) @ toward > 0.0]
+        walls, along = mesh_of(behind), np.eye(3)[axis]
+        low, high = walls.bounds[2 * axis : 2 * axis + 2]
+        places = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
+        lines: pv.PolyData = pv.merge([walls.slice(normal=along, origin=place * along) for place in places])
+        lines.translate(1e-2 * step * toward, inplace=True)
+        return lines
 
 
 class _Copies:

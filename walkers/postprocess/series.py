@@ -1,21 +1,29 @@
-"""Views of a run, or of one walker, beside each other: containers from the side, planes from above (Khan, Fig. 1)."""
+"""Views of a run, or of one walker, beside each other: containers from the side, planes along their normal.
+
+One walker is shown as in Fig. 1 of Khan et al.: strips of the floor below each other, one a time; beside each other
+where it walks up a slope. On a tilted plane up in the picture is uphill.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkers.inputs.case import Case
 from walkers.inputs.errors import refused
 from walkers.physics.units import DURATION, parse_quantity
-from walkers.postprocess.drawing import check_place, new_figure, save_figure, styled
-from walkers.postprocess.motion import Group, Motion, gathered, read_motion
-from walkers.postprocess.scene import Picture, Scene, Window, axes_toward
+from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, gathered, read_motion
+from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, plan_axes
 from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
@@ -31,12 +39,24 @@ _PIXELS = 40.0
 """To a millimetre of a picture, at least, where the screen has room for it."""
 _TALL, _TALLEST, _WIDEST = 1000, 1600, 1900
 """Pixels of a view: so high, higher for boxes that are much higher than wide, lower for what is much wider."""
-_PAGE = (20.0, 12.0)
-"""Inches of a time series, across and up, at most."""
+_PAGE = (8.5, 9.0)
+"""Inches of a picture, across and up, at most: its letters are as large as those of the page that shows it."""
 _PANEL = (1.4, 5.0)
-"""Inches of a picture in it, across and up: as large as one of the two says, if the page has room."""
+"""Inches of a view in it, across and up: as large as one of the two says, if the page has room."""
 _BESIDE, _BENEATH, _EDGES = 0.3, 0.8, (0.9, 0.1)
-"""Inches between pictures: for what sticks out of tick labels, for time, ticks and label; and about all of them."""
+"""Inches between views: for what sticks out of tick labels, for time, ticks and label; and about all of them."""
+_STRIP, _LENGTHS, _GAP = 0.8, (3.6, 5.4), 0.08
+"""Inches of a strip with a walker: across it; along it, at least and at most; and between strips."""
+_MARGIN, _STILL, _LONG = 0.25, 0.1, 4.0
+"""Edge of a strip over half the width of the walker; share of half its length below which it does not walk; and number
+of its lengths above which each strip is centred on it."""
+_LETTERS: dict[Any, Any] = {
+    "font.size": 10,
+    "axes.titlesize": 10,
+    "axes.labelsize": 10,
+    "xtick.labelsize": 9,
+    "ytick.labelsize": 9,
+}
 
 
 def render_run(directory: Path, destination: Path | None = None, *, images: int = SHOWN) -> list[Path]:
@@ -65,7 +85,7 @@ def render_series(
     destination
         The PNG to write; ``series.png``, of one walker ``walker.png``, in the run directory if None.
     images
-        How many, evenly through the drive.
+        How many at most, equally far apart through the drive: fewer where the last one is nearer to its end then.
     apart
         Seconds between them: the last ones of the run then, as many as ``images``.
     walker
@@ -76,33 +96,126 @@ def render_series(
     InputError
         If the destination is no PNG, frames were recorded less often, or the drive was shorter than that.
     """
+    from matplotlib import rc_context
+
     path = destination or directory / (SERIES_NAME if walker is None else PICTURE_NAME)
     check_place(path, ".png")
     whole = read_motion(directory)
     motion = gathered(whole if walker is None else whole.of_walkers(whole.walkers[walker : walker + 1]))
-    frames = _frames_evenly(motion, images) if apart is None else _frames_apart(motion, images, apart, directory)
-    sideways = motion.case.boundary.closed
-    axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) if sideways else np.eye(3)
+    frames = even_frames(motion, images) if apart is None else _frames_apart(motion, images, apart, directory)
+    with rc_context(_LETTERS):
+        figure = _views(motion, frames) if walker is None else _strips(motion, frames)
+    return save_figure(figure, path, [directory.name])
+
+
+def _views(motion: Motion, frames: Sequence[int]) -> Figure:
+    """All beads at several times, with axes in mm."""
+    boundary = motion.case.boundary
+    sideways = boundary.closed
+    axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    if not sideways:
+        axes = plan_axes(motion, np.array([1.0, 0.0, 0.0]))
     driven = slice(motion.first_driven, None)
     scene = Scene.around(motion, axes, 1.0 if sideways else 1.1, driven, shaken=False)
     (left, low, _), (right, high, _) = scene.low, scene.high
     high += 0.05 * (high - low) if sideways else 0.0
     scene = replace(scene, high=np.array([right, high, scene.high[2]]))
     window = Window(scene, _pixels(right - left, high - low))
-    decimals = 2 if apart is None or apart >= 0.1 else 4
-    figure, panels = _panels(len(frames), right - left, high - low, rows=None if walker is None else len(frames))
-    for panel, frame in zip(panels, frames, strict=True):
+    figure, panels = _panels(len(frames), right - left, high - low)
+    names = ("x", "height") if sideways else ("across the slope", "uphill") if boundary.tilt else ("x", "y")
+    for panel, frame, time in zip(panels, frames, even_labels(motion.time[frames]), strict=True):
         panel.imshow(window.picture(frame), extent=(left, right, low, high), interpolation="antialiased")
-        panel.set_title(f"{motion.time[frame]:.{decimals}f} s", fontsize=10)
-        panel.set_xlabel("x (mm)" if walker is None or panel is panels[-1] else "")
+        panel.set_title(time)
+        panel.set_xlabel(f"{names[0]} (mm)")
         panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])
         panel.spines["right"].set_visible(sideways)  # as the left one, a wall
         panel.grid(visible=False)
         foremost = panel.get_position().x0 == panels[0].get_position().x0
         panel.tick_params(labelleft=foremost)
-        panel.set_ylabel(f"{'height' if sideways else 'y'} (mm)" if foremost else "")
+        panel.set_ylabel(f"{names[1]} (mm)" if foremost else "")
     window.close()
-    return save_figure(figure, path, [directory.name])
+    if boundary.tilted:
+        panels[0].annotate(boundary.tilted, (0.0, 1.0), (0.0, 20.0), "axes fraction", "offset points")
+    return figure
+
+
+def _strips(motion: Motion, frames: Sequence[int]) -> Figure:
+    """One walker at several times on strips of the floor, each with its time; on a long walk with its way too."""
+    axes, radius = plan_axes(motion, np.array(motion.case.drive_axis)), 1e3 * motion.radius[:, None]
+    place = 1e3 * motion.position[frames] @ axes.T
+    middle = place.mean(axis=1)
+    half, extent = (np.abs(place - middle[:, None]) + radius).max(axis=(0, 1)), np.ptp(middle, axis=0)
+    still = extent.max() < _STILL * half.max()
+    along = int(motion.case.boundary.tilt > 0.0 if still else extent[1] > extent[0])  # strips are upright, or level
+    path, times = middle - middle[0], even_labels(motion.time[frames])
+    if long := bool(extent[along] > _LONG * 2.0 * half[along]):
+        times = [f"{time}\n{np.linalg.norm(way):.1f} mm" for time, way in zip(times, path, strict=True)]
+    else:
+        path[:, along] = 0.0
+    seen, margin = place - path[:, None], _MARGIN * half[1 - along]
+    low, high = (seen - radius).min(axis=(0, 1)) - margin, (seen + radius).max(axis=(0, 1)) + margin
+    inches = min(_STRIP / (high - low)[1 - along], _LENGTHS[1] / (high - low)[along])
+    wider = max((0.0 if along else _LENGTHS[0]) / inches - (high - low)[along], 0.0) / 2.0
+    low[along], high[along] = low[along] - wider, high[along] + wider
+    camera = np.zeros((len(motion.time), 3))
+    camera[frames] = path @ axes
+    window = Window(Scene(motion, axes, low, high, shaken=False, path=camera), _pixels(*(high - low)[:2].tolist()))
+    pictures = [window.picture(frame) for frame in frames]
+    window.close()
+    bounds = np.stack([low, high], axis=1)[:2] - middle[0, :2, None]
+    tilted = motion.case.boundary.tilted
+    said = [motion.case.title or motion.case.name]
+    said += [f"{tilted}, seen along its normal"] if tilted else []
+    said += ["centred on the beads; time and distance walked"] if long else []
+    figure, panels = _strip_panels(pictures, bounds, inches, along, said)
+    _describe_strips(figure, panels, motion.case, times, along)
+    return figure
+
+
+def _strip_panels(
+    pictures: Sequence[Picture], bounds: FloatArray, inches: float, along: int, said: Sequence[str]
+) -> tuple[Figure, list[Axes]]:
+    """Pictures with these bounds (mm, shape (2, 2)) below each other, or if they are upright beside each other.
+
+    Above them is what is said of them.
+    """
+    (across, up), left, below = np.ptp(bounds, axis=1) * inches, 0.75 if along else 0.3, 0.2 if along else 0.6
+    columns, rows = (len(pictures), 1) if along else (1, len(pictures))
+    wide = left + columns * (across + _GAP) + (0.9 if along or len(said) == 1 else 1.6)
+    lines = [line for one in said for line in wrap(plain_text(one), round(13.0 * wide))]
+    tall = below + rows * (up + _GAP) + 0.15 + 0.18 * len(lines) + (0.25 if along else 0.0)
+    figure, grid = new_figure(wide, tall, nrows=rows, ncols=columns, squeeze=False)
+    figure.set_layout_engine("none")
+    figure.suptitle("\n".join(lines), y=1.0 - 0.08 / tall, fontsize=10)
+    for number, (panel, picture) in enumerate(zip(grid.flat, pictures, strict=True)):
+        row, column = divmod(number, columns)
+        corner = left + column * (across + _GAP), below + (rows - 1 - row) * (up + _GAP)
+        panel.set_position((corner[0] / wide, corner[1] / tall, across / wide, up / tall))
+        panel.imshow(picture, extent=bounds.ravel().tolist(), interpolation="antialiased", aspect="auto")
+        panel.grid(visible=False)
+        panel.spines[["left", "bottom"]].set_visible(False)
+        upright, level = bool(along) and column == 0, not along and row == rows - 1
+        panel.tick_params(left=upright, labelleft=upright, bottom=level, labelbottom=level)
+    return figure, list(grid.flat)
+
+
+def _describe_strips(figure: Figure, panels: Sequence[Axes], case: Case, times: Sequence[str], along: int) -> None:
+    """Times, and what the axis is; on a slope an arrow down it, the way of that part of gravity."""
+    tilted, wide = case.boundary.tilted, figure.get_figwidth()
+    for panel, time in zip(panels, times, strict=True):
+        if along:
+            panel.set_title(time)
+        else:
+            panel.text(1.03, 0.5, time, transform=panel.transAxes, va="center")
+    if along:
+        panels[0].set_ylabel("uphill (mm)" if tilted else "across the drive axis (mm)")
+    else:
+        panels[-1].set_xlabel("across the slope (mm)" if tilted else "along the drive axis (mm)")
+    if tilted and case.gravity:
+        place = 1.0 - 0.45 / wide
+        figure.text(place, 0.56, case.boundary.pull, ha="center")
+        how: dict[str, Any] = {"xycoords": "figure fraction", "arrowprops": {"arrowstyle": "-|>", "lw": 1.5, "fc": "k"}}
+        panels[0].annotate("", (place, 0.36), (place, 0.55), **how)
 
 
 def _pixels(wide: float, tall: float) -> list[int]:
@@ -138,8 +251,8 @@ def top_view(group: Group, walker: int, frame: int, along: tuple[float, float], 
     return picture
 
 
-def _panels(count: int, wide: float, tall: float, *, rows: int | None = None) -> tuple[Figure, list[Axes]]:
-    """A figure with so many axes of one shape, given in mm, in so many rows, or as many as make them largest.
+def _panels(count: int, wide: float, tall: float) -> tuple[Figure, list[Axes]]:
+    """A figure with so many axes of one shape, given in mm, in as many rows as make them largest.
 
     Their places are reckoned here: no layout of matplotlib's knows how large axes of a fixed aspect will be.
     """
@@ -150,7 +263,7 @@ def _panels(count: int, wide: float, tall: float, *, rows: int | None = None) ->
         across, up = ((whole - edge) for whole, edge in zip(_PAGE, _EDGES, strict=True))
         return min(aspired, (across / ceil(count / rows) - _BESIDE) / wide, (up / rows - _BENEATH) / tall)
 
-    rows = rows or max(range(1, count + 1), key=lambda rows: (inches(rows), -rows))
+    rows = max(range(1, count + 1), key=lambda rows: (inches(rows), -rows))
     columns = ceil(count / rows)
     across, up = inches(rows) * wide + _BESIDE, inches(rows) * tall + _BENEATH
     size = (_EDGES[0] + columns * across, _EDGES[1] + rows * up)
@@ -165,14 +278,6 @@ def _panels(count: int, wide: float, tall: float, *, rows: int | None = None) ->
         corner = (left / size[0], bottom / size[1])
         panel.set_position((*corner, (across - _BESIDE) / size[0], (up - _BENEATH) / size[1]))
     return figure, list(axes.flat)[:count]
-
-
-def _frames_evenly(motion: Motion, images: int) -> list[int]:
-    """Through the drive; at the same phase of it, if there are as many cycles, or walkers would seem to go back."""
-    start, cycle = motion.first_driven, motion.case.run.samples_per_cycle
-    cycles = (len(motion.time) - 1 - start) // cycle
-    every, steps = (cycle, cycles) if cycles >= images - 1 else (1, len(motion.time) - 1 - start)
-    return [start + every * int(step) for step in np.unique(np.linspace(0, steps, images).round())]
 
 
 def _frames_apart(motion: Motion, images: int, apart: float, directory: Path) -> list[int]:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from walkers.inputs.errors import refused
 from walkers.inputs.readable import readable_unit
-from walkers.postprocess.drawing import letter_panels, new_figure, plain_text, styled
+from walkers.postprocess.drawing import UNSEEN, errors_seen, letter_panels, new_figure, plain_text, styled
 from walkers.sweeps.table import ERRORS, find_name, value_text, varied_columns, with_unit
 
 if TYPE_CHECKING:
@@ -32,6 +32,8 @@ _MARKERS = "osD^vXP<>*"
 _MODELS = (("--", "_"), (":", "+"))  # of each model the line, and the symbol where points are not joined
 _FEW_COLOURS = 6  # more come from a map of colours rather than from the style
 _MOST_COLOURS = 12  # numbers with more values have a scale of colours rather than a legend
+_ROUNDING = 1e-12  # of numbers, over the largest
+_LEAST_RANGE = 1e-4  # of what is drawn over its mean: y shows no less, which would be rounding
 _FEW_TICKS = 6  # ticks are at the values of x if these are so few, and not too near
 
 
@@ -65,9 +67,13 @@ class Factor:
         """Which of the points have a level."""
         return np.array([value == level for value in self.values], dtype=bool)
 
+    def exact(self, level: float) -> float:
+        """A number; zero if it is but the rounding of the others."""
+        return 0.0 if abs(level) < _ROUNDING * max(map(abs, self.levels)) else level
+
     def told(self, level: Any, *, by_name: bool = False) -> str:
         """A level as text, with its unit; if so wanted a number with the factor's name."""
-        text = f"{level:.6g} {self.unit}".strip() if self.is_number else str(level)
+        text = f"{self.exact(level):.6g} {self.unit}".strip() if self.is_number else str(level)
         return f"{self.name} = {text}" if by_name and self.is_number else text
 
 
@@ -323,7 +329,7 @@ def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, col
         is_course = x.is_number and not x.is_sample and x.keys[0] not in _SEEDS
         joined = is_course and len(set(places[rows])) == len(rows) > 1
         y, errors = drawn.values[rows], drawn.errors[rows]
-        bars: Any = errors if np.isfinite(errors).any() else None
+        bars: Any = errors if np.isfinite(errors).any() and errors_seen(drawn.errors, drawn.values) else None
         line = "-" if joined and not drawn.theory else "none"
         axes.errorbar(places[rows] + aside, y, yerr=bars, capsize=2, lw=0.9, ls=line, **look)
         for model, values in enumerate(drawn.theory.values()):
@@ -351,7 +357,7 @@ def _scale_x(axes: Axes, x: Factor, log: str) -> None:
         axes.set_xscale("log")
     apart = np.diff(x.levels) > 0.08 * (x.levels[-1] - x.levels[0])
     if len(x.levels) <= _FEW_TICKS and apart.all():
-        axes.set_xticks(x.levels, [f"{level:.4g}" for level in x.levels])
+        axes.set_xticks(x.levels, [f"{x.exact(level):.4g}" for level in x.levels])
         axes.set_xticks([], minor=True)
     elif "x" not in log and all(float(level).is_integer() for level in x.levels):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -370,6 +376,9 @@ def _scale_y(axes: Axes, drawn: Drawn, log: str) -> None:
     if np.all(np.mod(drawn.values[np.isfinite(drawn.values)], 1.0) == 0.0):  # numbers of something
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         low, high = low - 0.5, high + 0.5
+    if high - low <= _LEAST_RANGE * abs(middle := (low + high) / 2.0) or high - low < _ROUNDING:
+        half = 0.05 * abs(middle) if abs(middle) > _ROUNDING else 1.0
+        low, high = middle - half, middle + half
     if high > low:
         axes.set_ylim(low - 0.06 * (high - low), high + 0.06 * (high - low))
 
@@ -390,6 +399,9 @@ def _legend(figure: Figure, grid: npt.NDArray[Any], colours: _Colours, drawn: Dr
     lines = {line.get_linestyle() for axes in grid.flat for line in axes.lines}
     for number, model in enumerate(drawn.theory):
         handles.append(Line2D([], [], label=model, **_model_look(number, _MODELS[number][0] in lines, "0.3")))
+    if np.isfinite(drawn.errors).any() and not errors_seen(drawn.errors, drawn.values):
+        title = f"{title}; {UNSEEN}" if title else UNSEEN
+        handles = handles or [Line2D([], [], ls="none", label=" ")]
     if handles:
         longest = max(len(str(handle.get_label())) for handle in handles)
         columns = max(1, min(len(handles), int(13.0 * figure.get_figwidth() / (longest + 6))))

@@ -11,6 +11,7 @@ import numpy as np
 
 from walkers.inputs.readable import readable_unit
 from walkers.inputs.rounding import rounded
+from walkers.postprocess.drawing import UNSEEN, errors_seen
 from walkers.postprocess.report.page import (
     COLOURS,
     LARGEST,
@@ -25,7 +26,8 @@ from walkers.postprocess.report.page import (
     write_page,
 )
 from walkers.postprocess.report.run import RunReport
-from walkers.sweeps.table import ERRORS, RESULTS, load, varied_columns, with_unit
+from walkers.sweeps.figure import readable_key
+from walkers.sweeps.table import ERRORS, RESULTS, load, value_text, varied_columns, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -86,13 +88,25 @@ def _spread_out(numbers: list[int]) -> list[int]:
 
 
 def _table(frame: pd.DataFrame) -> dict[str, Any]:
-    """Heads and rows of what varied, in the file's units, and what came out, in the usual ones."""
+    """Heads and rows of what varied, in the file's units, and what came out, in the usual ones.
+
+    What is the same for all points is no column, of which a screen holds few: it is ``shared``, in words.
+    """
     varied, units = varied_columns(frame), frame.attrs["units"]
     results = [name for name in _SHOWN if name in frame and name not in varied and frame[name].notna().any()]
     shown = {name: (units[name], 1.0) for name in varied} | {name: readable_unit(units[name]) for name in results}
-    heads = [with_unit(name if name in varied else name.replace("_", " "), unit) for name, (unit, _) in shown.items()]
-    rows = [[_cell(row[name], size, unit or "") for name, (unit, size) in shown.items()] for _, row in frame.iterrows()]
-    return {"head": heads, "rows": rows}
+    heads = {name: with_unit(readable_key(name), unit) for name, (unit, _) in shown.items()}
+    cells = {
+        name: [_cell(row[name], size, unit or "") for _, row in frame.iterrows()]
+        for name, (unit, size) in shown.items()
+    }
+    same = [name for name in shown if len(frame) > 1 and len({str(cell) for cell in cells[name]}) == 1]
+    kept = [name for name in shown if name not in same]
+    return {
+        "head": [heads[name] for name in kept],
+        "rows": list(zip(*(cells[name] for name in kept), strict=True)) if kept else [[] for _ in frame.index],
+        "shared": ", ".join(f"{readable_key(name)} {cells[name][0]['text']} {shown[name][0]}".strip() for name in same),
+    }
 
 
 def _cell(value: Any, size: float, unit: str) -> dict[str, Any]:
@@ -110,18 +124,25 @@ def _cell(value: Any, size: float, unit: str) -> dict[str, Any]:
 def _overview(frame: pd.DataFrame) -> Model | None:
     """What came out against the number that varies most; a colour for each value of what varies besides."""
     result = next((name for name in RESULTS if name in frame and frame[name].notna().any()), None)
+    import pandas as pd
+
     varied, units = varied_columns(frame), frame.attrs["units"]
     numeric = [name for name in varied if frame[name].map(type).isin((int, float)).all()]
     if result is None or not numeric:
         return None
     x = max(numeric, key=lambda name: frame[name].nunique())
-    others = [name for name in varied if name != x]
+    others = [name for name in varied if name != x and frame[name].astype(str).nunique() > 1]
     unit, size = readable_unit(units[result])
-    label = with_unit(result, unit)
-    bars = ", bars: scatter of the copies" if result in ERRORS else ""
-    plot = new_plot(f"{label} against {x}{bars}", with_unit(x, units[x]), label, height=380)
+    label, along_x = with_unit(result, unit), with_unit(readable_key(x), units[x])
     known = frame[frame[result].notna()].sort_values(x, kind="stable")
-    apart = known[others].astype(str).agg(", ".join, axis=1) if others else known["point"].map(lambda _: "")
+    errors = known[ERRORS[result]].to_numpy(float) if result in ERRORS else np.empty(0)
+    seen = errors_seen(errors, known[result].to_numpy(float))
+    told = ", bars: scatter of the copies" if seen else f"; {UNSEEN}" if len(errors) else ""
+    plot = new_plot(f"{label} against {readable_key(x)}{told}", along_x, label, height=380)
+    apart = known["point"].map(lambda _: "")
+    if others:
+        levels = [known[name].map(lambda level, unit=units[name]: _level(level, unit)) for name in others]
+        apart = pd.concat(levels, axis=1).agg(", ".join, axis=1)
     names = list(dict.fromkeys(apart.sort_index()))
     for name, colour in zip(names, cycle(COLOURS), strict=False):
         part = known[apart == name]
@@ -129,8 +150,13 @@ def _overview(frame: pd.DataFrame) -> Model | None:
         legend: dict[str, Any] = {"legend_label": name} if name and len(names) <= _MOST_LEGENDS else {}
         plot.line(along, values, color=colour, line_alpha=0.4, **legend)
         plot.scatter(along, values, color=colour, size=7, **legend)
-        if result in ERRORS:
+        if seen:
             error_bars(plot, along, values, part[ERRORS[result]].to_numpy(float) / size)
     if plot.legend:
-        plot.legend.title = ", ".join(with_unit(name, units[name]) for name in others)
+        plot.legend.title = ", ".join(map(readable_key, others))
     return with_legend(plot)
+
+
+def _level(value: Any, unit: str) -> str:
+    """A value of what varies, with its unit: ``60 Hz``."""
+    return f"{value_text(value)} {unit}".strip()

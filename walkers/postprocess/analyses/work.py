@@ -24,7 +24,7 @@ from walkers.physics.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.analyses.walking import spread
 from walkers.postprocess.analysis import Analysis, Measured, Quantity
 from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.figures import MOST_NAMED, Line, Panel
+from walkers.postprocess.figures import MOST_NAMED, Line, Panel, nested_widths
 from walkers.postprocess.gait import STEADY_SPEED, walk
 from walkers.postprocess.motion import LEAST_SAMPLES, Group, Motion
 from walkers.postprocess.tables import Columns, columns_of
@@ -78,10 +78,10 @@ class Working(Analysis):
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
         """The work on each walker, cycle by cycle."""
         walker, cycle, work = run.tables["work"].values()
-        lines = []
+        lines, widths = [], nested_widths(walker.max() + 1)
         for number in range(walker.max() + 1):
             these, label = walker == number, f"walker {number}" if number < MOST_NAMED else ""
-            lines.append(Line(cycle[these], 1e9 * work[these], label, number))
+            lines.append(Line(cycle[these], 1e9 * work[these], label, number, width=widths[number]))
         settled = float(run.motion.case.run.settled_strobes)
         title = "Work of the drive on each walker; grey: settling"
         panel = Panel(title, "cycle of the drive", "work (nJ)", lines, settled=settled, zero=True)

@@ -1,12 +1,13 @@
 """The beads of a run in three dimensions, to be played and turned: a K3D plot for reports and for notebooks.
 
-Seen in the frame of the boundary, in mm. Beads are beach balls, which shows how they roll, but for those whose spins
-are recorded too seldom to be added up (`walkers.postprocess.scene.turns_of`).
+Lengths are in mm, in the frame of the boundary; where a walker walks far the view moves along with it. Beads are beach
+balls, which shows how they roll, but for those whose spins are recorded too seldom to be added up
+(`walkers.postprocess.scene.turns_of`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, radians, tan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,8 +21,10 @@ from walkers.postprocess.scene import (
     against_gravity,
     axes_toward,
     beach_ball,
+    camera_axes,
     floor_lines,
     mesh_of,
+    plan_axes,
     round_below,
     walls_of,
 )
@@ -31,10 +34,10 @@ if TYPE_CHECKING:
 
 MOST_PLACES = 8000
 """Beads times instants of a plot, for the size of its file."""
-_FEWEST_INSTANTS = 150  # before instants are left out beyond this, walkers are
 _FLOOR, _LINES = 0xDFE5E8, 0x9AA6AE
 _AROUND = 1.15  # extent of the view over that of the beads
 _VIEW, _ASPECT = 30.0, 1.5  # degrees, of the camera's view; width of a picture over its height, at least
+_MOST_LINES = 200.0  # on a floor
 _LANE = 1.25  # lengths of a walker between the lanes of independent ones
 _GRID = 2.0**-13
 """mm, to which places are rounded: 0.1 µm. What is rounded to powers of two can be packed."""
@@ -62,21 +65,33 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
     import k3d
 
     read = run if isinstance(run, Motion) else read_motion(run)
-    motion, stride, captions = _thinned(gathered(read, lane=_LANE).driven, places)
-    if len(motion.walkers) < len(read.walkers):
-        first = "The first walker is" if len(motion.walkers) == 1 else f"The first {len(motion.walkers)} walkers are"
-        captions.append(f"{first} shown, of {len(read.walkers)}.")
-    scene, shown = Scene.around(motion, np.eye(3), rolling=True), motion.select(slice(None, None, stride))
+    motion, stride, captions = _thinned(read.driven, places)
+    motion = gathered(motion, lane=_LANE)
+    scene = Scene.around(motion, camera_axes(motion), _AROUND, shaken=False, rolling=True).following(_ASPECT, _AROUND)
+    shown, path = motion.select(slice(None, None, stride)), scene.path
+    if path is not None:
+        path = path[::stride]
+        shown = replace(shown, position=shown.position - 1e-3 * path[:, None])
+        captions.append("The view moves along with the beads.")
     colours = scene.colours(np.any(scene.pointed_out[::stride], axis=0)).round() @ [0x10000, 0x100, 1]
-    cameras = cameras_of(motion)
+    cameras = cameras_of(motion, scene.path)
     look: dict[str, Any] = {"grid_visible": False, "axes": ["x", "y", "z"], "background_color": 0xFFFFFF}
     plot = k3d.plot(height=height, name=motion.case.name, fps=30.0, camera_fov=_VIEW, camera_auto_fit=False, **look)
     if scene.turns is None:
         captions.append("Beads do not show how they roll: their frames are too far apart for it.")
-        parts = [*_walls(motion), _points(shown, colours[0])]
+        beads = [_points(shown, colours[0])]
     else:
-        parts = [*_walls(motion), *_balls(shown, scene.turns.turned[::stride], colours)]
-    for part in parts:
+        beads = _balls(shown, scene.turns.turned[::stride], colours)
+    boundary = _walls(motion, round_below(scene.height(_ASPECT) / 5.0))
+    if path is not None:
+        back = np.tile(np.eye(4), (len(path), 1, 1))
+        back[:, :3, 3] = np.round(-path / _GRID) * _GRID
+        for part in boundary:
+            part.model_matrix = _series(shown, back)
+    if motion.case.boundary.tilted and motion.case.gravity:
+        boundary.append(_gravity(scene))
+        captions.append(f"{motion.case.boundary.tilted.capitalize()}; the arrow shows the direction of gravity.")
+    for part in [*boundary, *beads]:
         plot += part
     plot.fps_meter, plot.camera = False, next(iter(cameras.values()))
     # Plays the run in so many seconds in K3D's own player, which goes by its time speed.
@@ -86,38 +101,59 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
     return Player(plot, begin, end, cameras, captions)
 
 
-def cameras_of(motion: Motion) -> dict[str, list[float]]:
-    """Where to look from so that everything is in view, gravity downward: `Player.cameras`."""
-    closed, upward = motion.case.boundary.closed, against_gravity(motion)
-    steep = upward[2] < 0.5
-    ways = {
-        "as at first": ([-0.25, -1.0, 0.2] if closed else [-0.1, -0.7, 0.9] if steep else [-0.55, -0.8, 0.6], upward),
-        "from the side": ([0.0, -1.0, 0.0], upward),
-        "onto the floor": ([0.0, 0.0, 1.0], upward if steep else np.array([0.0, 1.0, 0.0])),
+def cameras_of(motion: Motion, path: FloatArray | None = None) -> dict[str, list[float]]:
+    """Where to look from so that everything is in view, gravity downward: `Player.cameras`.
+
+    ``path`` is taken from where beads are (`walkers.postprocess.scene.Scene`).
+    """
+    upward = against_gravity(motion)
+    first = np.array([-0.25, -1.0, 0.2]) if motion.case.boundary.closed else camera_axes(motion)[2]
+    views = {
+        "as at first": axes_toward(first, upward),
+        "from the side": axes_toward(np.array([0.0, -1.0, 0.0]), upward),
+        "onto the floor": plan_axes(motion, np.array([1.0, 0.0, 0.0])),
     }
     cameras = {}
-    for name, (way, up) in ways.items():
-        seen = Scene.around(motion, axes_toward(np.array(way), up), _AROUND, shaken=False)
+    for name, axes in views.items():
+        seen = Scene.around(motion, axes, _AROUND, shaken=False, path=path)
         distance = seen.height(_ASPECT) / 2.0 / tan(radians(_VIEW / 2.0)) + float(seen.high[2] - seen.low[2]) / 2.0
-        place, middle, _ = seen.camera(distance)
+        place, middle, up = seen.camera(distance)
         cameras[name] = np.concatenate([place, middle, up]).tolist()
     return cameras
 
 
+def _gravity(scene: Scene) -> Any:
+    """An arrow the way of gravity, at the left edge of the first view: on the right a wall would hide it."""
+    import k3d
+
+    long = 0.3 * scene.height(_ASPECT)
+    side = max(float(scene.high[0] - scene.low[0]) / 2.0, 0.4 * _ASPECT * scene.height(_ASPECT))
+    down = -against_gravity(scene.motion)
+    origin = scene.camera(0.0)[1] - side * scene.axes[0] - long / 2.0 * down
+    look = {"color": 0x1D2429, "head_size": 1.7 * long, "line_width": 0.04 * long}
+    ends = [one[None].astype(np.float32) for one in (origin, long * down)]
+    return k3d.vectors(*ends, name="gravity", **look)
+
+
 def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
-    """The motion of fewer walkers, of how many frames one is shown, and that in words."""
-    beads, count = len(motion.radius), len(motion.walkers)
-    if motion.case.apart and count > 2:
-        instants = min(len(motion.time), _FEWEST_INSTANTS)
-        motion = motion.of_walkers(motion.walkers[: max(2, places * count // (instants * beads))])
+    """The motion of what is shown, of how many frames one is shown, and that in words."""
+    captions, count = [], len(motion.walkers)
+    if motion.case.apart:
+        firsts = {one.make: one for one in reversed(motion.walkers)}
+        motion = motion.of_walkers(sorted(firsts.values(), key=lambda one: one.walker))
+        if len(firsts) < count:
+            each = "" if len(firsts) == 1 else " of each make"
+            captions.append(f"The first walker{each} is shown, of {count} in the run.")
     stride, samples = ceil(len(motion.time) * len(motion.radius) / places), motion.case.run.samples_per_cycle
     # Of a divisor of the samples in a cycle, or of whole cycles, the phases are the same in each cycle.
     divisors = (number for number in range(stride, samples + 1) if samples % number == 0)
     stride = next(divisors, ceil(stride / samples) * samples)
-    if stride == 1:
-        return motion, stride, []
-    often = f"{samples // stride} instants a cycle are" if stride < samples else f"every {stride // samples}th cycle is"
-    return motion, stride, [f"{often.capitalize()} shown, with what is between them."]
+    if stride > 1:
+        cycles = "each cycle" if stride <= samples else f"{stride // samples} cycles"
+        captions.append(
+            f"Recorded instants shown: {max(samples // stride, 1)} in {cycles}, with interpolated ones between them."
+        )
+    return motion, stride, captions
 
 
 def _balls(motion: Motion, turned: FloatArray, colours: FloatArray) -> list[Any]:
@@ -167,8 +203,8 @@ def _series(motion: Motion, values: FloatArray) -> dict[str, Any]:
     return {f"{time:.6f}": value for time, value in zip(motion.time, values.astype(np.float32), strict=True)}
 
 
-def _walls(motion: Motion) -> list[Any]:
-    """The boundary, transparent where it is upright, and lines on a bare floor that say how far beads go."""
+def _walls(motion: Motion, step: float) -> list[Any]:
+    """The boundary, transparent where it is upright, and lines on a bare floor, a step (mm) apart."""
     import k3d
 
     faces = [1e3 * corners for corners in walls_of(motion)]
@@ -181,7 +217,7 @@ def _walls(motion: Motion) -> list[Any]:
         parts.append(k3d.mesh(points, mesh.regular_faces.astype(np.uint32), opacity=opacity, **look))
     if motion.case.boundary.bare:
         low, high = faces[0].min(axis=0), faces[0].max(axis=0)
-        step = round_below(float(high[0] - low[0]) / 8.0)
+        step = max(step, round_below(float(np.ptp([low, high])) / _MOST_LINES))
         ends = floor_lines(low, high, step).astype(np.float32)
         pairs = np.arange(len(ends), dtype=np.uint32).reshape(-1, 2)
         look = {"indices_type": "segment", "shader": "simple", "color": _LINES, "name": f"every {step:g} mm"}
