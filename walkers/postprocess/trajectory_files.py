@@ -13,6 +13,7 @@ from typing import TextIO
 import numpy as np
 
 from walkers.inputs.errors import refused
+from walkers.inputs.extras import require
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.runner.files import beside
@@ -39,6 +40,8 @@ def write_trajectory(directory: Path, destination: Path, *, every: int = 1) -> P
     if write is None or destination.is_dir():
         expected = f"{destination}: expected the name of a .xyz, .extxyz or .lammpstrj file"
         raise refused("--to", expected)
+    if write is _write_xyz:
+        require("xyz")
     motion = read_motion(directory).driven.select(slice(None, None, every))
     destination.parent.mkdir(parents=True, exist_ok=True)
     box = box_of(motion)
