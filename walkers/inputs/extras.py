@@ -27,7 +27,7 @@ class ExtraMissing(InputError):
 
     def __init__(self, extra: str, missing: list[str]) -> None:
         how = f"pip install 'granular-walkers[{extra}]'"
-        super().__init__(EXTRAS[extra][0], [Problem("", None, f"needs {' and '.join(missing)}: {how}")])
+        super().__init__(EXTRAS[extra][0], [Problem("", None, f"needs {', '.join(missing)}: {how}")])
         self.args = (f"{self.source} {self.problems[0]}",)
 
 

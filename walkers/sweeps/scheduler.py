@@ -402,7 +402,7 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Fu
         stop = threading.Event()
         with ThreadPoolExecutor(options.workers) as pool:
             try:
-                yield partial(pool.submit, work, stop)
+                yield lambda **deck: pool.submit(work, stop, **deck)
             finally:
                 stop.set()
                 pool.shutdown(wait=False, cancel_futures=True)
