@@ -9,6 +9,7 @@ PILE ?= pile-small
 FILM ?= 360p
 SWEEP ?= fig2
 CALIBRATION ?= ruby
+PIP := .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile -c requirements.txt
 
 .PHONY: help
 help: ## List the targets
@@ -26,7 +27,7 @@ walker: setup ## Run the walker of Fig. 1b (or CASE=...): velocity, pictures, a 
 	@$(WALKERS) export $(CASE) --to vtk --out $(OUT) | sed 's/^/  /'
 
 .PHONY: sweep
-sweep: setup ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.toml: on that cluster), print its table
+sweep: setup $(if $(SITE),.venv/with-cluster) ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.toml: on that cluster), print its table
 	@$(WALKERS) sweep $(SWEEP) --out $(OUT) $(if $(SITE),--site $(SITE)) $(if $(JOBS),--jobs $(JOBS)); status=$$?; \
 	  [ $$status -gt 1 ] || $(WALKERS) list $(basename $(notdir $(SWEEP))) --out $(OUT); exit $$status
 
@@ -35,19 +36,19 @@ pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures
 	@$(MAKE) --no-print-directory walker CASE=$(PILE) OUT=$(OUT) FILM=720p
 
 .PHONY: figures
-figures: setup ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)
+figures: setup .venv/with-theory ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)
 	@$(WALKERS) paper figures --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
 .PHONY: calibrate
-calibrate: setup ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
+calibrate: setup .venv/with-calibrate ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
 	@$(WALKERS) calibrate $(CALIBRATION) --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
 .PHONY: model-terms
-model-terms: setup ## Which physics is missing: the theory fitted to the published numbers with each further term
+model-terms: setup .venv/with-theory ## Which physics is missing: the theory fitted to the published numbers with each further term
 	@$(WALKERS) paper terms
 
 .PHONY: test
-test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test first)
+test: setup cluster chromium .venv/with-dev ## Lint, check types, run the tests (a 2-bead smoke test first)
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
@@ -57,60 +58,62 @@ test: setup cluster ## Lint, check types, run the tests (a 2-bead smoke test fir
 	@$(WALKERS) show fig1b --theory > /dev/null & .venv/bin/pytest -q tests/test_crosscheck.py -k momentum > /dev/null & wait
 	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"
 
-.PHONY: test-browser
-test-browser: setup chromium ## Test reports in Debian's Chromium, without a network (`make test` does so where it is installed)
-	.venv/bin/pytest -q tests/test_browser.py
-
 .PHONY: test-slow
-test-slow: setup ## Run what `make test` leaves out: what only a release needs
+test-slow: setup cluster paraview .venv/with-dev ## Run what `make test` leaves out: what only a release needs
 	.venv/bin/pytest -q -n 2 -m slow
 
 .PHONY: audit
-audit: setup ## Prove what the installed engine does, beside a second engine and closed forms
+audit: setup .venv/with-check ## Prove what the installed engine does, beside a second engine and closed forms
 	@$(WALKERS) check engine
 
 .PHONY: validate
-validate: setup ## Check it against published benchmarks, exact solutions and a second engine (under ten minutes)
+validate: setup .venv/with-check ## Check it against published benchmarks, exact solutions and a second engine (under ten minutes)
 	@$(WALKERS) check literature --out $(OUT)
 
 .PHONY: docs-pictures
-docs-pictures: setup ## Make what docs/ shows and is not of today's parameters: pictures, tables, outputs, numbers (ONLY=fig2: that)
+docs-pictures: setup .venv/with-dev ## Make what docs/ shows and is not of today's parameters: pictures, tables, outputs, numbers (ONLY=fig2: that)
 	@.venv/bin/python -m docs.illustrations $(OUT) docs $(ONLY)
 
 .PHONY: docs-notebooks
-docs-notebooks: setup ## Execute the tutorial's notebooks and store what they show
+docs-notebooks: setup .venv/with-dev ## Execute the tutorial's notebooks and store what they show
 	@.venv/bin/python -m tests.notebooks
 
 .PHONY: docs
-docs: engine .venv/ready-docs ## Build the documentation into build/site, to be opened from disk; runs its examples
+docs: setup .venv/with-docs ## Build the documentation into build/site, to be opened from disk; runs its examples
 	@.venv/bin/python -m sphinx -q -W --keep-going -d build/doctrees docs build/site
 	@echo "open build/site/index.html"
 
 .PHONY: bench
-bench: setup ## Measure what docs/explanation/performance.md states (ONLY=large: a second of ten thousand beads)
+bench: setup .venv/with-dev ## Measure what docs/explanation/performance.md states (ONLY=large: a second of ten thousand beads)
 	.venv/bin/python tests/benchmark.py $(ONLY)
 
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/api docs/reference/generated
 
+.PHONY: extras
+extras: setup .venv/with-all ## Install what reports, archives, calibrations, the theory, checks and clusters need
+
 .PHONY: setup
 setup: engine .venv/ready ## Install what is missing: liggghts and what compiles its contact model (apt-get), and .venv
 	@.venv/bin/python -c "from walkers.runner.binary import compile_model; compile_model()"
 
 # As root, through sudo, or with one message for whoever is root. $(1): packages, $(2): what they are for.
+# Without what Debian recommends: with liggghts that is ParaView, 2.4 GB.
 define debian
-	@if [ "$$(id -u)" = 0 ]; then apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $(1) >/dev/null; \
+	@if [ "$$(id -u)" = 0 ]; then apt-get update -qq && RUNLEVEL=1 DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(1) >/dev/null; \
 	elif command -v sudo >/dev/null && { [ -t 0 ] || sudo -n true 2>/dev/null; }; then \
-	  sudo apt-get update -qq && sudo DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $(1) >/dev/null; \
+	  sudo apt-get update -qq && sudo RUNLEVEL=1 DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(1) >/dev/null; \
 	else echo "$(2) is missing and cannot be installed without root. Ask an administrator to run: apt-get install $(1)" >&2; exit 1; fi
 endef
 
+# The engine, what its contact model is compiled with, and Mesa, by which pictures are drawn without a screen.
+ENGINE := liggghts openmpi-bin g++ libliggghts-dev libopenmpi-dev libegl1 libgl1 libgl1-mesa-dri libxrender1
 .PHONY: engine
-ifeq ($(shell command -v liggghts >/dev/null && command -v g++ >/dev/null && command -v mpicxx >/dev/null && test -d /usr/include/liggghts && echo all),)
+ifeq ($(shell command -v liggghts >/dev/null && command -v mpirun >/dev/null && command -v g++ >/dev/null && command -v mpicxx >/dev/null && test -d /usr/include/liggghts && ls /usr/lib/*/libEGL.so.1 >/dev/null 2>&1 && echo all),)
 engine:
-	@echo "installing the engine, liggghts, and what its contact model is compiled with"
-	$(call debian,liggghts g++ libliggghts-dev libopenmpi-dev,liggghts or what its contact model is compiled with)
+	@echo "installing the engine, liggghts, what its contact model is compiled with, and Mesa"
+	$(call debian,$(ENGINE),liggghts or what its contact model is compiled with)
 else
 engine:
 endif
@@ -119,9 +122,8 @@ endif
 .PHONY: cluster
 ifeq ($(shell PATH="$$PATH:/usr/sbin" command -v slurmctld),)
 cluster:
-	@if [ "$$(id -u)" = 0 ]; then echo "installing slurm-wlm and munge, for the tests"; \
-	  apt-get update -qq && RUNLEVEL=1 DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
-	  slurm-wlm munge >/dev/null || echo "that failed: tests on SLURM will be skipped" >&2; fi
+	@[ "$$(id -u)" != 0 ] || echo "installing slurm-wlm and munge, for the tests"
+	$(if $(filter 0,$(shell id -u)),$(call debian,slurm-wlm munge,slurm-wlm))
 else
 cluster:
 endif
@@ -129,10 +131,19 @@ endif
 .PHONY: chromium
 ifeq ($(shell command -v chromium),)
 chromium:
-	@echo "installing chromium, for the tests"
-	$(call debian,--no-install-recommends chromium,chromium)
+	@echo "installing chromium, for the tests of reports"
+	$(call debian,chromium,chromium)
 else
 chromium:
+endif
+
+.PHONY: paraview
+ifeq ($(shell command -v pvpython >/dev/null && command -v xvfb-run >/dev/null && echo all),)
+paraview:
+	@echo "installing paraview, python3-paraview and xvfb, for the tests"
+	$(call debian,paraview python3-paraview xvfb xauth,paraview)
+else
+paraview:
 endif
 
 .venv/ready: requirements.txt pyproject.toml
@@ -140,13 +151,13 @@ endif
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || $(MAKE) --no-print-directory venv-package
 	@echo "installing Python packages into .venv"
 	@rm -rf .venv && $(PYTHON) -m venv .venv
-	@.venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
-	@.venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	@$(PIP) --editable '.[film]'
 	@touch $@
 
-.venv/ready-docs: .venv/ready requirements-docs.txt
-	@echo "installing Sphinx and what the site needs into .venv"
-	@.venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-docs.txt
+# What an extra of pyproject.toml names, in a stamp of its own.
+.venv/with-%: .venv/ready
+	@echo "installing the packages of granular-walkers[$*] into .venv"
+	@$(PIP) 'granular-walkers[$*]'
 	@touch $@
 
 .PHONY: venv-package

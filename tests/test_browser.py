@@ -1,7 +1,7 @@
 """Reports in a browser, without a network: they play, pause and turn, and say nothing to the console.
 
-Debian's Chromium, driven by Playwright; without it these tests are left out: ``make test-browser`` installs it.
-WebGL is computed by the processor (SwiftShader), which is slow: windows are small and patience is long.
+Debian's Chromium, which ``make test`` installs, driven by Playwright. WebGL is computed by the processor
+(SwiftShader), which is slow: windows are small and patience is long.
 """
 
 import shutil
@@ -17,7 +17,6 @@ from tests.test_report import HOSTILE, pile_report, swept, swept_report, walked_
 __all__ = ["pile_report", "swept", "swept_report", "walked_report", "walked_run"]  # fixtures
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: make test-browser installs it")
 MILLISECONDS = 1e3 * PATIENCE
 _FLAGS = [
     *("--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking"),

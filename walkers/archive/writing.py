@@ -18,6 +18,7 @@ from typing import Any
 from walkers.archive.crate import LICENCES, METADATA_NAME, PAPER, PREVIEW_NAME, Author, describe_crate
 from walkers.archive.verification import SUMS_NAME, verify
 from walkers.inputs.errors import WalkersError, refused
+from walkers.inputs.extras import require
 from walkers.postprocess.report.page import fill
 from walkers.runner.directory import CASE_NAME, FinishedRun, name_of
 from walkers.runner.files import beside, json_bytes
@@ -79,6 +80,7 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
     `InputError` if it is no run or sweep, or not finished, or an option makes no sense; `ArchiveRefused` if files are
     not what the manifests say.
     """
+    require("archive")
     directory, options = Path(directory), options or ArchiveOptions()
     _check(options)
     found = [one for one in verify(directory) if not one.of_points]  # `contents_of` asks for all points

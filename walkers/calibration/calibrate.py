@@ -21,6 +21,7 @@ from walkers.calibration.posterior import Density, Posterior, sample_posterior
 from walkers.inputs.calibration import QUANTITIES, Calibration, Speed
 from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem, WalkersError, refused
+from walkers.inputs.extras import require
 from walkers.inputs.schema import ALTERNATIVES
 from walkers.inputs.sweep import Sweep, expand
 from walkers.paper.comparison import misalignment
@@ -170,6 +171,7 @@ def calibrate(
     runner.EngineFailure
         If there is no engine, or its audit failed.
     """
+    require("calibrate")
     _check_ranges(calibration)
     space, design = Space(calibration.parameters), calibration.design
     folder, failures = out / calibration.name, {}

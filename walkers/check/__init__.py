@@ -4,3 +4,7 @@
 exact solutions. The second engine is `engine` and its formulas, `kernels`: of the bridges it takes the law
 (`walkers.physics.laws`), which it interpolates in its own way, and nothing of the decks.
 """
+
+from walkers.inputs.extras import require
+
+require("check")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.inputs.errors import InputError, Problem, refused
+from walkers.inputs.extras import require
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
 from walkers.paper.figures import fig1b, fig2, fig3, fig4, fig_sensitivity
@@ -92,6 +93,7 @@ def make_figures(  # noqa: PLR0913
     InputError
         If there is no such figure or format, or a file is where a folder is to be.
     """
+    require("theory")
     import joblib
 
     known = (*FIGURES, COMPARISON)

@@ -19,6 +19,7 @@ import numpy as np
 
 from walkers.inputs import library
 from walkers.inputs.case import Case
+from walkers.inputs.extras import require
 from walkers.inputs.text import rendered
 from walkers.paper.published import OBSERVATIONS, Observation, Point
 from walkers.runner.files import write_text
@@ -198,6 +199,7 @@ def fit(
 
 def try_model_terms(to: Path) -> list[Fit]:
     """Fit without any term, with each, with all of them, and the paper's law alone; write ``model_terms.md``."""
+    require("theory")
     bare = fit("Coulomb friction and the bridges' resistance", ALWAYS)
     # From where the others end: what has more parameters must not come out worse for want of generations.
     added = [fit(name, {**ALWAYS, **ranges}, begin=bare.parameters) for name, ranges in TERMS.items()]

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walkers.inputs.errors import WalkersError, refused
+from walkers.inputs.extras import require
 from walkers.physics.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
@@ -80,6 +81,8 @@ def render_film(
     """
     path, options = destination or directory / "film.mp4", options or FilmOptions()
     _check_format(path, options)
+    if path.suffix.lower() == ".mp4":
+        require("film")
     motion = _shown(read_motion(directory).driven, options.walker)
     times = film_times(motion, options)
     count, frames = len(times.time), slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)

@@ -52,7 +52,7 @@ def write_vtk(
         Take one of so many samples of the drive, if None one a cycle. Bridges are in the frames in which they were
         recorded.
     vtu
-        Also write the beads as ``.vtu`` (through meshio).
+        Also write the beads as ``.vtu``.
     as_placed
         Leave independent walkers where the deck has them, centimetres apart, instead of drawing them side by side.
 
@@ -76,9 +76,7 @@ def write_vtk(
                 time = float(motion.time[frame])
                 entries.append(f'    <DataSet timestep="{time!r}" group="" part="{part}" file="{file}" />')
             if vtu:
-                import pyvista as pv
-
-                pv.save_meshio(beside / f"beads_{frame:06d}.vtu", meshes["beads"])
+                meshes["beads"].cast_to_unstructured_grid().save(beside / f"beads_{frame:06d}.vtu")
         head = '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>'
         lines = ["<?xml version='1.0' encoding='utf-8'?>", head, *entries, "  </Collection>", "</VTKFile>"]
         write_text(beside / _COLLECTION, "\n".join(lines))

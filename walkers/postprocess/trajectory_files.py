@@ -13,6 +13,7 @@ from typing import TextIO
 import numpy as np
 
 from walkers.inputs.errors import refused
+from walkers.inputs.extras import require
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.runner.files import beside
@@ -42,6 +43,8 @@ def write_trajectory(directory: Path, destination: Path, form: str, *, every: in
     if destination.suffix.lower() not in SUFFIXES[form] or destination.is_dir():
         raise refused("--output", f"{destination}: expected the name of a {' or '.join(SUFFIXES[form])} file")
     write = {"xyz": _write_xyz, "lammps": _write_lammps}[form]
+    if form == "xyz":
+        require("xyz")
     motion = read_motion(directory).driven.select(slice(None, None, every))
     destination.parent.mkdir(parents=True, exist_ok=True)
     box = box_of(motion)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkers.inputs.extras import require
 from walkers.inputs.readable import readable_unit
 from walkers.inputs.rounding import rounded
 from walkers.postprocess.drawing import UNSEEN, errors_seen
@@ -49,6 +50,7 @@ def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARG
     they fit into so many bytes, first and last first and then those halfway between; the page says which are left out.
     The file is ``report.html`` in the sweep's directory if no other is named.
     """
+    require("report")
     frame = load(directory)
     path = to or directory / NAME
     check_report(path)

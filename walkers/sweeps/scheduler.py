@@ -1,12 +1,12 @@
-"""Run a sweep: points packed into decks, these handed to Parsl's workers, until every point is settled.
+"""Run a sweep: points packed into decks, these handed to workers, until every point is settled.
 
 A deck costs a start-up and a share a step whoever is in it, so that fewer decks are cheaper; more of them fill the
 cores more evenly and give results sooner. They are packed by predicted cost, so that all cores finish together: the
 whole sweep for a number of workers, whatever is finished, so that an interrupted sweep goes on with the decks that it
 would have had.
 
-Parsl runs the workers, here or on a cluster, and gives out again a deck whose worker was lost. What the failure of a
-deck means for its points is decided here: it is tried again in halves.
+Workers are threads on this machine, or Parsl's on a cluster, which gives out again a deck whose worker was lost. What
+the failure of a deck means for its points is decided here: it is tried again in halves.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from __future__ import annotations
 import errno
 import heapq
 import resource
-import shutil
 import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -37,7 +37,7 @@ from walkers.runner.directory import is_locked, run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
 from walkers.runner.summary import pairs_of_beads, predicted_seconds
 from walkers.sweeps.making import check_audit, make_runs
-from walkers.sweeps.site import Site, check_path, pilots, threads
+from walkers.sweeps.site import Site, check_path, pilots
 from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
@@ -394,33 +394,41 @@ def work(
 
 @contextmanager
 def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Future[Report]]]:
-    """Start Parsl; yield what takes the arguments of `work`, but the first, there.
+    """Start threads, or Parsl on a cluster; yield what takes the arguments of `work`, but the first, there.
 
     At the end the workers and their engines have ended, however the block is left.
     """
+    if options.site is None:
+        stop = threading.Event()
+        with ThreadPoolExecutor(options.workers) as pool:
+            try:
+                yield lambda **deck: pool.submit(work, stop, **deck)
+            finally:
+                stop.set()
+                pool.shutdown(wait=False, cancel_futures=True)
+        return
     import parsl
 
-    folder, stop = record.directory / PARSL, None
-    if options.site is None:
-        stop, config = threading.Event(), threads(options.workers, folder)
-    else:
-        config = pilots(options.site, folder)
+    folder = record.directory / PARSL
     try:
-        kernel = parsl.DataFlowKernel(config)
+        kernel = parsl.DataFlowKernel(pilots(options.site, folder))
     except Exception as error:  # whatever Parsl raises: an address that this machine does not have, ports in use
         told = " ".join(str(error).split())
         told = f"Parsl cannot start ({told}); see {folder}, and [executor] address in the site file"
         raise ClusterFailed(told) from error
     try:
-        yield partial(parsl.python_app(work, data_flow_kernel=kernel), stop)
+        yield partial(parsl.python_app(work, data_flow_kernel=kernel), None)
     finally:
-        if stop is not None:
-            stop.set()
         kernel.cleanup()
-        if stop is not None:  # threads leave nothing to look into
-            shutil.rmtree(kernel.run_dir, ignore_errors=True)
-            with suppress(OSError):
-                folder.rmdir()
+
+
+def _check_cluster(error: BaseException) -> None:
+    """Raise `ClusterFailed` if a deck failed because the cluster's jobs do."""
+    from parsl.executors.errors import BadStateException
+
+    if isinstance(error, BadStateException):
+        first = " ".join(str(error).partition("Error 2:")[0].split())  # the others say the same
+        raise ClusterFailed(f"the cluster's jobs fail: {first}") from error
 
 
 class _Scheduler:
@@ -514,12 +522,9 @@ class _Scheduler:
 
     def _take_in(self, deck: PlannedDeck, group: int, future: Future[Report]) -> None:
         """Count what is finished; hand the rest out again: what others were making as it is, what failed in halves."""
-        from parsl.executors.errors import BadStateException
-
         error = future.exception()
-        if isinstance(error, BadStateException):
-            first = " ".join(str(error).partition("Error 2:")[0].split())  # the others say the same
-            raise ClusterFailed(f"the cluster's jobs fail: {first}") from error
+        if error is not None and self.plan.options.site is not None:
+            _check_cluster(error)
         report = Report(failure=type(error).__name__, message=str(error) or repr(error)) if error else future.result()
         self.settled |= set(report.finished)
         self.velocities |= report.finished

@@ -6,7 +6,7 @@
     cores     = 32
     jobs      = 4
 
-The scheduling is Parsl's. Jobs of a cluster are pilots: each holds workers that take deck after deck until
+The scheduling on a cluster is Parsl's. Jobs of a cluster are pilots: each holds workers that take deck after deck until
 none is left.
 """
 
@@ -26,6 +26,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 
 from walkers.inputs.changes import value_at
 from walkers.inputs.errors import InputError, Problem, refused
+from walkers.inputs.extras import require
 from walkers.inputs.library import expected_of
 from walkers.inputs.messages import quoted, validated
 from walkers.inputs.reading import read_toml
@@ -121,6 +122,7 @@ def cores_here() -> int:
 
 def load_site(path: str | Path) -> Site:
     """Read a site file; `InputError` tells what is wrong with it, in Parsl's words if it is Parsl that refuses it."""
+    require("cluster")
     document = read_toml(Path(path))
     site = Site(validated(SiteFile, document, str(path), "a site"))
     settings = [[table, key] for table in ("provider", "executor") for key in document.get(table, ())]
@@ -150,15 +152,6 @@ def check_path(folder: Path) -> None:
     whole = str(folder.resolve())
     if odd := _ODD.search(whole):
         raise refused("--out", f"with a site file {_TAKEN} in the path, found {odd[0]!r} in {whole!r}")
-
-
-def threads(workers: int, run_dir: Path) -> Config:
-    """Parsl's configuration for so many decks at once on this machine: threads, no server, no open port."""
-    from parsl.config import Config
-    from parsl.executors import ThreadPoolExecutor
-
-    executor = ThreadPoolExecutor(label="threads", max_threads=workers)
-    return Config(executors=[executor], run_dir=str(run_dir), strategy="none", initialize_logging=False)
 
 
 def pilots(site: Site, run_dir: Path) -> Config:

@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.case import Case
+from walkers.inputs.extras import require
 from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
 from walkers.physics.dimer import Dimer
 from walkers.theory.quasistatic import (
@@ -155,6 +156,7 @@ def walk(
     cycles, steps_per_cycle
         Of the drive, at most (fewer for a gait that repeats itself sooner), and steps of time in each.
     """
+    require("theory")
     from walkers.theory.stepping import integrate
 
     given = (frequency, peak_acceleration, steady_acceleration, walker.scale)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkers.inputs.extras import require
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, gathered, read_motion
 from walkers.postprocess.scene import (
@@ -62,6 +63,7 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
 
     Beads times instants are so many ``places`` at most: instants are left out evenly, and walkers if they are many.
     """
+    require("report")
     import k3d
 
     read = run if isinstance(run, Motion) else read_motion(run)

@@ -9,6 +9,7 @@ from typing import Any
 from walkers.inputs.caption import caption
 from walkers.inputs.case import Case
 from walkers.inputs.changes import dotted
+from walkers.inputs.extras import require
 from walkers.inputs.origins import Origin, text_of
 from walkers.postprocess.analysis import (
     Measured,
@@ -69,6 +70,7 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None)
     InputError, postprocess.dump.DumpError
         If the name is none of an HTML file, or there is no folder for it; if the dumps cannot be read.
     """
+    require("report")
     path = to or directory / NAME
     check_report(path)
     run = RunReport(directory, origins=origins)

@@ -1,0 +1,42 @@
+"""Packages that only some commands need: the extras of ``pyproject.toml``.
+
+They are imported where they are used. What needs an extra calls `require` first, before it computes or writes anything.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from walkers.inputs.errors import InputError, Problem
+
+EXTRAS = {
+    "archive": ("an archive", ("rocrate", "tomli-w")),
+    "calibrate": ("a calibration", ("corner", "scikit-learn", "threadpoolctl")),
+    "check": ("a check of the engine", ("joblib", "numba")),
+    "cluster": ("a sweep on a cluster", ("parsl",)),
+    "film": ("an MP4", ("imageio-ffmpeg",)),
+    "report": ("a report or an interactive view", ("bokeh", "k3d")),
+    "theory": ("the theory", ("joblib", "numba")),
+    "xyz": ("extended XYZ", ("ase",)),
+}
+"""For each extra: what needs it, and its packages as PyPI names them."""
+
+
+class ExtraMissing(InputError):
+    """Packages of an extra that are not installed; the message says how to install them."""
+
+    def __init__(self, extra: str, missing: list[str]) -> None:
+        how = f"pip install 'granular-walkers[{extra}]'"
+        super().__init__(EXTRAS[extra][0], [Problem("", None, f"needs {', '.join(missing)}: {how}")])
+        self.args = (f"{self.source} {self.problems[0]}",)
+
+
+def require(extra: str) -> None:
+    """Raise `ExtraMissing` unless the packages of an extra are installed; none of them is imported."""
+    if missing := [package for package in EXTRAS[extra][1] if find_spec(module_of(package)) is None]:
+        raise ExtraMissing(extra, missing)
+
+
+def module_of(package: str) -> str:
+    """Name under which a package of `EXTRAS` is imported."""
+    return {"scikit-learn": "sklearn"}.get(package, package.replace("-", "_"))
