@@ -65,24 +65,15 @@ def show(case: Case, settings: Set = None, as_json: Json = False) -> None:
 
 
 def deck(case: Case, settings: Set = None, to: Path | None = Option(None, help=_DECK)) -> None:
-    """Print the LIGGGHTS deck of a case (of a run in segments, the first), or write it with its files."""
-    from walkers.inputs.errors import refused
-    from walkers.runner.binary import find_engine, plugin_of, run_script
-    from walkers.runner.directory import write_deck
-    from walkers.templates.deck import DECK_NAME, RUN_NAME, render_deck
+    """Print the LIGGGHTS deck of a case, or write it with its files, to be run by hand."""
+    from walkers.sweeps.by_hand import write_folder
+    from walkers.templates.deck import RUN_NAME, render_deck, whole
 
-    made = render_deck(load(case, settings))
+    loaded = load(case, settings)
     if to is None:
-        print(made.text, end="")
+        print(render_deck(loaded, whole(loaded)).text, end="")
         return
-    plugin = plugin_of(find_engine())
-    try:
-        to.mkdir(parents=True)
-    except OSError as error:
-        raise refused(to, f"expected a folder that can be made ({error.strerror})") from error
-    write_deck(made, to)
-    (to / RUN_NAME).write_text(run_script(plugin, made.layout.ranks), encoding="utf-8")
-    print(f"{to / DECK_NAME}    run it there with: sh {RUN_NAME}")
+    print(f"{write_folder(loaded, to)}    run it there with: sh {RUN_NAME}    then: walkers run {to}")
 
 
 def run(

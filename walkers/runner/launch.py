@@ -90,7 +90,7 @@ def launch(
     deck, directory, engine
         The deck; where its files are already, and the engine works; the binary.
     on_step
-        Called a few times a second, and at the end, with the step that the engine is at; what it raises ends the engine.
+        Called a few times a second, and at the end, with the engine's step; what it raises ends the engine.
     time_limit
         Wall time in s after which the run is stopped.
     keep_open
@@ -118,6 +118,13 @@ def launch(
             if not starts:
                 raise
             time.sleep(_PAUSE_SECONDS)
+
+
+def judge(deck: Deck, directory: Path, log: Path) -> EngineReport:
+    """Judge by its log and its dumps a deck that an engine ran which nobody watched; failures are those of `launch`."""
+    watch = _Watch(deck, directory, Path("liggghts"), None)
+    watch.log = log
+    return watch.verdict(0)
 
 
 def check_room(folder: Path, needed: int) -> None:
