@@ -21,7 +21,7 @@ from walkers.inputs.drive import Drive, Harmonic, common_frequency
 from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import read_toml, shipped_cases
 from walkers.postprocess.analyses.meetings import Course, Meeting, collective
-from walkers.postprocess.analysis import describe_result, read_result
+from walkers.postprocess.analysis import describe_result, figures_of, read_result
 from walkers.postprocess.gait import postures, turned_over_at
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
@@ -179,6 +179,12 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     first = tray.result["groups_at_end"][0]
     apart = np.linalg.norm(centre[-12:, first[1]] - centre[-12:, first[0]], axis=-1)
     assert apart.max() < 1.1 * group.make.length  # they hold on to each other, however they turn
+    assert {path.name for path in tray.plot()} >= {"walk.png", "paths.png"}
+    (axes,) = figures_of(tray.directory)["paths"].axes
+    for walker, line in enumerate(axes.lines[:9]):  # in the plane, where they stood
+        np.testing.assert_allclose(line.get_xydata(), 1e3 * centre[:, walker, :2])
+    assert len(axes.patches) == 18
+    assert axes.get_aspect() == 1.0
 
 
 def test_what_walkers_do_as_many_is_counted() -> None:

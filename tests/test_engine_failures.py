@@ -107,7 +107,12 @@ def test_a_contact_model_that_cannot_be_compiled_is_told(tmp_path: Path, monkeyp
 
 
 def _half(text: str) -> str:
-    return re.sub(r"^(run +)(\d+)", lambda found: f"{found[1]}{int(found[2]) // 2}", text, flags=re.MULTILINE)
+    return re.sub(
+        r"^(run +|variable +cycles string )(\d+)",
+        lambda found: f"{found[1]}{int(found[2]) // 2}",
+        text,
+        flags=re.MULTILINE,
+    )
 
 
 def _narrow(text: str) -> str:

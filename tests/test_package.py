@@ -138,9 +138,7 @@ def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -
     assert "mine-" in told("walkers", "list")
     pictures = [*told("walkers", "plot", "mine.toml").split(), *told("walkers", "render", "mine.toml").split()]
     assert {"walk.png", "walker.png"} <= {Path(one).name for one in pictures if Path(one).is_file()}
-    table = (
-        "import walkers; print(*walkers.sweep('two.toml')['status'], walkers.find_run('mine.toml').trajectory.shape[0])"
-    )
+    table = "import walkers; print(*walkers.sweep('two.toml')['status'], walkers.load('mine.toml').trajectory.shape[0])"
     assert told("python", "-c", table).split() == ["finished", "finished", "61"]
     assert told("walkers", "report", "mine.toml", status=2).splitlines()[-1] == (
         "walkers: a report or an interactive view needs bokeh, k3d: pip install 'granular-walkers[report]'"
@@ -168,7 +166,7 @@ NEEDING: dict[str, list[Callable[[walkers.Run, Path], object]]] = {
 def test_what_needs_an_extra_names_it_before_it_begins(
     extra: str, run_directory: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = walkers.find_run(run_directory(run=SHORT))
+    run = walkers.load(run_directory(run=SHORT))
     for package in EXTRAS[extra][1]:
         monkeypatch.setitem(sys.modules, module_of(package), None)
     for use in NEEDING[extra]:

@@ -406,7 +406,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     np.testing.assert_allclose(box.bounds, [-2e-3, 2e-3, -2e-3, 2e-3, 0.0, 20e-3], atol=1e-9)
     (in_folder / "pile-ci.toml").write_text(to_toml(document(run=HALF)))
     assert "60 beads" in told("run", "pile-ci.toml", "--out", str(run.parent))
-    assert "Not yet" in told("export", "pile-ci", "--to", "deck")
+    assert "in which the beads come to rest" in told("export", "pile-ci", "--to", "deck")
 
 
 def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:

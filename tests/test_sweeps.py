@@ -36,9 +36,11 @@ from walkers.postprocess import read_motion, read_table
 from walkers.runner import find_engine, finished_run
 from walkers.runner.directory import FIRST_SEGMENT, locked
 from walkers.runner.failures import WalkersMet
+from walkers.runner.summary import predicted_overhead
 from walkers.sweeps.making import make_runs
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep, work
 from walkers.sweeps.table import load, thresholds
+from walkers.templates import render_deck
 
 TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
 # Long enough for whoever is to be stopped meanwhile, however fast or busy the machine.
@@ -203,6 +205,19 @@ def test_dry_run_says_what_is_to_do_and_writes_nothing(sweep_file: Callable[...,
     told = _sweep(name, "--dry-run").stdout
     assert "4: 4 finished" in told
     assert "0 points in 0 decks" in told
+
+
+def test_the_forecast_counts_shapes_of_bridges_that_were_never_solved() -> None:
+    """Of a bead on a wall, of equal beads, of both: each takes as long as the engine takes for a point or two."""
+    volumes = [random.uniform(0.005, 0.03) for _ in range(2)]  # no test solved them before
+    cases = [make_case(liquid={"volume_fraction": volume}) for volume in volumes]
+    begin = predicted_overhead(cases)
+    assert predicted_overhead([*cases, cases[0]]) - begin < begin / 4.0
+    render_deck(cases[0])
+    middle = predicted_overhead(cases)
+    render_deck(cases[1])
+    assert begin - middle == pytest.approx(middle - predicted_overhead(cases))
+    assert begin - middle > 0.2
 
 
 def test_a_failing_point_does_not_stop_the_others(

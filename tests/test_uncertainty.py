@@ -113,7 +113,7 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     assert "plane tilted by 20°" in page
     gentle = resolve_case({**tables, "boundary": {"material": "glass", "tilt": "10 deg"}}, name="gentle")
     walkers.run(gentle, tmp_path)
-    first, second = (find_side(walkers.find_run(one, tmp_path).directory) for one in (case, gentle))
+    first, second = (find_side(walkers.load(one, tmp_path).directory) for one in (case, gentle))
     text = compare_runs(first, second).text
     assert "facing up (mm/s)" in text
     assert "right_facing" not in text

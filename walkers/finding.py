@@ -51,11 +51,15 @@ class Place(NamedTuple):
 def placed(name: str | Path, out: Path = DEFAULT_OUT) -> Place | None:
     """What there is of a name, as a path or in a folder of runs, but for the runs of cases.
 
-    A folder shadows no shipped case by its name alone.
+    A folder shadows no shipped case by its name alone. That of a deck that was run by hand is made a run directory.
     """
+    from walkers.sweeps.by_hand import is_deck_folder, take_in
+
     path = Path(name)
     with suppress(OSError):  # a name that no file system takes
         for place in (path, out / path):
+            if is_deck_folder(place) and str(name) not in shipped_cases():
+                take_in(place)
             for kind, file in RECORDS.items():
                 if (place / file).is_file():
                     return Place(place, kind)

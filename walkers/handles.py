@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from walkers.finding import files_of
 from walkers.inputs.errors import refused
-from walkers.runner.binary import find_engine
 from walkers.runner.directory import FAILURE_NAME, ask_to_stop, case_of, finished_run, is_locked, unfinished
 from walkers.runner.files import read_json
 
@@ -233,7 +232,8 @@ class Run:
         ----------
         form
             ``vtk`` or ``paraview`` (`walkers.postprocess.paraview`), ``xyz`` or ``lammps``
-            (`walkers.postprocess.trajectory_files`), ``archive`` (`walkers.archive.writing`), ``deck`` (`export_deck`).
+            (`walkers.postprocess.trajectory_files`), ``archive`` (`walkers.archive.writing`), ``deck``
+            (`walkers.sweeps.by_hand.write_folder`).
         to
             The file, or the folder of ``vtk``, ``paraview`` and ``deck``; in the run directory if None, ``archive`` and
             ``deck`` in the current folder.
@@ -248,10 +248,11 @@ class Run:
         from walkers.archive.writing import ArchiveOptions, write_archive
         from walkers.postprocess.paraview import write_paraview, write_vtk
         from walkers.postprocess.trajectory_files import SUFFIXES, write_trajectory
+        from walkers.sweeps.by_hand import write_folder
 
         place = _path(to)
         if form == "deck":
-            return export_deck(self.case, place or Path(f"{self.directory.name}-deck"))
+            return write_folder(self.case, place or Path(f"{self.directory.name}-deck"))
         if form == "archive":
             return write_archive(self.finished_directory, place, ArchiveOptions(**options))
         if form in SUFFIXES:
@@ -340,19 +341,3 @@ class Sweep:
 
 def _path(to: str | Path | None) -> Path | None:
     return None if to is None else Path(to)
-
-
-def export_deck(case: Case, folder: Path) -> Path:
-    """Write the deck of a case, its files and ``run.sh`` into a new folder, to be run by hand; the deck's path."""
-    from walkers.runner.binary import plugin_of, run_script
-    from walkers.runner.directory import write_deck
-    from walkers.templates.deck import DECK_NAME, RUN_NAME, render_deck
-
-    made, plugin = render_deck(case), plugin_of(find_engine())
-    try:
-        folder.mkdir(parents=True)
-    except OSError as error:
-        raise refused(folder, f"expected a new folder ({error.strerror})") from error
-    write_deck(made, folder)
-    (folder / RUN_NAME).write_text(run_script(plugin, made.layout.ranks), encoding="utf-8")
-    return folder / DECK_NAME

@@ -4,20 +4,35 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import refused
+import numpy as np
+
+from walkers.inputs.changes import changed
+from walkers.inputs.errors import InputError, refused
+from walkers.inputs.readable import readable_unit
+from walkers.inputs.reading import resolve_case
 from walkers.postprocess.drawing import FORMATS, save_figure
 from walkers.runner.directory import case_of
-from walkers.sweeps.figure import draw, drawn_column, layout_of
+from walkers.sweeps.figure import Factor, draw, drawn_column, layout_of
 from walkers.sweeps.table import default_column, find_name, load
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from walkers.inputs.case import Case
     from walkers.theory.quasistatic import FloatArray
+
+
+_OF_SHAPE = ("radii", "volume_fraction", "contact_angle")
+"""Ends of the keys that bridges have another shape by."""
 
 
 class LeftOutWarning(UserWarning):
@@ -112,6 +127,7 @@ def _figure_of(
     if laid_out.untold:
         _tell(f"not told apart: {'; '.join(laid_out.untold)}")
     predicted: dict[str, FloatArray] = {}
+    cases: list[Case] = []
     if theory:
         from walkers.theory.prediction import outside_of_the_paper, predicted_column
 
@@ -121,7 +137,36 @@ def _figure_of(
             _tell(f"not drawn at {number} of {len(done)} points: {reason}")
         if predicted and (beyond := [told for case in cases if (told := outside_of_the_paper(case))]):
             _tell(f"{len(beyond)} of {len(done)} points are {beyond[0]}" + (", …" if len(beyond) > 1 else ""))
-    return draw(laid_out, drawn_column(done, column, predicted), title=table.attrs["title"], log=log)
+    drawn = drawn_column(done, column, predicted)
+    if predicted:
+        drawn = replace(drawn, curves=partial(_curves, cases, column, readable_unit(done.attrs["units"][column])[1]))
+    return draw(laid_out, drawn, title=table.attrs["title"], log=log)
+
+
+def _curves(
+    cases: Sequence[Case], column: str, size: float, rows: npt.NDArray[np.int64], x: Factor, places: FloatArray
+) -> dict[str, FloatArray]:
+    """What the theory predicts where a key of some of the cases has other values; nothing where it would take long.
+
+    Cases of another shape of their bridges are solved for a quarter of a second each.
+    """
+    from walkers.theory.prediction import predicted_column
+
+    key, case = x.keys[0], cases[rows[0]]
+    if len(x.keys) > 1 or not case.document or key.endswith(_OF_SHAPE):
+        return {}
+    at: list[int] = []
+    between: list[Case] = []
+    for number, place in enumerate(places.tolist()):
+        with suppress(InputError, ValueError):  # beyond what a case may be
+            value = f"{place!r} {x.unit}" if x.unit else place
+            between.append(resolve_case(changed(case.document, {key: value}), name=case.name))
+            at.append(number)
+    found: dict[str, FloatArray] = {}
+    for model, values in predicted_column(between, column)[0].items() if between else ():
+        found[model] = np.full(len(places), np.nan)
+        found[model][at] = values / size
+    return found
 
 
 def _column(table: pd.DataFrame, wanted: str | None) -> str:

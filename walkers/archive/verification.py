@@ -31,7 +31,7 @@ _MOST_ANYWAY = 1 << 28
 """Bytes: what unpacks to less is read in a second."""
 _SHOWN = (
     *(".png", ".pdf", ".svg", ".gif", ".mp4", ".html", ".htm"),
-    *(".vtp", ".vtu", ".pvd", ".py", ".xyz", ".lammpstrj", ".csv"),
+    *(".vtp", ".vtm", ".vtu", ".pvd", ".py", ".xyz", ".lammpstrj", ".csv"),
 )
 """Suffixes of pictures, films, pages, files for ParaView (with their script) and exports: the program writes them on
 demand and never reads them again."""

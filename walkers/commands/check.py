@@ -142,7 +142,7 @@ def check_case(
     return 1 if chapter.failures else 0
 
 
-def library(name: str | None = Argument(None, metavar="[NAME]", help=_NAME)) -> None:
+def library(name: str | None = Argument(None, metavar="NAME", help=_NAME)) -> None:
     """List materials, liquids, friction, bridge laws, cases, sweeps and calibrations; or print one with its sources."""
     from walkers.inputs.catalogue import catalogue, describe, describe_one
 

@@ -69,14 +69,14 @@ def export(
         if form not in forms:
             refuse_given({option: value}, f"is for --to {', '.join(forms)}")
     if form == "deck":
-        from walkers.handles import export_deck
-        from walkers.templates.deck import RUN_NAME, render_deck
+        from walkers.sweeps.by_hand import write_folder
+        from walkers.templates.deck import RUN_NAME, render_deck, whole
 
         case = load_case(what, settings, out)
         if output is None:
-            print(render_deck(case).text, end="")
+            print(render_deck(case, whole(case)).text, end="")
         else:
-            print(f"{export_deck(case, output)}    run it there with: sh {RUN_NAME}")
+            print(f"{write_folder(case, output)}    run it there with: sh {RUN_NAME}    then: walkers run {output}")
         return
     if form == "archive":
         from walkers.archive.crate import Author

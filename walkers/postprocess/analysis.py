@@ -22,7 +22,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known, rests_on, with_bands
-from walkers.runner.directory import SEGMENTS, case_of
+from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, segment_directories
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, FileChanged, check_unchanged, forget_tables, record_tables
 
@@ -292,8 +292,7 @@ def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
     """The result of a run directory and its tables, from its dumps."""
     from walkers.postprocess.motion import read_motion
 
-    files = (path.relative_to(directory) for path in (directory / SEGMENTS).rglob("*"))
-    check_unchanged(directory, [path.as_posix() for path in files])
+    check_unchanged(directory, files_of_segments(directory))
     motion = read_motion(directory)
     case = motion.case
     result: dict[str, Any] = {
@@ -307,6 +306,8 @@ def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
         "truncated": motion.truncated,
         "rests_on": rests_on(case.origins),
     }
+    if told := read_json(segment_directories(directory)[-1] / SEGMENT_NAME).get("by_hand"):
+        result["by_hand"] = told
     tables: dict[str, Columns] = {}
     for one in analyses_of(case):
         found, summary = one.of(motion)
@@ -390,7 +391,7 @@ def current_result(directory: str | Path) -> dict[str, Any]:
         raise
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         pass
-    if kept is not None and not any((directory / SEGMENTS).rglob("*.bin")):
+    if kept is not None and not any(name.endswith(".bin") for name in files_of_segments(directory)):
         return kept
     result, tables = _measured(directory)
     try:
@@ -417,7 +418,10 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
 
 def warnings_of(result: Mapping[str, Any]) -> list[str]:
     """What a reader of a result should know."""
-    warnings = [warning for one in analyses_in(result) for warning in one.warnings(result)]
+    warnings = [
+        *result.get("by_hand", ()),
+        *(warning for one in analyses_in(result) for warning in one.warnings(result)),
+    ]
     return [*warnings, "the dump ends within a frame"] if result["truncated"] else warnings
 
 

@@ -270,7 +270,7 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
     figure.suptitle(_title(groups[0].case))
     _draw_strobe(axes["strobe"], groups[0])
     for name, panel in (("walked", walked), ("turned", turned)):
-        _draw(axes[name], panel)
+        draw_panel(axes[name], panel)
         axes[name].set_xlabel(panel.x)
         for number, line in enumerate(axes[name].lines):
             # Marks of walkers that do the same stand beside each other.
@@ -292,7 +292,7 @@ def stacked(panels: Sequence[Panel], case: Case) -> Figure:
     figure, axes = new_figure(TWO_COLUMNS, height, nrows=len(panels), height_ratios=ratios, sharex=True, squeeze=False)
     figure.suptitle(_title(case))
     for one, panel in zip(axes[:, 0], panels, strict=True):
-        _draw(one, panel)
+        draw_panel(one, panel)
         one.set_title(panel.title)
         if any(line.label for line in panel.lines):
             one.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), borderaxespad=0.0)
@@ -302,7 +302,7 @@ def stacked(panels: Sequence[Panel], case: Case) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, panel: Panel) -> None:
+def draw_panel(axes: Axes, panel: Panel) -> None:
     """A panel without its title and what is below it."""
     for line in panel.lines:
         colour = f"C{line.colour}" if isinstance(line.colour, int) else line.colour

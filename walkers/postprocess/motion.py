@@ -15,7 +15,15 @@ from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive
 from walkers.postprocess.dump import BinaryDump, BoolArray, DumpError, FloatArray, IntArray, NoNumberError, local_frames
-from walkers.runner.directory import SEGMENT_NAME, SEGMENTS, case_of, drive_from, layout_of, segment_directories
+from walkers.runner.directory import (
+    SEGMENT_NAME,
+    SEGMENTS,
+    case_of,
+    drive_from,
+    layout_of,
+    run_of,
+    segment_directories,
+)
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
@@ -75,7 +83,7 @@ class Motion:
     @property
     def directory(self) -> Path:
         """Of the run."""
-        return self.frames[0][0].parent.parent
+        return run_of(self.frames[0][0])
 
     @property
     def first_driven(self) -> int:

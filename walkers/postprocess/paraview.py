@@ -1,4 +1,6 @@
-"""Files for ParaView: beads, bridges and the moving boundary as .vtp, joined by one .pvd in physical seconds.
+"""Files for ParaView: beads, bridges and the moving boundary as named blocks, a .vtm a frame, in a .pvd in seconds.
+
+Names of arrays end with their units, as in ``speed (m/s)``; arrays without one are numbers of something.
 
 Beside them a script that shows them, and no state file (``.pvsm``): only ParaView can write those, they hold all
 properties of one version and the absolute paths of the files.
@@ -9,7 +11,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +31,11 @@ if TYPE_CHECKING:
 _COLLECTION, _SCRIPT = "walkers.pvd", "show.py"
 _WIDE, _AROUND = 16.0 / 9.0, 1.15  # width over height of the view; its extent over that of what the beads reach
 _NECK = 0.45  # radius of what is drawn of a bridge over that of the smallest bead
-_SCALES = {"speed": "speed (m/s)", "radius": "radius (m)", "velocity": "velocity (m/s)", "omega": "omega (rad/s)"}
-"""Titles of colour scales; others are numbers of something."""
+_UNITS = {
+    **{"speed": "m/s", "velocity": "m/s", "omega": "rad/s", "radius": "m", "gap": "m", "normal_force": "N"},
+    "liquid": "m^3",
+}
+"""Of arrays."""
 
 
 def write_vtk(
@@ -59,7 +64,8 @@ def write_vtk(
     Returns
     -------
     Path
-        The ``.pvd`` file: its times are seconds; part 0 the beads, part 1 the boundary, part 2 the bridges.
+        The ``.pvd`` file: its times are seconds, each with the blocks ``beads``, ``boundary`` and, where they were
+        recorded, ``bridges``.
     """
     destination = destination or directory / "vtk"
     motion, place = _shown(directory, as_placed=as_placed), destination.resolve()
@@ -70,11 +76,12 @@ def write_vtk(
     try:
         beside.chmod(0o755)
         for frame, meshes in _frames(motion, every or motion.case.run.samples_per_cycle):
-            for part, (kind, mesh) in enumerate(meshes.items()):
-                file = f"{kind}_{frame:06d}.vtp"
-                _save(mesh, beside / file)
-                time = float(motion.time[frame])
-                entries.append(f'    <DataSet timestep="{time!r}" group="" part="{part}" file="{file}" />')
+            files = {kind: f"{kind}_{frame:06d}.vtp" for kind in meshes}
+            for kind, mesh in meshes.items():
+                _save(mesh, beside / files[kind])
+            write_text(beside / f"frame_{frame:06d}.vtm", _blocks(files))
+            time = float(motion.time[frame])
+            entries.append(f'    <DataSet timestep="{time!r}" group="" part="0" file="frame_{frame:06d}.vtm" />')
             if vtu:
                 meshes["beads"].cast_to_unstructured_grid().save(beside / f"beads_{frame:06d}.vtu")
         head = '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>'
@@ -103,9 +110,10 @@ def write_paraview(
     names = set(beads_at(driven, 0).array_names)
     if (bridges := next(read_bridges(driven), None)) is not None:
         names.update(*(one.point_data(driven)(bridges) for one in analyses_of(driven.case)))
+    known = {name.partition(" (")[0]: name for name in names}
     colour = colour or ("walker" if driven.walkers else "speed")
-    if colour not in names:
-        raise refused("--colour", f"{colour!r}: expected one of {', '.join(sorted(names))}")
+    if colour not in known:
+        raise refused("--colour", f"{colour!r}: expected one of {', '.join(sorted(known))}")
     folder = write_vtk(directory, destination=destination, **options).parent
     write_text(folder / _SCRIPT, _script(driven, colour, folder.resolve()))
     return folder / _SCRIPT
@@ -141,7 +149,7 @@ def _check_replaceable(place: Path) -> None:
     """Only a folder that this module wrote, or an empty one, may be replaced."""
     held = ""
     if place.is_dir():
-        ours = {".vtp", ".vtu", Path(_COLLECTION).suffix}
+        ours = {".vtp", ".vtm", ".vtu", Path(_COLLECTION).suffix}
         names = [path.name for path in place.iterdir() if path.suffix not in ours and path.name != _SCRIPT]
         held = f"it holds {names[0]}" if names else ""
     elif place.exists():
@@ -149,6 +157,20 @@ def _check_replaceable(place: Path) -> None:
     if held:
         expected = "expected a new or empty folder, or one that walkers export wrote before"
         raise refused(place, f"{expected}; {held}")
+
+
+def _blocks(files: Mapping[str, str]) -> str:
+    """A file of VTK's that joins others, by the names of its blocks."""
+    lines = [
+        f'    <DataSet index="{at}" name="{kind}" file="{file}"/>' for at, (kind, file) in enumerate(files.items())
+    ]
+    head = '<VTKFile type="vtkMultiBlockDataSet" version="1.0" byte_order="LittleEndian">\n  <vtkMultiBlockDataSet>'
+    return "\n".join(["<?xml version='1.0'?>", head, *lines, "  </vtkMultiBlockDataSet>", "</VTKFile>"])
+
+
+def _named(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """Arrays by their names with units."""
+    return {f"{name} ({_UNITS[name]})" if name in _UNITS else name: one for name, one in arrays.items()}
 
 
 def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, pv.PolyData]]]:
@@ -163,7 +185,7 @@ def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, pv.Poly
         meshes = {"beads": beads_at(motion, frame), "boundary": walls.translate(motion.substrate[frame])}
         if following is not None and following.frame == frame:
             for one in further:
-                meshes["beads"].point_data.update(one(following))
+                meshes["beads"].point_data.update(_named(one(following)))
             meshes["bridges"] = bridges_at(motion, following)
         yield frame, meshes
 
@@ -171,8 +193,8 @@ def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, pv.Poly
 def beads_at(motion: Motion, frame: int) -> pv.PolyData:
     """Beads of a frame as points, positions in the frame of the run, SI units.
 
-    Point data: ``bead`` (number, from 0), ``walker`` (its number, -1 for none), ``radius``, ``large``, ``omega``, and
-    ``velocity`` and ``speed`` relative to the boundary.
+    Point data: ``bead`` (number, from 0), ``walker`` (its number, -1 for none), ``radius (m)``, ``large``,
+    ``omega (rad/s)``, and ``velocity (m/s)`` and ``speed (m/s)`` relative to the boundary.
     """
     import pyvista as pv
 
@@ -186,28 +208,36 @@ def beads_at(motion: Motion, frame: int) -> pv.PolyData:
         "speed": np.linalg.norm(motion.velocity[frame], axis=1),
         "omega": motion.spin[frame],
     }
-    for name, values in arrays.items():
+    for name, values in _named(arrays).items():
         mesh.point_data[name] = np.ascontiguousarray(values)
     return mesh
 
 
 def bridges_at(motion: Motion, bridges: Bridges) -> pv.PolyData:
-    """Bridges of a frame as lines with ``gap`` (m), ``normal_force`` (N), ``touching`` and ``walker`` (first bead's).
+    """Bridges of a frame as lines, from centre to centre, or from a centre to the nearest point of the wall.
 
-    A line joins two centres, or a centre and the nearest point of the wall.
+    Cell data: ``bead_1`` and ``bead_2`` (numbers of beads, from 0; -1 for a wall), ``wall`` (its number, -1 for none),
+    ``gap (m)``, ``normal_force (N)``, ``touching`` and ``walker`` (the first bead's).
     """
     import pyvista as pv
 
-    centres = motion.position[bridges.frame]
+    centres, pairs = motion.position[bridges.frame], np.sort(bridges.beads, axis=1)
     held = centres[bridges.wall_beads]
     feet = np.stack([held - wall.distances(held)[:, None] * wall.normals(held) for wall in motion.case.boundary.walls])
     walls = np.stack([held, feet[bridges.walls, np.arange(len(held))]], axis=1)
-    ends = np.concatenate([centres[bridges.beads], walls]) + motion.substrate[bridges.frame]
+    ends = np.concatenate([centres[pairs], walls]) + motion.substrate[bridges.frame]
     mesh = pv.line_segments_from_points(ends.reshape(-1, 3))
-    gap = mesh.cell_data["gap"] = np.concatenate([bridges.gap, bridges.wall_gap])
-    mesh.cell_data["normal_force"] = np.concatenate([bridges.force, bridges.wall_force])
-    mesh.cell_data["touching"] = (gap <= 0.0).astype(np.int64)
-    mesh.cell_data["walker"] = motion.walker_of[np.concatenate([bridges.beads[:, 0], bridges.wall_beads])]
+    first, gap = np.concatenate([pairs[:, 0], bridges.wall_beads]), [bridges.gap, bridges.wall_gap]
+    arrays = {
+        "bead_1": first,
+        "bead_2": np.concatenate([pairs[:, 1], np.full(len(held), -1)]),
+        "wall": np.concatenate([np.full(len(pairs), -1), bridges.walls]),
+        "gap": np.concatenate(gap),
+        "normal_force": np.concatenate([bridges.force, bridges.wall_force]),
+        "touching": (np.concatenate(gap) <= 0.0).astype(np.int64),
+        "walker": motion.walker_of[first],
+    }
+    mesh.cell_data.update(_named(arrays))
     return mesh
 
 
@@ -224,8 +254,9 @@ def _script(motion: Motion, colour: str, folder: Path) -> str:
         name=_SCRIPT,
         collection=_COLLECTION,
         folder=str(folder),
-        colour=colour,
-        scale=_SCALES.get(colour),
+        colour=next(iter(_named({colour: motion.radius}))),
+        radius=next(iter(_named({"radius": motion.radius}))),
+        has_unit=colour in _UNITS,
         largest=None if vectors is None else np.percentile(np.linalg.norm(vectors, axis=-1), 99.0),
         rounds=48 if len(motion.radius) < 100 else 24,
         neck=_NECK * float(motion.radius.min()),

@@ -122,7 +122,7 @@ class FinishedRun:
     @property
     def layout(self) -> Layout:
         """What the dumps of the first segment hold."""
-        return layout_of(self.directory / FIRST_SEGMENT)
+        return layout_of(self.segments[0])
 
 
 def case_of(directory: Path) -> Case:
@@ -137,8 +137,23 @@ def layout_of(segment: Path) -> Layout:
 
 
 def segment_directories(directory: Path) -> list[Path]:
-    """The whole segments of a run, in their order."""
-    return sorted(path for path in (directory / SEGMENTS).glob("[0-9]*") if not path.suffix)
+    """The whole segments of a run, in their order; that of a deck that was run by hand is the directory itself."""
+    found = sorted(path for path in (directory / SEGMENTS).glob("[0-9]*") if not path.suffix)
+    return found or ([directory] if (directory / SEGMENT_NAME).is_file() else [])
+
+
+def run_of(segment: Path) -> Path:
+    """The run directory that a segment is of."""
+    return segment.parent.parent if segment.parent.name == SEGMENTS else segment
+
+
+def files_of_segments(directory: Path) -> list[str]:
+    """What engines were given and wrote for a run, as paths within its directory."""
+    found = [path for segment in segment_directories(directory) for path in segment.iterdir() if path.is_file()]
+    layouts = (layout_of(segment) for segment in segment_directories(directory)[:1])
+    dumps = {name for one in layouts for name in (one.bead_dump, one.pair_bridge_dump, one.wall_bridge_dump)}
+    by_hand = [directory] == segment_directories(directory)  # with tables and pictures beside
+    return [path.relative_to(directory).as_posix() for path in found if not by_hand or path.name in dumps]
 
 
 def finished_run(directory: Path) -> FinishedRun | None:

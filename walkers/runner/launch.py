@@ -141,6 +141,13 @@ def last_step(log: Path) -> int:
     return int(lines[-1][0]) if lines else 0
 
 
+def judge(deck: Deck, directory: Path, log: Path) -> EngineReport:
+    """Judge by its log and its dumps a deck that an engine ran which nobody watched; failures are those of `launch`."""
+    watch = _Watch(deck, directory, Path("liggghts"), None)
+    watch.log = log
+    return watch.verdict(0)
+
+
 def check_room(folder: Path, needed: int) -> None:
     """Raise `DiskFull` unless so many bytes, and some more, are free where a folder is."""
     free = shutil.disk_usage(folder).free

@@ -27,14 +27,16 @@ _MOST_THREADS = 4
 
 
 def write_manifest(
-    case: Case, name: str, engine: Engine, report: EngineReport, *, started: float, directory: Path, **more: Any
+    case: Case, name: str, engine: Engine | None, report: EngineReport, *, started: float, directory: Path, **more: Any
 ) -> None:
     """Write the manifest of a run, all of whose files are in its directory but this one.
 
     The run was ``started`` so many seconds after the epoch, and took the engine, in all calls, what its report says.
+    Of an engine that was started by hand (None) only the version is known.
     """
     finished = time.time()
-    audit, plugin = read_audit(engine.sha256), plugin_of(engine)
+    audit = read_audit(engine.sha256) if engine else None
+    plugin = plugin_of(engine) if engine else None
     paths = [path for path in sorted(directory.rglob("*")) if path.is_file()]
     files = {path.relative_to(directory).as_posix(): path.stat().st_size for path in paths}
     contents = {
@@ -43,13 +45,13 @@ def write_manifest(
         "name": case.name,
         "run": name,
         "engine": {
-            "path": str(engine.path),
+            "path": str(engine.path) if engine else "",
             "version": report.version,
-            "sha256": engine.sha256,
+            "sha256": engine.sha256 if engine else "",
             "audit": audit.summary() if audit else None,
         },
         "deck_version": CONTENT_VERSION,
-        "contact_model": {"path": str(plugin), "sha256": checksum(plugin)},
+        "contact_model": {"path": str(plugin), "sha256": checksum(plugin)} if plugin else None,
         **_made_by(),
         "host": platform.node(),
         "platform": platform.platform(),

@@ -1,11 +1,13 @@
 """What a case amounts to before it is run: its numbers in SI, its forces, its time step and its cost.
 
-The cost is predicted from measurements on one core of a 2020s x86 server (docs/explanation/performance.md).
+The cost is predicted from measurements of CPU time on one core of a 2020s x86 server
+(docs/explanation/performance.md).
 """
 
 from __future__ import annotations
 
-from math import ceil, isfinite, pi
+from collections.abc import Iterable
+from math import ceil, inf, isfinite, pi
 from typing import Any
 
 from walkers.inputs.bodies import Walkers
@@ -18,25 +20,30 @@ from walkers.inputs.text import printable
 from walkers.physics.capillary import capillary_force_limit_at_wall
 from walkers.physics.time_step import auto_fractions
 from walkers.physics.units import ACCELERATION_OF_ONE_G
-from walkers.templates.deck import settling_steps
+from walkers.templates.deck import RESTING_SEGMENTS, settling_steps
 
-START_UP_SECONDS = 0.1
-_STEP_MICROSECONDS = 2.2
-_WALKER_MICROSECONDS = 0.54
-"""2.7 µs a step for one walker, 5.5 for 6, 15 for 24, 53 for 96, in either frame."""
-_BEAD_STEPS_PER_SECOND = 6e6
-"""Of loose beads: 32,500 steps a second with 200 of them alone on a quiet machine, a tenth less beside another run."""
+START_UP_SECONDS = 0.04
+_STEP_MICROSECONDS = 0.9
+_WALKER_MICROSECONDS = 0.22
+"""1.0 µs a step for one walker, 2.2 for 6, 6.2 for 24, 22 for 96, 2.6 for 9 in a tray."""
+_BEAD_STEPS_PER_SECOND = 7.5e6
+"""Of loose beads: 7.7 million with 60 of them."""
+_SOLVING_SECONDS = 0.27
+"""Of a shape of a bridge that was never solved."""
+_MEASURING_SECONDS = 0.037
+"""Of the tables and the result of a run."""
+PROGRAM_SECONDS = 1.5
+"""Of what a program loads before and while it runs cases."""
 _LOOSE_PACKING = 0.55
 _FASTEST_CLIMB = 12e-3
 """m/s; of some hundred climbs in glycerol at the paper's drive none was faster."""
 _GAIN_PER_RANK = 0.9
-_RESTING_SEGMENTS = 3
-_TRIED_AGAIN = (1.0, 0.17, 0.08)
+_TRIED_AGAIN = (1.0, 0.1, 0.1)
 """Share of the runs that end when their velocities are constant that are made a first, a second and a third time."""
 
 
 def predicted_seconds(case: Case, walkers: int | None = None) -> float:
-    """Wall time in s of a run, or of a deck, on as many cores as it has MPI processes.
+    """Time in s that the engine takes for a run, or a deck, on as many cores as it has MPI processes.
 
     Parameters
     ----------
@@ -47,14 +54,31 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
     """
     run = case.run
     cycles = sum(share * cycles for share, cycles in zip(_TRIED_AGAIN, run.attempts, strict=False))
-    segments = ceil(run.cycles / run.cycles_per_segment) + (_RESTING_SEGMENTS if run.rests else 0)
-    steps = cycles * run.steps_per_cycle + (_RESTING_SEGMENTS * settling_steps(case) if run.rests else 0)
+    segments = ceil(run.cycles / run.cycles_per_segment) + (RESTING_SEGMENTS if run.rests else 0)
+    steps = cycles * run.steps_per_cycle + (RESTING_SEGMENTS * settling_steps(case) if run.rests else 0)
     count = pairs_of_beads(case) if walkers is None else walkers
     if case.loose:
         seconds_a_step = case.count / (_BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1)))
     else:
         seconds_a_step = (_STEP_MICROSECONDS + _WALKER_MICROSECONDS * count) * 1e-6
     return START_UP_SECONDS * segments + steps * seconds_a_step
+
+
+def predicted_overhead(cases: Iterable[Case]) -> float:
+    """CPU time in s of what is done for runs besides the engine's work: bridges are solved, motions are measured."""
+    from walkers.physics.bridge import Surfaces
+    from walkers.physics.laws.young_laplace import unsolved
+
+    cases = list(cases)
+    kinds = {(one.liquid, one.contact.minimum_separation_ratio, tuple(sorted(set(one.radii)))) for one in cases}
+    bridges = [
+        Surfaces.of(radius, other, liquid, ratio)
+        for liquid, ratio, radii in kinds
+        if liquid.law.startswith("young-laplace")
+        for place, radius in enumerate(radii)
+        for other in (inf, *radii[place:])
+    ]
+    return _SOLVING_SECONDS * unsolved(bridges) + _MEASURING_SECONDS * len(cases)
 
 
 def pairs_of_beads(case: Case) -> int:
@@ -127,7 +151,7 @@ def summarise(case: Case) -> dict[str, Any]:
             "samples": run.steps // run.steps_per_sample + 1,
             "until_steady": run.until_steady,
             "segments": -(-run.cycles // run.cycles_per_segment),
-            "predicted_seconds": predicted_seconds(case),
+            "predicted_seconds": predicted_seconds(case) + predicted_overhead([case]),
         },
     }
     if case.walkers and len(case.walkers[0].radii) == 2:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, prod
 from textwrap import wrap
@@ -30,6 +30,7 @@ _LEAST_ASYMMETRIES = 3  # different radii are shown by sin δ from so many on
 _MOST_PANELS = 12  # more combinations of what is left are not told apart by panels
 _MARKERS = "osD^vXP<>*"
 _MODELS = (("--", "_"), (":", "+"))  # of each model the line, and the symbol where points are not joined
+_CURVE, _BEYOND = 61, 0.04  # points of a curve of a model; how far it goes beyond the points, over their range
 _FEW_COLOURS = 6  # more come from a map of colours rather than from the style
 _MOST_COLOURS = 12  # numbers with more values have a scale of colours rather than a legend
 _ROUNDING = 1e-12  # of numbers, over the largest
@@ -87,6 +88,10 @@ class Layout:
     untold: Sequence[str] = ()
 
 
+Curves = Callable[[npt.NDArray[np.int64], Factor, FloatArray], Mapping[str, FloatArray]]
+"""From rows that differ along x alone, and values of x, to what models predict there; nothing where none can."""
+
+
 @dataclass(frozen=True)
 class Drawn:
     """A column of a table in readable units, its errors, and what models predict, row by row; the axis's label."""
@@ -95,6 +100,8 @@ class Drawn:
     values: FloatArray
     errors: FloatArray
     theory: Mapping[str, FloatArray] = field(default_factory=dict)
+    curves: Curves | None = None
+    """What models predict between and beyond the points of some rows, for a factor along x."""
 
 
 def factors_of(table: pd.DataFrame) -> list[Factor]:
@@ -277,7 +284,7 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
     shared = {"sharey": True, "sharex": len(layout.x) == 1}
     figure, grid = new_figure(width, height, nrows=rows, ncols=columns, squeeze=False, **shared)
     for axes, (number, (x, here, name)) in zip(grid.flat, enumerate(parts), strict=False):
-        _panel(axes, x, here, drawn, colours)
+        _panel(axes, x, here, drawn, colours, log)
         axes.set_title(plain_text(name))
         if len(layout.x) > 1 or number + columns >= len(parts):  # nothing is below
             axes.set_xlabel(plain_text(x.label))
@@ -317,7 +324,7 @@ class _Colours:
             self.looks.append({"marker": marker, "color": colour, "mfc": face, "ms": 4.5})
 
 
-def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, colours: _Colours) -> None:
+def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, colours: _Colours, log: str) -> None:
     """Means with their errors, joined by lines unless a theory's are there, and the theory's values."""
     places = np.array(x.values if x.is_number else [x.levels.index(one) for one in x.values], float)
     count = len(colours.levels)
@@ -332,10 +339,23 @@ def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, col
         bars: Any = errors if np.isfinite(errors).any() and errors_seen(drawn.errors, drawn.values) else None
         line = "-" if joined and not drawn.theory else "none"
         axes.errorbar(places[rows] + aside, y, yerr=bars, capsize=2, lw=0.9, ls=line, **look)
-        for model, values in enumerate(drawn.theory.values()):
-            axes.plot(places[rows] + aside, values[rows], zorder=1, **_model_look(model, joined, look["color"]))
+        along = _along_axis(x, log) if joined and drawn.curves else places[rows] + aside
+        curves = drawn.curves(rows, x, along) if joined and drawn.curves else {}
+        for model, (name, values) in enumerate(drawn.theory.items()):
+            at, shown = (along, curves[name]) if name in curves else (places[rows] + aside, values[rows])
+            axes.plot(at, shown, zorder=1, **_model_look(model, joined, look["color"]))
     if np.nanmin(drawn.values) <= 0.0 <= np.nanmax(drawn.values):
         axes.axhline(0.0, color="0.4", lw=0.6, zorder=0)
+
+
+def _along_axis(x: Factor, log: str) -> FloatArray:
+    """Where curves along x are drawn: a little beyond its smallest and largest values."""
+    low, high = x.levels[0], x.levels[-1]
+    if "x" in log and low > 0.0:
+        beyond = (high / low) ** _BEYOND
+        return np.geomspace(low / beyond, high * beyond, _CURVE)
+    beyond = _BEYOND * (high - low)
+    return np.linspace(low - beyond if low <= 0.0 else max(low - beyond, 0.1 * low), high + beyond, _CURVE)
 
 
 def _model_look(number: int, joined: bool, colour: Any) -> dict[str, Any]:

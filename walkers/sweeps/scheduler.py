@@ -35,7 +35,7 @@ from walkers.postprocess.analysis import current_result
 from walkers.runner.binary import Engine, find_engine
 from walkers.runner.directory import is_locked, run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
-from walkers.runner.summary import pairs_of_beads, predicted_seconds
+from walkers.runner.summary import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
 from walkers.sweeps.making import check_audit, make_runs
 from walkers.sweeps.site import Site, check_path, pilots
 from walkers.sweeps.table import (
@@ -239,12 +239,14 @@ class SweepPlan:
     final: list[Failure]
 
     def as_text(self) -> str:
-        """The plan in a few lines, with the predicted time of the engines, over all of their MPI processes."""
+        """The plan in a few lines, with the predicted CPU time of all processes."""
         record, at_once = self.record, self.options.decks_at_once
         missing = {point for deck in self.decks for point in deck.points}
+        besides = PROGRAM_SECONDS + predicted_overhead(self.cases[point] for point in missing)
         seconds = sum(deck.seconds * max(self.cases[point].run.ranks for point in deck.points) for deck in self.decks)
         apart = sum(predicted_seconds(self.cases[point]) * self.cases[point].run.ranks for point in missing)
-        until = makespan((deck.seconds for deck in self.decks), at_once)
+        # Python works for one deck at a time, while the engines of others run.
+        until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
         told = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
         keys = ", ".join(with_unit(key, unit) for key, unit in record.units.items())
         at_most = "at most " if record.descent else ""
@@ -253,7 +255,7 @@ class SweepPlan:
             f"  varied     {keys or 'nothing'}",
             f"  points     {len(record.runs)}: {told}",
             f"  to do      {at_most}{len(missing)} points in {len(self.decks)} decks",
-            f"  predicted  {at_most}{seconds:.0f} core-seconds ({apart:.0f} with a deck a point), "
+            f"  predicted  {at_most}{seconds + besides:.0f} core-seconds ({apart + besides:.0f} with a deck a point), "
             f"{until:.0f} s with {at_once} at once",
             f"  directory  {record.directory}",
         ]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import ceil, inf, pi, prod, sqrt
 
 from walkers.inputs.case import Case
@@ -12,6 +13,7 @@ from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import rendered
+from walkers.physics.matter import Contact
 from walkers.templates.layout import (
     BEAD_COLUMNS,
     MEAN_SPIN_COLUMNS,
@@ -22,7 +24,20 @@ from walkers.templates.layout import (
     Layout,
     PlacedWalker,
 )
-from walkers.templates.scene import Scene, place, surface_of
+from walkers.templates.parameters import (
+    PRINTED,
+    STATUS_LINES_PER_CYCLE,
+    Parameter,
+    along,
+    in_cycles,
+    number,
+    of_contacts,
+    of_drive,
+    of_liquid,
+    of_time,
+    suffixes,
+)
+from walkers.templates.scene import Scene, Surface, place, surface_of
 
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
@@ -30,14 +45,21 @@ LAYOUT_NAME = "layout.json"
 BRIDGES_NAME = "bridges.txt"
 LOADS_NAME = "loads.txt"
 RUN_NAME = "run.sh"
-STATUS_LINES_PER_CYCLE = 4
+SCALED_NAME = "bridges.scaled.txt"
+SCALE_NAME = "scale.awk"
+"""What writes the tables anew, for a tension or viscosity that was changed by hand: beside decks to be run by hand."""
 CONTENT_VERSION = 7
-"""Of what decks compute: to be raised where the same case gives another deck, comments aside. Runs are named by it."""
+"""Of what decks compute, by which runs are named: to be raised where a case gives other numbers.
+
+Decks that compute the same numbers bit for bit in other words keep it.
+"""
 
 RESTART_NAME = "state.restart"
 PREVIOUS_RESTART_NAME = "previous.restart"
 SETTLING_SECONDS = 0.05
 """Length of the segments in which beads come to rest; at the end of each we check whether they have."""
+RESTING_SEGMENTS = 3
+"""So many of them were enough in the piles that were made."""
 _STIFFEST = 1e9
 """Pa; no case has stiffer contacts, but a check may."""
 _MOST_BINS = 3e7
@@ -119,7 +141,13 @@ def first_segment(case: Case) -> Segment:
     run = case.run
     if run.rests:
         return Segment(0, settling_steps(case), None)
-    return Segment(0, min(run.cycles_per_segment, run.cycles) * run.steps_per_cycle, 0)
+    return Segment(0, min(run.cycles_per_segment, run.attempts[0]) * run.steps_per_cycle, 0)
+
+
+def whole(case: Case) -> Segment:
+    """A run at a stretch, as by hand: a rest that is enough for most piles, and the cycles that are tried first."""
+    rest = RESTING_SEGMENTS * settling_steps(case) if case.run.rests else 0
+    return Segment(0, rest + case.run.attempts[0] * case.run.steps_per_cycle, rest)
 
 
 def next_segment(case: Case, segment: Segment) -> Segment | None:
@@ -192,7 +220,6 @@ def compose(plan: Plan) -> Deck:
     from walkers.templates.bridge_tables import UnusableLawError, bridge_tables
 
     case, scene = plan.case, plan.scene
-    first = case.drive.harmonics[0]
     layout = _layout(plan)
     surfaces = scene.surfaces or (surface_of(case),)
     several = len(scene.loadings) > 1
@@ -206,6 +233,8 @@ def compose(plan: Plan) -> Deck:
     space = prod(high - low for low, high in zip(scene.lower, scene.upper, strict=True))
     pair_columns = " ".join(PAIR_BRIDGES).split()
     moduli = [*(contact.youngs_modulus for contact in contacts), case.contact.youngs_modulus]
+    given, derived = _parameters(plan, surfaces)
+    named = {one.name: one.value for one in (*given, *derived)}
     text = rendered(
         "walkers.templates",
         "walker.lig.j2",
@@ -215,19 +244,27 @@ def compose(plan: Plan) -> Deck:
         recording=plan.recording,
         layout_name=LAYOUT_NAME,
         bridges_name=BRIDGES_NAME,
+        scaled_name=SCALED_NAME,
+        scale_name=SCALE_NAME,
+        given=given,
+        derived=derived,
+        printed=PRINTED,
+        named=named,
+        run_steps=_run_steps(plan, named),
+        in_cycles=partial(in_cycles, steps_per_cycle=case.run.steps_per_cycle),
         run_name=RUN_NAME,
         types=len(surfaces) + 1,
-        moduli=moduli,
+        ends_of_harmonics=suffixes(len(case.drive.harmonics)),
+        moduli=" ".join(["${youngs_modulus}"] * len(moduli) if "youngs_modulus" in named else map(number, moduli)),
         stiff=max(moduli) > _STIFFEST,
-        friction=_pairs([(one.friction_bead_bead, one.friction_bead_wall) for one in contacts]),
-        rolling_friction=_pairs([(one.rolling_friction,) * 2 for one in contacts]),
-        restitution=_pairs([(one.restitution,) * 2 for one in contacts]),
+        friction=_coefficients(contacts, named, "friction_bead_bead", "friction_bead_wall"),
+        rolling_friction=_coefficients(contacts, named, "rolling_friction"),
+        restitution=_coefficients(contacts, named, "restitution"),
         down=[component / case.gravity for component in case.gravity_vector] if case.gravity else [],
         plan=plan,
         shaken=plan.drive_from is not None,
         several=several,
-        # Of a drive that moves the walls; it has one harmonic.
-        peak_velocity=[first.peak_velocity * component for component in first.direction],
+        along=along,
         loads_name=LOADS_NAME,
         pair_bridge_terms=[f"c_pair_bridges[{pair_columns.index(one) + 1}]" for one in layout.pair_bridge_columns],
         wall_bridge_terms=[f"f_walls[{WALL_BRIDGES.index(one) + 1}]" for one in layout.wall_bridge_columns],
@@ -258,14 +295,40 @@ def _loads(scene: Scene) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _pairs(surfaces: Sequence[tuple[float, float]]) -> list[float]:
-    """A coefficient for every pair of atom types, of each surface's value against itself and against the walls.
+def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter], list[Parameter]]:
+    """The named parameters of a deck, and what follows from them."""
+    case, recording, begin = plan.case, plan.recording, plan.drive_from
+    several = len(plan.scene.loadings) > 1
+    drive, of_it = of_drive(case.drive, amplitudes=begin is not None and not several)
+    stable = min(limits_of(case).as_dict().values())
+    time, of_that = of_time(case, None if recording.begin else begin, recording.steps, stable)
+    given = [*drive, *time]
+    if case.gravity > 0.0 and not several:
+        given.append(Parameter("gravity", number(case.gravity), "m/s^2"))
+    if not plan.checkpoint.read:
+        given.append(Parameter("density", number(case.density), "kg/m^3", "of the beads"))
+    given += of_contacts(case, [contact for contact, _ in surfaces])
+    if len(surfaces) == 1:
+        given += of_liquid(surfaces[0], min(bead.radius for bead in plan.scene.beads))
+    return given, [*of_it, *of_that]
+
+
+def _run_steps(plan: Plan, named: Mapping[str, str]) -> str:
+    """The number of steps, by the parameters that it follows from."""
+    if "cycles" not in named:
+        return str(plan.recording.steps)
+    return f"$({'v_rest_steps+' if 'rest_steps' in named else ''}v_cycles*v_steps_per_cycle)"
+
+
+def _coefficients(contacts: Sequence[Contact], named: Collection[str], of_beads: str, of_walls: str = "") -> list[str]:
+    """A coefficient for every pair of atom types, of each surface against itself and against the walls, or its name.
 
     The walls come last. Beads of different surfaces never meet.
     """
-    wall = len(surfaces)
+    wall, names = len(contacts), (of_beads, of_walls or of_beads)
+    values = [[f"${{{name}}}" if name in named else number(getattr(one, name)) for name in names] for one in contacts]
     return [
-        surfaces[min(one, other, wall - 1)][int(max(one, other) == wall)]
+        values[min(one, other, wall - 1)][int(max(one, other) == wall)]
         for one in range(wall + 1)
         for other in range(wall + 1)
     ]

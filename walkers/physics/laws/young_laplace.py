@@ -12,8 +12,9 @@ The resistances are those of `walkers.physics.reynolds`.
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterable
 from contextlib import suppress
-from functools import lru_cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -27,6 +28,7 @@ from walkers.physics.bridge import Curve, FloatArray, Surfaces
 NODES = (24, 48, 96)
 """Gaps at which the equation is solved: as many as the last coefficients tell, of which the largest suffices for
 errors below 1e-7 of the pull at contact at volumes above 1e-6 R³."""
+_Shape = tuple[float, float, float]
 _SMALL = 1e-9
 """Of the pull at contact: the last coefficients of a polynomial that is fine enough."""
 
@@ -40,8 +42,7 @@ def law(surfaces: Surfaces) -> Curve:
         If no bridge was found (a contact angle so large that the liquid is not held between them).
     """
     radius = surfaces.radius
-    shape = (surfaces.other_radius / radius, surfaces.volume / radius**3, surfaces.liquid.contact_angle)
-    farthest, smooth = _solved(*(float(f"{one:.14g}") for one in shape))
+    farthest, smooth = _solved(_shape(surfaces))
     rupture = radius * farthest
 
     def pull(gaps: FloatArray) -> FloatArray:
@@ -50,13 +51,35 @@ def law(surfaces: Surfaces) -> Curve:
     return reynolds.curve(surfaces, pull, rupture)
 
 
+def unsolved(bridges: Iterable[Surfaces]) -> int:
+    """How many shapes of bridges were never solved: each takes a quarter of a second."""
+    return sum(not _place(shape).is_file() for shape in {_shape(one) for one in bridges})
+
+
+def _shape(surfaces: Surfaces) -> _Shape:
+    """The other radius and the volume in units of the bead's radius, and the contact angle."""
+    radius, angle = surfaces.radius, surfaces.liquid.contact_angle
+    numbers = (surfaces.other_radius / radius, surfaces.volume / radius**3, angle)
+    other, volume, angle = (float(f"{one:.14g}") for one in numbers)
+    return other, volume, angle
+
+
+def _place(shape: _Shape) -> Path:
+    """Where the solution of a shape is kept."""
+    name = sha256(_solver() + repr((NODES, _SMALL, shape)).encode()).hexdigest()[:24]
+    return user_cache_path("granular-walkers") / "young-laplace" / f"{name}.npy"
+
+
+@cache
+def _solver() -> bytes:
+    """What is kept is of this solver."""
+    return Path(__file__).parents[1].joinpath("laplace.py").read_bytes()
+
+
 @lru_cache(maxsize=4096)
-def _solved(other_radius: float, volume: float, contact_angle: float) -> tuple[float, Chebyshev]:
+def _solved(shape: _Shape) -> tuple[float, Chebyshev]:
     """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's radius."""
-    shape = (other_radius, volume, contact_angle)
-    source = Path(__file__).parents[1].joinpath("laplace.py").read_bytes()  # what is kept is of this solver
-    name = sha256(source + repr((NODES, _SMALL, shape)).encode()).hexdigest()[:24]
-    place = user_cache_path("granular-walkers") / "young-laplace" / f"{name}.npy"
+    place = _place(shape)
     try:
         numbers = np.load(place)
     except (OSError, ValueError, EOFError):
@@ -69,7 +92,7 @@ def _solved(other_radius: float, volume: float, contact_angle: float) -> tuple[f
     return float(numbers[0]), Chebyshev(numbers[1:], domain=[0.0, 1.0])
 
 
-def _solve(shape: tuple[float, float, float]) -> FloatArray:
+def _solve(shape: _Shape) -> FloatArray:
     """The rupture distance, then the coefficients of the polynomial."""
     from walkers.physics.laplace import force_curve, rupture_distance
 

@@ -1,0 +1,130 @@
+"""Decks that are run by hand: what is written, what parameters do that are edited, what is read of what they leave."""
+
+import re
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import SHORT, call, make_case
+from walkers import load
+from walkers.inputs import InputError
+from walkers.sweeps.by_hand import take_in, write_folder
+
+
+def _edit(folder: Path, **values: str) -> None:
+    """Change parameters of a deck."""
+    deck = folder / "walker.lig"
+    text = deck.read_text()
+    for name, value in values.items():
+        text, count = re.subn(rf"(?m)^(variable +{name} string) \S+", rf"\g<1> {value}", text)
+        assert count == 1, name
+    deck.write_text(text)
+
+
+def _run(folder: Path, before: str = "") -> None:
+    """Run a deck as its script says, perhaps by another program."""
+    script = (folder / "run.sh").read_text().replace("exec ", f"exec {before} ", 1)
+    subprocess.run(["sh", "-c", script], cwd=folder, check=False)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Of a deck that was not run."""
+    write_folder(make_case(run=SHORT), tmp_path / "hand")
+    return tmp_path / "hand"
+
+
+def test_a_deck_run_by_hand_is_read_and_says_so(folder: Path, run_directory: Callable[..., Path]) -> None:
+    with pytest.raises(InputError, match=r"the deck was not run .*; do: cd .* && sh run\.sh"):
+        load(folder)
+    _run(folder)
+    found, same = load(folder), load(run_directory(run=SHORT))
+    assert found.result["by_hand"] == ["run by hand"]
+    assert {**found.result, "by_hand": 0} == {**same.result, "by_hand": 0}
+    assert "warning: run by hand" in found.describe()
+    assert found.case.document == make_case(run=SHORT).document
+    for command in ("run", "plot", "report", "export --to vtk", "check files"):
+        assert call(*command.split(), str(folder)).returncode == 0, command
+    written = (folder / "result.json").stat().st_mtime_ns
+    load(folder)
+    assert (folder / "result.json").stat().st_mtime_ns == written
+
+
+EDITED = {
+    "acceleration": ({"peak_acceleration": "29.4"}, {"drive": {"peak_acceleration": "29.4 m/s^2"}}),
+    "amplitude": ({"amplitude": "1.1636e-4"}, {"drive": {"peak_acceleration": "29.4 m/s^2"}}),
+    "friction": (
+        {"friction_bead_wall": "0.2", "restitution": "0.5"},
+        {"contact": {"friction": {"bead_bead": 0.1, "bead_wall": 0.2}, "restitution": 0.5}},
+    ),
+    "viscosity": ({"viscosity": "0.0092"}, {"liquid": {"viscosity_ratio": 2.0}}),
+    "tension": ({"surface_tension": "0.03"}, {"liquid": {"surface_tension": "30 mN/m"}}),
+    "length": ({"cycles": "9"}, {"run": {**SHORT, "cycles": 9, "settling_cycles": 3}}),
+    "frequency": ({"frequency": "70.0"}, {"drive": {"frequency": "70 Hz"}}),
+}
+
+
+@pytest.mark.parametrize("name", EDITED)
+def test_an_edited_parameter_is_another_case(name: str, folder: Path, run_directory: Callable[..., Path]) -> None:
+    edits, changes = EDITED[name]
+    _edit(folder, **edits)
+    _run(folder)
+    found, same = load(folder), load(run_directory(**{"run": SHORT, **changes}))
+    # Where the walker stands at first and its time step are those of the case as it was.
+    assert found.result["velocity"]["mean"] == pytest.approx(same.result["velocity"]["mean"], rel=5e-3)
+    assert found.case.drive.peak_acceleration == pytest.approx(same.case.drive.peak_acceleration, rel=1e-3)
+    assert found.case.contact == same.case.contact
+    assert found.case.run.period == pytest.approx(same.case.run.period)
+    (told,) = found.result["by_hand"][1:]
+    assert told.startswith("the deck was edited: ")
+    assert all(parameter in told for parameter in edits)
+    assert "other line" not in told
+
+
+def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None:
+    _run(folder)
+    first = load(folder).result["velocity"]["mean"]
+    _edit(folder, peak_acceleration="20.0")
+    deck = folder / "walker.lig"
+    deck.write_text(deck.read_text().replace("nve/sphere", "nve/sphere  # as ever").replace("delay 0", "delay 1"))
+    _run(folder)
+    again = load(folder)
+    assert again.result["velocity"]["mean"] < first
+    assert "peak_acceleration 20, was 39.2; 1 other line(s)" in again.result["by_hand"][1]
+
+
+FAILS = {
+    "an error of the engine": ({}, "pair_coeff      * *", "pair_coeff * * 3", "failed: the engine stopped: ERROR"),
+    "a time step beyond the limits": ({"steps_per_cycle": "400"}, "", "", "failed: .*blow-up"),
+    "steps that are no cycle": ({"time_step": "3e-6"}, "", "", "cannot be read .*not one cycle of 80 Hz"),
+    "a run that was stopped": ({"cycles": "4000"}, "", "", "still runs, or was stopped: the engine wrote"),
+}
+
+
+@pytest.mark.parametrize("name", FAILS)
+def test_a_run_by_hand_that_failed_is_told_in_one_message(name: str, folder: Path) -> None:
+    edits, old, new, told = FAILS[name]
+    _edit(folder, **edits)
+    deck = folder / "walker.lig"
+    deck.write_text(deck.read_text().replace(old, new))
+    _run(folder, "timeout 1" if name == "a run that was stopped" else "")
+    with pytest.raises(InputError, match=told) as caught:
+        take_in(folder)
+    assert len(str(caught.value).splitlines()) == 1
+    assert not (folder / "manifest.json").exists()
+
+
+LENGTHS = {
+    "fig1b": ("12", "stops here if the walkers are steady; if not, it runs again with 24, then 60 cycles"),
+    "pile-ci": ("36", "below 0.005 m/s"),
+}
+
+
+@pytest.mark.parametrize("name", LENGTHS)
+def test_a_deck_says_how_a_run_would_go_on(name: str) -> None:
+    cycles, told = LENGTHS[name]
+    deck = call("export", "--to", "deck", name).stdout
+    assert re.search(rf"^variable +cycles string {cycles} ", deck, re.MULTILINE)
+    assert told in deck

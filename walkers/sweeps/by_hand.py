@@ -1,0 +1,239 @@
+"""Decks that are run by hand: the folder that is written for one, and what its run leaves there, read as a run.
+
+The folder becomes the run directory, and its only segment. ``deck.json`` keeps the case and the deck as they were
+written; the engine prints the parameters that it reads, so that a deck whose parameters were edited is another case.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Collection, Mapping
+from dataclasses import fields, replace
+from functools import partial
+from math import isclose, isfinite, nan, pi
+from pathlib import Path
+from typing import Any
+
+from walkers.inputs.case import Case, settling_of
+from walkers.inputs.drive import Harmonic
+from walkers.inputs.errors import refused
+from walkers.inputs.origins import Origin
+from walkers.physics.matter import Contact
+from walkers.postprocess.analysis import tabulate
+from walkers.postprocess.dump import DumpError
+from walkers.runner.binary import find_engine, plugin_of, run_script
+from walkers.runner.directory import CASE_NAME, SEGMENT_NAME, layout_of, write_deck
+from walkers.runner.failures import EngineFailure, MissingFrames
+from walkers.runner.files import read_json, write_json
+from walkers.runner.launch import EngineReport, judge
+from walkers.runner.manifest import MANIFEST_NAME, write_manifest
+from walkers.templates.deck import (
+    DECK_NAME,
+    LAYOUT_NAME,
+    OUTPUT_NAME,
+    RUN_NAME,
+    SCALE_NAME,
+    Deck,
+    Segment,
+    render_deck,
+    whole,
+)
+from walkers.templates.parameters import PRINTED, suffixes
+
+RECORD_NAME = "deck.json"
+"""In the folder of a deck to be run by hand: its case and its text as they were written."""
+_LOGS = (OUTPUT_NAME, "log.liggghts")
+"""Where `run_script` lets the engine's output go, and what LIGGGHTS writes anyhow."""
+_PRINTED = re.compile(rf"^{PRINTED} (.+)$", re.MULTILINE)
+_GIVEN = re.compile(r"^variable +(\w+) string ([-+.\de]+)(?: |$)", re.MULTILINE)
+_VARIABLE = re.compile(r"variable (\w+) string")
+_SAME = 1e-9
+_OF_LIQUID = {"surface_tension": "surface_tension", "viscosity": "dynamic_viscosity"}
+_KEYS = {
+    **{name: f"drive.{name}" for name in ("frequency", "peak_acceleration", "phase")},
+    **{f"friction_{of}": f"contact.friction.{of}" for of in ("bead_bead", "bead_wall")},
+    **{name: f"contact.{name}" for name in ("restitution", "rolling_friction", "youngs_modulus", "poissons_ratio")},
+    **{name: f"liquid.{key}" for name, key in _OF_LIQUID.items()},
+    **{"gravity": "environment.gravity", "density": "beads.density", "cycles": "run.cycles"},
+}
+"""Of a case, for parameters of a deck."""
+_SCALE = """# Writes tables for another surface tension and viscosity: the deck gives the factors pull and resistance.
+/^[-+.0-9]/ { printf "%s", $1; printf " %.12g", pull * $2; for (i = 3; i <= NF; i++) printf " %.12g", resistance * $i
+              printf "\\n"; next }
+{ print }
+"""
+
+
+def write_folder(case: Case, folder: Path) -> Path:
+    """Write the deck of a case's whole run with all that it needs into a new folder, and return the deck's path.
+
+    `InputError` if the folder is there or cannot be made; errors of `find_engine` and `plugin_of`.
+    """
+    deck, plugin = render_deck(case, whole(case)), plugin_of(find_engine())
+    try:
+        folder.mkdir(parents=True)
+    except OSError as error:
+        raise refused(folder, f"expected a folder that can be made ({error.strerror})") from error
+    write_deck(deck, folder)
+    (folder / SCALE_NAME).write_text(_SCALE, encoding="utf-8")
+    (folder / RUN_NAME).write_text(run_script(plugin, deck.layout.ranks), encoding="utf-8")
+    write_json(folder / RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
+    return folder / DECK_NAME
+
+
+def is_deck_folder(folder: Path) -> bool:
+    """Whether `write_folder` wrote a folder."""
+    return (folder / RECORD_NAME).is_file() and (folder / DECK_NAME).is_file()
+
+
+def take_in(folder: Path) -> None:
+    """Make a run directory of the folder of a deck that was run by hand; nothing if it is one of the last run there.
+
+    Raises
+    ------
+    InputError
+        If the deck was not run, is still running, or failed; or its files cannot be read.
+    """
+    if _is_current(folder):
+        return
+    try:
+        record = read_json(folder / RECORD_NAME)
+        case, written = Case.from_dict(record["case"]), str(record["deck"])
+        now = (folder / DECK_NAME).read_text(encoding="utf-8", errors="surrogateescape")
+        logs = [folder / name for name in _LOGS if (folder / name).is_file()]
+        if not logs:
+            expected = f"expected a log of the engine, {' or '.join(_LOGS)}"
+            raise refused(folder, f"the deck was not run ({expected}); do: cd {folder} && sh {RUN_NAME}")
+        log = max(logs, key=lambda path: path.stat().st_mtime_ns)
+        said = log.read_text(encoding="utf-8", errors="replace")
+        ran, segment, changes = _as_run(case, written, now, said)
+        deck = render_deck(ran, segment)
+        _write(folder, ran, deck, segment, _judged(deck, folder, log), changes)
+    except (OSError, ValueError, KeyError, TypeError, DumpError) as error:
+        raise refused(folder, f"the deck that was run by hand cannot be read ({error})") from error
+
+
+def _is_current(folder: Path) -> bool:
+    """Whether the folder is a run directory, and was made one after the deck was edited or run last."""
+    try:
+        layout, made = layout_of(folder), (folder / MANIFEST_NAME).stat().st_mtime_ns
+        names = [DECK_NAME, layout.bead_dump, layout.pair_bridge_dump, layout.wall_bridge_dump]
+        logs = [name for name in _LOGS if (folder / name).is_file()]
+        return all((folder / name).stat().st_mtime_ns <= made for name in [*names, *logs])
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def _judged(deck: Deck, folder: Path, log: Path) -> EngineReport:
+    try:
+        report = judge(deck, folder, log)
+    except MissingFrames as failure:
+        raise refused(folder, f"the engine that was started by hand still runs, or was stopped: {failure}") from failure
+    except EngineFailure as failure:
+        raise refused(folder, f"the deck that was run by hand failed: {failure}") from failure
+    return replace(report, wall_seconds=report.loop_seconds)
+
+
+def _as_run(case: Case, written: str, now: str, said: str) -> tuple[Case, Segment, list[str]]:
+    """The case that the engine ran, as one segment, and what of the deck was edited.
+
+    ``written`` and ``now`` are the deck's texts, ``said`` is the engine's log with the parameters as the engine read
+    them. `ValueError` if they are none of a case.
+    """
+    given = {name: float(value) for name, value in _GIVEN.findall(written)}
+    words = (_PRINTED.findall(said) or [""])[-1].split()
+    printed = {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
+    values, case = {**given, **printed}, case.for_cycles(case.run.attempts[0])
+    edited = {name: values[name] for name, value in given.items() if values[name] != value}
+    ran = _case_of(case, values, edited)
+    rest = int(values.get("rest_steps", 0))
+    changes = [f"{name} {value:g}, was {given[name]:g}" for name, value in edited.items()]
+    changes += [f"{name} {value:g}" for name, value in printed.items() if name not in given and _edited(name, now)]
+    segment = Segment(0, rest + ran.run.steps, rest)
+    return ran, segment, [*changes, *_other_changes(written, now, printed)]
+
+
+def _case_of(case: Case, values: Mapping[str, float], edited: Mapping[str, float]) -> Case:
+    """The case with the values of a deck's parameters, of which some were edited."""
+    ends = suffixes(len(case.drive.harmonics))
+    harmonics = [_harmonic(one, end, values) for one, end in zip(case.drive.harmonics, ends, strict=True)]
+    drive, steps, cycles = (
+        replace(case.drive, harmonics=tuple(harmonics)),
+        int(values["steps_per_cycle"]),
+        int(values["cycles"]),
+    )
+    step, parts = values.get("time_step", case.run.time_step), case.run.samples_per_cycle
+    if not isclose(step * steps * drive.frequency, 1.0, rel_tol=_SAME) or steps % parts:
+        raise ValueError(
+            f"{steps} steps of {step:g} s are not one cycle of {drive.frequency:g} Hz in {parts} equal parts"
+        )
+    run = replace(case.run, time_step=step, steps_per_cycle=steps)
+    if cycles != run.cycles:
+        settling = settling_of(cycles) if case.walkers else 0
+        run = replace(run, cycles=cycles, cycles_per_segment=cycles, settling_cycles=settling)
+    contact = {one.name: values[one.name] for one in fields(Contact) if one.name in values}
+    liquid: dict[str, Any] = {key: edited[name] for name, key in _OF_LIQUID.items() if name in edited}
+    ran = replace(
+        case,
+        drive=drive,
+        run=run,
+        gravity=values.get("gravity", case.gravity),
+        density=values.get("density", case.density),
+        material=None if "density" in edited else case.material,
+        contact=replace(case.contact, **contact),
+        liquid=replace(case.liquid, name=None, **liquid) if liquid else case.liquid,
+    )
+    # What was told of where values come from holds for a case that is the same.
+    return case if ran == case else ran.read_from({}, partial(_origins, case, edited))
+
+
+def _edited(name: str, now: str) -> bool:
+    """Whether a parameter that followed from others is a number now."""
+    return name in dict(_GIVEN.findall(now))
+
+
+def _harmonic(one: Harmonic, end: str, values: Mapping[str, float]) -> Harmonic:
+    """A harmonic by its parameters; an amplitude that does not follow from the acceleration was edited, and counts."""
+    frequency = values.get(f"frequency{end}", one.frequency)
+    peak = values.get(f"peak_acceleration{end}", one.peak_acceleration)
+    implied = values.get(f"amplitude{end}", nan) * (2.0 * pi * frequency) ** 2
+    if isfinite(implied) and not isclose(implied, peak, rel_tol=_SAME):
+        peak = implied
+    phase = values.get(f"phase{end}", one.phase)
+    return replace(one, frequency=frequency, peak_acceleration=peak, phase=phase)
+
+
+def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:
+    """What else of a deck's commands was edited, in a line, if anything."""
+    before, after = (
+        [
+            command
+            for line in text.splitlines()
+            if (command := " ".join(line.partition("#")[0].split()))
+            and not ((match := _VARIABLE.match(command)) and match[1] in given)
+        ]
+        for text in (written, now)
+    )
+    others = [line for line in after if line not in before] or [line for line in before if line not in after]
+    return [f"{len(others)} other line(s), of which no account is taken here, first: {others[0]}"] if others else []
+
+
+def _origins(case: Case, edited: Mapping[str, float]) -> tuple[Origin, ...]:
+    """Where the values of a case come from some of whose parameters were edited: these are given now."""
+    keys = {_KEYS.get(name, name): value for name, value in edited.items()}
+    kept = tuple(one for one in case.origins if one.key not in keys)
+    return (*kept, *(Origin(key, f"{value:.6g} (SI)", "given", value=value) for key, value in keys.items()))
+
+
+def _write(folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, changes: list[str]) -> None:
+    """Write what a run directory has: case, layout, segment, tables, result, and last its manifest."""
+    (folder / MANIFEST_NAME).unlink(missing_ok=True)
+    told = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
+    write_json(folder / CASE_NAME, case.as_dict(), at_once=False)
+    write_json(folder / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
+    of_segment = {**vars(segment), "root_mean_square_velocity": None, **vars(report), "by_hand": told}
+    write_json(folder / SEGMENT_NAME, of_segment, at_once=False)
+    tabulate(folder)
+    about: dict[str, Any] = {"drive_from": segment.drive_from, "segments": 1, "by_hand": told}
+    write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)

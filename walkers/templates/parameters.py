@@ -1,0 +1,152 @@
+"""The named parameters of a deck: lines that a reader of the deck may change, and formulas of what follows from them.
+
+LIGGGHTS puts the text of a ``string`` variable where ``${name}`` stands, and computes ``$(formula)`` in double
+precision to 20 digits, so that a deck with names computes bit for bit what one with numbers does. The value of an
+``equal`` variable is written with 15 digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil, inf
+
+from walkers.inputs.case import Case
+from walkers.inputs.drive import Drive, Vector
+from walkers.physics.laws import LAWS, law_of
+from walkers.physics.matter import Contact
+from walkers.templates.scene import Surface
+
+STATUS_LINES_PER_CYCLE = 4
+PRINTED = "parameters:"
+"""How the line begins by which the engine says what the parameters were."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A line of a deck: name, value (a number, or a formula in ``$()``), unit, and what is not obvious."""
+
+    name: str
+    value: str
+    unit: str = ""
+    told: str = ""
+
+    @property
+    def line(self) -> str:
+        """The command, and a comment."""
+        about = ": ".join(text for text in (self.unit, self.told) if text)
+        return f"{f'variable        {self.name} string {self.value}':55} {f'# {about}' if about else ''}".rstrip()
+
+
+def number(value: float) -> str:
+    """The shortest text that reads back as the same double."""
+    return repr(float(value))
+
+
+def suffixes(count: int) -> list[str]:
+    """What tells the names of several parameters of a kind apart: nothing if there is one."""
+    return [""] if count == 1 else [f"_{place}" for place in range(1, count + 1)]
+
+
+def in_cycles(steps: int, steps_per_cycle: int) -> str:
+    """Steps as a multiple or a part of a cycle, where they are one."""
+    whole, rest = divmod(steps, steps_per_cycle)
+    if whole and not rest:
+        return "${steps_per_cycle}" if whole == 1 else f"$({whole}*v_steps_per_cycle)"
+    for parts in (steps_per_cycle // steps, STATUS_LINES_PER_CYCLE):
+        if parts and ceil(steps_per_cycle / parts) == steps:
+            return f"$(ceil(v_steps_per_cycle/{parts}))" if steps_per_cycle % parts else f"$(v_steps_per_cycle/{parts})"
+    return str(steps)
+
+
+def along(name: str, direction: Vector) -> str:
+    """A parameter times a unit vector."""
+    parts = {1.0: f"${{{name}}}", 0.0: "0.0"}
+    return " ".join(parts.get(part, f"$(v_{name}*({number(part)}))") for part in direction)
+
+
+def of_drive(drive: Drive, *, amplitudes: bool) -> tuple[list[Parameter], list[Parameter]]:
+    """What is given of a drive, and what follows from that; without ``amplitudes`` its times alone."""
+    given, derived = [], []
+    for end, one in zip(suffixes(len(drive.harmonics)), drive.harmonics, strict=True):
+        given.append(Parameter(f"frequency{end}", number(one.frequency), "Hz"))
+        if amplitudes:
+            given.append(Parameter(f"peak_acceleration{end}", number(one.peak_acceleration), "m/s^2"))
+            formula = f"$(v_peak_acceleration{end}/(2.0*PI*v_frequency{end})^2)"
+            derived.append(Parameter(f"amplitude{end}", formula, "m", "of the displacement"))
+        if amplitudes and drive.frame == "lab":
+            formula = f"$(v_peak_acceleration{end}/(2.0*PI*v_frequency{end}))"
+            derived.append(Parameter(f"peak_velocity{end}", formula, "m/s", "of the walls"))
+        if len(drive.harmonics) > 1 or one.phase:
+            given.append(Parameter(f"phase{end}", number(one.phase), "rad"))
+    if len(drive.harmonics) > 1:
+        told = "of a cycle, the common period of all: to be changed with them"
+        given.append(Parameter("cycle_frequency", number(drive.frequency), "Hz", told))
+    return given, derived
+
+
+def of_time(case: Case, drive_from: int | None, steps: int, stable: float) -> tuple[list[Parameter], list[Parameter]]:
+    """What is given of the time step and of the length, and what follows from that.
+
+    Parameters
+    ----------
+    case
+        For its run.
+    drive_from, steps
+        Step at which the drive begins, None if the length is to be no parameter; number of steps.
+    stable
+        Time step below which the integration is stable, s.
+    """
+    run = case.run
+    frequency = "frequency" if len(case.drive.harmonics) == 1 else "cycle_frequency"
+    told = f"a multiple of {run.samples_per_cycle} for which the time step is below {stable:.3g} s"
+    given = [Parameter("steps_per_cycle", str(run.steps_per_cycle), told=told)]
+    exact = 1.0 / (case.drive.frequency * run.steps_per_cycle) == run.time_step
+    formula = f"$(1.0/(v_{frequency}*v_steps_per_cycle))"
+    derived = [Parameter("time_step", formula if exact else number(run.time_step), "s")]
+    if drive_from:
+        given.append(Parameter("rest_steps", str(drive_from), told="before the drive, in which the beads come to rest"))
+    if drive_from is not None and (steps - drive_from) % run.steps_per_cycle == 0:
+        given.append(Parameter("cycles", str((steps - drive_from) // run.steps_per_cycle), told="of the drive"))
+    return given, derived
+
+
+def of_contacts(case: Case, contacts: Sequence[Contact]) -> list[Parameter]:
+    """Stiffness, damping and friction; these two where all beads have the same."""
+    first = contacts[0]
+    softened = "softened for a longer time step; speeds agree within 1 % from 1e7 to 5e8"
+    found = [Parameter("youngs_modulus", number(first.youngs_modulus), "Pa", softened)]
+    found = found if {one.youngs_modulus for one in (*contacts, case.contact)} == {first.youngs_modulus} else []
+    found.append(Parameter("poissons_ratio", number(case.contact.poissons_ratio)))
+    if len(contacts) == 1:
+        names = ["restitution", "friction_bead_bead", "friction_bead_wall"]
+        names += ["rolling_friction"] if case.contact.rolling_friction > 0.0 else []
+        found += [Parameter(name, number(getattr(first, name))) for name in names]
+    return found
+
+
+def of_liquid(surface: Surface, radius: float) -> list[Parameter]:
+    """Tension and viscosity, if pulls and resistances in the tables of the bridges are proportional to them; else none.
+
+    The laws that come with the program are tried for a bead of this radius (m) on a wall, whose table a deck has.
+    """
+    import numpy as np
+
+    from walkers.physics.bridge import Surfaces
+
+    contact, liquid = surface
+    if liquid.law not in LAWS or not (liquid.surface_tension > 0.0 and liquid.dynamic_viscosity > 0.0):
+        return []
+    doubled = replace(
+        liquid, surface_tension=2.0 * liquid.surface_tension, dynamic_viscosity=2.0 * liquid.dynamic_viscosity
+    )
+    once, twice = (
+        law_of(one)(Surfaces.of(radius, inf, one, contact.minimum_separation_ratio)) for one in (liquid, doubled)
+    )
+    gaps = once.rupture * np.array([0.0, 0.01, 0.3, 0.9])
+    if not np.allclose(twice.forces(gaps).columns(), 2.0 * once.forces(gaps).columns(), rtol=1e-9, atol=0.0):
+        return []
+    return [
+        Parameter("surface_tension", number(liquid.surface_tension), "N/m"),
+        Parameter("viscosity", number(liquid.dynamic_viscosity), "Pa s", "of the bridges"),
+    ]
