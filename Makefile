@@ -77,10 +77,6 @@ validate: setup ## Check it against published benchmarks, exact solutions and a 
 docs-pictures: setup ## Make what docs/ shows and is not of today's parameters: pictures, tables, outputs, numbers (ONLY=fig2: that)
 	@.venv/bin/python -m docs.illustrations $(OUT) docs $(ONLY)
 
-.PHONY: docs-notebooks
-docs-notebooks: setup ## Execute the tutorial's notebooks and store what they show
-	@.venv/bin/python -m tests.notebooks
-
 .PHONY: docs
 docs: engine .venv/ready-docs ## Build the documentation into build/site, to be opened from disk; runs its examples
 	@.venv/bin/python -m sphinx -q -W --keep-going -d build/doctrees docs build/site
@@ -92,7 +88,7 @@ bench: setup ## Measure what docs/explanation/performance.md states (ONLY=large:
 
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/api docs/reference/generated
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/generated
 
 .PHONY: setup
 setup: engine .venv/ready ## Install what is missing: liggghts and what compiles its contact model (apt-get), and .venv

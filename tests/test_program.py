@@ -206,6 +206,7 @@ def test_the_package_claims_one_name_and_exports_few_that_are_documented() -> No
     modules = "walkers.inputs, walkers.pipeline, walkers.postprocess.report.run, walkers.sweeps.report"
     wanted = "{'inputs', 'runner', 'sweeps', 'IPython'}"
     assert _python(f"import sys, {modules}; print(sorted({wanted} & set(sys.modules)))", "/") == "[]"
-    names = ["Run", "find_run", "load", "load_case", "plot_sweep", "report", "run", "sweep", "sweep_figure"]
+    names = ["FilmOptions", "Run", "find_run", "load", "load_case", "plot_sweep", "report", "run"]
+    names += ["sweep", "sweep_figure"]
     assert dir(walkers) == walkers.__all__ == names
     assert all(getattr(walkers, name).__doc__ for name in walkers.__all__)

@@ -19,9 +19,21 @@ if TYPE_CHECKING:
     from walkers.inputs.reading import load_case
     from walkers.pipeline import Run, find_run, report, run, sweep
     from walkers.plotting import plot_sweep, sweep_figure
+    from walkers.postprocess.films import FilmOptions
     from walkers.sweeps.table import load
 
-__all__ = ["Run", "find_run", "load", "load_case", "plot_sweep", "report", "run", "sweep", "sweep_figure"]
+__all__ = [
+    "FilmOptions",
+    "Run",
+    "find_run",
+    "load",
+    "load_case",
+    "plot_sweep",
+    "report",
+    "run",
+    "sweep",
+    "sweep_figure",
+]
 
 DEFAULT_OUT = Path("runs")
 RECORDS = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}
@@ -35,6 +47,7 @@ _exported = exporting(
     **{
         "pipeline": ["Run", "find_run", "report", "run", "sweep"],
         "plotting": ["plot_sweep", "sweep_figure"],
+        "postprocess.films": ["FilmOptions"],
         "inputs.reading": ["load_case"],
         "sweeps.table": ["load"],
     },

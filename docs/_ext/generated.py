@@ -1,4 +1,4 @@
-"""Pages of the reference that the program writes, in reference/generated/: keys, tables, the library, shipped files."""
+"""Pages of the reference that the build writes to reference/generated: keys and columns, the library, shipped files."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ import re
 import types
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
-from sphinx.application import Sphinx
-from sphinx.config import Config
 
 import walkers.inputs
 from walkers.inputs.reading import read_toml
@@ -26,6 +24,11 @@ from walkers.postprocess.analysis import analyses
 from walkers.postprocess.tables import described
 from walkers.sweeps.table import STATE, derived_columns, result_columns
 
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+    from sphinx.config import Config
+
+MEANINGS = Path(__file__).with_name("meanings.toml")
 INPUTS = Path(walkers.inputs.__file__).parent
 program = _program()
 """The program with all of its commands, for the directive ``typer`` of reference/commands.rst."""
@@ -99,67 +102,102 @@ def _refusal(validator: BeforeValidator | Kind) -> str | None:
     return None
 
 
-def _default(field: FieldInfo) -> str:
+def _default(field: FieldInfo, hint: Any) -> str:
+    """The default in the units of the messages, where a value has a unit."""
     if field.default is PydanticUndefined:
         return "required" if field.is_required() else ""
     if field.default is None or fields_of(type(field.default)) or field.default in ABSENT:
         return ""
-    return f"`{json.dumps(field.default)}`"
+    unit = next((one.unit for one in _parts(hint) if isinstance(one, Kind)), "")
+    if isinstance(field.default, float) and unit:
+        return f"`{field.default:.4g} {unit}`"
+    return f"`{json.dumps(field.default)}`" if field.default != {} else ""
 
 
-def _keys() -> str:
-    """Every key of a case file with what it expects, read off the models that check it."""
-    text = ["# Keys, as the program checks them\n\nWhat each means is in [](../cases.md). Defaults are in SI units.\n"]
+def _meanings() -> dict[str, str]:
+    """What each key means, by its dotted name; clusters have the keys of dimers."""
+    contents = read_toml(MEANINGS)
+    found = {key: text for key, text in contents.items() if isinstance(text, str)}
+    for table, entries in contents.items():
+        if isinstance(entries, dict):
+            found |= {f"{table}.{key}": text for key, text in entries.items()}
+    return found
 
-    def add(model: type, name: str) -> None:
+
+def _tables_of_keys() -> Iterator[tuple[str, dict[str, tuple[Any, FieldInfo]]]]:
+    """The tables of a case file: heading and keys, each with its type hint and field."""
+
+    def tables(model: type, name: str) -> Iterator[tuple[str, dict[str, tuple[Any, FieldInfo]]]]:
         hints = get_type_hints(model, include_extras=True)
         fields = {key: (hints[name], field) for key, (name, field) in fields_of(model).items()}
-        own = {key: (hint, field) for key, (hint, field) in fields.items() if not _tables_in(hint)}
-        if own:
-            text.append(f"\n## {name or 'at the top'}\n\n{inspect.getdoc(model)}\n".replace("``", "`"))
-            supplied = {key for key in own if f"{name.strip('[]')}.{key}" in SUPPLIED}
-            rows = (
-                (f"`{key}`", _expected(hint), "the library's" if key in supplied else _default(field))
-                for key, (hint, field) in own.items()
-            )
-            text.append(_table(["key", "expects", "default"], rows))
+        yield name, {key: (hint, field) for key, (hint, field) in fields.items() if not _tables_in(hint)}
         for key, (hint, _) in fields.items():
             for inner in _tables_in(hint)[:1]:
                 path = f"{name.strip('[]')}.{key}".strip(".")
-                add(inner, f"[[{path}]]" if list in map(get_origin, _parts(hint)) else f"[{path}]")
+                yield from tables(inner, f"[[{path}]]" if list in map(get_origin, _parts(hint)) else f"[{path}]")
 
-    add(CaseFile, "")
-    return "\n".join(text)
-
-
-# --- tables, library, what is shipped ---------------------------------------------------------------------------------
+    return tables(CaseFile, "")
 
 
-def _tables() -> str:
+def key_rows() -> dict[str, list[tuple[str, str, str, str]]]:
+    """The keys of a case file by table: key, meaning, what it expects, default. `KeyError` if one has no meaning."""
+    meanings, used, found = _meanings(), set(), {}
+    for name, fields in _tables_of_keys():
+        bare = name.strip("[]")
+        rows = []
+        for key, (hint, field) in fields.items():
+            path = f"{bare}.{key}".strip(".").replace("clusters.", "dimers.").replace("drive.harmonics.", "drive.")
+            used.add(path)
+            default = "from the library" if f"{bare}.{key}" in SUPPLIED else _default(field, hint)
+            rows.append((f"`{key}`", meanings[path], _expected(hint), default))
+        found[name] = rows
+    if unknown := set(meanings) - used:
+        raise KeyError(f"meanings of keys that a case file does not have: {', '.join(sorted(unknown))}")
+    return found
+
+
+def _keys() -> str:
+    """Keys of case files and columns of tables, read off the declarations that the program itself uses."""
+    text = ["# Keys and columns\n\n## Keys of a case file\n\n`walkers show CASE` prints every value.\n"]
+    listed = key_rows()
+    for name, rows in listed.items():
+        if name == "[[clusters]]":
+            text.append("\n### [[clusters]]\n\nThe keys of `[dimers]`.\n")
+        elif rows:
+            text.append(
+                f"\n### {name or 'Top level'}\n\n{_table(['key', 'meaning', 'expects', 'default'], iter(rows))}"
+            )
+    return "".join(text) + _columns()
+
+
+def _columns() -> str:
     """Columns of the tables of a run and of a sweep, from where they are declared."""
-    text = "# Tables and their columns\n\nUnits and meanings are in the parquet files, too.\n\n"
-    text += "Of `rotation_*` and the like there is one for each bead or contact: `rotation_1`, `rotation_2`, …\n\n"
+    text = (
+        "\n## Columns of the tables of a run\n\nThe parquet files contain the units and meanings too. A name with `*`"
+    )
+    text += " stands for one column per bead or contact: `rotation_1`, `rotation_2`, …\n\n"
     tables = {name: described(table) for one in analyses() for name, table in one.tables.items()}
-    text += "".join(f"## {name}.parquet\n\n{_described(columns)}\n" for name, columns in tables.items())
-    text += "## The table of a sweep\n\nAfter the keys that vary.\n\n"
+    text += "".join(f"### {name}\n\n{_described(columns)}\n" for name, columns in tables.items())
+    text += "## Columns of the table of a sweep\n\nThe first columns are the keys that vary.\n\n"
     for one in analyses():
         columns = {**one.derived, **one.columns}
-        text += f"### Of {one.name}\n\n{_described(columns)}\n" if columns else ""
+        text += f"### Analysis {one.name}\n\n{_described(columns)}\n" if columns else ""
     names = [one.name for one in analyses()]
     known = {key for one in analyses() for key in one.derived} | set(result_columns(names))
     common = {key: told for key, told in derived_columns(names).items() if key not in known}
-    return text + f"### Of all\n\n{_described({**common, **STATE})}"
+    return text + f"### All sweeps\n\n{_described({**common, **STATE})}"
 
 
 def _library() -> str:
     """The library of materials and liquids with its sources."""
     contents = read_toml(INPUTS / "library.toml")
-    text = "# Materials and liquids\n\nWhat `walkers/inputs/library.toml` holds. A case may override each number.\n"
+    text = "# Library\n\nThe materials and liquids of the program, as `walkers library` prints them.\n"
+    text += "A case can override each number.\n"
     for kind, title in _KINDS.items():
         text += f"\n## {title}\n"
         for name, entries in contents[kind].items():
             text += f"\n### {name}\n\n{_sourced(entries)}"
-    text += "\n## Surfaces that touch\n"
+    text += "\n## Friction of pairs of surfaces\n"
     for entry in contents["surface_pairs"]:
         numbers = {
             key: {"source": f"calibrated with {' and '.join(entry['calibrated_with'])}", **one}
@@ -168,7 +206,7 @@ def _library() -> str:
         }
         text += f"\n### {' on '.join(entry['materials'])}\n\n{_sourced(numbers)}"
     rows = ((f"`{key}`", str(one.get("usual", "")), _range(one)) for key, one in contents["unmeasured"].items())
-    return f"{text}\n## What nobody has measured\n\n{_table(['', 'usual', 'range'], rows)}"
+    return f"{text}\n## Values that nobody has measured\n\n{_table(['', 'usual', 'range'], rows)}"
 
 
 def _sourced(entries: Mapping[str, Any]) -> str:
@@ -183,7 +221,7 @@ def _range(entry: Mapping[str, Any]) -> str:
 
 def _shipped() -> str:
     """Shipped cases and sweeps with their titles."""
-    text = "# Shipped cases, sweeps and calibrations\n\nEach may be named instead of a file.\n"
+    text = "# Shipped cases, sweeps and calibrations\n\nEvery command accepts these names instead of a file.\n"
     for folder, command in (("cases", "run"), ("sweeps", "sweep"), ("calibrations", "calibrate")):
         files = sorted((INPUTS / folder).glob("*.toml"))
         rows = ((f"`walkers {command} {file.stem}`", str(read_toml(file).get("title", ""))) for file in files)
@@ -191,7 +229,7 @@ def _shipped() -> str:
     return text
 
 
-PAGES = {"keys": _keys, "tables": _tables, "library": _library, "shipped": _shipped}
+PAGES = {"keys": _keys, "library": _library, "shipped": _shipped}
 
 
 def _write(app: Sphinx, _config: Config) -> None:

@@ -1,0 +1,30 @@
+"""
+A sweep: velocity against the drive
+===================================
+
+Vary the peak acceleration from 1 to 9 g. The lines are predictions of the theory; nothing in them is fitted to the
+runs.
+"""
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+
+import walkers
+
+Path("runs").mkdir(exist_ok=True)
+Path("runs/drive.toml").write_text("""
+title = "Velocity against the drive"
+case  = "fig1b"
+
+[axes]
+drive.peak_acceleration = { linspace = ["1 g", "9 g", 9] }
+""")
+table = walkers.sweep("runs/drive.toml")
+print(table[["drive.peak_acceleration", "gamma0", "velocity", "rotation_1", "steady"]].to_string(index=False))
+
+# %%
+# ``sweep_figure`` returns a matplotlib figure that you can change.
+
+figure = walkers.sweep_figure("runs/drive", theory=True)
+plt.show()

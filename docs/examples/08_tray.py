@@ -1,0 +1,23 @@
+"""
+A tray of walkers that meet
+===========================
+
+Place nine walkers close to each other. They meet, stick together and separate.
+"""
+
+from pathlib import Path
+
+import walkers
+
+run = walkers.run("tray")
+print(run.describe())
+
+# %%
+# Views from above, at equal time intervals:
+
+picture = run.render(Path("runs/tray.png"))[0]
+
+# %%
+# The table ``meetings`` lists who merged with whom, and when.
+
+print(run.table("meetings").head(8).to_string(index=False))
