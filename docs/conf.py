@@ -20,7 +20,7 @@ project_copyright = author
 version = release = metadata.version("granular-walkers")
 
 extensions = [
-    *("numpydoc", "sphinx.ext.autodoc", "sphinxcontrib.typer", "myst_parser"),
+    *("numpydoc", "sphinx.ext.autodoc", "myst_parser"),
     *("sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex"),
     *("readable", "generated"),  # docs/_ext
 ]

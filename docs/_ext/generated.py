@@ -1,4 +1,4 @@
-"""Pages of the reference that the build writes to reference/generated: keys and columns, the library, shipped files."""
+"""Pages of the reference that the build writes to reference/generated: commands, keys, columns, library."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
+from typer.main import get_command
 
 import walkers.inputs
 from walkers.inputs.reading import read_toml
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 
 MEANINGS = Path(__file__).with_name("meanings.toml")
 INPUTS = Path(walkers.inputs.__file__).parent
-program = _program()
-"""The program with all of its commands, for the directive ``typer`` of reference/commands.rst."""
 
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 _KINDS = {"materials": "Materials", "liquids": "Liquids"}
@@ -229,7 +228,35 @@ def _shipped() -> str:
     return text
 
 
-PAGES = {"keys": _keys, "library": _library, "shipped": _shipped}
+_COMMANDS = """# Commands
+
+The output of `walkers --help` and of `walkers COMMAND --help`. `walkers --install-completion` installs the
+completion of commands, options, cases, sweeps and runs for your shell.
+
+| exit status | meaning |
+| --- | --- |
+| 0 | done |
+| 1 | a run or a check failed |
+| 2 | bad input |
+| 130 | interrupted with Ctrl-C |
+| 143 | terminated |
+| 129 | the terminal was closed |
+
+"""
+
+
+def _commands() -> str:
+    """Help texts as a terminal of 80 columns shows them."""
+    program = get_command(_program())
+    context = program.make_context("walkers", [], resilient_parsing=True, terminal_width=80)
+    text = f"{_COMMANDS}```text\n$ walkers --help\n{program.get_help(context)}\n```\n"
+    for name, command in program.commands.items():
+        inner = command.make_context(name, [], context, resilient_parsing=True, terminal_width=80)
+        text += f"\n## walkers {name}\n\n```text\n$ walkers {name} --help\n{command.get_help(inner)}\n```\n"
+    return text
+
+
+PAGES = {"commands": _commands, "keys": _keys, "library": _library, "shipped": _shipped}
 
 
 def _write(app: Sphinx, _config: Config) -> None:
