@@ -1,10 +1,8 @@
-"""Wet granular walkers, simulated with LIGGGHTS: the one public name of the project.
+"""Wet granular walkers, simulated with LIGGGHTS.
 
-`load_case` reads a case, `run` takes it to its result as ``walkers run`` does, `find_run` finds a finished run, `sweep`
-makes all points of a sweep, `load` gives its table, `plot_sweep` and `sweep_figure` its figure, `report` writes a file
-to mail. The folders of the project are packages below: `physics` (laws), `inputs` (cases), `templates` (decks),
-`runner` (run directories), `postprocess` (what runs mean), and on them `sweeps`, `check`, `theory`, `paper` and
-`calibration`.
+`load_case` reads a case. `run` runs it and gives a `Run`; `find_run` finds a finished run. `sweep` runs all points of a
+sweep and gives its table; `load` reads a table. `sweep_figure` and `plot_sweep` draw a table, `report` writes an HTML
+file. `FilmOptions` describes a film for `Run.film`.
 """
 
 from __future__ import annotations
