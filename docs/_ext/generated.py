@@ -86,6 +86,8 @@ def _expected(hint: Any) -> str:
     if get_origin(hint) in (list, tuple):
         parts = list(dict.fromkeys(_expected(one) for one in get_args(hint) if one is not ...))
         return f"a list, each {' or '.join(parts)}"
+    if get_origin(hint) is dict:
+        return "a table"
     words = {str: "text", bool: "true or false", int: "a whole number", float: "a plain number without a unit"}
     return words.get(hint, getattr(hint, "__name__", str(hint)))
 
@@ -256,7 +258,7 @@ def _commands() -> str:
     return text
 
 
-PAGES = {"commands": _commands, "keys": _keys, "library": _library, "shipped": _shipped}
+PAGES = {"commands": _commands, "tables": _keys, "library": _library, "shipped": _shipped}
 
 
 def _write(app: Sphinx, _config: Config) -> None:

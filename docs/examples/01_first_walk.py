@@ -13,9 +13,9 @@ run = walkers.run("fig1b")
 print(run.describe())
 
 # %%
-# A picture of one walker at six times. The grid is fixed to the floor.
+# A picture of one walker at three times. The grid is fixed to the floor.
 
-picture = run.render(Path("runs/first_walk.png"))[0]
+picture = run.render(Path("runs/first_walk.png"), images=3)[0]
 
 # %%
 # The tables of a run are pandas data frames in SI units.

@@ -45,7 +45,7 @@ print(run.describe())
 # The result lists the values that nobody has measured: here friction and the drag of the bridges. See
 # :doc:`/how-to/own-beads` for the uncertainty that these values cause.
 
-picture = run.render(Path("runs/steel.png"))[0]
+picture = run.render(Path("runs/steel.png"), images=3)[0]
 
 # %%
 # Change a value without editing the file:

@@ -8,8 +8,6 @@ runs.
 
 from pathlib import Path
 
-import matplotlib.pyplot as plt
-
 import walkers
 
 Path("runs").mkdir(exist_ok=True)
@@ -24,7 +22,6 @@ table = walkers.sweep("runs/drive.toml")
 print(table[["drive.peak_acceleration", "gamma0", "velocity", "rotation_1", "steady"]].to_string(index=False))
 
 # %%
-# ``sweep_figure`` returns a matplotlib figure that you can change.
+# ``plot_sweep`` writes a figure of the table; ``sweep_figure`` returns it, so that you can change it.
 
-figure = walkers.sweep_figure("runs/drive", theory=True)
-plt.show()
+picture = walkers.plot_sweep("runs/drive", "runs/drive.png", theory=True)

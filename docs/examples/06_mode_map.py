@@ -2,8 +2,8 @@
 A map of modes
 ==============
 
-Vary two quantities at once: the asymmetry of the beads and the dimensionless peak force. Colours show the velocity;
-crosses mark walkers whose beads separate.
+Vary two quantities at once: the asymmetry of the beads and the dimensionless peak force. Walkers rest at a weak drive
+and walk faster with more asymmetry.
 """
 
 from pathlib import Path
@@ -33,7 +33,5 @@ velocity = table.pivot(index="dimers.sin_delta", columns="drive.gamma0", values=
 figure, axes = plt.subplots(figsize=(7, 4))
 colours = axes.pcolormesh(velocity.columns, velocity.index, 1e3 * velocity, shading="nearest")
 figure.colorbar(colours, label="velocity (mm/s)")
-apart = table[table["open_3"] > 0.01]
-axes.plot(apart["drive.gamma0"], apart["dimers.sin_delta"], "kx")
 axes.set(xlabel=r"dimensionless peak force $\Gamma_0$", ylabel=r"asymmetry $\sin\,\delta$")
 plt.show()

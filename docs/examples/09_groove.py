@@ -26,11 +26,11 @@ table = walkers.sweep("runs/groove.toml")
 
 figure, axes = plt.subplots(figsize=(7, 4))
 axes.plot(table["boundary.opening"], 1e3 * table["velocity"], "o-")
-axes.set(xlabel="opening of the groove (°)", ylabel="velocity (mm/s)", ylim=(0.0, None))
+axes.set(xlabel="opening of the groove (°)", ylabel="velocity (mm/s)")
 plt.show()
 
 # %%
 # The picture shows the narrowest groove.
 
 run = walkers.Run(Path(table["run"].iloc[0]))
-picture = run.render(Path("runs/groove.png"))[0]
+picture = run.render(Path("runs/groove.png"), images=3)[0]

@@ -40,8 +40,8 @@ ZOO = [("chain", 2), ("chain", 3), ("fan", 3), ("fan", 4), ("diamond", 4), ("rin
 # The first bead of each cluster is the large one; it leads. Draw the beads at the end of each run.
 
 Path("runs").mkdir(exist_ok=True)
-figure, panels = plt.subplots(1, len(ZOO), figsize=(12, 2.6))
-for panel, (arrangement, number) in zip(panels, ZOO, strict=True):
+figure, panels = plt.subplots(2, 3, figsize=(7.5, 5.5))
+for panel, (arrangement, number) in zip(panels.flat, ZOO, strict=True):
     radii = ", ".join(['"0.3 mm"', *['"0.2 mm"'] * (number - 1)])
     file = Path(f"runs/{arrangement}_of_{number}.toml")
     file.write_text(CASE.format(arrangement=arrangement, radii=radii))
@@ -50,6 +50,6 @@ for panel, (arrangement, number) in zip(panels, ZOO, strict=True):
     for (x, y), size in zip((places - places.mean(axis=0))[:, :2], radius, strict=True):
         panel.add_patch(plt.Circle((x, y), size, facecolor="0.85", edgecolor="0.3"))
     speed = 1e3 * run.result["velocity"]["mean"]
-    panel.set(title=f"{arrangement} of {number}\n{speed:.2f} mm/s", xlim=(-1, 1), ylim=(-1, 1), aspect="equal")
+    panel.set(title=f"{arrangement} of {number}\n{speed:.2f} mm/s", xlim=(-0.9, 0.9), ylim=(-0.8, 0.8), aspect="equal")
     panel.set_axis_off()
 plt.show()

@@ -46,4 +46,4 @@ print(f"constant: {1e3 * run.result['velocity']['mean']:.2f} mm/s")
 print((table.set_index("liquid.law")["velocity"] * 1e3).round(2).to_string())
 
 # %%
-figure = walkers.sweep_figure("runs/laws")
+picture = walkers.plot_sweep("runs/laws", "runs/laws.png")

@@ -6,13 +6,10 @@ Run the six pairs of beads of Fig. 3 of the paper, each at the same dimensionles
 not walk.
 """
 
-import matplotlib.pyplot as plt
-
 import walkers
 
 table = walkers.sweep("fig3")
 print((1e3 * table[["radius_1", "radius_2", "velocity"]]).assign(sin_delta=table["sin_delta"]).to_string(index=False))
 
 # %%
-figure = walkers.sweep_figure("runs/fig3", x="sin_delta", theory=True)
-plt.show()
+picture = walkers.plot_sweep("runs/fig3", "runs/fig3.png", x="sin_delta", theory=True)
