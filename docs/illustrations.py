@@ -257,8 +257,10 @@ without_hashes = partial(_RUN_HASH.sub, "")
 
 
 def output_of(command: str, out: Path) -> str:
-    """The output of a command on a case; the folder of the runs is called ``runs``."""
+    """What a command on a case prints; runs are in ``runs``, wherever that is."""
     _, name, *arguments = shlex.split(command)
+    if "--theory" in arguments:
+        run(next(one for one in arguments if not one.startswith("-")), out)  # which it prints beside the models
     words = [sys.executable, "-m", "walkers.main", name, *arguments, "--out", str(out)]
     words += ["--force"] if name == "run" else []  # else it says that it was run already
     printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout

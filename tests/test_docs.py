@@ -120,7 +120,7 @@ def test_pages_are_written_anew(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(
         "Walks at <!--fact fig4b_velocity-->9.99<!--/fact--> mm/s.\n\n<!--output-->\n```console\n"
-        "$ walkers list\nsomething old\n```\n\n```console\n$ walkers show fig1b\n...\n```\n"
+        "$ walkers list\nsomething old\n```\n\n```console\n$ walkers show --theory fig1b\n...\n```\n"
     )
     other = shutil.copy(DOCS / "index.md", tmp_path)
     assert refresh_pages([page, Path(other)], facts(DOCS), tmp_path) == [page]
@@ -128,7 +128,7 @@ def test_pages_are_written_anew(tmp_path: Path) -> None:
     assert f"<!--fact fig4b_velocity-->{facts(DOCS)['fig4b_velocity']}<!--/fact--> mm/s" in text
     assert "something old" not in text
     assert "0 runs, 0 B\n" in text
-    assert "$ walkers show fig1b\n...\n" in text  # not marked
+    assert "$ walkers show --theory fig1b\n...\n" in text  # not marked
 
 
 # --- examples and keys ------------------------------------------------------------------------------------------------
@@ -145,7 +145,7 @@ def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch
 
 
 def test_each_key_of_a_case_file_has_its_meaning() -> None:
-    rows = key_rows()  # `KeyError` if one has none, or none has one
+    rows = key_rows()  # `KeyError` if one has none
     assert {"`radii`", "`friction.bead_wall`", "`gravity`"} <= {row[0] for table in rows.values() for row in table}
     assert all(meaning.endswith((".", ")", "`")) for table in rows.values() for _, meaning, _, _ in table)
 

@@ -5,8 +5,6 @@ A first walk
 Run the walker of Fig. 1b of the paper, print its velocity, and look at it.
 """
 
-from pathlib import Path
-
 import walkers
 
 run = walkers.run("fig1b")
@@ -15,7 +13,7 @@ print(run.describe())
 # %%
 # A picture of one walker at three times. The grid is fixed to the floor.
 
-picture = run.render(Path("runs/first_walk.png"), images=3)[0]
+picture = run.render("runs/first_walk.png", images=3)[0]
 
 # %%
 # The tables of a run are pandas data frames in SI units.

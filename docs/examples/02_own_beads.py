@@ -45,10 +45,10 @@ print(run.describe())
 # The result lists the values that nobody has measured: here friction and the drag of the bridges. See
 # :doc:`/how-to/own-beads` for the uncertainty that these values cause.
 
-picture = run.render(Path("runs/steel.png"), images=3)[0]
+picture = run.render("runs/steel.png", images=3)[0]
 
 # %%
 # Change a value without editing the file:
 
-heavier = walkers.run(walkers.load_case(file, {"contact.friction.bead_wall": 0.15}))
-print(f"{1e3 * heavier.result['velocity']['mean']:.2f} mm/s with half of the friction")
+smoother = walkers.run(walkers.load_case(file, {"contact.friction.bead_wall": 0.15}))
+print(f"{1e3 * smoother.result['velocity']['mean']:.2f} mm/s with half of the friction")

@@ -18,10 +18,11 @@ case  = "fig1b"
 [axes]
 drive.peak_acceleration = { linspace = ["1 g", "9 g", 9] }
 """)
-table = walkers.sweep("runs/drive.toml")
+sweep = walkers.sweep("runs/drive.toml")
+table = sweep.table()
 print(table[["drive.peak_acceleration", "gamma0", "velocity", "rotation_1", "steady"]].to_string(index=False))
 
 # %%
-# ``plot_sweep`` writes a figure of the table; ``sweep_figure`` returns it, so that you can change it.
+# ``plot`` writes a figure of the table; ``figure`` returns it, so that you can change it.
 
-picture = walkers.plot_sweep("runs/drive", "runs/drive.png", theory=True)
+picture = sweep.plot("runs/drive.png", theory=True)[0]

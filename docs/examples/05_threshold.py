@@ -28,7 +28,7 @@ to          = "0.4 g"
 step        = "0.2 g"
 until_below = "0.002 mm/s"
 """)
-table = walkers.sweep("runs/threshold.toml")
+table = walkers.sweep("runs/threshold.toml").table()
 
 # %%
 # Each step is a run from rest. Steps below the threshold are not made.

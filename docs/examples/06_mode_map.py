@@ -24,7 +24,7 @@ dimers.replicates  = 2
 dimers.sin_delta = { linspace = [0.1, 0.4, 4] }
 drive.gamma0     = { linspace = [0.1, 1.3, 7] }
 """)
-table = walkers.sweep("runs/map.toml")
+table = walkers.sweep("runs/map.toml").table()
 
 # %%
 # ``pivot`` makes an array of two axes.

@@ -45,7 +45,7 @@ case = "two_tones_case.toml"
 [axes]
 "drive.harmonics[1].phase" = { linspace = ["0 deg", "360 deg", 13] }
 """)
-table = walkers.sweep("runs/two_tones.toml")
+table = walkers.sweep("runs/two_tones.toml").table()
 
 figure, axes = plt.subplots(figsize=(7, 4))
 axes.plot(table["drive.harmonics[1].phase"], 1e3 * table["velocity"], "o-")

@@ -5,8 +5,6 @@ A tray of walkers that meet
 Place nine walkers close to each other. They meet, stick together and separate.
 """
 
-from pathlib import Path
-
 import walkers
 
 run = walkers.run("tray")
@@ -15,7 +13,7 @@ print(run.describe())
 # %%
 # Views from above, at equal time intervals:
 
-picture = run.render(Path("runs/tray.png"))[0]
+picture = run.render("runs/tray.png")[0]
 
 # %%
 # The table ``meetings`` lists who merged with whom, and when.

@@ -22,7 +22,8 @@ dimers.replicates = 2
 [axes]
 boundary.opening = { linspace = ["90 deg", "170 deg", 9] }
 """)
-table = walkers.sweep("runs/groove.toml")
+sweep = walkers.sweep("runs/groove.toml")
+table = sweep.table()
 
 figure, axes = plt.subplots(figsize=(7, 4))
 axes.plot(table["boundary.opening"], 1e3 * table["velocity"], "o-")
@@ -32,5 +33,4 @@ plt.show()
 # %%
 # The picture shows the narrowest groove.
 
-run = walkers.Run(Path(table["run"].iloc[0]))
-picture = run.render(Path("runs/groove.png"), images=3)[0]
+picture = sweep.runs[0].render("runs/groove.png", images=3)[0]

@@ -6,8 +6,6 @@ A large bead above two small ones side by side, with one more below, stands on a
 vertically. Six such clusters start up to 10° off the vertical. All of them turn upright and climb.
 """
 
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -31,4 +29,4 @@ figure.tight_layout()
 plt.show()
 
 # %%
-picture = run.render(Path("runs/climber.png"))[0]
+picture = run.render("runs/climber.png")[0]

@@ -6,8 +6,6 @@ Pour 60 wet beads of two sizes into a box 4 mm wide and shake it vertically. Thi
 climb; the case ``pile-small`` is long enough.
 """
 
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 
 import walkers
@@ -16,7 +14,7 @@ run = walkers.run("pile-ci")
 print(run.describe())
 
 # %%
-picture = run.render(Path("runs/pile.png"))[0]
+picture = run.render("runs/pile.png")[0]
 
 # %%
 # The table ``bed`` has one row per frame.

@@ -6,13 +6,11 @@ Film a walker for four cycles of the drive, 50 times slower than in reality. The
 the floor shakes.
 """
 
-from pathlib import Path
-
 import walkers
 
 run = walkers.run("fig4b")
 options = walkers.FilmOptions(size=(480, 240), fps=20, slowdown=50.0, walker=0, begin=0.05, end=0.1)
-picture = run.film(Path("runs/walk.gif"), options)
+picture = run.film("runs/walk.gif", options)
 
 # %%
 # A name that ends in ``.mp4`` gives an MP4 file.

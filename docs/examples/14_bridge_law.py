@@ -41,9 +41,9 @@ case = "fig1b"
 [axes]
 liquid.law = ["young-laplace", "willett", "rabinovich", "soulie"]
 """)
-table = walkers.sweep("runs/laws.toml")
+sweep = walkers.sweep("runs/laws.toml")
 print(f"constant: {1e3 * run.result['velocity']['mean']:.2f} mm/s")
-print((table.set_index("liquid.law")["velocity"] * 1e3).round(2).to_string())
+print((sweep.table().set_index("liquid.law")["velocity"] * 1e3).round(2).to_string())
 
 # %%
-picture = walkers.plot_sweep("runs/laws", "runs/laws.png")
+picture = sweep.plot("runs/laws.png")[0]

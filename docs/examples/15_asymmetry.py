@@ -8,8 +8,9 @@ not walk.
 
 import walkers
 
-table = walkers.sweep("fig3")
+sweep = walkers.sweep("fig3")
+table = sweep.table()
 print((1e3 * table[["radius_1", "radius_2", "velocity"]]).assign(sin_delta=table["sin_delta"]).to_string(index=False))
 
 # %%
-picture = walkers.plot_sweep("runs/fig3", "runs/fig3.png", x="sin_delta", theory=True)
+picture = sweep.plot("runs/fig3.png", x="sin_delta", theory=True)[0]
