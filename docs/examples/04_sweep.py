@@ -20,7 +20,7 @@ drive.peak_acceleration = { linspace = ["1 g", "9 g", 9] }
 """)
 sweep = walkers.sweep("runs/drive.toml")
 table = sweep.table()
-print(table[["drive.peak_acceleration", "gamma0", "velocity", "rotation_1", "steady"]].to_string(index=False))
+print(table[["drive.peak_acceleration", "gamma0", "velocity", "steady"]].round(6))
 
 # %%
 # ``plot`` writes a figure of the table; ``figure`` returns it, so that you can change it.
