@@ -74,10 +74,6 @@ validate: setup .venv/with-check ## Check it against published benchmarks, exact
 docs-pictures: setup .venv/with-dev ## Make what docs/ shows and is not of today's parameters: pictures, tables, outputs, numbers (ONLY=fig2: that)
 	@.venv/bin/python -m docs.illustrations $(OUT) docs $(ONLY)
 
-.PHONY: docs-notebooks
-docs-notebooks: setup .venv/with-dev ## Execute the tutorial's notebooks and store what they show
-	@.venv/bin/python -m tests.notebooks
-
 .PHONY: docs
 docs: setup .venv/with-docs ## Build the documentation into build/site, to be opened from disk; runs its examples
 	@.venv/bin/python -m sphinx -q -W --keep-going -d build/doctrees docs build/site
@@ -89,7 +85,7 @@ bench: setup .venv/with-dev ## Measure what docs/explanation/performance.md stat
 
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/api docs/reference/generated
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/generated
 
 .PHONY: extras
 extras: setup .venv/with-all ## Install what reports, archives, calibrations, the theory, checks and clusters need

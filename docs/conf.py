@@ -1,4 +1,4 @@
-"""How Sphinx builds the site (``make docs``): from docs/, the docstrings and what the program says of itself."""
+"""Configuration of the site that ``make docs`` builds from docs/, the docstrings and the program's declarations."""
 
 from __future__ import annotations
 
@@ -20,12 +20,11 @@ project_copyright = author
 version = release = metadata.version("granular-walkers")
 
 extensions = [
-    *("numpydoc", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode", "sphinxcontrib.typer"),
-    *("myst_nb", "sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex"),
+    *("numpydoc", "sphinx.ext.autodoc", "myst_parser"),
+    *("sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex"),
     *("readable", "generated"),  # docs/_ext
 ]
-exclude_patterns = ["_ext", "_templates", "examples", "**/.ipynb_checkpoints", "gallery/**.ipynb"]
-templates_path = ["_templates"]
+exclude_patterns = ["_ext", "examples", "gallery/**.ipynb"]
 default_role = "py:obj"
 nitpicky = False
 
@@ -33,11 +32,6 @@ nitpicky = False
 myst_enable_extensions = ["dollarmath", "colon_fence", "attrs_block", "deflist"]
 myst_heading_anchors = 4
 myst_links_external_new_tab = False
-# Notebooks are shown as they were executed when they were committed.
-nb_execution_mode = "off"
-nb_merge_streams = True
-nb_ipywidgets_js = {}  # would come from the network: what a widget shows, a picture shows here
-nb_mime_priority_overrides = [("html", "application/vnd.jupyter.widget-view+json", None)]
 
 # Nothing comes from the network: formulas become MathML, which browsers draw by themselves.
 html_math_renderer = "mathml"
@@ -62,8 +56,6 @@ html_theme_options = {
 }
 html_sidebars = {"index": []}
 
-autosummary_generate = True
-autosummary_ignore_module_all = True  # all modules of a package, not those alone that it names
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"exclude-members": "model_config"}
@@ -85,7 +77,8 @@ sphinx_gallery_conf = {
     "min_reported_time": 1000,
     "write_computation_times": False,  # its table of times would load scripts from the network
     "plot_gallery": True,
+    "image_scrapers": ("pictures.scraper", "matplotlib"),  # docs/_ext
     "image_srcset": ["2x"],
 }
-# Two classes of different packages may have one name: an annotation that says it is left without a link.
+# Annotations name classes that have no page of their own.
 suppress_warnings = ["ref.python"]

@@ -1,11 +1,10 @@
-"""What the documentation shows of our own numbers: pictures, tables, outputs of commands, numbers in sentences.
+"""Pictures, tables, outputs of commands and numbers in the documentation that come from simulations.
 
-All of it follows from the shipped parameters. `make_illustrations` makes it anew and records, for each picture and
-table, a digest of the cases that it shows; `stale` tells which are of other cases than today's.
+All of them follow from the shipped parameters. `make_illustrations` makes them again and records a digest of the cases
+that each picture and table shows. `stale` lists those that show other cases than the current ones.
 
-Pages have two kinds of marks, which readers do not see. A block of code that begins with a command and stands below
-``<!--output-->`` is what that command prints; ``<!--fact fig4b_velocity-->8.15<!--/fact-->`` is a number of the
-comparison.
+Pages contain two kinds of invisible marks. A code block below ``<!--output-->`` begins with a command and contains its
+output. ``<!--fact fig4b_velocity-->8.15<!--/fact-->`` contains a number of the comparison.
 """
 
 from __future__ import annotations
@@ -49,13 +48,13 @@ _BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>wa
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
 _ASSEMBLES = {"run.duration": "10 s", "run.seed": 10}
-"""The pile whose first climber the page follows from rest: on a plain wall, of beads that were no neighbours."""
+"""The pile whose first climber the page follows: it climbs a plain wall, and its beads were no neighbours at rest."""
 _OF_CALIBRATION = ("corner", "predictions")
 
 
 @dataclass(frozen=True)
 class Illustration:
-    """Files of docs/, the cases whose runs they show, and what makes them: folder of the runs, folder of the docs."""
+    """Files of docs/, the cases that they show, and the function that makes them from the folders of runs and docs."""
 
     files: tuple[str, ...]
     cases: Callable[[], Iterable[Case]]
@@ -72,7 +71,7 @@ def _of_figure(name: str, *files: str, sweeps: Iterable[str]) -> Illustration:
 def _of_run(
     name: str, case: str, changes: Mapping[str, Any] | None = None, apart: float | None = None, film: Any = None
 ) -> Illustration:
-    """A picture of one run as `walkers render` has it, or views so many s apart; or a film of it."""
+    """A picture of one run as `walkers render` makes it, views at an interval in s, or a film."""
     file = f"pictures/{name}.gif" if film else f"pictures/{name}.png"
 
     def make(out: Path, docs: Path) -> None:
@@ -88,7 +87,7 @@ def _of_run(
 
 
 def _of_climbs(name: str, *others: str, assembly: Mapping[str, Any] | None = None) -> Illustration:
-    """What `walkers climb` draws and prints of sweeps; and how the first climb of the run of a case assembled."""
+    """Figure and output of `walkers climb` for sweeps, and the assembly of the first climb of a run."""
     names = (*others, name)
     files = [f"figures/{name}.png", f"figures/{name}.md", *(["figures/pile-assembly.png"] if assembly else [])]
 
@@ -129,7 +128,7 @@ def _make_calibration(out: Path, docs: Path) -> None:
 
 
 def _calibrated() -> list[Case]:
-    """The experiments of the calibration with the shipped values of what it varies."""
+    """The experiments of the calibration with the shipped values of its parameters."""
     read = load_calibration("ruby")
     base = flatten(read.file.set, lambda _: False)
     return [load_case(read.file.case, {**base, **values}) for values in read.experiments.values()]
@@ -172,7 +171,7 @@ _SHOWN = ("walking", "meetings", "pile")  # analyses of what they show
 
 
 def digest(cases: Iterable[Case]) -> str:
-    """Twelve hex digits over all that cases' runs depend on but the engine's binary, and over how they are measured."""
+    """Twelve hex digits over cases, deck version and versions of analyses; the engine binary does not count."""
     cases = list(cases)
     shown = [one for one in analyses() if one.name in _SHOWN and any(map(one.applies, cases))]
     told = {
@@ -189,7 +188,7 @@ def _recorded(docs: Path) -> dict[str, str]:
 
 
 def stale(docs: Path) -> dict[str, list[str]]:
-    """Of `ILLUSTRATIONS` those of which files are missing, or show other cases than today's; and these files."""
+    """The illustrations with files that are missing or show other cases than the current ones, and these files."""
     record, found = _recorded(docs), {}
     for name, one in ILLUSTRATIONS.items():
         today = digest(one.cases())
@@ -199,9 +198,9 @@ def stale(docs: Path) -> dict[str, list[str]]:
 
 
 def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[Path]:
-    """Make pictures and tables, then what pages print of them: those named, or all that are missing or of other cases.
+    """Make the named pictures and tables, or all that are stale, then update the pages.
 
-    ``out`` is the folder of the run directories; runs that are missing are made.
+    ``out`` is the folder of the run directories. Missing runs are made.
     """
     for name in only:
         if name not in ILLUSTRATIONS:
@@ -223,14 +222,14 @@ def pages_of(docs: Path) -> list[Path]:
 
 
 def facts(docs: Path) -> dict[str, str]:
-    """Numbers that sentences may quote: the engine's of the comparison, three digits, and how many agree."""
+    """Numbers that sentences may quote: the values of the engine in the comparison, and how many agree."""
     compared: dict[str, Any] = read_json(docs / "figures" / "comparison.json")
     numbers = {one["key"]: f"{one['engine']:.3g}" for one in compared["numbers"] if one["engine"] is not None}
     return {**numbers, "agree": f"{compared['agree']} of {compared['of']}"}
 
 
 def refresh_pages(pages: Iterable[Path], known: Mapping[str, str], out: Path) -> list[Path]:
-    """Write what today's commands print and today's numbers into pages; those that changed."""
+    """Write the current outputs and numbers into pages; return the pages that changed."""
     changed = []
     for page in pages:
         old = page.read_text("utf-8")
@@ -243,18 +242,18 @@ def refresh_pages(pages: Iterable[Path], known: Mapping[str, str], out: Path) ->
 
 
 def outputs_in(page: Path) -> dict[str, str]:
-    """The commands of a page whose output is below them, and that output; names of runs without their hash."""
+    """The commands of a page with their outputs, without the hashes of run names."""
     found = _BLOCK.finditer(page.read_text("utf-8"))
     return {one["command"]: without_hashes(one["text"]) for one in found}
 
 
 def facts_in(page: Path) -> list[tuple[str, str]]:
-    """The facts that a page quotes, and how."""
+    """The names and texts of the facts that a page quotes."""
     return [(one["name"], one["text"]) for one in _FACT.finditer(page.read_text("utf-8"))]
 
 
 without_hashes = partial(_RUN_HASH.sub, "")
-"""A text with the names of runs without what depends on the engine's binary."""
+"""A text without the hashes of run names, which depend on the engine binary."""
 
 
 def output_of(command: str, out: Path) -> str:

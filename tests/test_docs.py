@@ -1,9 +1,9 @@
-"""What README and docs/ show is today's: links, pictures, outputs, numbers in sentences, examples, notebooks."""
+"""README and docs/ are up to date: links, pictures, outputs, numbers in sentences, keys, examples."""
 
 from __future__ import annotations
 
+import ast
 import doctest
-import json
 import re
 import shutil
 from collections.abc import Callable
@@ -12,10 +12,10 @@ from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 
-import nbformat
 import pytest
 
 import walkers
+from docs._ext.generated import key_rows
 from docs.illustrations import (
     ILLUSTRATIONS,
     RECORD,
@@ -29,14 +29,12 @@ from docs.illustrations import (
     stale,
     without_hashes,
 )
-from tests.notebooks import executed, notebooks, stored, tagged
 from walkers.inputs import load_case
 from walkers.runner.files import read_json, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
-SMALL_PICTURES = "from walkers.postprocess import series; series._TALL, series._TALLEST, series._WIDEST = 250, 400, 475"
-WRITTEN_BY_THE_BUILD = ("docs/gallery", "docs/reference/api", "docs/reference/generated")
+WRITTEN_BY_THE_BUILD = ("docs/gallery", "docs/reference/generated")
 PAGES = [page for page in pages_of(DOCS) if not page.relative_to(ROOT).as_posix().startswith(WRITTEN_BY_THE_BUILD)]
 
 # --- links ------------------------------------------------------------------------------------------------------------
@@ -133,7 +131,7 @@ def test_pages_are_written_anew(tmp_path: Path) -> None:
     assert "$ walkers show --theory fig1b\n...\n" in text  # not marked
 
 
-# --- examples and notebooks -------------------------------------------------------------------------------------------
+# --- examples and keys ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -150,21 +148,26 @@ def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch
     assert not failed
 
 
-@pytest.mark.parametrize("path", notebooks(), ids=lambda path: path.stem)
-def test_a_notebook_gives_what_it_gave(path: Path, tmp_path: Path) -> None:
-    """Executed anew, without an error. Speeds: to 0.1 %, as other machines round otherwise, or 0.01 mm/s."""
-    now, before = executed(path, tmp_path, SMALL_PICTURES), nbformat.read(path, as_version=4)
-    assert tagged(now, "velocity") == pytest.approx(tagged(before, "velocity"), rel=1e-3, abs=1e-5)
-    kinds = [[output["output_type"] for output in cell.get("outputs", [])] for cell in stored(now).cells]
-    assert kinds == [[output["output_type"] for output in cell.get("outputs", [])] for cell in before.cells]
-    # Progress is shown while the engine runs, and a line is left of it.
-    assert re.search(r"(fig1b|fig3\S*): done", json.dumps(now.cells[1]))
+def test_each_key_of_a_case_file_has_its_meaning() -> None:
+    rows = key_rows()  # `KeyError` if one has none
+    assert {"`radii`", "`friction.bead_wall`", "`gravity`"} <= {row[0] for table in rows.values() for row in table}
+    assert all(meaning.endswith((".", ")", "`")) for table in rows.values() for _, meaning, _, _ in table)
 
 
-def test_stored_notebooks_are_small_and_of_no_machine() -> None:
-    for path in notebooks():
-        text = path.read_text("utf-8")
-        assert len(text) < 1_000_000
-        words = re.sub(r"[A-Za-z0-9+/=\\n]{200,}", "", text)  # pictures
-        assert not re.search(r"(?<![\w.)\]])/(tmp|home|root|work|usr|var)/", words)
-        assert all(cell.get("execution_count") for cell in json.loads(text)["cells"] if cell["cell_type"] == "code")
+def test_the_table_of_performance_is_the_benchmarks() -> None:
+    """`make bench` keeps the ratios."""
+    page = (DOCS / "explanation" / "performance.md").read_text("utf-8")
+    told = [float(row.split("|")[-2]) for row in page.splitlines() if re.match(r"\| .* \| \d", row)]
+    ratios = read_json(ROOT / "tests" / "benchmark_ratios.json")
+    assert told == pytest.approx(list(ratios.values()), abs=0.06)
+
+
+@pytest.mark.parametrize("path", sorted((DOCS / "examples").glob("*.py")), ids=lambda path: path.stem)
+def test_examples_of_the_gallery_use_public_names_alone(path: Path) -> None:
+    """Laws of bridges, in texts that an example writes, are not looked at; the site's build runs each example."""
+    tree = ast.parse(path.read_text("utf-8"))
+    imported = [one.module for one in ast.walk(tree) if isinstance(one, ast.ImportFrom)]
+    imported += [name.name for one in ast.walk(tree) if isinstance(one, ast.Import) for name in one.names]
+    assert {name for name in imported if name and name.split(".")[0] == "walkers"} == {"walkers"}
+    used = [one for one in ast.walk(tree) if isinstance(one, ast.Attribute) and isinstance(one.value, ast.Name)]
+    assert {one.attr for one in used if one.value.id == "walkers"} <= set(walkers.__all__)

@@ -1,4 +1,4 @@
-"""Pages of the reference that the program writes, in reference/generated/: keys, tables, the library, shipped files."""
+"""Pages of the reference that the build writes to reference/generated: commands, keys, columns, library."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import re
 import types
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
-from sphinx.application import Sphinx
-from sphinx.config import Config
+from typer.main import get_command
 
 from walkers.inputs.catalogue import COMMANDS, NOT_KNOWN, catalogue
 from walkers.inputs.library import Known
+from walkers.inputs.reading import read_toml
 from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.schema import CaseFile, fields_of
 from walkers.main import _program
@@ -26,8 +26,11 @@ from walkers.postprocess.analysis import analyses
 from walkers.postprocess.tables import described
 from walkers.sweeps.table import STATE, derived_columns, result_columns
 
-program = _program()
-"""The program with all of its commands, for the directive ``typer`` of reference/commands.rst."""
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+    from sphinx.config import Config
+
+MEANINGS = Path(__file__).with_name("meanings.toml")
 
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 _PAGE = re.compile(r"docs/(\S+?\.md)")
@@ -82,6 +85,8 @@ def _expected(hint: Any) -> str:
     if get_origin(hint) in (list, tuple):
         parts = list(dict.fromkeys(_expected(one) for one in get_args(hint) if one is not ...))
         return f"a list, each {' or '.join(parts)}"
+    if get_origin(hint) is dict:
+        return "a table"
     words = {str: "text", bool: "true or false", int: "a whole number", float: "a plain number without a unit"}
     return words.get(hint, getattr(hint, "__name__", str(hint)))
 
@@ -97,56 +102,87 @@ def _refusal(validator: BeforeValidator | Kind) -> str | None:
     return None
 
 
-def _default(field: FieldInfo) -> str:
+def _default(field: FieldInfo, hint: Any) -> str:
+    """The default in the units of the messages, where a value has a unit."""
     if field.default is PydanticUndefined:
         return "required" if field.is_required() else ""
     if field.default is None or fields_of(type(field.default)) or field.default in ABSENT:
         return ""
-    return f"`{json.dumps(field.default)}`"
+    unit = next((one.unit for one in _parts(hint) if isinstance(one, Kind)), "")
+    if isinstance(field.default, float) and unit:
+        return f"`{field.default:.4g} {unit}`"
+    return f"`{json.dumps(field.default)}`" if field.default != {} else ""
 
 
-def _keys() -> str:
-    """Every key of a case file with what it expects, read off the models that check it."""
-    text = ["# Keys, as the program checks them\n\nWhat each means is in [](../cases.md). Defaults are in SI units.\n"]
+def _meanings() -> dict[str, str]:
+    """What each key means, by its dotted name; clusters have the keys of dimers."""
+    contents = read_toml(MEANINGS)
+    found = {key: text for key, text in contents.items() if isinstance(text, str)}
+    for table, entries in contents.items():
+        if isinstance(entries, dict):
+            found |= {f"{table}.{key}": text for key, text in entries.items()}
+    return found
 
-    def add(model: type, name: str) -> None:
+
+def _tables_of_keys() -> Iterator[tuple[str, dict[str, tuple[Any, FieldInfo]]]]:
+    """The tables of a case file: heading and keys, each with its type hint and field."""
+
+    def tables(model: type, name: str) -> Iterator[tuple[str, dict[str, tuple[Any, FieldInfo]]]]:
         hints = get_type_hints(model, include_extras=True)
         fields = {key: (hints[name], field) for key, (name, field) in fields_of(model).items()}
-        own = {key: (hint, field) for key, (hint, field) in fields.items() if not _tables_in(hint)}
-        if own:
-            text.append(f"\n## {name or 'at the top'}\n\n{inspect.getdoc(model)}\n".replace("``", "`"))
-            supplied = {key for key in own if f"{name.strip('[]')}.{key}" in SUPPLIED}
-            rows = (
-                (f"`{key}`", _expected(hint), "the library's" if key in supplied else _default(field))
-                for key, (hint, field) in own.items()
-            )
-            text.append(_table(["key", "expects", "default"], rows))
+        yield name, {key: (hint, field) for key, (hint, field) in fields.items() if not _tables_in(hint)}
         for key, (hint, _) in fields.items():
             for inner in _tables_in(hint)[:1]:
                 path = f"{name.strip('[]')}.{key}".strip(".")
-                add(inner, f"[[{path}]]" if list in map(get_origin, _parts(hint)) else f"[{path}]")
+                yield from tables(inner, f"[[{path}]]" if list in map(get_origin, _parts(hint)) else f"[{path}]")
 
-    add(CaseFile, "")
-    return "\n".join(text)
-
-
-# --- tables, library, what is shipped ---------------------------------------------------------------------------------
+    return tables(CaseFile, "")
 
 
-def _tables() -> str:
+def key_rows() -> dict[str, list[tuple[str, str, str, str]]]:
+    """The keys of a case file by table: key, meaning, what it expects, default. `KeyError` if one has no meaning."""
+    meanings, found = _meanings(), {}
+    for name, fields in _tables_of_keys():
+        bare = name.strip("[]")
+        rows = []
+        for key, (hint, field) in fields.items():
+            path = f"{bare}.{key}".strip(".").replace("clusters.", "dimers.").replace("drive.harmonics.", "drive.")
+            default = "from the library" if f"{bare}.{key}" in SUPPLIED else _default(field, hint)
+            rows.append((f"`{key}`", meanings[path], _expected(hint), default))
+        found[name] = rows
+    return found
+
+
+def _keys() -> str:
+    """Keys of case files and columns of tables, read off the declarations that the program itself uses."""
+    text = ["# Keys and columns\n\n## Keys of a case file\n\n`walkers show CASE` prints every value.\n"]
+    listed = key_rows()
+    for name, rows in listed.items():
+        if name == "[[clusters]]":
+            text.append("\n### [[clusters]]\n\nThe keys of `[dimers]`.\n")
+        elif rows:
+            text.append(
+                f"\n### {name or 'Top level'}\n\n{_table(['key', 'meaning', 'expects', 'default'], iter(rows))}"
+            )
+    return "".join(text) + _columns()
+
+
+def _columns() -> str:
     """Columns of the tables of a run and of a sweep, from where they are declared."""
-    text = "# Tables and their columns\n\nUnits and meanings are in the parquet files, too.\n\n"
-    text += "Of `rotation_*` and the like there is one for each bead or contact: `rotation_1`, `rotation_2`, …\n\n"
+    text = (
+        "\n## Columns of the tables of a run\n\nThe parquet files contain the units and meanings too. A name with `*`"
+    )
+    text += " stands for one column per bead or contact: `rotation_1`, `rotation_2`, …\n\n"
     tables = {name: described(table) for one in analyses() for name, table in one.tables.items()}
-    text += "".join(f"## {name}.parquet\n\n{_described(columns)}\n" for name, columns in tables.items())
-    text += "## The table of a sweep\n\nAfter the keys that vary.\n\n"
+    text += "".join(f"### {name}\n\n{_described(columns)}\n" for name, columns in tables.items())
+    text += "## Columns of the table of a sweep\n\nThe first columns are the keys that vary.\n\n"
     for one in analyses():
         columns = {**one.derived, **one.columns}
-        text += f"### Of {one.name}\n\n{_described(columns)}\n" if columns else ""
+        text += f"### Analysis {one.name}\n\n{_described(columns)}\n" if columns else ""
     names = [one.name for one in analyses()]
     known = {key for one in analyses() for key in one.derived} | set(result_columns(names))
     common = {key: told for key, told in derived_columns(names).items() if key not in known}
-    return text + f"### Of all\n\n{_described({**common, **STATE})}"
+    return text + f"### All sweeps\n\n{_described({**common, **STATE})}"
 
 
 def _library() -> str:
@@ -181,7 +217,35 @@ def _shipped() -> str:
     return text
 
 
-PAGES = {"keys": _keys, "tables": _tables, "library": _library, "shipped": _shipped}
+_COMMANDS = """# Commands
+
+The output of `walkers --help` and of `walkers COMMAND --help`. `walkers --install-completion` installs the
+completion of commands, options, cases, sweeps and runs for your shell.
+
+| exit status | meaning |
+| --- | --- |
+| 0 | done |
+| 1 | a run or a check failed |
+| 2 | bad input |
+| 130 | interrupted with Ctrl-C |
+| 143 | terminated |
+| 129 | the terminal was closed |
+
+"""
+
+
+def _commands() -> str:
+    """Help texts as a terminal of 80 columns shows them."""
+    program = get_command(_program())
+    context = program.make_context("walkers", [], resilient_parsing=True, terminal_width=80)
+    text = f"{_COMMANDS}```text\n$ walkers --help\n{program.get_help(context)}\n```\n"
+    for name, command in program.commands.items():
+        inner = command.make_context(name, [], context, resilient_parsing=True, terminal_width=80)
+        text += f"\n## walkers {name}\n\n```text\n$ walkers {name} --help\n{command.get_help(inner)}\n```\n"
+    return text
+
+
+PAGES = {"commands": _commands, "tables": _keys, "library": _library, "shipped": _shipped}
 
 
 def _write(app: Sphinx, _config: Config) -> None:

@@ -24,6 +24,12 @@ LOG = logging.getLogger(__name__)
 _LITERAL = re.compile(r"(``.*?``)")
 _AMBIGUOUS = re.compile(r"\\[dt]?frac\s*\d|[\^_]\d\d|\\sqrt\s*\d\d")
 """LaTeX takes 4 and 3 of ``\\frac43``, the converter 43 and what comes next."""
+_FUNCTIONS = r"(\\(?:sin|cos|tan|ln|log|exp|operatorname\{\w+\})(?:\^\d)?)"
+_SPACED = (
+    (re.compile(rf"(?<=[\w)}}])\s*{_FUNCTIONS}"), r"\\,\1"),
+    (re.compile(rf"{_FUNCTIONS}\s*(?=\\(?!left|,)|[A-Za-z\d])"), r"\1\\,"),
+)
+"""LaTeX sets spaces before a function and between it and its argument, the converter none."""
 
 
 def _readable(_app: Sphinx, what: str, _name: str, _it: Any, _options: Any, lines: list[str]) -> None:
@@ -58,8 +64,11 @@ def _is_foreign(_app: Sphinx, _what: str, _name: str, it: Any, _skip: bool, _opt
 def _mathml(node: nodes.Element, *, block: bool) -> str:
     if _AMBIGUOUS.search(node.astext()):
         LOG.warning("formula %r: write braces around the numbers", node.astext(), location=node)
+    text = node.astext()
+    for pattern, spaced in _SPACED:
+        text = pattern.sub(spaced, text)
     try:
-        return tex2mathml(node.astext(), as_block=block)
+        return tex2mathml(text, as_block=block)
     except MathError as error:
         LOG.warning("formula %r: %s", node.astext(), error, location=node)
         return f"<code>{node.astext()}</code>"

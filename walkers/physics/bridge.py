@@ -1,22 +1,21 @@
-"""What a law of a liquid bridge says: the pull and the resistances of two surfaces against their gap.
+"""Interface of a bridge law: the pull and the resistances between two surfaces as functions of their gap.
 
-Two surfaces 1 and 2 (spheres, or a sphere and a plane) have the unit vector n from 2 to 1 between their centres, the
-gap h, and arms l1, l2 from the centres to the middle of the contact. Three velocities describe how they move apart:
+The surfaces 1 and 2 are two spheres, or a sphere and a plane. The unit vector n points from 2 to 1, h is the gap, l1
+and l2 are the distances of the centres from the middle of the contact. Three velocities describe the relative motion:
 
     normal    w = (v1 - v2) · n
     sliding   s = (v1 - v2) - w n + n × (l1 ω1 + l2 ω2)       of the surfaces at the contact
     rolling   q = n × (ω1 - ω2)                               rad/s
 
-A law gives the pull P and a resistance matrix, all functions of h. The force on 1 and the couple between the two are
+A law gives the pull P and the resistances N, S, C and Q as functions of h. The force on 1 and the torque are
 
-    F = -(P + N w) n - (S s + C q),        M = -(C s + Q q);
+    F = -(P + N w) n - (S s + C q),        M = -(C s + Q q).
 
-the torques are -l1 n × F - n × M on 1 and -l2 n × F + n × M on 2, so that momentum and angular momentum are conserved
-and the dissipated power N w² + S s² + 2 C s·q + Q q² is not negative where N, S, Q ≥ 0 and C² ≤ S Q. A drag c on the
-velocity of a centre along a plane, v = s - l1 q, is S = c, C = -c l1, Q = c l1².
+The torques on the bodies are -l1 n × F - n × M on 1 and -l2 n × F + n × M on 2. Momentum and angular momentum are
+therefore conserved. The dissipated power N w² + S s² + 2 C s·q + Q q² is not negative if N, S, Q ≥ 0 and C² ≤ S Q. A
+drag c on the velocity of a centre along a plane, v = s - l1 q, corresponds to S = c, C = -c l1 and Q = c l1².
 
-Body 1 is `Surfaces.radius`, the bead at a plane and the smaller one of two. For the other one as body 1, n and s turn
-round while q does not: C changes its sign, and nothing else.
+Body 1 is the bead at a plane, or the smaller one of two beads. If the other bead is body 1, C changes its sign.
 
 Surfaces that overlap (h < 0) have the pull and the resistances of h = 0.
 """
@@ -38,11 +37,18 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Two surfaces that a bridge joins, or may join.
+    """Two surfaces with a bridge between them.
 
-    ``radius`` is that of the bead, the smaller one of two, ``other_radius`` of the other one, infinity for a plane (m),
-    ``volume`` the bridge's liquid (m³), ``minimum_separation_ratio`` the gap over the reduced radius below which
-    resistances stop growing (roughness).
+    Attributes
+    ----------
+    radius, other_radius
+        Radius of the bead, or of the smaller one of two beads; radius of the other bead, infinite for a plane; m.
+    volume
+        Volume of the bridge, m³.
+    liquid
+        Liquid of the bridge.
+    minimum_separation_ratio
+        Gap, divided by the reduced radius, below which the resistances stop growing (roughness).
     """
 
     radius: float
@@ -53,7 +59,7 @@ class Surfaces:
 
     @classmethod
     def of(cls, radius: float, other_radius: float, liquid: Liquid, minimum_separation_ratio: float) -> Surfaces:
-        """A bead and another or a plane (a radius of infinity), with the liquid that their bridge has."""
+        """Make the surfaces of a bead and another bead or a plane (infinite radius), and the volume of their bridge."""
         if other_radius == inf:
             volume = bridge_volume_at_wall(radius, liquid.volume_fraction)
         else:
@@ -68,20 +74,29 @@ class Surfaces:
 
     @property
     def reduced_radius(self) -> float:
-        """R1 R2/(R1 + R2), at a plane the bead's radius, m."""
+        """Reduced radius R1 R2/(R1 + R2); at a plane, the radius of the bead; m."""
         return self.radius if self.at_wall else self.radius * self.other_radius / (self.radius + self.other_radius)
 
     @property
     def closest(self) -> float:
-        """Gap below which resistances stop growing, m."""
+        """Gap below which the resistances stop growing, m."""
         return self.minimum_separation_ratio * self.reduced_radius
 
 
 @dataclass(frozen=True)
 class Forces:
-    """Pull (N) and resistances at some gaps, arrays of shape (N,): see the module for their meaning.
+    """Pull and resistances at given gaps, arrays of shape (n,). The module defines them.
 
-    ``normal`` (N), ``sliding`` (S) are in N s/m, ``coupling`` (C) in N s, ``rolling`` (Q) in N m s.
+    Attributes
+    ----------
+    pull
+        Pull P, N.
+    normal, sliding
+        Resistances N and S, N s/m.
+    coupling
+        Resistance C, N s.
+    rolling
+        Resistance Q, N m s.
     """
 
     pull: FloatArray
@@ -97,18 +112,18 @@ class Forces:
 
 @dataclass(frozen=True)
 class Curve:
-    """A law for two given surfaces.
+    """The law for two given surfaces.
 
     Attributes
     ----------
     forces
-        Of gaps from 0 to ``rupture``, m.
+        Function that gives the `Forces` at gaps from 0 to ``rupture``, in m.
     rupture, formation
-        Gaps at which the bridge breaks and below which it forms, m: 0 where the surfaces must touch.
+        Gap at which the bridge breaks, and gap below which it forms (0: the surfaces must touch), m.
     scale
-        Over which forces vary near contact, m; a kink may be there. 0 is for `Surfaces.closest`.
+        Gap over which the forces vary near contact, m. A kink may be there. 0 stands for `Surfaces.closest`.
     pull
-        That of ``forces`` by itself, N, of a law whose resistances are more work than its pull.
+        Function that gives the pull alone, N, for laws whose resistances are expensive to compute.
     """
 
     forces: Callable[[FloatArray], Forces]

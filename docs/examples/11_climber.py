@@ -1,9 +1,9 @@
 """
-A climber comes upright
+A cluster climbs a wall
 =======================
 
-A large bead above two small ones side by side, with one more below, on a wall that is shaken vertically. Six of them
-begin up to 10° off the vertical. A dimer would turn over; these touch the wall on triangles, come upright and climb.
+A large bead above two small ones side by side, with one more below, stands on a vertical wall that is shaken
+vertically. Six such clusters start up to 10° off the vertical. All of them turn upright and climb.
 """
 
 import matplotlib.pyplot as plt
@@ -15,7 +15,7 @@ run = walkers.run("climber")
 print(run.describe())
 
 # %%
-# Their angles from the vertical, on a logarithmic scale, and how high they have come, once a cycle.
+# Plot the angle from the vertical (logarithmic scale) and the height, once per cycle.
 
 samples = run.case.run.samples_per_cycle
 figure, (angles, heights) = plt.subplots(1, 2, figsize=(9, 4))
@@ -27,3 +27,6 @@ angles.set(xlabel="time (s)", ylabel="angle from the vertical (°)", ylim=(1e-4,
 heights.set(xlabel="time (s)", ylabel="height climbed (mm)")
 figure.tight_layout()
 plt.show()
+
+# %%
+picture = run.render("runs/climber.png")[0]

@@ -2,8 +2,8 @@
 The gait of a walker
 ====================
 
-What the beads of Fig. 4b's walker do in two cycles of the drive: how fast the walker goes, how fast each bead rotates,
-and which contacts are open. Driven so hard, its beads part in every cycle, and come together again.
+Plot what each bead of the walker of Fig. 4b does in two cycles of the drive. The drive is so strong that the beads
+separate from each other and from the substrate in every cycle.
 """
 
 import matplotlib.pyplot as plt
@@ -11,14 +11,12 @@ import matplotlib.pyplot as plt
 import walkers
 
 run = walkers.run("fig4b")
-print(run.describe())
 
 # %%
-# The trajectory has a row for each sample and walker. Two cycles of one walker, when it is steady:
+# The table ``trajectory`` has one row per sample and walker. Take the last two cycles of the first walker:
 
 walker = run.trajectory.query("walker == 0")
-last = walker["cycle"].max()
-cycles = walker[walker["cycle"] >= last - 2.0]
+cycles = walker[walker["cycle"] >= walker["cycle"].max() - 2.0]
 
 figure, (speeds, gaps) = plt.subplots(2, sharex=True, figsize=(7, 6))
 speeds.plot(cycles["cycle"], 1e3 * cycles["velocity"], "k", label="mass centre, relative to the substrate")
@@ -32,6 +30,3 @@ gaps.axhline(0.0, color="0.5", lw=0.8)
 gaps.set(xlabel="cycle", ylabel="gap (µm)")
 gaps.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize="small", frameon=False)
 plt.show()
-
-# %%
-# ``run.plot()`` draws this with the means of all walkers, at every step of the engine.

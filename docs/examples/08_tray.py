@@ -1,0 +1,21 @@
+"""
+A tray of walkers that meet
+===========================
+
+Place nine walkers close to each other. They meet, stick together and separate.
+"""
+
+import walkers
+
+run = walkers.run("tray")
+print(run.describe())
+
+# %%
+# Views from above, at equal time intervals:
+
+picture = run.render("runs/tray.png")[0]
+
+# %%
+# The table ``meetings`` lists who merged with whom, and when.
+
+print(run.table("meetings").head(8).to_string(index=False))

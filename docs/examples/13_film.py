@@ -1,0 +1,16 @@
+"""
+A film
+======
+
+Film a walker for four cycles of the drive, 50 times slower than in reality. The film shows how the beads roll and how
+the floor shakes.
+"""
+
+import walkers
+
+run = walkers.run("fig4b")
+options = walkers.FilmOptions(size=(480, 240), fps=20, slowdown=50.0, walker=0, begin=0.05, end=0.1)
+picture = run.film("runs/walk.gif", options)
+
+# %%
+# A name that ends in ``.mp4`` gives an MP4 file.
