@@ -168,7 +168,7 @@ def test_runs_name_the_audit_of_their_engine(own_cache: Path) -> None:
     assert _audit_of(unaudited) is None
     with warnings.catch_warnings():  # it is said once
         warnings.simplefilter("error", UnauditedEngineWarning)
-        run_case(make_case(run={**SHORT, "cycles": 3}), own_cache / "a")
+        run_case(make_case(run={**SHORT, "cycles": 5}), own_cache / "a")
     kept = record(run_audit(["stock"]), quick=True)
     assert kept is not None
     audited = run_case(case, own_cache / "b")

@@ -161,7 +161,7 @@ def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> N
     directory = looked_through / "grid"
     figure = walkers.load(directory).figure(theory=True)
     (axes,) = _panels(figure)
-    assert _legend(figure)[2:] == ["theory", "paper's fit, κ = 0.033 s/mm"]
+    assert _legend(figure)[2:] == [MODEL, PAPER]
     lines = {line.get_linestyle(): line for line in axes.lines if line.get_color() == "C1"}
     table = walkers.load(directory).table()
     predicted = [predict(case_of(Path(run))) for run in table.loc[table["drive.frequency"] == 80.0, "run"]]

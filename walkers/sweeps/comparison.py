@@ -73,10 +73,14 @@ def _pair(
     numbers = zip(names, (*values, *scatters, difference, numerical), strict=True)
     contents = {"quantity": quantity, "unit": unit, **{name: one if isfinite(one) else None for name, one in numbers}}
     usual, size = readable_unit(unit)
-    told = [rounded(value / size, usual) for value in (*values, difference)]
-    told[2] = told[2] if told[2][:1] == "-" or told[2] == "0" else f"+{told[2]}"
+    told = [*(rounded(value / size, usual) for value in values), _difference(difference / size, usual)]
     both = " and ".join(_two_digits(one / size, usual) for one in scatters if isfinite(one))
     return contents, [with_unit(quantity, usual), *told, both or "-", _two_digits(numerical / size, usual)]
+
+
+def _difference(value: float, unit: str) -> str:
+    told = rounded(value, unit)
+    return told if told[:1] == "-" or told == "0" else f"+{told}"
 
 
 def _two_digits(value: float, unit: str) -> str:
@@ -214,7 +218,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
     heads = [*keys[0], *(f"{name}: {quantity}" for name in names), "difference", "scatter of copies"]
     unit, size = readable_unit(tables[0].attrs["units"][column])
     largest = max((one["difference"] or 0.0 for one in points), key=abs)
-    line = f"{len(both)} points in both; largest difference {largest / size:+.3g} {unit}".rstrip()
+    line = f"{len(both)} points in both; largest difference {_difference(largest / size, unit)} {unit}".rstrip()
     if any(unmatched):
         line += f"; left out: {unmatched[0]} of {names[0]}, {unmatched[1]} of {names[1]}"
     contents: dict[str, Any] = {**dict(zip(_SIDES, names, strict=True)), "keys": dict(records[0].units)}
