@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _ACROSS = 3
 _ROW = 2.1  # inches
+_MOST_LETTERS = 40  # side by side below a panel
 _RATE = "climbs per start and second"
 _KINDS = (("all", "", "ko"), ("plain walls", "on_plain_walls", "C1s"), ("corners", "in_corners", "C2^"))
 """Of all climbs and of parts of them: label, key in what `summarise_climbs` gives, colour and marker."""
@@ -115,7 +116,8 @@ def _draw_rates(
         panel.set_yticks(places, told)
         panel.set(xlabel=_RATE, xlim=(0.0, None), ylim=sides)
     else:
-        panel.set_xticks(places, told, rotation=30 if len(labels) > 4 else 0)
+        crowded = sum(map(len, told)) > _MOST_LETTERS
+        panel.set_xticks(places, told, rotation=30 if crowded else 0, ha="right" if crowded else "center")
         panel.set(ylabel=_RATE, ylim=(0.0, None), xlim=sides)
 
 
