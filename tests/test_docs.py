@@ -139,11 +139,9 @@ def test_pages_are_written_anew(tmp_path: Path) -> None:
 )
 def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a folder of the tests (``tmp``), with what a user would have imported."""
-    if module == "pipeline":  # its sweep is there for its table: Fig. 4b would take all of 60 cycles
+    if module == "walkers.pipeline":  # its sweep is there for its table: Fig. 4b would take all of 60 cycles
         monkeypatch.setattr("walkers.inputs.run_tables._MOST_CYCLES", 12)
-    failed, tried = doctest.testmod(
-        import_module(f"walkers.{module}"), extraglobs={"tmp": runs_folder, "walkers": walkers}
-    )
+    failed, tried = doctest.testmod(import_module(module), extraglobs={"tmp": runs_folder, "walkers": walkers})
     assert tried
     assert not failed
 

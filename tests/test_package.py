@@ -138,7 +138,7 @@ def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -
     assert "mine-" in told("walkers", "list")
     pictures = [*told("walkers", "plot", "mine.toml").split(), *told("walkers", "render", "mine.toml").split()]
     assert {"walk.png", "walker.png"} <= {Path(one).name for one in pictures if Path(one).is_file()}
-    table = "import walkers; print(*walkers.sweep('two.toml')['status'], walkers.load('mine.toml').trajectory.shape[0])"
+    table = "import walkers; print(*walkers.sweep('two.toml').table()['status'], walkers.load('mine.toml').trajectory.shape[0])"
     assert told("python", "-c", table).split() == ["finished", "finished", "61"]
     assert told("walkers", "report", "mine.toml", status=2).splitlines()[-1] == (
         "walkers: a report or an interactive view needs bokeh, k3d: pip install 'granular-walkers[report]'"
@@ -147,7 +147,7 @@ def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -
 
 
 NEEDING: dict[str, list[Callable[[walkers.Run, Path], object]]] = {
-    "archive": [lambda run, out: run.archive(out / "run.zip")],
+    "archive": [lambda run, out: run.export("archive", out / "run.zip")],
     "calibrate": [lambda _, out: calibrate(load_calibration("ruby"), out, Options(1))],
     "check": [lambda *_: importlib.reload(importlib.import_module("walkers.check"))],
     "cluster": [lambda _, out: load_site(out / "site.toml")],
@@ -158,7 +158,7 @@ NEEDING: dict[str, list[Callable[[walkers.Run, Path], object]]] = {
         lambda _, out: try_model_terms(out),
         lambda _, out: make_figures(out / "runs", out / "figures", Options(1)),
     ],
-    "xyz": [lambda run, out: run.export(out / "run.xyz")],
+    "xyz": [lambda run, out: run.export("xyz", out / "run.xyz")],
 }
 
 
@@ -175,7 +175,7 @@ def test_what_needs_an_extra_names_it_before_it_begins(
         ):
             use(run, tmp_path)
     assert not list(tmp_path.iterdir())
-    told = call("report", str(run.directory))
+    told = call("report", str(run.directory), "--to", str(tmp_path / "run.html"))
     assert (told.returncode == 2 and told.stderr.count("\n") == 1) == (extra == "report")
 
 

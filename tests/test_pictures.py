@@ -64,7 +64,7 @@ def test_beads_and_floor_are_where_the_engine_put_them(moved: Group, collection:
     np.testing.assert_allclose(beads["omega (rad/s)"], moved.spin[frame].reshape(-1, 3))
     mesh = pv.read(collection.parent / f"beads_{frame:06d}.vtu")
     np.testing.assert_allclose(mesh.points, beads.points)
-    np.testing.assert_array_equal(mesh["radius_(m)"], beads["radius (m)"])
+    np.testing.assert_array_equal(mesh["radius (m)"], beads["radius (m)"])
     floors = [pv.read(collection.parent / f"boundary_{number:06d}.vtp") for number in (0, frame)]
     np.testing.assert_allclose(floors[1].points - floors[0].points, np.tile(shift, (4, 1)), atol=1e-12)
     assert np.linalg.norm(shift) > 1e-5

@@ -326,7 +326,7 @@ BAD: dict[str, tuple[str, dict[str, dict[str, Any]], str]] = {
     "low": ("pile-ci", {"boundary": {"height": "2 mm"}}, "boundary.height"),
     "long": ("pile-ci", {"run": {"duration": "9000 s"}}, "run.duration"),
     "step": ("pile-ci", {"run": {"time_step": "6 us"}}, "run.time_step"),
-    "friction": ("pile-ci", {"contact": {"friction": {}}}, "contact.friction.bead_bead"),
+    "friction": ("pile-ci", {"contact": {"friction": {"bead_bead": -0.1}}}, "contact.friction.bead_bead"),
     "unknown": ("pile-ci", {"boundary": {"depth": "3 mm"}}, "boundary.depth"),
     "material": ("pile-ci", {"boundary": {"material": "glas"}, "contact": {"friction": {}}}, "boundary.material"),
     "outside": ("cluster", {"placed": {"at": ["2.2 mm", "2.2 mm", "8 mm"]}}, "placed[0].at"),

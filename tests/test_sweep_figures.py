@@ -51,8 +51,8 @@ def _table(units: dict[str, str], rows: list[list[Any]], axes: list[tuple[str, .
 @pytest.mark.parametrize(("error", "bars"), [(2e-4, 3), (2e-6, 0)])
 def test_error_bars_that_symbols_would_hide_are_left_out_and_the_legend_says_so(error: float, bars: int) -> None:
     table = _table({"drive.frequency": "Hz"}, [[60.0], [70.0], [80.0]], [("drive.frequency",)])
-    table = table.assign(velocity=[1e-3, 2e-3, 3e-3], standard_error=error)
-    table.attrs["units"] |= {"velocity": "m/s", "standard_error": "m/s"}
+    table = table.assign(velocity=[1e-3, 2e-3, 3e-3], scatter=error)
+    table.attrs["units"] |= {"velocity": "m/s", "scatter": "m/s"}
     figure = draw(layout_of(table, table), drawn_column(table, "velocity"))
     (panel,) = _panels(figure)
     assert sum(len(one.get_segments()) for one in panel.collections if isinstance(one, LineCollection)) == bars
@@ -62,7 +62,7 @@ def test_error_bars_that_symbols_would_hide_are_left_out_and_the_legend_says_so(
 def test_axes_do_not_magnify_rounding() -> None:
     table = _table({"dimers.angle": "deg"}, [[-30.0], [-3.2e-15], [30.0]], [("dimers.angle",)])
     for values in ([1e-3, 1e-3 * (1.0 + 1e-9), 1e-3], [3.2e-18, -3.2e-18, 0.0]):
-        shown = table.assign(velocity=values, standard_error=0.0)
+        shown = table.assign(velocity=values, scatter=0.0)
         shown.attrs["units"] = {**table.attrs["units"], "velocity": "m/s"}
         (panel,) = _panels(draw(layout_of(shown, shown), drawn_column(shown, "velocity")))
         assert np.ptp(panel.get_ylim()) > 0.1

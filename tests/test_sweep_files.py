@@ -166,7 +166,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"case": ""}, 'case = "": no such file'),
     ({"sample": {"points": 4}}, r"sample = .*\[\[name\]\]"),
     ({"axis": {}}, 'unknown key; a sweep takes .*did you mean "axes"'),
-    ({"case": "fig1c"}, 'case = "fig1c": no such file, nor a shipped case .*did you mean "fig1b"'),
+    ({"case": "fig1c"}, 'case = "fig1c": no such file, run or sweep, nor a shipped case .*did you mean "fig1b"'),
     ({"set": {"drive.frequncy": "60 Hz"}}, "drive.frequncy: unknown key"),
     # What would make the same point twice
     ({"axes": {"drive.frequency": ["80 Hz", "80.0 Hz"]}}, r'"80\.0 Hz": expected different'),

@@ -12,6 +12,7 @@ import walkers
 from tests.conftest import make_case
 from walkers.inputs import library, load_case, resolve_case
 from walkers.inputs.axes import ranges_of
+from walkers.inputs.catalogue import catalogue
 from walkers.inputs.errors import InputError
 from walkers.inputs.numerical import STIFFER, measured, numerical_error
 from walkers.inputs.readable import kind_of
@@ -49,9 +50,10 @@ def test_the_numerical_error_is_what_a_shorter_step_and_harder_beads_change(runs
 def test_what_is_usual_lies_within_its_range() -> None:
     """Strictly, but for a contact angle of 0°, the end of what is possible."""
     numbers = {key: (one.usual, one.range) for key, one in library.unmeasured().items() if one.usual}
-    for pair in library.surface_pairs():
-        calibrated = library.surface_pair(*pair)
-        numbers |= {f"contact.{key} of {pair}": (one, one.range) for key, one in calibrated.items() if one.range}
+    for entry in catalogue(of_others=False):
+        if entry.kind == "surface pairs":
+            known = {key: one for key, one in entry.numbers.items() if one.range}
+            numbers |= {f"contact.{key} of {entry.name}": (one, one.range) for key, one in known.items()}
     assert len(numbers) > 15
     for key, (known, ends) in numbers.items():
         assert known is not None

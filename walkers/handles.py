@@ -206,8 +206,8 @@ class Run:
 
         Examples
         --------
-        >>> len(walkers.run("fig1b", tmp).view().objects)  # twelve beads, the floor, the lines on it
-        14
+        >>> len(walkers.run("fig1b", tmp).view().objects)  # two beads, the floor, the lines on it
+        4
         """
         from walkers.postprocess.report.player import player_of
 

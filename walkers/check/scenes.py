@@ -418,8 +418,11 @@ def step_lines(bench: Bench) -> Iterator[Line]:
     """A walker's way in four cycles, with the step that ``auto`` takes, its half and its quarter."""
     case, ways = _walker(4), []
     for finer in (1, 2, 4):
-        plan = plan_of(replace(case, run=replace(case.run, time_step=case.run.time_step / finer, steps_per_cycle=0)))
-        steps = round(4.0 / case.drive.frequency / case.run.time_step) * finer
+        cycle = case.run.steps_per_cycle * finer
+        plan = plan_of(
+            replace(case, run=replace(case.run, time_step=case.run.time_step / finer, steps_per_cycle=cycle))
+        )
+        steps = 4 * cycle
         frames = bench.run(replace(plan, recording=recording(steps, steps))).frames
         ways.append(frames[-1, :, :3] - frames[0, :, :3])
     coarse, fine = farthest(ways[0], ways[2]), farthest(ways[1], ways[2])
