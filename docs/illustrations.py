@@ -149,6 +149,8 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "pile-starts": _of_climbs("pile-starts", assembly=_ASSEMBLES),
     "pile-controls": _of_climbs("pile-controls", "pile-starts"),
     "pile-needs": _of_climbs("pile-needs"),
+    "pile-calibrated": _of_climbs("pile-calibrated"),
+    "pile-cylinder": _of_climbs("pile-cylinder"),
     "pile-film": _of_run(
         *("pile", "pile-small", _ASSEMBLES),
         film=FilmOptions(size=(360, 640), fps=10, slowdown=1.0, begin=2.5, end=8.5),
