@@ -99,7 +99,12 @@ FAILS = {
     "an error of the engine": ({}, "pair_coeff      * *", "pair_coeff * * 3", "failed: the engine stopped: ERROR"),
     "a time step beyond the limits": ({"steps_per_cycle": "400"}, "", "", "failed: .*blow-up"),
     "steps that are no cycle": ({"time_step": "3e-6"}, "", "", "cannot be read .*not one cycle of 80 Hz"),
-    "a run that was stopped": ({"cycles": "4000", "peak_acceleration": "1.0"}, "", "", "still runs, or was stopped: the engine wrote"),
+    "a run that was stopped": (
+        {"cycles": "4000", "peak_acceleration": "1.0"},
+        "",
+        "",
+        "still runs, or was stopped: the engine wrote",
+    ),
 }
 
 

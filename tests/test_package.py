@@ -32,7 +32,7 @@ from walkers.theory.prediction import predict
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 OPTIONAL: dict[str, list[str]] = PROJECT["optional-dependencies"]
-FOR_USERS = {extra: OPTIONAL[extra] for extra in OPTIONAL if extra not in {"all", "notebook", "docs", "dev"}}
+FOR_USERS = {extra: OPTIONAL[extra] for extra in OPTIONAL if extra not in {"all", "docs", "dev"}}
 OURS = canonicalize_name(PROJECT["name"])
 
 
@@ -138,7 +138,8 @@ def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -
     assert "mine-" in told("walkers", "list")
     pictures = [*told("walkers", "plot", "mine.toml").split(), *told("walkers", "render", "mine.toml").split()]
     assert {"walk.png", "walker.png"} <= {Path(one).name for one in pictures if Path(one).is_file()}
-    table = "import walkers; print(*walkers.sweep('two.toml').table()['status'], walkers.load('mine.toml').trajectory.shape[0])"
+    table = "import walkers; print(*walkers.sweep('two.toml').table()['status'], "
+    table += "walkers.load('mine.toml').trajectory.shape[0])"
     assert told("python", "-c", table).split() == ["finished", "finished", "61"]
     assert told("walkers", "report", "mine.toml", status=2).splitlines()[-1] == (
         "walkers: a report or an interactive view needs bokeh, k3d: pip install 'granular-walkers[report]'"

@@ -7,6 +7,7 @@ import json
 import re
 import types
 from collections.abc import Iterator, Mapping, Sequence
+from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -17,6 +18,7 @@ from typer.main import get_command
 
 from walkers.inputs.catalogue import COMMANDS, NOT_KNOWN, catalogue
 from walkers.inputs.library import Known
+from walkers.inputs.numerical import measured
 from walkers.inputs.reading import read_toml
 from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.schema import CaseFile, fields_of
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 MEANINGS = Path(__file__).with_name("meanings.toml")
 
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+_AT_REST = 1e-6  # m/s
 _PAGE = re.compile(r"docs/(\S+?\.md)")
 
 
@@ -212,9 +215,20 @@ def _shipped() -> str:
     """Shipped cases and sweeps with their titles."""
     text = "# Shipped cases, sweeps and calibrations\n\nEvery command accepts these names instead of a file.\n"
     for kind, command in COMMANDS.items():
-        rows = ((f"`walkers {command} {one.name}`", one.text) for one in catalogue(of_others=False) if one.kind == kind)
-        text += f"\n## {kind.capitalize()}\n\n{_table(['', 'title'], rows)}"
+        names = [(one.name, one.text) for one in catalogue(of_others=False) if one.kind == kind]
+        rows = [(f"`walkers {command} {name}`", title, _numerical_error(name)) for name, title in names]
+        columns = 3 if kind == "cases" else 2
+        heads = ["", "title", "numerical error"][:columns]
+        text += f"\n## {kind.capitalize()}\n\n{_table(heads, (row[:columns] for row in rows))}"
     return text
+
+
+def _numerical_error(case: str) -> str:
+    """The numerical error of the velocity of a shipped case, as a share of it; nothing if it was not measured."""
+    if (one := measured().get(case)) is None:
+        return ""
+    share = hypot(one["half_step"], one["stiffer"]) / abs(one["velocity"])
+    return f"{100.0 * share:.2g} %" if abs(one["velocity"]) > _AT_REST else "below 0.001 mm/s"
 
 
 _COMMANDS = """# Commands
