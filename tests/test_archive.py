@@ -134,7 +134,7 @@ def test_the_commit_of_a_checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_what_changed_is_named(run: Path, tmp_path: Path) -> None:
     """Nothing is read from pictures and films; a folder of segments is taken for a part of the run."""
     files = len(FinishedRun(run).manifest["files"])
-    assert _verified(run) == [f"{run.name}: {files} files are what they were"]
+    assert _verified(run) == [f"{run.name}: {files} files are unchanged"]
     for name in ("film.mp4", "vtk/walkers_0000.vtp", "vtk/walkers_0001.vtp", ".DS_Store", "test.toml"):
         (run / name).parent.mkdir(exist_ok=True)
         (run / name).write_bytes(b"new")
@@ -148,7 +148,7 @@ def test_what_changed_is_named(run: Path, tmp_path: Path) -> None:
     (run / "segments" / "0000" / "walk.png").touch()
     (run / "\x1b[2J").touch()
     assert _verified(run, 1) == [
-        f"{run.name}: {files - 2} files are what they were",
+        f"{run.name}: {files - 2} files are unchanged",
         "  changed    segments/0000/beads.bin",
         "  missing    walkers.parquet",
         r"  not listed \x1b[2J",
@@ -245,7 +245,7 @@ def test_an_archive_without_dumps(run: Path, tmp_path: Path) -> None:
     shutil.unpack_archive(archive, tmp_path / "unpacked")
     there = tmp_path / "unpacked" / "runs" / run.name
     files = len(FinishedRun(run).manifest["files"])
-    assert _verified(there)[0].endswith(f"{files - 3} files are what they were, 3 left out of the archive")
+    assert _verified(there)[0].endswith(f"{files - 3} files are unchanged, 3 left out of the archive")
     assert Run(there).result == Run(run).result
     call("export", str(there), "--to", "archive", "-o", str(again), "--without-dumps", check=True)
     assert archive.read_bytes() == again.read_bytes()
@@ -284,7 +284,7 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     for place in places:
         shutil.rmtree(place)
     gone = _verified(there, 1)
-    assert gone[0] == "angles: 0 points have their run"
+    assert gone[0] == "angles: 0 points have a run"
     assert sum("(missing: point " in line for line in gone) == 2
     refused = call("export", str(there), "--to", "archive", "-o", str(tmp_path / "two.zip"))
     assert (refused.returncode, "2 of 2 points are not finished" in refused.stderr) == (2, True)

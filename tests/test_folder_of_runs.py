@@ -229,7 +229,7 @@ def test_clean_removes_nothing_behind_a_symbolic_link(out: Path, tmp_path: Path)
     link.symlink_to(kept)
     before = {path: path.read_bytes() for path in kept.rglob("*") if path.is_file()}
     told = call("clean", link.name, "--yes", check=True).stdout
-    assert "a symbolic link: what it leads to stays" in told
+    assert "a symbolic link: its target stays" in told
     assert "1 finished run to remove, 0 B" in told
     assert not link.is_symlink()
     assert {path: path.read_bytes() for path in kept.rglob("*") if path.is_file()} == before
@@ -272,7 +272,7 @@ def test_clean_leaves_what_somebody_put_into_a_sweeps_directory(out: Path) -> No
         (sweep / name).write_text(text)
     told = call("clean", "grid", "--dry-run", check=True).stdout
     assert f"1 sweep to remove, {bytes_text(written)}" in told
-    assert "stays, for walkers did not write it: measured.csv, notes, sliding_1.png" in told
+    assert "stays, walkers did not write it: measured.csv, notes, sliding_1.png" in told
     call("clean", "grid", "--yes", check=True)
     assert {str(path.relative_to(sweep)): path.read_text() for path in sweep.rglob("*.*")} == theirs
 

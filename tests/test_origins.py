@@ -190,7 +190,7 @@ def test_set_on_the_command_line() -> None:
     assert {"text": "70Hz", "value": 70.0, "origin": "given"}.items() <= given.items()
     text = call("show", "fig1b", check=True).stdout
     assert re.search(r"^ +frequency +80 Hz +given$", text, flags=re.MULTILINE)
-    assert re.search(r"^ +volume_fraction .* calibrated with Si AK5 and Si AK10, may be ", text, flags=re.MULTILINE)
+    assert re.search(r"^ +volume_fraction .* calibrated with Si AK5 and Si AK10, range ", text, flags=re.MULTILINE)
 
 
 def test_a_sweep_with_a_setting_has_a_directory_of_its_own(in_folder: Path) -> None:
@@ -238,7 +238,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed}
     assert {one.key for one in spread.held} == {"contact.friction.bead_bead", "contact.rolling_friction"}
     assert "as given contact.friction.bead_bead 0.3" in describe(spread)
-    assert "too few points to say on what it depends" in describe(spread)
+    assert "too few draws for rank correlations" in describe(spread)
     assert spread.depends == {"velocity": {}}
     table = walkers.load(spread.directory).table()
     assert table["contact.friction.bead_wall"].between(0.1, 0.6).all()
@@ -256,9 +256,9 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert (low, high) == (band.low, band.high)
     own = done.result["velocity"]["mean"]
     assert f"({band_text((min(low, own), max(high, own)), 'm/s')}, 5 to 95 %" in done.describe()
-    assert "not known" not in done.describe()
+    assert "uncertain:" not in done.describe()
     unspread = walkers.run(resolve_case({**GLASS, "run": {"cycles": 5}}, name="guessed"), runs_folder)
-    assert "not known: volume fraction, viscosity ratio, contact angle, friction, restitution" in " ".join(
+    assert "uncertain: volume fraction, viscosity ratio, contact angle, friction, restitution" in " ".join(
         unspread.describe().split()
     )
     with pytest.raises(InputError, match=r"uncertain.contact.restitution.*: expected a range that holds"):

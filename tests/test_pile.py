@@ -428,7 +428,7 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     upper = 3.6889 / found["seconds"]  # of no event (Garwood 1936)
     assert found["rate_interval"] == pytest.approx([0.0, upper], rel=1e-4)
     printed = call("climb", record.name, "--null", str(out), "--out", str(out), check=True).stdout
-    assert printed.count(f"0 of 2 runs, 0: 0 per start and second (0 to {upper:.3g} with 95% confidence)") == 16
+    assert printed.count(f"0 of 2 runs, 0: 0 per run and second (0 to {upper:.3g} with 95% confidence)") == 16
     written = tmp_path / "climbs.csv"
     assert call("climb", str(out), "--to", str(written), check=True).stdout.count("0 of 2 runs climbed") == 1
     assert pd.read_csv(written)["rate_high"].to_list() == pytest.approx([upper] * 3, rel=1e-4)
@@ -545,7 +545,7 @@ def test_a_climber_that_leaves_the_container_ends_the_run(tmp_path: Path) -> Non
     finished = walkers.run(resolve_case(tables, name="cluster"), tmp_path)
     assert finished.result["driven"] == pytest.approx(3.2e-3 / 4.79e-3, abs=0.1)
     assert "over its walls" in read_json(finished.directory / MANIFEST_NAME)["ended"]
-    assert "then climbers left the container" in finished.describe()
+    assert "climbers left the container" in finished.describe()
     assert call("check", "files", str(finished.directory)).returncode == 0
 
 

@@ -223,14 +223,14 @@ def test_theory_and_engine_agree_on_how_fast_a_climber_turns_over(
 
 def test_the_program_prints_theory_beside_the_engine(in_folder: Path) -> None:
     (in_folder / "test.toml").write_text(to_toml(document(run={"cycles": 12, "settling_cycles": 8})))
-    assert "not run" in call("show", "test.toml", "--theory", check=True).stdout
+    assert "no run yet" in call("show", "test.toml", "--theory", check=True).stdout
     call("run", "test.toml", check=True)
     told = call("show", "test.toml", "--theory", "--json", check=True).stdout
     contents = json.loads(told)
     assert contents["engine"]["velocity"]["mean"] == pytest.approx(contents["viscous"]["velocity"], rel=0.08)
     sideways = document(boundary={"tilt": "10 deg", "uphill": "90 deg"})
     (in_folder / "sideways.toml").write_text(to_toml(sideways))
-    assert "boundary.uphill: the theory is one of planes" in call("show", "sideways.toml", "--theory").stderr
+    assert "boundary.uphill: the theory is for planes" in call("show", "sideways.toml", "--theory").stderr
     (in_folder / "up.toml").write_text(to_toml(document(drive={"axis": "z"})))
     done = call("show", "up.toml", "--theory")
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)

@@ -1,7 +1,7 @@
 """Wet granular walkers, simulated with LIGGGHTS.
 
-`load_case` reads a case. `run` and `sweep` run a case and a sweep as the commands do; `start` does not wait for the
-end. `load` finds runs and sweeps. They return a `Run` or a `Sweep`, whose methods plot, film, report and export.
+`load_case` reads a case. `run` and `sweep` run a case and a sweep, as the commands do. `start` does not wait for the
+run to end. `load` finds runs and sweeps. A `Run` or a `Sweep` has methods that plot, film, report and export.
 `FilmOptions` describes a film for `Run.film`.
 """
 

@@ -1,4 +1,4 @@
-"""Runs and sweeps as Python sees them: what they gave, and what can be made of them."""
+"""Runs and sweeps in Python: their results, and what can be made from them."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ Export = Literal["deck", "vtk", "paraview", "xyz", "lammps", "archive"]
 
 
 class Pictures(list[Path]):
-    """Paths of pictures; a notebook shows the pictures themselves."""
+    """Paths of pictures; a notebook shows the pictures."""
 
     def _repr_html_(self) -> str:
-        """The PNGs, one below the other; of other files the names."""
+        """The PNGs below each other; other files by name."""
         shown = []
         for path in self:
             if path.suffix.lower() == ".png" and path.is_file():
@@ -46,17 +46,17 @@ class Pictures(list[Path]):
 
 @dataclass(frozen=True)
 class Run:
-    """A run: finished, or being made, interrupted or failed. `InputError` if a result is asked for before it is there.
+    """A run: finished, running, interrupted or failed. Its results raise `InputError` until it is finished.
 
     Attributes
     ----------
     directory
         The run directory. A run that is not finished is in the folder of this name with ``.incomplete`` appended.
     cached
-        Whether it was there before.
+        Whether the run existed before.
     origins
-        Where the values of the case come from by which it was asked for; None: of that by which it was made. The same
-        numbers may once have been given and once be the library's.
+        Sources of the values of the requested case; None: of the case that made the run. The same number may be given
+        in one case and come from the library in another.
     """
 
     directory: Path
@@ -79,23 +79,23 @@ class Run:
 
     @property
     def progress(self) -> Progress | None:
-        """How far a run is that is being made, by whatever process; None if its files do not say."""
+        """Progress of a running run, whichever process runs it; None if unknown."""
         from walkers.sweeps.making import progress_at
 
         return progress_at(self.directory) if is_locked(self.directory) else None
 
     @property
     def last_frame(self) -> Motion:
-        """The last complete frame of its motion, of a run that is being made too."""
+        """The last complete frame of the motion, also of an unfinished run."""
         from walkers.postprocess.motion import read_last_frame
 
         return read_last_frame(self._files)
 
     def stop(self, patience: float = 30.0) -> str:
-        """Stop it if it is being made, whichever process makes it; its status then, after at most ``patience`` seconds.
+        """Stop the run, whichever process runs it, and return its status after at most ``patience`` seconds.
 
-        Its complete segments stay: ``walkers run`` continues with them. A point that a sweep makes in a deck with
-        others goes on.
+        Complete segments are kept, and ``walkers run`` continues after them. A point that shares a deck with other
+        points of a sweep does not stop.
         """
         ask_to_stop(self.directory)
         end = time.monotonic() + patience
@@ -105,19 +105,19 @@ class Run:
 
     @property
     def finished_directory(self) -> Path:
-        """Its directory; `InputError` if it is not finished."""
+        """The directory of a finished run; otherwise `InputError`."""
         if finished_run(self.directory) is None:
             raise refused(self.directory, f"the run is {self._state}")
         return self.directory
 
     @property
     def _files(self) -> Path:
-        """Where its files are now."""
+        """The directory that holds the files now."""
         return files_of(self.directory)
 
     @property
     def _state(self) -> str:
-        """What has become of an unfinished run, and what to do."""
+        """The status of an unfinished run, and what to do."""
         if (status := self.status) == "running":
             return f"running{f': {progress}' if (progress := self.progress) else ''}"
         failure = self._files / FAILURE_NAME
@@ -131,7 +131,7 @@ class Run:
 
     @property
     def result(self) -> dict[str, Any]:
-        """The result, SI units."""
+        """The result in SI units."""
         from walkers.postprocess.analysis import current_result
         from walkers.postprocess.uncertainty import rests_on
 
@@ -140,19 +140,19 @@ class Run:
 
     @property
     def motion(self) -> Motion:
-        """Places, velocities and spins of all beads, as arrays; of an unfinished run those of its whole segments."""
+        """Positions, velocities and spins of all beads as arrays; also of an unfinished run."""
         from walkers.postprocess.motion import read_motion
 
         return read_motion(self._files)
 
     @property
     def trajectory(self) -> pd.DataFrame:
-        """One row per sample and walker, SI units."""
+        """One row per sample and walker, in SI units."""
         return self.table("trajectory")
 
     @property
     def walkers(self) -> pd.DataFrame:
-        """One row per walker, SI units."""
+        """One row per walker, in SI units."""
         return self.table("walkers")
 
     def table(self, name: str) -> pd.DataFrame:
@@ -162,7 +162,7 @@ class Run:
         return read_table(self.finished_directory, name)
 
     def describe(self) -> str:
-        """The result in a few lines: mm, mm/s, degrees; of an unfinished run how far it is."""
+        """The result as text in mm, mm/s and degrees; of an unfinished run, its progress."""
         from walkers.postprocess.analysis import describe_result
 
         if finished_run(self.directory) is None:
@@ -170,7 +170,7 @@ class Run:
         return describe_result(self.directory, self.result, cached=self.cached)
 
     def _repr_html_(self) -> str:
-        """The result in a notebook: a table with errors and units, warnings, the parameters folded in."""
+        """The result in a notebook: a table with errors, units and warnings, and the parameters."""
         from walkers.postprocess.report.run import result_html
 
         if finished_run(self.directory) is None:
@@ -178,13 +178,13 @@ class Run:
         return result_html(self.directory, self.result, self.origins)
 
     def plot(self, to: str | Path | None = None, formats: Sequence[str] = ("png",)) -> Pictures:
-        """Draw its figures, see `walkers.postprocess.analysis.plot_run`: a list of paths, which a notebook shows."""
+        """Draw the figures and return their paths; see `walkers.postprocess.analysis.plot_run`."""
         from walkers.postprocess.analysis import plot_run
 
         return Pictures(plot_run(self.finished_directory, _path(to), formats))
 
     def render(self, to: str | Path | None = None, *, images: int = 6) -> Pictures:
-        """Render pictures of it, see `walkers.postprocess.series.render_run`: paths, which a notebook shows."""
+        """Render pictures and return their paths; see `walkers.postprocess.series.render_run`."""
         from walkers.postprocess.series import render_run
 
         return Pictures(render_run(self.finished_directory, _path(to), images=images))
@@ -196,13 +196,13 @@ class Run:
         *,
         on_progress: Callable[[int, int], None] | None = None,
     ) -> Path:
-        """Film it, see `walkers.postprocess.films.render_film`."""
+        """Render a film; see `walkers.postprocess.films.render_film`."""
         from walkers.postprocess.films import render_film
 
         return render_film(self.finished_directory, _path(to), options, on_progress=on_progress)
 
     def view(self, *, height: int = 480) -> k3d.Plot:
-        """Its beads in three dimensions, for a notebook, so many pixels high.
+        """An interactive 3-D view of the beads for a notebook, ``height`` pixels high.
 
         Examples
         --------
@@ -214,7 +214,7 @@ class Run:
         return player_of(self.finished_directory, height=height).plot
 
     def report(self, to: str | Path | None = None) -> Path:
-        """Write one HTML file to mail, see `walkers.postprocess.report.run.report_run`.
+        """Write a self-contained HTML report; see `walkers.postprocess.report.run.report_run`.
 
         Examples
         --------
@@ -226,7 +226,7 @@ class Run:
         return report_run(self.finished_directory, _path(to), self.origins)
 
     def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
-        """Write it for other programs.
+        """Write the run for other programs.
 
         Parameters
         ----------
@@ -235,10 +235,10 @@ class Run:
             (`walkers.postprocess.trajectory_files`), ``archive`` (`walkers.archive.writing`), ``deck``
             (`walkers.sweeps.by_hand.write_folder`).
         to
-            The file, or the folder of ``vtk``, ``paraview`` and ``deck``; in the run directory if None, ``archive`` and
-            ``deck`` in the current folder.
+            The file, or the folder for ``vtk``, ``paraview`` and ``deck``. None: in the run directory, for ``archive``
+            and ``deck`` in the current folder.
         options
-            What these functions take, such as ``every``; of an archive the fields of `ArchiveOptions`.
+            Arguments of these functions, such as ``every``; for an archive, the fields of `ArchiveOptions`.
 
         Examples
         --------
@@ -264,12 +264,12 @@ class Run:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep: its points, each with a run, and the table of what they gave.
+    """A sweep: its points, their runs, and the table of results.
 
     Attributes
     ----------
     directory
-        Of the sweep; the runs of its points are beside it.
+        The sweep directory; the runs are in the same folder.
     """
 
     directory: Path
@@ -290,20 +290,20 @@ class Sweep:
 
     @property
     def runs(self) -> list[Run]:
-        """The run of each point, finished or not."""
+        """The runs of all points, finished or not."""
         from walkers.sweeps.table import read_record
 
         record = read_record(self.directory)
         return [Run(record.out / name) for name in record.runs]
 
     def table(self) -> pd.DataFrame:
-        """One row per point, see `walkers.sweeps.table.load`."""
+        """One row per point; see `walkers.sweeps.table.load`."""
         from walkers.sweeps.table import load
 
         return load(self.directory)
 
     def describe(self) -> str:
-        """Numbers of points by status, why points failed, and the table: mm/s."""
+        """The status of the points, their failures, and the table with velocities in mm/s."""
         from walkers.sweeps.table import describe_status, short_text
 
         return f"{describe_status(self.directory)}\n\n{short_text(self.table())}"
@@ -313,25 +313,25 @@ class Sweep:
         return str(self.table()._repr_html_())  # type: ignore[operator]
 
     def figure(self, **choices: Any) -> Figure:
-        """A figure of its table, to be changed or shown, see `walkers.plotting.sweep_figure`."""
+        """A matplotlib figure of the table; see `walkers.plotting.sweep_figure`."""
         from walkers.plotting import sweep_figure
 
         return sweep_figure(self.directory, **choices)
 
     def plot(self, to: str | Path | None = None, **choices: Any) -> Pictures:
-        """Draw its table into a file, see `walkers.plotting.plot_sweep`."""
+        """Plot the table to a file; see `walkers.plotting.plot_sweep`."""
         from walkers.plotting import plot_sweep
 
         return Pictures([plot_sweep(self.directory, to, **choices)])
 
     def report(self, to: str | Path | None = None) -> Path:
-        """Write one HTML file to mail, see `walkers.sweeps.report.report_sweep`."""
+        """Write a self-contained HTML report; see `walkers.sweeps.report.report_sweep`."""
         from walkers.sweeps.report import report_sweep
 
         return report_sweep(self.directory, _path(to))
 
     def export(self, form: Export = "archive", to: str | Path | None = None, **options: Any) -> Path:
-        """Pack it with its runs into an ``archive``, see `Run.export`; there is no other form."""
+        """Write the sweep and its runs as an ``archive``, the only form; see `Run.export`."""
         from walkers.archive.writing import ArchiveOptions, write_archive
 
         if form != "archive":

@@ -29,7 +29,7 @@ _ENGINE_SECONDS = 10.0
 
 
 class _Stream(FileIO):
-    """Standard output or error: what the one cannot take is told by its name, what the other cannot goes nowhere."""
+    """Standard output or error. A failed write to standard output names it; one to standard error is ignored."""
 
     def write(self, data: Any) -> int:
         try:
@@ -87,7 +87,7 @@ def _open_streams() -> None:
 
 
 def _status(arguments: list[str] | None) -> int:
-    """Run the program: its exit status. What is not known to happen is raised."""
+    """Run the program and return its exit status. Unexpected errors are raised."""
     try:
         _check_words(sys.argv[1:] if arguments is None else arguments)
         outcome: Any = _program()(arguments, standalone_mode=False, prog_name="walkers")
@@ -100,7 +100,7 @@ def _status(arguments: list[str] | None) -> int:
 
 
 def _check_words(words: list[str]) -> None:
-    """Refuse what is no UTF-8, and a folder that is none, before anything is done."""
+    """Refuse arguments and folders that are not UTF-8 before anything is done."""
     with suppress(OSError):  # a folder that is gone
         words = [str(Path.cwd()), *words]
     if not all(word.isascii() for word in words):
@@ -111,7 +111,7 @@ def _check_words(words: list[str]) -> None:
 
 
 class _Grouped(TyperGroup):
-    """The commands under the headings of `GROUPS`; one that is not there is refused with the one that is meant."""
+    """The commands under the headings of `GROUPS`. An unknown command is refused with a suggestion."""
 
     def format_commands(self, _ctx: Any, formatter: Any) -> None:
         """Write them below their headings."""
@@ -133,7 +133,7 @@ class _Grouped(TyperGroup):
 
 
 class _OrCase(TyperGroup):
-    """Commands of a command, one of which, CASE, is meant by any other word."""
+    """Sub-commands of a command; any other word is CASE."""
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command of a name."""
@@ -182,13 +182,13 @@ def _use_library(file: Path | None) -> None:
 def _options(
     library: Annotated[
         Path | None,
-        typer.Option(callback=_use_library, help="A library of your own, instead of library.toml beside the case."),
+        typer.Option(callback=_use_library, help="Your own library file; default: library.toml beside the case."),
     ] = None,
     version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show what is installed and exit.")
+        bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show the versions and exit.")
     ] = False,
 ) -> None:
-    """Take what is no command's."""
+    """Options of the program."""
 
 
 def describe_version() -> str:

@@ -1,4 +1,4 @@
-"""A case from file to result, and runs and sweeps found again: what the commands do, for use from Python."""
+"""Run cases and sweeps, and find their results: the commands as Python functions."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def run(
     time_limit: float | None = None,
     allow_failed_audit: bool = False,
 ) -> Run:
-    """Run a case, unless its run is there already, and tabulate it; an interrupted run goes on.
+    """Run a case unless a finished run exists. An interrupted run continues.
 
     Parameters
     ----------
@@ -49,20 +49,20 @@ def run(
     engine
         Name or path of the binary; see `walkers.runner.find_engine`.
     force
-        Run again; the old run is replaced only by a finished one.
+        Run again. The old run is replaced when the new one is finished.
     progress
-        Whether to show how far the run is; if None, in notebooks. Or what is called a few times a second meanwhile.
+        Show the progress; None: only in notebooks. Or a function that is called with it a few times per second.
     time_limit
-        Wall time in s that the engine may take, for each segment of the run.
+        Limit of the wall time in s for each segment of the run.
     allow_failed_audit
-        Run on an engine that failed its audit.
+        Use an engine that failed ``walkers check engine``.
 
     Raises
     ------
     InputError
-        If a case cannot be used.
+        If the case cannot be used.
     runner.EngineFailure
-        If the engine fails in one of the known ways.
+        If the engine fails.
 
     Examples
     --------
@@ -102,9 +102,9 @@ def run(
 
 
 def start(case: Case | str | Path, out: str | Path = DEFAULT_OUT, **how: Any) -> Run:
-    """Begin a run as `run` does, and do not wait for it.
+    """Start a run as `run` does, without waiting for its end.
 
-    It ends with this Python. What becomes of it is in `Run.status` and `Run.progress`; `Run.stop` stops it.
+    The run stops when this Python process ends. `Run.status` and `Run.progress` follow it; `Run.stop` stops it.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def sweep(
     changes: Mapping[str, Any] | None = None,
     progress: bool | None = None,
 ) -> Sweep:
-    """Make the runs of a sweep that are missing, on this machine.
+    """Run the missing points of a sweep on this machine.
 
     Parameters
     ----------
@@ -155,16 +155,16 @@ def sweep(
     out
         Folder of the run directories.
     jobs
-        Decks at once; all cores if left out.
+        Number of parallel decks; default: one per core.
     changes
-        Values put beside those of its ``[set]``, by dotted keys.
+        Values that replace those in ``[set]``, by dotted keys.
     progress
-        Show how far it is; if None, in notebooks.
+        Show the progress; None: only in notebooks.
 
     Returns
     -------
     Sweep
-        Points that failed say so in the column ``status`` of its table.
+        The column ``status`` of its table marks failed points.
 
     Raises
     ------
@@ -192,24 +192,24 @@ def sweep(
 def load(
     what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
 ) -> Run | Sweep:
-    """Find a run, which need not be finished, or a sweep.
+    """Find a sweep, or a run, finished or not.
 
     Parameters
     ----------
     what
-        A run or a sweep: its directory, or its name in ``out``; or a case (resolved, file or shipped name), whose run
-        with the installed engine is looked up there.
+        The directory of a run or a sweep, its name in ``out``, or a case (resolved, file or shipped name). The run of a
+        case is the one with the installed engine.
     out
         Folder of the run directories.
     changes
-        Values in place of those of the case, by dotted keys.
+        Values that replace those of the case, by dotted keys.
 
     Raises
     ------
     InputError
-        If there is none, or it cannot be read.
+        If it does not exist or cannot be read.
     runner.EngineFailure
-        If a case is given and there is no engine to look its run up for.
+        If a case is given and no engine is installed.
 
     Examples
     --------
@@ -223,13 +223,13 @@ def load(
 def load_finished(
     what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
 ) -> Run | Sweep:
-    """Find a finished run, or a sweep; `InputError` with what it is instead."""
+    """Find a sweep or a finished run; otherwise `InputError`."""
     found = load(what, out, changes)
     return found if isinstance(found, Sweep) else replace(found, directory=found.finished_directory)
 
 
 def load_run(what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None) -> Run:
-    """Find a finished run; `InputError` with what it is instead."""
+    """Find a finished run; otherwise `InputError`."""
     found = load_finished(what, out, changes)
     if isinstance(found, Sweep):
         raise refused(what, NOT_A_RUN["sweep"])
@@ -237,7 +237,7 @@ def load_run(what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Ma
 
 
 def load_sweep(what: str | Path, out: str | Path = DEFAULT_OUT) -> Sweep:
-    """Find a sweep; `InputError` with what it is instead."""
+    """Find a sweep; otherwise `InputError`."""
     if there := placed(what, Path(out)):
         if there.kind == "run":
             raise refused(what, f"is a run: walkers run {what} prints its result")

@@ -40,22 +40,22 @@ class LeftOutWarning(UserWarning):
 
 
 def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: Any) -> Path:
-    """Draw a sweep's table and write the figure.
+    """Plot a sweep's table to a file.
 
     Parameters
     ----------
     directory
         A sweep's directory, such as ``runs/fig2``.
     to
-        The file, whose suffix is one of `walkers.postprocess.drawing.FORMATS`; the sweep's directory and the name of
-        ``y`` if left out.
+        The file, with a suffix of `walkers.postprocess.drawing.FORMATS`; None: in the sweep's directory, named after
+        ``y``.
     choices
         ``x``, ``y``, ``hue``, ``panels``, ``log``, ``theory`` of `sweep_figure`.
 
     Raises
     ------
     InputError
-        As `sweep_figure`; or if the file's suffix is none of a figure.
+        As `sweep_figure`, or if the suffix of the file is unknown.
     """
     table = load(directory)
     place = Path(to) if to is not None else Path(directory) / f"{_column(table, choices.get('y'))}.png"
@@ -78,7 +78,7 @@ def sweep_figure(
     log: str = "",
     theory: bool = False,
 ) -> Figure:
-    """A figure of a sweep's table, to be changed or shown.
+    """Plot a sweep's table as a matplotlib figure.
 
     Parameters
     ----------
@@ -86,13 +86,13 @@ def sweep_figure(
         A sweep's directory, such as ``runs/fig2``.
     x, hue, panels
         Keys that vary, such as ``drive.frequency`` or ``frequency``, or columns of the table (`walkers.load`);
-        guessed if left out. ``none`` for neither colours nor panels.
+        chosen automatically if None. ``none``: no colours or panels.
     y
-        A column of the table; ``velocity``, of piles ``climbs`` if left out.
+        A column of the table; default: ``velocity``, for piles ``climbs``.
     log
         Which axes are logarithmic: ``x``, ``y`` or ``xy``.
     theory
-        Draw the theory's predictions at the points (`walkers.theory.prediction.predicted_column`) too.
+        Also draw the theory (`walkers.theory.prediction.predicted_column`).
 
     Returns
     -------

@@ -22,7 +22,7 @@ _LONGEST_SILENCE_SECONDS = 60.0
 
 @contextmanager
 def progress_of(name: str) -> Iterator[Callable[[Progress], None]]:
-    """Yield a function that shows how far the run of a case is."""
+    """Yield a function that shows the progress of a run."""
     with _shown(name) as show:
 
         def advance(run: Progress) -> None:
@@ -33,7 +33,7 @@ def progress_of(name: str) -> Iterator[Callable[[Progress], None]]:
 
 @contextmanager
 def progress_of_sweep(name: str) -> Iterator[Callable[[SweepProgress], None]]:
-    """Yield a function that shows how far a sweep is."""
+    """Yield a function that shows the progress of a sweep."""
     with _shown(name) as show:
 
         def advance(sweep: SweepProgress) -> None:
@@ -50,10 +50,10 @@ def progress_of_sweep(name: str) -> Iterator[Callable[[SweepProgress], None]]:
 
 @contextmanager
 def progress_of_film(name: str) -> Iterator[Callable[[int, int], None]]:
-    """Yield a function that shows how many pictures of a film are made, of how many."""
+    """Yield a function that shows the progress of a film."""
     begin = time.monotonic()
     with _shown(name) as show:
-        yield lambda made, count: show(count, made, f"{made} of {count} pictures", time.monotonic() - begin)
+        yield lambda made, count: show(count, made, f"{made} of {count} frames", time.monotonic() - begin)
 
 
 def shown_if(wanted: bool | None, progress: AbstractContextManager[T]) -> AbstractContextManager[T | None]:

@@ -60,7 +60,7 @@ class Verification:
 
     def describe(self) -> str:
         """The outcome, and a line for each file that is not what it was, or is not listed."""
-        told = f"{self.name}: {self.intact} {'points have their run' if self.of_points else 'files are what they were'}"
+        told = f"{self.name}: {self.intact} {'points have a run' if self.of_points else 'files are unchanged'}"
         lines = [f"{told}, {self.left_out} left out of the archive" if self.left_out else told]
         for kind, names in self.told.items():  # which a stranger chose, and may have put escape sequences into
             lines += [f"  {kind:<10} {printable(shortened(name, _LONGEST_SHOWN))}" for name in names]

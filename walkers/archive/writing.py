@@ -63,9 +63,9 @@ class ArchiveRefused(WalkersError):
 
 @dataclass(frozen=True)
 class ArchiveOptions:
-    """How an archive is made: with what the engine wrote of the motion or without; by whom; under which of `LICENCES`.
+    """Options of an archive: whether it has the engine's dumps, its authors, its licence (one of `LICENCES`).
 
-    Tables and results go in in any case.
+    It always has the tables and results.
     """
 
     dumps: bool = True
@@ -74,11 +74,10 @@ class ArchiveOptions:
 
 
 def write_archive(directory: str | Path, to: Path | None = None, options: ArchiveOptions | None = None) -> Path:
-    """Pack a finished run, or a sweep all of whose runs are finished, into an RO-Crate.
+    """Pack a finished run, or a sweep whose runs are all finished, into an RO-Crate.
 
-    The zip is ``NAME.zip`` in the current directory if no other is named; an older one is replaced at the end.
-    `InputError` if it is no run or sweep, or not finished, or an option makes no sense; `ArchiveRefused` if files are
-    not what the manifests say.
+    The default file is ``NAME.zip`` in the current directory; an older file is replaced. `InputError` if it is
+    no run or sweep, is not finished, or an option is invalid; `ArchiveRefused` if a file differs from its manifest.
     """
     require("archive")
     directory, options = Path(directory), options or ArchiveOptions()
@@ -86,7 +85,7 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
     found = [one for one in verify(directory) if not one.of_points]  # `contents_of` asks for all points
     if not all(one.passed for one in found):
         told = "\n".join(one.describe() for one in found if not one.passed)
-        raise ArchiveRefused(f"{directory} is not archived, for it is not what it was:\n{told}")
+        raise ArchiveRefused(f"{directory} is not archived, files have changed:\n{told}")
     contents = contents_of(directory, dumps=options.dumps)
     to = Path(f"{contents.name}.zip") if to is None else to
     if to.suffix != ".zip" or to.is_dir():

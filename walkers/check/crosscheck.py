@@ -64,12 +64,12 @@ class Start:
     def line(self) -> Line:
         """How they part; piles, which are chaotic, fail if they do in the first cycle."""
         case, cycles = self.first.case, self.together
-        told = "one motion to the end" if cycles is None else f"one motion until cycle {cycles:.1f}"
+        told = "same motion to the end" if cycles is None else f"same motion until cycle {cycles:.1f}"
         name = f"start {case.seed}, " if case.mixture is not None else ""
         early = case.mixture is not None and cycles is not None and cycles < 1.0
         farthest = 1e6 * float(self.apart.max())
         given = Verdict.FAIL if early else None
-        return Line(f"{name}{told}; places at most apart", 0.0, farthest, unit="µm", given=given)
+        return Line(f"{name}{told}; largest distance of beads", 0.0, farthest, unit="µm", given=given)
 
 
 @dataclass(frozen=True)
@@ -180,7 +180,7 @@ def _drift(first: Motion, second: Motion) -> Iterator[Line]:
     speeds = [1e3 * weights @ (one.position[-1] - one.position[0]) / np.ptp(one.time) for one in (first, second)]
     allowed = max(GAIT * float(np.linalg.norm(speeds[0])), SPEED_FLOOR)
     for axis, one, two in reversed(list(zip("xyz", *speeds, strict=True))):
-        yield Line(f"mass centre along {axis}", float(one), float(two), allowed, "mm/s", scale=1.0)
+        yield Line(f"centre of mass along {axis}", float(one), float(two), allowed, "mm/s", scale=1.0)
 
 
 def _walker_lines(first: Group, second: Group, label: str) -> Iterator[Line]:

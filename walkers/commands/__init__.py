@@ -6,8 +6,8 @@ A function named ``check_engine`` is the command ``walkers check engine``.
 GROUPS = {"run": "Run", "look": "Look at results", "keep": "Keep and share", "check": "Check and calibrate"}
 """The modules, with their headings in the help."""
 SECTIONS = {
-    "check": "Check the engine, the decks, a case by a second engine, or files; exit status 1 if something differs.",
-    "paper": "Compare with the published walker: the paper's figures and numbers, and further terms of its theory.",
+    "check": "Check the engine, the contact model, one case, or files. Exit status 1 if something differs.",
+    "paper": "Compare with the published results: figures, numbers, and further terms of the theory.",
 }
 """Commands that have commands."""
 MOVED = {

@@ -18,29 +18,27 @@ if TYPE_CHECKING:
     from walkers.inputs.case import Case as ResolvedCase
     from walkers.sweeps.scheduler import Options
 
-_CASE = "A case: its file, or the name of a shipped case such as fig1b; or a run of it, by its name or its folder."
-_RUN = "A run: its case (file or name), its name in --out, or its folder."
-_RUN_OR_SWEEP = "A run or a sweep: its case (file or name), its name in --out, or its folder."
-_SET = "Replace a value of the case, such as drive.frequency=70Hz; may be repeated."
-_AGE = "Only what is older than this, such as 7d or 12h."
+_CASE = "A case file, the name of a shipped case such as fig1b, or a run (name or folder)."
+_RUN = "A run: its folder, its name in --out, or its case (file or name)."
+_RUN_OR_SWEEP = "A run or a sweep: its folder, its name in --out, or its case (file or name)."
+_SET = "Replace a value of the case, such as drive.frequency=70Hz. Repeatable."
+_AGE = "Only runs and sweeps older than this, such as 7d or 12h."
 
 Case = Annotated[str, Argument(metavar="CASE", help=_CASE, autocompletion=offering("case", "run"))]
 Run = Annotated[str, Argument(metavar="RUN", help=_RUN, autocompletion=offering("case", "run"))]
 RunOrSweep = Annotated[
     str, Argument(metavar="RUN|SWEEP", help=_RUN_OR_SWEEP, autocompletion=offering("case", "run", "sweep"))
 ]
-Out = Annotated[Path, Option(help="Folder of the runs.")]
+Out = Annotated[Path, Option(help="Folder that contains the runs.")]
 Set = Annotated[list[str] | None, Option("--set", metavar="KEY=VALUE", help=_SET)]
 EngineName = Annotated[str | None, Option(help="Name or path of the liggghts binary.")]
 AllowFailedAudit = Annotated[
-    bool, Option("--allow-failed-audit", help="Run on an engine that failed walkers check engine.")
+    bool, Option("--allow-failed-audit", help="Use an engine that failed walkers check engine.")
 ]
-Jobs = Annotated[int | None, Option("-j", "--jobs", min=1, help="Decks that run at once; default: one per core.")]
-Json = Annotated[bool, Option("--json", help="Print JSON, SI units.")]
-Formats = Annotated[
-    list[str] | None, Option("--format", help="Format of the figures: png, svg or pdf; may be repeated.")
-]
-SweepColumn = Annotated[str | None, Option(help="Sweeps: column of the table; default: velocity, for piles climbs.")]
+Jobs = Annotated[int | None, Option("-j", "--jobs", min=1, help="Number of parallel decks; default: one per core.")]
+Json = Annotated[bool, Option("--json", help="Print JSON in SI units.")]
+Formats = Annotated[list[str] | None, Option("--format", help="Format of the figures: png, svg or pdf. Repeatable.")]
+SweepColumn = Annotated[str | None, Option(help="Sweeps: column of the table; default: velocity, or climbs for piles.")]
 CaseName = Annotated[
     str | None, Option(metavar="NAME", help="Only runs of the case with this name.", autocompletion=names_of_cases)
 ]

@@ -34,18 +34,18 @@ if TYPE_CHECKING:
     from walkers.check.report import Chapter
     from walkers.inputs.case import Case as Resolved
 
-_FILES = "A run or a sweep (folder, name in --out, or case), or an archive."
+_FILES = "An archive, or a run or a sweep (folder, name in --out, or case)."
 _NAME = "A material, a liquid, a bridge law, a case, a sweep or a calibration."
-_CALIBRATION = "A calibration file, or a shipped calibration such as ruby."
+_CALIBRATION = "A calibration file, or the name of a shipped calibration such as ruby."
 
 
 def check_engine(
-    only: list[str] | None = Option(None, help="Name of a check; may be repeated."),
-    quick: bool = Option(False, "--quick", help="Leave out the checks that take longest."),
+    only: list[str] | None = Option(None, help="Run only the check with this name. Repeatable."),
+    quick: bool = Option(False, "--quick", help="Skip the slowest checks."),
     as_json: Json = False,
     engine: EngineName = None,
 ) -> int:
-    """Compare forces of the engine and its contact model with a second engine and exact formulas."""
+    """Compare the forces of the engine and its contact model with a second engine and exact formulas."""
     from walkers.check.audit import record, run_audit, selected
     from walkers.inputs.errors import refused
     from walkers.runner.binary import find_engine
@@ -69,14 +69,14 @@ def check_engine(
 
 
 def check_literature(
-    chapters: list[str] | None = Argument(None, metavar="CHAPTER", help="benchmarks, bridges, crosscheck."),
-    quick: bool = Option(False, "--quick", help="Of each chapter the part that takes seconds."),
+    chapters: list[str] | None = Argument(None, metavar="CHAPTER", help="benchmarks, bridges, crosscheck, or all."),
+    quick: bool = Option(False, "--quick", help="Run only the fast part of each chapter."),
     out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help="Folder of the page; default: OUT/validation."),
-    jobs: int | None = Option(None, "-j", "--jobs", min=1, help="Chapters at once; default: one per core."),
+    to: Path | None = Option(None, help="Folder to write the page to; default: OUT/validation."),
+    jobs: int | None = Option(None, "-j", "--jobs", min=1, help="Number of parallel chapters; default: one per core."),
     as_json: Json = False,
 ) -> int:
-    """Compare decks and laws with published benchmarks and exact solutions, and write a page with the results."""
+    """Compare engine and bridge laws with published benchmarks and exact solutions, and write a page of results."""
     from walkers.check.report import as_dict, validate
 
     check_folder("--out", out)
@@ -93,7 +93,7 @@ def _tell_seconds(chapter: Chapter) -> None:
 
 
 def check_files(what: str = Argument(metavar="PATH", help=_FILES), settings: Set = None, out: Out = DEFAULT_OUT) -> int:
-    """Compare the files of a run, a sweep or an archive with their recorded checksums."""
+    """Compare the files of a run, a sweep or an archive with their checksums."""
     from walkers.archive.verification import verify
     from walkers.finding import find
 
@@ -106,14 +106,14 @@ def check_case(
     context: typer.Context,
     settings: Set = None,
     out: Out = DEFAULT_OUT,
-    cycles: int | None = Option(None, help="Cycles of the drive; default: those of the case."),
-    without: list[str] | None = Option(None, metavar="TERM", help="Leave out a term, such as friction."),
-    seeds: int = Option(1, min=1, help="Piles: number of starts, for the statistics."),
+    cycles: int | None = Option(None, help="Number of drive cycles; default: as in the case."),
+    without: list[str] | None = Option(None, metavar="TERM", help="Leave out a force, such as friction. Repeatable."),
+    seeds: int = Option(1, min=1, help="Piles: number of random starts."),
     as_json: Json = False,
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
-    """Run CASE with the engine and with a second one, written from the published formulas, and compare."""
+    """Run CASE with LIGGGHTS and with an independent second engine in Python, and compare the motion."""
     from walkers.check.crosscheck import crosscheck, shortened
     from walkers.check.engine import TERMS
     from walkers.check.report import as_dict
@@ -143,7 +143,7 @@ def check_case(
 
 
 def library(name: str | None = Argument(None, metavar="NAME", help=_NAME)) -> None:
-    """List materials, liquids, friction, bridge laws, cases, sweeps and calibrations; or print one with its sources."""
+    """List materials, liquids, friction, bridge laws, cases, sweeps and calibrations, or print one with its sources."""
     from walkers.inputs.catalogue import catalogue, describe, describe_one
 
     found = catalogue()
@@ -152,14 +152,14 @@ def library(name: str | None = Argument(None, metavar="NAME", help=_NAME)) -> No
 
 def paper_figures(
     out: Out = DEFAULT_OUT,
-    to: Path = Option(Path("figures"), help="Folder of the figures."),
-    only: list[str] | None = Option(None, help="Name of a figure, or comparison; may be repeated."),
+    to: Path = Option(Path("figures"), help="Folder to write the figures to."),
+    only: list[str] | None = Option(None, help="Draw only the figure with this name, or comparison. Repeatable."),
     formats: Formats = None,
     jobs: Jobs = None,
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
-    """Draw the paper's figures with engine, theory and published values; missing runs are made first."""
+    """Draw the paper's figures with simulation, theory and published values. Missing runs are made first."""
     from walkers.paper.make import FORMATS, make_figures
     from walkers.progress import progress_of_sweep
 
@@ -175,8 +175,8 @@ def paper_figures(
     return 1 if made.failures or made.left_out else 0
 
 
-def paper_terms(to: Path = Option(Path("figures"), help="Folder of the table.")) -> None:
-    """Fit the theory to the published numbers with each further term; no engine is needed."""
+def paper_terms(to: Path = Option(Path("figures"), help="Folder to write the table to.")) -> None:
+    """Fit the theory with further terms, one at a time, to the published numbers. Needs no engine."""
     from walkers.paper.model_terms import PAGE_NAME, try_model_terms
 
     check_folder("--to", to)
@@ -187,12 +187,12 @@ def paper_terms(to: Path = Option(Path("figures"), help="Folder of the table."))
 def calibrate(
     calibration: str = Argument(metavar="CALIBRATION", help=_CALIBRATION),
     out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help="Folder of tables and figures; default: OUT/NAME."),
+    to: Path | None = Option(None, help="Folder to write tables and figures to; default: OUT/NAME."),
     jobs: Jobs = None,
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
-    """Calibrate unknown parameters to published numbers; an interrupted calibration continues."""
+    """Calibrate unknown parameters to published numbers. An interrupted calibration continues."""
     from walkers.calibration.calibrate import calibrate
     from walkers.calibration.report import write_outcome
     from walkers.inputs.calibration import load_calibration

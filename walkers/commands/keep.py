@@ -1,4 +1,4 @@
-"""Commands that give runs away and remove them."""
+"""Commands that export and remove runs."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from walkers.commands.arguments import (
 from walkers.completion import offering
 
 _FORM = (
-    "deck: the LIGGGHTS deck of the case. vtk: .vtp files and a .pvd. paraview: the same with a script that shows it. "
+    "deck: the LIGGGHTS deck of the case. vtk: .vtp files and a .pvd. paraview: the same, with a ParaView script. "
     "xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an RO-Crate (.zip) to publish."
 )
-_OUTPUT = "File or folder to write; default: in the folder of the run; an archive here; a deck is printed."
-_EVERY = "vtk, paraview, xyz, lammps: write one of this many samples; default: one per cycle, all for xyz and lammps."
-_AS_PLACED = "vtk, paraview: leave independent walkers where the deck has them, not side by side."
-_WITHOUT_DUMPS = "archive: leave out the dumps of the engine; tables and results stay."
+_OUTPUT = "File or folder to write. Default: in the run's folder; archives: the current folder; decks: printed."
+_EVERY = "vtk, paraview, xyz, lammps: write every Nth sample; default: one per cycle, for xyz and lammps every sample."
+_AS_PLACED = "vtk, paraview: keep independent walkers at their places in the deck instead of side by side."
+_WITHOUT_DUMPS = "archive: leave out the engine's dumps; tables and results are included."
 _LICENCE = "archive: CC-BY-4.0 (default), CC0-1.0, CC-BY-SA-4.0 or BSD-3-Clause."
 _ANY = offering("case", "run", "sweep")
-_RUNS = "Runs and sweeps, by case, name in --out or folder."
+_RUNS = "Runs and sweeps: folder, name in --out, or case."
 
 
 def export(
@@ -49,11 +49,11 @@ def export(
     every: int | None = Option(None, min=1, help=_EVERY),
     as_placed: bool = Option(False, "--as-placed", help=_AS_PLACED),
     vtu: bool = Option(False, "--vtu", help="vtk: also write the beads as .vtu."),
-    colour: str | None = Option(None, help="paraview: array that colours the beads; default: walker, else speed."),
-    start: bool = Option(False, "--open", help="paraview: start ParaView with it."),
+    colour: str | None = Option(None, help="paraview: array that colours the beads; default: walker, for piles speed."),
+    start: bool = Option(False, "--open", help="paraview: start ParaView with the script."),
     without_dumps: bool = Option(False, "--without-dumps", help=_WITHOUT_DUMPS),
-    author: list[str] | None = Option(None, help="archive: name of an author; may be repeated."),
-    orcid: list[str] | None = Option(None, help="archive: ORCIDs of the authors, in their order."),
+    author: list[str] | None = Option(None, help="archive: name of an author. Repeatable."),
+    orcid: list[str] | None = Option(None, help="archive: ORCID of an author, in the order of --author. Repeatable."),
     licence: str | None = Option(None, help=_LICENCE),
 ) -> None:
     """Write a run for other programs: LIGGGHTS deck, VTK, ParaView, XYZ, LAMMPS dump, or an archive to publish."""
@@ -111,13 +111,13 @@ def clean(
     runs: list[str] | None = Argument(None, metavar="RUN|SWEEP", help=_RUNS, autocompletion=_ANY),
     settings: Set = None,
     out: Out = DEFAULT_OUT,
-    finished: bool = Option(False, "--finished", help="Also finished runs, except those of sweeps."),
+    finished: bool = Option(False, "--finished", help="Also remove finished runs, except those of sweeps."),
     case: CaseName = None,
     older_than: OlderThan = None,
-    dry_run: bool = Option(False, "--dry-run", help="Print what would be removed; remove nothing."),
-    yes: bool = Option(False, "--yes", "-y", help="Do not ask."),
+    dry_run: bool = Option(False, "--dry-run", help="Print what would be removed, and remove nothing."),
+    yes: bool = Option(False, "--yes", "-y", help="Do not ask for confirmation."),
 ) -> int:
-    """Remove interrupted and failed runs, or the given runs and sweeps, after asking; never a running one."""
+    """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay."""
     from walkers.finding import find
     from walkers.runner.directory import UNFINISHED
     from walkers.sweeps.folder import clean, plan_cleaning

@@ -31,17 +31,17 @@ from walkers.commands.arguments import (
 from walkers.completion import offering
 
 _ANY = offering("case", "run", "sweep")
-_LISTED = "A sweep, by its name or folder: print the status of its points and its table."
+_LISTED = "A sweep (name or folder): print the status of its points and its table."
 _SWEEPS = offering("sweep")
-_ALL = "Also the runs of the sweeps."
-_WHERE = 'Only runs with this value, such as "drive.frequency=80 Hz"; may be repeated.'
-_TABLE = "Write the table of the sweep to this file (.csv, .parquet, .json), units included."
-_WITHIN = "Count climbs until this time, s of drive; default: until the first run without a climb ends."
-_THRESHOLDS = "Print the number of climbs for other definitions of a climb instead."
-_PILES = "Piles: sweeps, folders of runs, or runs (or their cases)."
-_NULL = "Runs in which nothing can climb: print their false climbs beside; may be repeated."
-_INTERVAL = "Pictures: time between them, as '2 s' or 'T/4' (T: a cycle); default: evenly over the run."
-_SLOWDOWN = "Film: this many times slower than in reality; default: a film of 5 to 10 s."
+_ALL = "Include the runs of sweeps."
+_WHERE = 'Only runs with this value, such as "drive.frequency=80 Hz". Repeatable.'
+_TABLE = "Write the table of the sweep, with units, to this file (.csv, .parquet, .json)."
+_WITHIN = "Count climbs until this time of the drive, in s; default: the end of the shortest run without a climb."
+_THRESHOLDS = "Print the number of climbs for other definitions of a climb."
+_PILES = "Sweeps, folders of runs, runs or cases of piles."
+_NULL = "Runs in which nothing can climb: also print their false climbs. Repeatable."
+_INTERVAL = "Pictures: time between them, such as '2 s' or 'T/4' (T: period); default: evenly over the run."
+_SLOWDOWN = "Film: slow motion factor; default: chosen so that the film lasts 5 to 10 s."
 
 
 def list_(
@@ -55,13 +55,13 @@ def list_(
     older_than: OlderThan = None,
     where: list[str] | None = Option(None, metavar="KEY=VALUE", help=_WHERE),
     sort: Literal["name", "status", "velocity", "age", "size"] = Option(
-        "name", help="Order; the fastest, youngest or largest first."
+        "name", help="Sort order: fastest, youngest or largest first."
     ),
     reverse: bool = Option(False, "--reverse", help="Reverse the order."),
     to: Path | None = Option(None, help=_TABLE),
     as_json: Json = False,
 ) -> None:
-    """List runs and sweeps with velocity or climbs, status, age and size; or the points of one sweep, as a table."""
+    """List runs and sweeps with status, result, age and size, or print the table of one sweep."""
     from walkers.sweeps import folder
 
     if sweep is not None:
@@ -95,17 +95,17 @@ def plot(
     run: RunOrSweep,
     settings: Set = None,
     out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help="Runs: folder of the figures. Sweeps: file (.png, .pdf, .svg)."),
-    x: str | None = Option(None, help="Sweeps: a key that varies, or a column of the table."),
+    to: Path | None = Option(None, help="Runs: folder of the figures. Sweeps: file to write (.png, .pdf, .svg)."),
+    x: str | None = Option(None, help="Sweeps: key or column on the x axis."),
     y: SweepColumn = None,
-    hue: str | None = Option(None, help="Sweeps: key or column shown by colours; or none."),
-    panels: str | None = Option(None, help="Sweeps: key or column shown by panels; or none."),
-    log_x: bool = Option(False, "--logx", help="Sweeps: logarithmic x."),
-    log_y: bool = Option(False, "--logy", help="Sweeps: logarithmic y."),
-    theory: bool = Option(False, "--theory", help="Sweeps: also draw what the theory predicts."),
+    hue: str | None = Option(None, help="Sweeps: key or column that sets the colour, or none."),
+    panels: str | None = Option(None, help="Sweeps: key or column that sets the panel, or none."),
+    log_x: bool = Option(False, "--logx", help="Sweeps: logarithmic x axis."),
+    log_y: bool = Option(False, "--logy", help="Sweeps: logarithmic y axis."),
+    theory: bool = Option(False, "--theory", help="Sweeps: also draw the theory."),
     formats: Formats = None,
 ) -> None:
-    """Plot a run (path, turning and gait of walkers, climbs of piles) or a column of a sweep's table."""
+    """Plot a run (path, orientation and gait of walkers; climbs of piles) or a column of a sweep's table."""
     found = load_any(run, settings, out)
     if isinstance(found, walkers.Sweep):
         refuse("--format", bool(formats), "is for runs: a sweep's figure has the format of --to's name")
@@ -121,18 +121,18 @@ def render(
     run: Run,
     settings: Set = None,
     out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help="File: .png; films: .mp4 or .gif. Default: in the folder of the run."),
-    walker: int | None = Option(None, min=0, help="Number of the walker to show; default: the first, or the whole."),
-    images: int | None = Option(None, min=1, max=20, help="Pictures: how many; default: 6."),
+    to: Path | None = Option(None, help="File to write: .png; films: .mp4, .gif; default: in the run's folder."),
+    walker: int | None = Option(None, min=0, help="Number of the walker to show; default: the first, or all beads."),
+    images: int | None = Option(None, min=1, max=20, help="Number of pictures; default: 6."),
     interval: str | None = Option(None, help=_INTERVAL),
     film: bool = Option(False, "--film", help="Render a film instead of pictures."),
-    size: str | None = Option(None, help="Film: 360p, 480p, 720p, 1080p, or pixels as 1280x720; default: 720p."),
+    size: str | None = Option(None, help="Film: 360p, 480p, 720p, 1080p, or pixels such as 1280x720; default: 720p."),
     fps: int | None = Option(None, min=1, max=60, help="Film: frames per second; default: 25."),
     slowdown: float | None = Option(None, min=0.05, max=10000.0, help=_SLOWDOWN),
-    begin: str | None = Option(None, "--from", help="Film: physical time of the first frame, as '0.1 s'."),
+    begin: str | None = Option(None, "--from", help="Film: physical time of the first frame, such as '0.1 s'."),
     end: str | None = Option(None, "--until", help="Film: physical time of the last frame."),
 ) -> None:
-    """Render pictures of a run at several times, or a film of it with --film."""
+    """Render pictures of a run at several times, or a film with --film."""
     from walkers.postprocess.films import FilmOptions, parse_size, parse_time
     from walkers.postprocess.series import render_series, seconds_apart
     from walkers.progress import progress_of_film
@@ -174,9 +174,9 @@ def report(
     what: RunOrSweep,
     settings: Set = None,
     out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help="The HTML file; default: report.html in the folder of the run or sweep."),
+    to: Path | None = Option(None, help="HTML file to write; default: report.html in the folder of the run or sweep."),
 ) -> None:
-    """Write one HTML file to mail: parameters, results, plots, and a 3-D view of the motion."""
+    """Write a self-contained HTML report: parameters, results, plots and a 3-D view of the motion."""
     from walkers.postprocess.report.page import check_report
 
     if to is not None:
@@ -192,7 +192,7 @@ def compare(
     y: SweepColumn = None,
     as_json: Json = False,
 ) -> None:
-    """Print the differences of two runs or cases, in parameters and results; or of two sweeps, point by point."""
+    """Compare two runs or cases in parameters and results, or two sweeps point by point."""
     from walkers.finding import placed
     from walkers.pipeline import find_side
     from walkers.sweeps.comparison import compare_runs, compare_sweeps
@@ -205,7 +205,7 @@ def compare(
         found = compare_sweeps(sweeps[first], sweeps[second], y)
     else:
         for one in sweeps:
-            refuse(one, True, "is a sweep, to be compared with another sweep")
+            refuse(one, True, "is a sweep; expected another sweep to compare with")
         refuse("--y", y is not None, "is for sweeps")
         found = compare_runs(find_side(first, out, changes), find_side(second, out, changes))
     print_as(as_json, lambda: found.contents, lambda: found.text)
@@ -218,10 +218,10 @@ def climb(
     within: float | None = Option(None, min=1e-9, help=_WITHIN),
     thresholds: bool = Option(False, "--sensitivity", help=_THRESHOLDS),
     null: list[str] | None = Option(None, help=_NULL),
-    to: Path | None = Option(None, help="Write the figure (.png, .svg, .pdf) or the table (.csv) into this file."),
+    to: Path | None = Option(None, help="Write the figure (.png, .svg, .pdf) or the table (.csv) to this file."),
     as_json: Json = False,
 ) -> None:
-    """Print how often, how soon and how fast clusters climb in piles: rates with exact intervals, by conditions."""
+    """Print probability, rate and speed of climbs in piles for each condition, with confidence intervals."""
     from walkers.finding import find
     from walkers.postprocess.drawing import FORMATS, check_place
     from walkers.sweeps import climbing

@@ -33,21 +33,21 @@ from walkers.completion import offering
 
 _MANY = 10_000
 """Points of a sweep that take seconds to be resolved."""
-_NAME = "Name of the case: NAME.toml is written."
-_FROM = "A shipped case to copy instead, such as pile-small (walkers library)."
+_NAME = "Name of the case; the file is NAME.toml."
+_FROM = "Copy this shipped case, such as pile-small (list: walkers library)."
 _OFFERED = offering("case", "run")
-_CASES = "Case files, names of shipped cases, or runs by their names or folders."
-_LIMIT = "Stop a run (of a pile: a segment) after this many seconds."
-_SPREAD = "Also run with values drawn from the ranges of what is not known: a band."
-_SWEEP_FILE = "A sweep file, or a shipped sweep such as fig2."
+_CASES = "Case files, names of shipped cases, or runs (name or folder)."
+_LIMIT = "Time limit in s for each run, for piles for each segment."
+_SPREAD = "Also run with uncertain values drawn from their ranges, and print the band of the result."
+_SWEEP_FILE = "A sweep file, or the name of a shipped sweep such as fig2."
 
 
 def new(
     name: str = Argument(metavar="NAME", help=_NAME),
-    kind: Literal["walker", "cluster", "pile"] = Option("walker", help="What the case simulates."),
+    kind: Literal["walker", "cluster", "pile"] = Option("walker", help="Kind of simulation."),
     source: str | None = Option(None, "--from", metavar="CASE", help=_FROM, autocompletion=offering("case")),
 ) -> None:
-    """Write a commented case file to begin with."""
+    """Write a commented case file as a starting point."""
     from walkers.inputs.beginning import write_case
 
     refuse("--kind", source is not None and kind != "walker", "has no meaning with --from")
@@ -59,11 +59,11 @@ def show(
     settings: Set = None,
     out: Out = DEFAULT_OUT,
     theory: bool = Option(
-        False, "--theory", help="Print what the theory predicts instead, beside the result of the run if there is one."
+        False, "--theory", help="Print the theory's prediction, with the result of the run if it exists."
     ),
     as_json: Json = False,
 ) -> None:
-    """Show every value of a case and its source, the forces, the time step and the predicted run time."""
+    """Show all values of a case with their sources, the forces, the time step and the predicted run time."""
     loaded = load_case(case, settings, out)
     if not theory:
         from walkers.runner.summary import describe, summarise
@@ -82,7 +82,7 @@ def show(
         key, _, why = str(error).partition(": ")
         raise InputError(case, [Problem(key, None, why)]) from error
     found: dict[str, Any] | None = None
-    with suppress(InputError, EngineMissing):  # not run yet, or never to be run here
+    with suppress(InputError, EngineMissing):  # no run yet, or no engine
         found = load_run(loaded, out).result
     print_as(as_json, lambda: {**predicted, "engine": found}, lambda: prediction.describe(predicted, found))
 
@@ -91,15 +91,15 @@ def run(
     cases: list[str] = Argument(metavar="CASE", help=_CASES, autocompletion=_OFFERED),
     settings: Set = None,
     out: Out = DEFAULT_OUT,
-    force: bool = Option(False, "--force", help="Run again even if the run exists."),
+    force: bool = Option(False, "--force", help="Run again if the run exists."),
     as_json: Json = False,
     limit: float | None = Option(None, min=0.0, help=_LIMIT),
     spread: bool = Option(False, "--spread", help=_SPREAD),
-    points: int | None = Option(None, min=2, max=4096, help="Number of runs of --spread; default: 32."),
+    points: int | None = Option(None, min=2, max=4096, help="Number of runs for --spread; default: 32."),
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
-    """Run cases and print their results; a run that exists is printed, an interrupted one continued."""
+    """Run cases and print the results. A finished run is only printed, an interrupted run continues."""
     from walkers.finding import case_at
     from walkers.pipeline import finished_at
     from walkers.progress import progress_of, progress_of_sweep
@@ -145,14 +145,14 @@ def sweep(
     settings: Set = None,
     out: Out = DEFAULT_OUT,
     jobs: Jobs = None,
-    site: Path | None = Option(None, help="A site file: run on that cluster instead."),
-    dry_run: bool = Option(False, "--dry-run", help="Print what would be run, and the cost; write nothing."),
-    retries: int = Option(0, min=0, help="Number of times a failed point is tried again."),
-    limit: float | None = Option(None, min=0.0, help="Stop an engine after this many seconds."),
+    site: Path | None = Option(None, help="Site file of a cluster to run on."),
+    dry_run: bool = Option(False, "--dry-run", help="Print the plan and its predicted cost, and run nothing."),
+    retries: int = Option(0, min=0, help="Number of retries for a failed point."),
+    limit: float | None = Option(None, min=0.0, help="Time limit in s for each deck."),
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
-    """Run the missing points of a sweep, on all cores or on a cluster; exit status 1 if a point failed."""
+    """Run the missing points of a sweep on all cores or on a cluster. Exit status 1 if a point fails."""
     from dataclasses import replace
 
     from walkers.inputs.sweep import load_sweep

@@ -51,7 +51,7 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
     case
         A TOML file, or the name of a shipped case such as ``fig1b``.
     changes
-        Values put in place of the file's, by dotted keys, as a file would say them.
+        Values that replace those of the file, by dotted keys, written as in a case file.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
     Raises
     ------
     InputError
-        If there is no such file or anything in it, or a change, cannot be used.
+        If the file does not exist, or the file or a change is invalid.
 
     Examples
     --------

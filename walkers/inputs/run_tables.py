@@ -126,7 +126,7 @@ def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
 def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
     often = run.samples_per_cycle if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
     cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}" if run.until_steady else run.cycles
-    whence = "from the duration" if table.duration else "walkers are looked at after 12 and 24"
+    whence = "from the duration" if table.duration else "checked after 12 and 24 cycles"
     silence = run.longest_silence(case.count)
     notes.default("run.samples_per_cycle", often)
     if case.loose:
@@ -135,11 +135,11 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
         notes.default("run.longest_settling", run.longest_settling, "of loose beads")
     if run.rests:
         notes.default("run.settled_below", run.settled_below)
-    notes.derived("run.time_step", run.time_step, "auto: its share of the limits, fitted into a cycle")
+    notes.derived("run.time_step", run.time_step, "auto: a fraction of the limits, whole steps per cycle")
     notes.derived("run.cycles", cycles, whence)
     notes.derived("run.settling_cycles", run.settling_cycles, "a third of the cycles, at most 20")
-    notes.derived("run.silence", silence, "an engine that writes nothing for so long is ended")
-    notes.derived("run.log_limit", run.most_log, "an engine that writes a longer log is ended")
+    notes.derived("run.silence", silence, "the engine is stopped if it writes nothing for this long")
+    notes.derived("run.log_limit", run.most_log, "the engine is stopped if its log is larger")
 
 
 def _check_length(table: RunTable, case: Case, cycles: int, settling: int, cycles_per_sample: int) -> None:

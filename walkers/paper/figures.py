@@ -74,7 +74,7 @@ def fig1b(sources: Sources) -> Figure:
         panel.set(yticks=[], title=f"{trajectory.time[frame]:.1f} s")
         panel.axvline(0.0, color="white", lw=0.6, ls=":")
         panel.grid(visible=False)
-    axes[-1].set_xlabel("along the shaking axis,\nfrom the mass centre at the start (mm)")
+    axes[-1].set_xlabel("along the shaking axis,\nfrom the centre of mass at the start (mm)")
     letter_panels(axes)
     figure.suptitle(f"{described(case)}\nan image every {cycles} cycles")
     return figure

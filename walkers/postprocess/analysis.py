@@ -444,10 +444,10 @@ def figures_of(directory: Path) -> dict[str, Figure]:
 
 
 def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:
-    """Draw the figures that the analyses of a run have, such as ``walk`` of walkers, ``climb`` of piles.
+    """Draw the figures of a run, such as ``walk`` for walkers and ``climb`` for piles.
 
-    Pictures of `walkers.postprocess.drawing.FORMATS` go to a folder, or to the run directory itself; an ``InputError``
-    says that there is no such format.
+    The files go to ``destination``, or to the run directory. A format that `walkers.postprocess.drawing.FORMATS` lacks
+    raises ``InputError``.
     """
     check_formats(formats)
     destination = destination or directory

@@ -163,30 +163,28 @@ class Climb:
     """
 
     track: Annotated[int, "", "number of the cluster, followed through time"]
-    first: Annotated[float, "s", "when it was first free of the bulk and held to a side wall"]
-    last: Annotated[float, "s", "when it was so last"]
-    begin: Annotated[float, "s", "of its greatest gain of height"]
-    end: Annotated[float, "s", "of that gain"]
+    first: Annotated[float, "s", "when it was first free of the bulk and held by a side wall"]
+    last: Annotated[float, "s", "when it was last free and held"]
+    begin: Annotated[float, "s", "start of its largest rise"]
+    end: Annotated[float, "s", "end of its largest rise"]
     out_of_pile: Annotated[
-        bool, "", "whether most of its first beads were in the bulk for a tenth of a second since the drive began"
+        bool, "", "whether most of its first beads were in the bulk for 0.1 s or longer after the drive began"
     ]
-    onset: Annotated[float, "s", "when the gain began by which it first counted as a climb; NaN if it never did"]
-    qualified: Annotated[
-        float, "s", "when it first counted as a climb, its gain having reached what counts; NaN if it never did"
-    ]
-    gain: Annotated[float, "m", "greatest gain of height, of the mean of its beads"]
-    speed: Annotated[float, "m/s", "that gain over the time in which it was made"]
-    standard_error: Annotated[float, "m/s", "of the speed, from those in ten parts of that time"]
-    climbed: Annotated[bool, "", "whether it counted as a climb at any time"]
-    leader: Annotated[int, "", "number of the bead that was most often topmost meanwhile, from 0"]
-    leader_large: Annotated[bool, "", "whether it is of the large class"]
-    height: Annotated[float, "m", "of the leader then"]
-    above_surface: Annotated[float, "m", "of the leader then, above the bulk's surface"]
-    size: Annotated[int, "", "beads then"]
-    large: Annotated[int, "", "large beads then"]
-    walls: Annotated[int, "", "number of side walls that held it then: two in a corner"]
-    wall_names: Annotated[str, "", "which ones: -x, +x, -y, +y, of a cylinder side"]
-    merged_into: Annotated[int, "", "number of the track that took it over, -1 if none did"]
+    onset: Annotated[float, "s", "start of the rise that first counts as a climb; NaN if none does"]
+    qualified: Annotated[float, "s", "when that rise reaches the height that counts as a climb; NaN if none does"]
+    gain: Annotated[float, "m", "height of its largest rise, from the mean height of its beads"]
+    speed: Annotated[float, "m/s", "gain over the duration of the rise"]
+    standard_error: Annotated[float, "m/s", "standard error of the speed, from ten parts of the rise"]
+    climbed: Annotated[bool, "", "whether it ever counts as a climb"]
+    leader: Annotated[int, "", "number of the bead that is most often topmost during the rise, from 0"]
+    leader_large: Annotated[bool, "", "whether the leader is large"]
+    height: Annotated[float, "m", "height of the leader at the end of the rise"]
+    above_surface: Annotated[float, "m", "the same above the surface of the bulk"]
+    size: Annotated[int, "", "number of beads at the end of the rise"]
+    large: Annotated[int, "", "number of large beads at the end of the rise"]
+    walls: Annotated[int, "", "number of side walls that hold it at the end of the rise: two in a corner"]
+    wall_names: Annotated[str, "", "these walls: -x, +x, -y, +y; side for a cylinder"]
+    merged_into: Annotated[int, "", "number of the cluster that it merged into, -1 for none"]
 
 
 def classify(number: int, track: Track, beads: Beads, definition: ClimbCriteria) -> Climb:
@@ -283,15 +281,15 @@ class Assembly:
     One row per climb, bead and frame.
     """
 
-    time: Annotated[float, "s", "from the begin of the drive; the first frame is the last one before it"]
+    time: Annotated[float, "s", "time since the start of the drive; the first frame is the last one before the drive"]
     track: Annotated[int, "", "number of the cluster that climbed"]
     bead: Annotated[int, "", "number of the bead, from 0"]
-    large: Annotated[bool, "", "whether it is of the large class"]
-    height: Annotated[float, "m", "of its centre"]
-    in_bulk: Annotated[bool, "", "whether it belongs to the pile's bulk"]
-    at_wall: Annotated[bool, "", "whether a bridge joins it to a side wall"]
-    neighbours: Annotated[int, "", "bridges that join it to other beads of the later climb"]
-    joined: Annotated[bool, "", "whether bridges between beads of the later climb lead from it to most of the others"]
+    large: Annotated[bool, "", "whether the bead is large"]
+    height: Annotated[float, "m", "height of the bead's centre"]
+    in_bulk: Annotated[bool, "", "whether the bead belongs to the bulk"]
+    at_wall: Annotated[bool, "", "whether the bead has a bridge to a side wall"]
+    neighbours: Annotated[int, "", "number of bridges to other beads of the later climber"]
+    joined: Annotated[bool, "", "whether bridges within the later climber connect the bead to most of the others"]
 
 
 def assembly_of(
@@ -337,11 +335,11 @@ class Event:
     another one; rejoined is what went back to the pile, detached what let go of the walls or whose beads parted.
     """
 
-    time: Annotated[float, "s", "from the begin of the drive"]
+    time: Annotated[float, "s", "time since the start of the drive"]
     event: Annotated[str, "", "freed, split, merged, rejoined or detached"]
-    track: Annotated[int, "", "number of the cluster to which it happened"]
-    other: Annotated[int, "", "that from which it split or into which it merged, -1 for none"]
-    height: Annotated[float, "m", "of the cluster's leader then"]
+    track: Annotated[int, "", "number of the cluster"]
+    other: Annotated[int, "", "number of the cluster that it split from or merged into, -1 for none"]
+    height: Annotated[float, "m", "height of the cluster's leader at the event"]
 
 
 def events_of(tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, definition: ClimbCriteria) -> list[Event]:

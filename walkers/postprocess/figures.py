@@ -126,7 +126,7 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
             least=_LEAST_DISTANCE,
         ),
         Panel("Orientation", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE),
-        Panel(f"Paths of the mass centres, {seen}", *names, paths, least=_LEAST_DISTANCE),
+        Panel(f"Paths of the centres of mass, {seen}", *names, paths, least=_LEAST_DISTANCE),
     ]
 
 

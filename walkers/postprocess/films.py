@@ -35,18 +35,18 @@ _COLOURS, _SAMPLES = 40, 6  # in a GIF; pictures from which they are taken
 
 @dataclass(frozen=True)
 class FilmOptions:
-    """How a film is made.
+    """Options of a film.
 
     Attributes
     ----------
     size, fps
-        Pixels across and up; pictures a second.
+        Width and height in pixels; frames per second.
     slowdown
-        How many times slower than in reality; if None, 1, 2, 5, 10 … such that the film lasts 5 to 10 s.
+        Slow motion factor; None: 1, 2, 5, 10, …, chosen so that the film lasts 5 to 10 s.
     walker
-        Number of the walker to show, of walkers that are independent.
+        Number of the walker to show, if walkers are independent.
     begin, end
-        Physical time from which and until which to show, s; to the end of the run if None.
+        Physical times of the first and the last frame, s; ``end`` None: the end of the run.
     """
 
     size: tuple[int, int] = _SIZES["720p"]
@@ -64,20 +64,20 @@ def render_film(
     *,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Film a run: one of its walkers if they are independent, else all beads, walkers and climbers coloured.
+    """Render a film of one walker if walkers are independent, otherwise of all beads.
 
     Parameters
     ----------
     directory, destination
-        A run directory, and the MP4 or GIF to write; ``film.mp4`` in the directory if None.
+        A run directory, and the MP4 or GIF file to write; None: ``film.mp4`` in the run directory.
     options, on_progress
-        How; called with the number of pictures made and of all.
+        Options; a function that is called with the number of finished frames and of all frames.
 
     Raises
     ------
     InputError, WalkersError
-        If the format cannot hold it, there is no such walker, or nothing is between begin and end; if ffmpeg could not
-        write all of it.
+        If the format cannot hold the film, the walker does not exist, or no frame is between begin and end; if ffmpeg
+        fails.
     """
     path, options = destination or directory / "film.mp4", options or FilmOptions()
     _check_format(path, options)
@@ -115,13 +115,13 @@ def render_film(
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Read a size of pictures, ``720p`` or ``1280x720``, as pixels across and up; an InputError if it is none."""
+    """Read a size such as ``720p`` or ``1280x720`` as width and height in pixels; otherwise `InputError`."""
     numbers = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower())
     if numbers and min(map(int, numbers.groups())) >= 64:
         return int(numbers[1]), int(numbers[2])
     if text in _SIZES:
         return _SIZES[text]
-    expected = f"expected {', '.join(_SIZES)}, or pixels across and up such as 1280x720, 64 at least"
+    expected = f"expected {', '.join(_SIZES)}, or width and height such as 1280x720, at least 64"
     raise refused("--size", f"{text!r}: {expected}")
 
 

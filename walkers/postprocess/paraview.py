@@ -54,12 +54,12 @@ def write_vtk(
         A run directory; folder to write, replaced if it holds nothing but files of this function, else an InputError
         is raised: ``vtk`` in the run directory if None.
     every
-        Take one of so many samples of the drive, if None one a cycle. Bridges are in the frames in which they were
-        recorded.
+        Write every ``every``-th sample of the drive; None: one per cycle. Bridges are in the frames that recorded
+        them.
     vtu
         Also write the beads as ``.vtu``.
     as_placed
-        Leave independent walkers where the deck has them, centimetres apart, instead of drawing them side by side.
+        Keep independent walkers at their places in the deck, centimetres apart, instead of side by side.
 
     Returns
     -------

@@ -60,7 +60,7 @@ _LETTERS: dict[Any, Any] = {
 
 
 def render_run(directory: Path, destination: Path | None = None, *, images: int = SHOWN) -> list[Path]:
-    """Render a run: of independent walkers the first at several times, of all else views of the whole.
+    """Render a run at several times: the first of independent walkers, otherwise all beads.
 
     Parameters and errors are those of `render_series`.
     """
@@ -76,7 +76,7 @@ def render_series(
     apart: float | None = None,
     walker: int | None = None,
 ) -> list[Path]:
-    """Views of a run beside each other, in rows, walkers and climbers coloured, with times and scales.
+    """Render views of a run in rows, with times and scales; walkers and climbers are coloured.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ SUFFIXES = {"xyz": (".xyz", ".extxyz"), "lammps": (".lammpstrj",)}
 
 
 def write_trajectory(directory: Path, destination: Path, form: str, *, every: int = 1) -> Path:
-    """Write the motion of a run's beads while it is driven, one of so many samples.
+    """Write the motion of the beads during the drive, every ``every``-th sample.
 
     Parameters
     ----------

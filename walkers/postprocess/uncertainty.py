@@ -16,7 +16,7 @@ from walkers.runner.files import read_json
 
 SPREAD_NAME = "spread.json"
 """In the directory of a spread (`spread_of`): its bands."""
-_OVER = "over the ranges of what nobody measured"
+_OVER = "over the ranges of uncertain values"
 _WIDTH = 110
 
 
@@ -71,7 +71,7 @@ def not_known(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
     if not names:
         return []
-    return [f"not known: {', '.join(dict.fromkeys(names))}; run with --spread for the band over their ranges"]
+    return [f"uncertain: {', '.join(dict.fromkeys(names))}; run with --spread for the band over their ranges"]
 
 
 def spread_of(directory: Path) -> Path:

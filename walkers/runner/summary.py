@@ -91,7 +91,7 @@ def notes(case: Case) -> list[str]:
     if not (case.loose and case.boundary.closed and case.mixture):
         return []
     numbers = {"large": case.large, "small": case.count - case.large}
-    told = [f"no {name} beads: in the paper large beads lead small ones" for name, one in numbers.items() if not one]
+    told = [f"no {name} beads; in the paper, large beads lead small ones" for name, one in numbers.items() if not one]
     room = 2.0 * case.boundary.height - _volume(case) / (_LOOSE_PACKING * case.boundary.cross_section)
     if (fastest := room / case.duration) < _FASTEST_CLIMB:
         told.append(
@@ -202,10 +202,10 @@ def describe(summary: dict[str, Any]) -> str:
             f"sin δ = {dimer['sin_delta']:.4g}, μ = {dimer['mass_asymmetry']:.4g}, Γ0 = {dimer['gamma0']:.4g}"
         )
         if dimer["sin_delta"] < 0:
-            lines.append("           bead 1 is the smaller one")
+            lines.append("           bead 1 is the smaller bead")
     lines.append(
         f"drive      a0 = {drive['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g "
-        f"(the paper's, {ACCELERATION_OF_ONE_G:g} m/s²; gravity is {summary['case']['gravity']:g} m/s²), "
+        f"(g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {summary['case']['gravity']:g} m/s²), "
         f"amplitude {drive['amplitude'] * 1e3:.4g} mm, peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
     )
     if summary["contacts"]:
@@ -236,11 +236,11 @@ def _text_of_case(case: dict[str, Any]) -> list[str]:
 def _whence(one: dict[str, Any]) -> str:
     """Where a value comes from, in a few words."""
     origin, source = str(one["origin"]), str(one["source"])
-    ends = f", may be {one['range'][0]} to {one['range'][1]}" if one["range"] else ""
+    ends = f", range {one['range'][0]} to {one['range'][1]}" if one["range"] else ""
     if one["uncertain"]:
-        ends = f", called uncertain{ends}"
+        ends = f", given as uncertain{ends}"
     elif origin == "default" and ends:
-        return f"guessed ({source or 'nobody measured it'}){ends}"
+        return f"guessed ({source or 'not measured'}){ends}"
     elif origin in ("calibrated", "package"):
         return source + ends
     return (f"{origin}: {source}" if source else origin) + ends
@@ -248,7 +248,7 @@ def _whence(one: dict[str, Any]) -> str:
 
 def _text_of_run(step: dict[str, Any], run: dict[str, Any]) -> list[str]:
     """The time step against its limits, the length of the run and its cost."""
-    lines = [f"time step  {step['step'] * 1e6:.5g} µs, {run['steps_per_cycle']} a cycle"]
+    lines = [f"time step  {step['step'] * 1e6:.5g} µs, {run['steps_per_cycle']} per cycle"]
     for name, limit in step["limits"].items():
         shown = f"{limit * 1e6:.4g} µs" if limit is not None else "none"
         share = f"{step['share'][name]:.3f} of it (auto: up to {step['auto'][name]:g})"
@@ -259,6 +259,6 @@ def _text_of_run(step: dict[str, Any], run: dict[str, Any]) -> list[str]:
     most = f"until the velocity is constant within {percent(CONSTANT)}, at most " if run["until_steady"] else ""
     lines.append(
         f"run        {most}{run['steps']} steps, {run['simulated_seconds']:.4g} s simulated{segments}, "
-        f"{run['samples']} samples, about {cost}"
+        f"{run['samples']} samples, takes about {cost}"
     )
     return lines

@@ -66,15 +66,15 @@ _SCALE = """# Writes tables for another surface tension and viscosity: the deck 
 
 
 def write_folder(case: Case, folder: Path) -> Path:
-    """Write the deck of a case's whole run with all that it needs into a new folder, and return the deck's path.
+    """Write the complete deck of a case to a new folder, and return the path of the deck.
 
-    `InputError` if the folder is there or cannot be made; errors of `find_engine` and `plugin_of`.
+    `InputError` if the folder exists or cannot be made; errors of `find_engine` and `plugin_of`.
     """
     deck, plugin = render_deck(case, whole(case)), plugin_of(find_engine())
     try:
         folder.mkdir(parents=True)
     except OSError as error:
-        raise refused(folder, f"expected a folder that can be made ({error.strerror})") from error
+        raise refused(folder, f"cannot make the folder ({error.strerror})") from error
     write_deck(deck, folder)
     (folder / SCALE_NAME).write_text(_SCALE, encoding="utf-8")
     (folder / RUN_NAME).write_text(run_script(plugin, deck.layout.ranks), encoding="utf-8")

@@ -290,11 +290,11 @@ def describe_origins(found: Mapping[str, Any]) -> str:
     if not found["climbs"]:
         return ""
     return (
-        f"  assembly   no two beads of {found['strangers']} of {found['climbs']} climbers were neighbours at rest; "
-        f"{found['share_of_bridges']:.0%} of their bridges were there then\n"
-        f"             their last beads joined {found['whole_before']:.2f} s before they came free (median)\n"
-        f"             leaders of {found['leaders_at_wall']} were at a wall at rest, as {found['share_at_wall']:.0%} "
-        f"of all beads of their sizes (by chance: {_told_p(found['p_at_wall'])})"
+        f"  assembly   in {found['strangers']} of {found['climbs']} climbers no two beads were neighbours at rest; "
+        f"{found['share_of_bridges']:.0%} of the climbers' bridges existed then\n"
+        f"             the last bead joined {found['whole_before']:.2f} s before the cluster came free (median)\n"
+        f"             {found['leaders_at_wall']} leaders were at a wall at rest, as were {found['share_at_wall']:.0%} "
+        f"of all beads of their size class ({_told_p(found['p_at_wall'])})"
     )
 
 
@@ -428,7 +428,7 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
     list of dict
         One row per definition, the usual one first: ``threshold`` and ``value`` (empty and None for the usual one),
         ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s);
-        ``rate`` (climbs per start and second) with its exact ``rate_interval``.
+        ``rate`` (climbs per run and second) with its exact ``rate_interval``.
     """
     usual = ClimbCriteria()
     tried: list[tuple[str, float | None]] = [("", None)]
@@ -489,21 +489,21 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
     half = "not reached" if found["median"] is None else f"{found['median']:.2f} s"
     lines = [
         f"{found['climbed']} of {found['runs']} runs climbed within {found['within']:.3g} s"
-        + (f", {found['ended']} ended before and had not" if found["ended"] else "")
+        + (f", {found['ended']} ended before without a climb" if found["ended"] else "")
         + f": probability {found['probability']:.2f}{_interval(found['interval'], '.2f')}",
-        f"  to climb   median {half}; {found['censored']} of {found['runs']} runs ended without a climb",
+        f"  waiting    median {half}; {found['censored']} of {found['runs']} runs ended without a climb",
         f"  climbs     {_told_rate(found)}"
-        + ("" if found["dispersion"] is None else f"; they scatter {found['dispersion']:.1f} times as Poisson's"),
+        + ("" if found["dispersion"] is None else f"; dispersion {found['dispersion']:.1f} (Poisson: 1)"),
     ]
     if found["climbs"]:
         sizes = ", ".join(f"{size}: {found['sizes'].count(size)}" for size in sorted(set(found["sizes"])))
         lines += [
             *(f"    {name.replace('_', ' '):15} {_told_rate(found[name])}" for name in _PARTS),
-            f"  leader     large in {found['led_by_large']} of {found['climbs']} climbs (by chance among all beads, "
-            f"{found['share_of_large']:.0%} of which are large: {_told_p(found['p_among_beads'])}; among its own: "
+            f"  leader     large in {found['led_by_large']} of {found['climbs']} climbs (random bead of the pile, "
+            f"{found['share_of_large']:.0%} large: {_told_p(found['p_among_beads'])}; random bead of the cluster: "
             f"{_told_p(found['p_among_own'])})",
-            f"  first one  counted after {_range(found['times'])} s, begun after {_range(found['onsets'])} s",
-            f"  beads      {sizes}",
+            f"  first one  begins after {_range(found['onsets'])} s, counts after {_range(found['times'])} s",
+            f"  beads      {sizes} (beads: climbs)",
             f"  height     {_range(np.array(found['heights']) * 1e3)} mm",
         ]
     if found["speeds"]:
@@ -517,7 +517,7 @@ def _told_p(value: float) -> str:
 
 
 def _told_rate(found: Mapping[str, Any]) -> str:
-    rate = "-" if found["rate"] is None else f"{found['rate']:.3g} per start and second"
+    rate = "-" if found["rate"] is None else f"{found['rate']:.3g} per run and second"
     return f"{found['climbs']}: {rate}{_interval(found['rate_interval'])}"
 
 

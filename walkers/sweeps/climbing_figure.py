@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _ACROSS = 3
 _ROW = 2.1  # inches
 _MOST_LETTERS = 40  # side by side below a panel
-_RATE = "climbs per start and second"
+_RATE = "climbs per run and second"
 _KINDS = (("all", "", "ko"), ("plain walls", "on_plain_walls", "C1s"), ("corners", "in_corners", "C2^"))
 """Of all climbs and of parts of them: label, key in what `summarise_climbs` gives, colour and marker."""
 

@@ -100,7 +100,7 @@ def compare_runs(first: Side, second: Side) -> Comparison:
         text += _told_errors([side.directory for side in sides if side.directory], names)
     if same := [one["quantity"] for one, _ in pairs if one["first"] == one["second"]]:
         text.append(f"the same in both: {', '.join(same)}")
-    text += [f"{name}: no finished run; the parameters alone are compared" for name in not_run]
+    text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
     contents: dict[str, Any] = {**dict(zip(_SIDES, names, strict=True)), "parameters": parameters}
     contents |= {"results": [one for one, _ in pairs], "not_run": not_run}
     return Comparison(contents, "\n\n".join(text))
@@ -181,7 +181,7 @@ def _told_errors(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
     ]
     for name, one, value in zip(names, results, own, strict=True):
         if band := band_of(one, "velocity", value):
-            lines.append(f"{name}: {band_text(band, 'm/s')} over the ranges of what nobody measured (5 to 95 %)")
+            lines.append(f"{name}: {band_text(band, 'm/s')} over the ranges of uncertain values (5 to 95 %)")
         else:
             lines += [f"{name}: {sentence}" for sentence in not_known(one["rests_on"])]
     return ["\n".join(lines)] if lines else []

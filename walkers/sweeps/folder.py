@@ -65,7 +65,7 @@ _MARK = b"granular-walkers"
 class Entry:
     """A run (``case-hash``) or a sweep in a folder.
 
-    It is finished, running, failed, or interrupted: a run would go on where it was, of a sweep points are missing. Its
+    It is finished, running, failed, or interrupted: a run can be continued, of a sweep points are missing. Its
     age (s) counts from when it was finished or last written to; its size (bytes) is that of its files, of a sweep those
     of its runs. Its parameters are those of `walkers.inputs.readable.flattened`, of a sweep the numbers of values of
     what varies. A run gave a velocity (mean over its walkers, m/s) or climbs; a sweep has points of some statuses.
@@ -332,15 +332,15 @@ class Cleaning:
         """What goes, what of sweeps, what stays, and how much it is."""
         rows, told, total = [], list(self.told), 0
         for one in self.remove:
-            size, why = one.size, one.reason or ("" if one.status == "finished" else "would go on where it was")
+            size, why = one.size, one.reason or ("" if one.status == "finished" else "can be continued")
             if one.directory.is_symlink():
-                size, why = 0, "a symbolic link: what it leads to stays"
+                size, why = 0, "a symbolic link: its target stays"
             elif one.is_sweep:
                 own = _own_files(one.directory)
                 size, why = sum(weigh(path)[0] for path in own), ""
                 theirs = ", ".join(sorted(path.name for path in one.directory.iterdir() if path not in own))
                 if theirs:
-                    told.append(f"stays, for walkers did not write it: {theirs} (in {one.directory})")
+                    told.append(f"stays, walkers did not write it: {theirs} (in {one.directory})")
             kind = "sweep" if one.is_sweep else one.status
             rows.append([one.name, kind, age_text(one.age), bytes_text(size), why])
             total += size

@@ -44,7 +44,7 @@ _MOST_LEGENDS = 10
 
 
 def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARGEST) -> Path:
-    """Write the report of a sweep: one HTML file to mail, which needs no network.
+    """Write the report of a sweep as one HTML file that needs no network.
 
     The table has all points. Whole runs, with parameters, results, plots and beads to be played, are taken along while
     they fit into so many bytes, first and last first and then those halfway between; the page says which are left out.

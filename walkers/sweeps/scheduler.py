@@ -255,8 +255,8 @@ class SweepPlan:
             f"  varied     {keys or 'nothing'}",
             f"  points     {len(record.runs)}: {told}",
             f"  to do      {at_most}{len(missing)} points in {len(self.decks)} decks",
-            f"  predicted  {at_most}{seconds + besides:.0f} core-seconds ({apart + besides:.0f} with a deck a point), "
-            f"{until:.0f} s with {at_once} at once",
+            f"  predicted  {at_most}{seconds + besides:.0f} core-seconds ({apart + besides:.0f} without shared decks), "
+            f"{until:.0f} s with {at_once} decks in parallel",
             f"  directory  {record.directory}",
         ]
         return "\n".join(lines)

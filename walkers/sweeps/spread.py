@@ -39,7 +39,7 @@ _LEAST_PER_VALUE = 3  # points for each value that is drawn, below which ranks a
 _AT_REST = 2e-5  # m/s: below, walkers are at rest, as in the sweeps that look for the threshold of motion
 _WORDS = {
     "forward": "walk toward the large bead",
-    "backward": "walk toward the small one",
+    "backward": "walk toward the small bead",
     "at_rest": "rest (below 0.02 mm/s)",
     "separated": "come apart",
 }
@@ -110,10 +110,10 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
     import numpy as np
 
     if not case.as_read:
-        raise refused(case.name, "was changed after it was read; expected a case as load_case(name, changes) gives it")
+        raise refused(case.name, "was changed after it was read; expected a case from load_case(name, changes)")
     varied = [one for one in case.origins if one.range is not None]
     if not varied:
-        told = "nothing here is uncertain: say ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
+        told = "nothing here is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
         raise refused(case.name, told)
     with blaming(case.name, case.document):
         ranges = {one.key: _range_of(one) for one in varied}
@@ -126,7 +126,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
     axis = sampled("sobol", points, seed, ranges)
     return Sweep(
         name=spread_of(run_place(case, find_engine(engine), Path())).name,
-        title=f"{case.title or case.name}: what nobody measured, over its ranges",
+        title=f"{case.title or case.name}: uncertain values drawn from their ranges",
         source=case.name,
         case_name=case.name,
         document=case.document,
@@ -197,13 +197,13 @@ def describe(spread: Spread) -> str:
     """A spread in a few lines: mm, mm/s."""
     units = {key: unit for one in analyses() for key, (unit, _) in one.columns.items()}
     points = max((band.points for band in spread.bands.values()), default=0)
-    lines = [f"  spread     {points} draws, each value from its range by itself, half of them below the case's own:"]
+    lines = [f"  spread     {points} independent draws of each value from its range; median: the case's value:"]
     lines += [
-        f"             {one.key} {one.range[0]} to {one.range[1]}, own {one.text}" for one in spread.varied if one.range
+        f"             {one.key} {one.text} ({one.range[0]} to {one.range[1]})" for one in spread.varied if one.range
     ]
     if spread.held:
         told = ", ".join(f"{one.key} {one.text}" for one in spread.held)
-        lines.append(f"    as given {told}: to be drawn too, they need ranges in [uncertain]")
+        lines.append(f"    as given {told}: add ranges in [uncertain] to draw them too")
     for name, band in spread.bands.items():
         unit, factor = SHOWN_UNITS.get(units[name], (units[name], 1.0))
         low, middle, high, smallest, largest = (
@@ -212,11 +212,11 @@ def describe(spread: Spread) -> str:
         ends = f"{low} to {high} {unit} (5 to 95 %), median {middle}; smallest {smallest}, largest {largest}"
         lines.append(f"    {name:9}{ends}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
-        told = f"depends most on {ranks} (rank correlation)" if ranks else "on none of them clearly"
+        told = f"depends most on {ranks} (rank correlation)" if ranks else "depends clearly on none of them"
         if band.points < _LEAST_PER_VALUE * len(spread.varied):
-            told = "too few points to say on what it depends, and for more than a rough band"
+            told = "too few draws for rank correlations; the band is rough"
         lines.append(f"{'':13}{told}")
     found = [f"{count} {_WORDS[name]}" for name, count in spread.counts.items() if count]
     found += [f"{len(spread.failures)} failed"] if spread.failures else []
-    lines += [f"    of these {', '.join(found)}"] if found else []
+    lines += [f"    draws    {', '.join(found)}"] if found else []
     return "\n".join([*lines, f"    table    {spread.directory}"])

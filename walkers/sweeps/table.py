@@ -43,17 +43,17 @@ PARSL = "parsl"
 """Folder of Parsl's scripts and logs in a sweep's directory."""
 _FORMAT = 2
 _DRIVE = {
-    "frequency": ("Hz", "of the drive"),
-    "peak_acceleration": ("m/s^2", "of the boundary"),
-    "peak_velocity": ("m/s", "of the boundary"),
-    "amplitude": ("m", "of the boundary's displacement"),
+    "frequency": ("Hz", "frequency of the drive"),
+    "peak_acceleration": ("m/s^2", "peak acceleration of the boundary"),
+    "peak_velocity": ("m/s", "peak velocity of the boundary"),
+    "amplitude": ("m", "amplitude of the boundary's displacement"),
 }
 """Columns that every case has."""
 STATE = {
     "status": ("", "finished, failed, running or missing"),
-    "lost": ("", "number of beads that left the simulation box, so that there is no result"),
-    "reason": ("", "name of the failure, empty where there is none"),
-    "run": ("", "run directory, from where the table was made; of a failed point what is left of it"),
+    "lost": ("", "number of beads that left the simulation box; a run that loses beads has no result"),
+    "reason": ("", "name of the failure, or empty"),
+    "run": ("", "run directory, relative to the folder where the table was made"),
 }
 RESULTS = ("velocity", "climbs")
 """What is shown of a sweep if nothing else is asked for, the first that the table has."""
@@ -288,7 +288,7 @@ def result_in(directory: Path) -> dict[str, Any]:
 
 
 def load(directory: str | Path) -> pd.DataFrame:
-    """The table of a sweep, given its directory such as ``runs/fig2``; `InputError` if it is none.
+    """The table of a sweep in a directory such as ``runs/fig2``; `InputError` if there is no sweep.
 
     Returns
     -------
@@ -296,8 +296,7 @@ def load(directory: str | Path) -> pd.DataFrame:
         One row per point, in the order of the sweep; a descent's points below its end are left out. Columns are
         ``point``, the keys that vary (in the unit of the sweep file), and (SI units)
         `derived_columns`, `result_columns` and `STATE`.
-        ``attrs["units"]`` maps columns to units, ``attrs["meanings"]`` to what they are. Numbers of points that are
-        not finished are NaN.
+        ``attrs["units"]`` maps columns to units, ``attrs["meanings"]`` to their meanings. Unfinished points have NaN.
     """
     import pandas as pd
 
@@ -448,9 +447,9 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
         rows.append(row)
     unit = record.units[descent.key] or ""
     described = {name: (frame.attrs["units"][name], _VARIED) for name in others} | {
-        "moving": (unit, f"last {descent.key} at which the walkers moved"),
+        "moving": (unit, f"last {descent.key} at which the walkers move"),
         "gamma0_moving": ("", "dimensionless peak force Γ0 of moving"),
-        "at_rest": (unit, f"first {descent.key} at which they did not"),
+        "at_rest": (unit, f"first {descent.key} at which the walkers rest"),
         "gamma0_at_rest": ("", "dimensionless peak force Γ0 of at_rest"),
     }
     return _with_units(pd.DataFrame(rows), described)

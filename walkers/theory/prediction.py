@@ -1,4 +1,4 @@
-"""What the theory says of cases: the paper's model, the same motion under Coulomb's law, where it ends, alignment."""
+"""Predictions of the theory for cases: the paper's model, motion under Coulomb's law, detachment, alignment."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ def check_applies(*cases: Case) -> None:
     """Raise ``ValueError`` for cases that the theory is not one of: the key at fault, and what the theory is one of."""
     for case in cases:
         if len(case.walkers) != 1 or len(case.walkers[0].radii) != 2 or case.loose:
-            raise ValueError("bodies: the theory is one of dimers")
+            raise ValueError("bodies: the theory is for dimers")
         if not case.boundary.bare:
-            raise ValueError("boundary.shape: the theory is one of planes")
+            raise ValueError("boundary.shape: the theory is for planes")
         if not case.drive.is_plain or case.drive.direction[2] != 0.0:
-            raise ValueError("drive: the theory is one of a single harmonic along the plane, without a phase")
+            raise ValueError("drive: the theory is for a single harmonic along the plane, without a phase")
         if hypot(*case.gravity_vector[:2]) > abs(case.axial_gravity) + 1e-9:
-            raise ValueError("boundary.uphill: the theory is one of planes that are tilted along the drive")
+            raise ValueError("boundary.uphill: the theory is for planes tilted along the drive")
 
 
 def threshold(case: Case, *, viscous: bool = True) -> float:
@@ -146,7 +146,7 @@ def _told(case: Case, *, viscous: bool) -> dict[str, Any]:
     if not motion.solved[0]:
         reason = "the forces have no solution"
     elif not motion.periodic[0]:
-        reason = "it comes to no steady motion"
+        reason = "the motion does not become periodic"
     elif motion.opened[0]:
         reason = f"{CONTACTS[int(np.argmin(motion.smallest_normal_force[:, 0]))]} would open"
     return {
@@ -218,9 +218,9 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
         }
         lines.append(f"  engine                         {_speed(found)}{_details(found)}")
     else:
-        lines.append("  engine                         not run; do: walkers run CASE")
+        lines.append("  engine                         no run yet; do: walkers run CASE")
     lines += [
-        f"  detachment  {end['contact']}, from a steady force of Γ = {end['gamma']:.3g}",
+        f"  detachment  {end['contact']} opens first, at a steady force of Γ = {end['gamma']:.3g}",
         *describe_alignment(mathieu),
     ]
     return "\n".join(lines)
@@ -228,16 +228,16 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
 
 def describe_alignment(found: dict[str, Any]) -> list[str]:
     """`alignment_of` as lines of text; a second one where something pulls along the axis."""
-    stays = "small angles stay small, if it rolls" if found["stable"] else "small angles grow, if it rolls"
+    stays = "small angles stay small if the beads roll" if found["stable"] else "small angles grow if the beads roll"
     if found["v"] == found["u"] == 0.0:
-        stays = "no tendency to the axis"
+        stays = "no torque toward the axis"
     level = f"Mathieu V = {found['v']:.3g}, stable up to {found['largest_stable_v']:.3g}: {stays}"
     if found["u"] == 0.0:
         return [f"  alignment   {level}"]
     steep = f"Mathieu U = {found['u']:.3g}, V = {found['v']:.3g}, β = {found['damping']:.3g}: {stays}"
     rate = found["rate"]
     if rate is None:
-        told = "not told, for the axial motion does not repeat itself"
+        told = "not known: the axial motion is not periodic"
     elif not found["stands"]:
         after = f"turns over after about {found['turns_over_after']:.2g} s"
         told = f"{after} (from 1° to 90°; small angles grow by {rate:.3g}/s)"
@@ -245,7 +245,7 @@ def describe_alignment(found: dict[str, Any]) -> list[str]:
         told = f"stands: small angles decay by {-rate:.3g}/s"
     else:
         told = "stands: small angles stay small"
-    return [f"  alignment   {steep}", f"  beads free  {told}"]
+    return [f"  alignment   {steep}", f"  with slip   {told}"]
 
 
 def _speed(model: dict[str, Any]) -> str:
@@ -256,9 +256,9 @@ def _speed(model: dict[str, Any]) -> str:
 
 def _details(model: dict[str, Any]) -> str:
     rotation = ", ".join(with_decimals(value * 1e3, 2) for value in model["rotation"])
-    told = f"; beads rotate at {rotation}, large one slides at {with_decimals(model['sliding'][0] * 1e3, 2)}"
+    told = f"; bead rotation {rotation}, sliding of the large bead {with_decimals(model['sliding'][0] * 1e3, 2)} mm/s"
     gamma = model.get("threshold")
-    return told + (f"; moves from Γc = {gamma:.3f}" if gamma is not None else "")
+    return told + (f"; threshold Γc = {gamma:.3f}" if gamma is not None else "")
 
 
 def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, FloatArray], dict[str, int]]:
@@ -291,7 +291,7 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
     values = motion.velocity if is_velocity else getattr(motion, family)[int(number) - 1]
     known = motion.periodic & np.isfinite(motion.velocity)
     model[able] = np.where(known, values, np.nan)
-    reasons += Counter({"a contact opens, or the motion does not repeat itself": int(np.sum(~known))})
+    reasons += Counter({"a contact opens, or the motion is not periodic": int(np.sum(~known))})
     for place in able if is_velocity else ():
         case, dimer = cases[place], dimer_of(cases[place])
         if why := why_not_the_paper(case):
@@ -309,5 +309,5 @@ def _why_not(case: Case, column: str) -> str | None:
     except ValueError as error:
         return str(error).partition(": ")[2]
     if case.axial_gravity != 0.0 and column != "right_facing":
-        return "on a slope the theory is one of walkers that face up (column right_facing)"
+        return "on a slope the theory is for walkers that face up (column right_facing)"
     return None

@@ -1,4 +1,4 @@
-"""The attraction of dry surfaces by van der Waals' forces, F = A R* / (6 (h + d0)²), without resistances.
+"""Van der Waals attraction of dry surfaces, F = A R* / (6 (h + d0)²), without resistances.
 
 A is the Hamaker constant, for silica in vacuum 6.5e-20 J (Bergström 1997), and d0 = 0.165 nm the distance of surfaces
 that touch (Israelachvili 2011, Sec. 13.13). Nothing has to form: the attraction begins and ends at the gap at which it

@@ -1,4 +1,4 @@
-"""The law of a bridge by the Young–Laplace equation: its pull and its rupture without a fit, Reynolds' resistances.
+"""The Young–Laplace equation, solved numerically: force and rupture distance, with Reynolds' resistances.
 
 The pull is that of `walkers.physics.laplace`, its closed form, for the volume and the contact angle given, between
 beads and at a plane; the bridge breaks at the largest gap at which the equation has a solution. There the pull falls as

@@ -38,51 +38,51 @@ _APPROACHES = {
 """By the angle between the headings of two that meet: from which on, and its words."""
 _FATES = {
     "parted": "have parted",
-    "walking": "are still joined at the end, and their middle is not slow",
-    "resting": "are still joined at the end, and their middle is slow",
+    "walking": "are joined at the end and move",
+    "resting": "are joined at the end and are slow",
 }
 _SLOW = 0.1
 """Of a free walker's speed; what is slower is called slow."""
 _END = 0.1
 """Of the drive; its last part, over which the end is measured."""
 _NUMBERS = {
-    "meeting_rate": ("meetings of a walker", "1/s", "meetings in which a walker takes part, in a second"),
+    "meeting_rate": ("meeting rate", "1/s", "number of meetings of a walker per second"),
     "pair_lifetime": (
-        "mean life of a pair",
+        "mean lifetime of a pair",
         "s",
-        "pair_time over the number of partings: the mean life if pairs part at random; NaN if none did",
+        "pair_time over the number of partings: the mean lifetime if pairs part at random; NaN without a parting",
     ),
-    "pair_time": ("time that pairs were joined", "s", "summed over all meetings"),
-    "clustered_share": ("walkers in clusters", "share", "walkers joined to others in the last frame"),
-    "largest_cluster": ("walkers in the largest cluster", "", "in the last frame; 1 if none are joined"),
+    "pair_time": ("total time of pairs", "s", "time for which pairs are joined, summed over all meetings"),
+    "clustered_share": ("walkers in clusters", "share", "share of walkers joined to others in the last frame"),
+    "largest_cluster": ("walkers in the largest cluster", "", "number in the last frame; 1 if none are joined"),
     "held_share": (
         "walkers held by side walls",
         "share",
-        "walkers that bridges join to a side wall in the last frame, themselves or by others",
+        "share of walkers joined to a side wall in the last frame, directly or through others",
     ),
     "nematic_order": (
         "nematic order along the drive axis",
         "",
-        "mean of cos 2θ of all walkers over the last tenth of the drive, θ from the drive axis to the heading: 1 all "
-        "along it, 0 any way, -1 all across it",
+        "mean of cos 2θ over all walkers and the last tenth of the drive, θ from the drive axis to the heading: 1 all "
+        "along the axis, 0 random, -1 all across it",
     ),
     "polar_order": (
         "polar order",
         "",
-        "length of the mean of all walkers' headings, averaged over the last tenth of the drive: 1 all one way; of N "
-        "that head any way 0.89/√N",
+        "length of the mean heading of all walkers, averaged over the last tenth of the drive: 1 all one way, "
+        "0.89/√N for N random headings",
     ),
     "free_speed": (
         "speed of free walkers",
         "m/s",
-        "mean speed, from cycle to cycle and whichever way, of walkers joined to no other and to no side wall",
+        "mean speed, from cycle to cycle, of walkers joined to no other walker and no side wall",
     ),
-    "joined_speed": ("speed of joined walkers", "m/s", "the same of walkers in clusters that no side wall holds"),
-    "speed_ratio": ("speed of joined walkers over free ones'", "", "joined_speed over free_speed"),
+    "joined_speed": ("speed of joined walkers", "m/s", "the same for walkers in clusters that no side wall holds"),
+    "speed_ratio": ("speed of joined walkers over speed of free walkers", "", "joined_speed over free_speed"),
     "slow_share": (
         "slow walkers at the end",
         "share",
-        "walkers that in the last tenth of the drive come less far than at a tenth of free_speed",
+        "share of walkers whose net speed over the last tenth of the drive is below a tenth of free_speed",
     ),
 }
 """Of each number of the result that has a column: its label in reports, its unit, what it is."""
@@ -92,12 +92,12 @@ _NUMBERS = {
 class Meeting:
     """``meetings.parquet``: one row per event between two walkers that are meant to meet."""
 
-    time: Annotated[float, "s", "from the begin of the drive"]
-    event: Annotated[str, "", "merged: the first bridge between two walkers is there; parted: the last one is gone"]
-    walker: Annotated[int, "", "number of one of the two"]
-    other: Annotated[int, "", "number of the other"]
-    size: Annotated[int, "", "walkers that are joined by bridges, directly or by others, with the first one after that"]
-    angle: Annotated[float, "rad", "between the headings of the two then: 0 alike, pi opposite"]
+    time: Annotated[float, "s", "time since the start of the drive"]
+    event: Annotated[str, "", "merged: the first bridge between two walkers forms; parted: the last one breaks"]
+    walker: Annotated[int, "", "number of one walker"]
+    other: Annotated[int, "", "number of the other walker"]
+    size: Annotated[int, "", "number of walkers in the cluster of the first one after the event"]
+    angle: Annotated[float, "rad", "angle between the two headings at the event: 0 parallel, pi opposite"]
 
 
 @dataclass(frozen=True)
@@ -124,8 +124,8 @@ class Meetings(Analysis):
     derived: ClassVar[Described] = {
         "coverage": (
             "",
-            "area of the beads, seen from above, over that of the container's floor; where walkers can walk away over "
-            "that of the squares on which they start, at the start",
+            "projected area of the beads over the floor area of the container; on an open substrate, over the area of "
+            "the squares on which the walkers start",
         )
     }
 
@@ -187,17 +187,17 @@ class Meetings(Analysis):
         """How often and what of it, how many together, how they stand, how they are slowed down."""
         del result
         label = "meetings of walkers"
-        yield Quantity("merged", f"{label}: merged", "", "merged", "how often two walkers stuck together")
-        yield Quantity("parted", f"{label}: parted", "", "parted", "how often two of them parted again")
-        told = "walkers in the largest group that bridges ever joined"
-        yield Quantity("largest_group", "most walkers together", "", "largest_group", told)
+        yield Quantity("merged", f"{label}: merged", "", "merged", "number of times that two walkers joined")
+        yield Quantity("parted", f"{label}: parted", "", "parted", "number of times that two walkers parted")
+        told = "largest number of walkers joined by bridges at any time"
+        yield Quantity("largest_group", "largest group of walkers", "", "largest_group", told)
         for name, (label, unit, told) in _NUMBERS.items():
             yield Quantity(name, label, unit, name, told)
         for approach, (_, angle) in _APPROACHES.items():
-            told = f"meetings of two whose headings are {angle}"
+            told = f"meetings of two walkers with headings {angle}"
             yield Quantity(f"{approach}.met", "", "", f"{approach}_met", told)
             for fate, words in _FATES.items():
-                told = f"of {approach}_met those that {words}"
+                told = f"number of pairs of {approach}_met that {words}"
                 yield Quantity(f"{approach}.{fate}", "", "", f"{approach}_{fate}", told)
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
@@ -206,7 +206,7 @@ class Meetings(Analysis):
         slow = result["slow_share"]
         return [
             f"  meetings   {result['merged']} merged, {result['parted']} parted, at most {result['largest_group']} "
-            f"together; at the end {f'walkers {together}' if together else 'all are alone'}",
+            f"together; at the end {f'joined: {together}' if together else 'none are joined'}",
             f"             at the end {100.0 * result['clustered_share']:.0f} % in clusters"
             f"{'' if slow is None else f', {100.0 * slow:.0f} % slow'}; nematic order {result['nematic_order']:.2f}, "
             f"polar order {result['polar_order']:.2f}",

@@ -49,52 +49,52 @@ _LAYERS = 0.5
 class Bed:
     """``bed.parquet``: one row per frame of a pile."""
 
-    time: Annotated[float, "s", "from the begin of the drive; negative while the pile settles"]
-    surface: Annotated[float, "m", "height of the bulk's surface: median over x-y cells of the highest bead top"]
+    time: Annotated[float, "s", "time since the start of the drive; negative while the pile settles"]
+    surface: Annotated[float, "m", "height of the bulk's surface: median over x-y cells of the top of the highest bead"]
     surface_low: Annotated[float, "m", "the same, 10th percentile"]
     surface_high: Annotated[float, "m", "the same, 90th percentile"]
-    brazil_nut: Annotated[float, "", "(mean height of large beads - of small ones) / (their sum)"]
-    brazil_nut_of_bulk: Annotated[float, "", "the same without the beads that are free of the bulk"]
+    brazil_nut: Annotated[float, "", "Brazil-nut index (z_large - z_small)/(z_large + z_small) of mean heights"]
+    brazil_nut_of_bulk: Annotated[float, "", "the same for the beads of the bulk"]
     mean_square_velocity: Annotated[
-        float, "m^2/s^2", "of the beads, relative to the container, at the frames' phase of the drive"
+        float, "m^2/s^2", "mean square velocity of the beads relative to the container, at the drive phase of the frame"
     ]
     contacts: Annotated[
-        float, "", "a bead: twice the bridges between beads that touch, over the beads; those to walls do not count"
+        float,
+        "",
+        "touching beads per bead: twice the bridges between touching beads over the number of beads; no walls",
     ]
     bridges: Annotated[
-        float, "", "a bead: twice the bridges between beads, touching or open, over the beads; not those to walls"
+        float, "", "bridges per bead: twice the bridges between beads over the number of beads; no walls"
     ]
-    touching: Annotated[int, "", "bridges between beads that touch"]
-    opened: Annotated[int, "", "bridges between beads that do not"]
-    mean_force: Annotated[float, "N", "normal force of the bridges between beads, positive: pulling together"]
-    liquid_in_bridges: Annotated[float, "m^3", "sum of the volumes of all bridges, those to walls too"]
-    bulk: Annotated[int, "", "beads in the bulk"]
-    at_wall: Annotated[int, "", "beads that a bridge joins to a side wall"]
-    large_at_wall: Annotated[int, "", "large ones among these"]
-    clusters: Annotated[int, "", "clusters that are free of the bulk and held to a side wall"]
-    highest: Annotated[float, "m", "height of the topmost bead of these; the surface where there is none"]
+    touching: Annotated[int, "", "number of bridges between beads that touch"]
+    opened: Annotated[int, "", "number of bridges between beads that do not touch"]
+    mean_force: Annotated[float, "N", "mean normal force of the bridges between beads, positive for attraction"]
+    liquid_in_bridges: Annotated[float, "m^3", "total volume of all bridges, including those to walls"]
+    bulk: Annotated[int, "", "number of beads in the bulk"]
+    at_wall: Annotated[int, "", "number of beads with a bridge to a side wall"]
+    large_at_wall: Annotated[int, "", "number of large beads with a bridge to a side wall"]
+    clusters: Annotated[int, "", "number of clusters free of the bulk and held by a side wall"]
+    highest: Annotated[float, "m", "height of the topmost bead of these clusters; of the surface if there is none"]
 
 
 @dataclass(frozen=True)
 class Profile:
     """``profile.parquet``: one row per layer of a pile."""
 
-    height: Annotated[FloatArray, "m", "middle of a layer"]
-    packing_fraction: Annotated[
-        FloatArray, "", "volume of beads over that of the container, mean over the second half of the drive"
-    ]
-    liquid_fraction: Annotated[FloatArray, "", "volume of bridges over that of the container, as above"]
+    height: Annotated[FloatArray, "m", "middle of the layer"]
+    packing_fraction: Annotated[FloatArray, "", "volume fraction of the beads, mean over the second half of the drive"]
+    liquid_fraction: Annotated[FloatArray, "", "volume fraction of the bridges, mean over the second half of the drive"]
 
 
 @dataclass(frozen=True)
 class Member:
     """``members.parquet``: one row per bead of a cluster that is free and held, and frame."""
 
-    time: Annotated[float, "s", "from the begin of the drive"]
+    time: Annotated[float, "s", "time since the start of the drive"]
     track: Annotated[int, "", "number of the cluster"]
     bead: Annotated[int, "", "number of the bead, from 0"]
-    large: Annotated[bool, "", "whether it is of the large class"]
-    height: Annotated[float, "m", "of its centre"]
+    large: Annotated[bool, "", "whether the bead is large"]
+    height: Annotated[float, "m", "height of the bead's centre"]
 
 
 class Pile(Analysis):
@@ -185,18 +185,18 @@ class Pile(Analysis):
             return folded
 
         yield Quantity("climbs", "", "", "climbs", "clusters that climbed a wall", of=lambda one: len(one["climbs"]))
-        yield Quantity("climbs", "", "s", "onset", "when the first of them began", of=of_climbs(min, "onset"))
+        yield Quantity("climbs", "", "s", "onset", "when the first climb began", of=of_climbs(min, "onset"))
         mean = of_climbs(lambda speeds: sum(speeds) / len(speeds), "speed")
-        yield Quantity("climbs", "", "m/s", "speed", "mean of their speeds", of=mean)
+        yield Quantity("climbs", "", "m/s", "speed", "mean speed of the climbs", of=mean)
         highest = of_climbs(max, "height")
-        yield Quantity("climbs", "", "m", "highest", "height that the highest of them reached", of=highest)
-        told, led = "how many of them were led by a large bead", of_climbs(sum, "leader_large")
+        yield Quantity("climbs", "", "m", "highest", "greatest height of a climb", of=highest)
+        told, led = "number of climbs led by a large bead", of_climbs(sum, "leader_large")
         yield Quantity("climbs", "", "", "led_by_large", told, of=led)
         yield Quantity("beads", "beads")
-        yield Quantity("large", "of them large")
+        yield Quantity("large", "large beads")
         yield Quantity("driven", "time shaken", "s")
-        told = "clusters that were free of the pile and held to a wall for a while"
-        yield Quantity("clusters", "clusters free of the pile and held to a wall", "", "clusters", told)
+        told = "number of clusters that came free of the pile, held by a wall"
+        yield Quantity("clusters", "clusters free of the pile and held by a wall", "", "clusters", told)
         for event in result.get("events", ()):
             yield Quantity(f"events.{event}", f"of them {event}")
         yield Quantity("surface.start", "height of the surface at the start", "m")
@@ -205,8 +205,8 @@ class Pile(Analysis):
         yield Quantity("brazil_nut.start", "Brazil-nut index at the start")
         label = "Brazil-nut index at the end"
         yield Quantity("brazil_nut.end", label, "", "brazil_nut_end", label)
-        yield Quantity("settling", "time to settle before", "s", "settling", "before the drive")
-        whens = {"rest": "at rest", "rest_inner": "at rest, beads at no wall", "shaken": "while shaken"}
+        yield Quantity("settling", "settling time", "s", "settling", "settling time before the drive")
+        whens = {"rest": "at rest", "rest_inner": "at rest, beads away from walls", "shaken": "while shaken"}
         for when, told in whens.items():
             for what in ("contacts", "bridges"):
                 yield Quantity(f"coordination.{when}.{what}", f"{what} per bead, {told}")
@@ -224,20 +224,20 @@ class Pile(Analysis):
         rest, inner, shaken = bridges["rest"], bridges["rest_inner"], bridges["shaken"]
         alone, early = "", result["driven"] < _WHOLE * result["duration"]
         if inner["beads"]:
-            alone = f"; {inner['beads']} beads at no wall have {inner['bridges']:.2f} and {inner['contacts']:.2f}"
+            alone = f"; {inner['beads']} beads away from walls: {inner['bridges']:.2f} and {inner['contacts']:.2f}"
         lines = [
             f"{result['case']}: {result['beads']} beads ({result['large']} large), {result['drive']}",
             f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling"
-            + (f"; then climbers left the container, before {result['duration']:.3g} s" if early else ""),
+            + (f"; ended before {result['duration']:.3g} s: climbers left the container" if early else ""),
             f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
-            f"  segregation (z of large - z of small)/sum: {nuts['start']:.3f} at the start, "
+            f"  segregation (z_large - z_small)/(z_large + z_small): {nuts['start']:.3f} at the start, "
             f"{nuts['end']:.3f} at the end",
             f"  bridges    between beads, at rest: {_told_bridges(rest)}{alone}",
         ]
         if shaken:
             lines.append(f"             while shaken: {_told_bridges(shaken)}")
         lines += [
-            f"  clusters   {result['clusters']} were free of the pile and held to a wall for a while"
+            f"  clusters   {result['clusters']} came free of the pile, held by a wall"
             + "".join(f", {count} {kind}" for kind, count in result["events"].items()),
             f"  climbs     {len(result['climbs']) or 'none'}",
         ]
@@ -249,7 +249,7 @@ class Pile(Analysis):
                 f"{climb['height'] * 1e3:.2f} mm {where} {' '.join(climb['walls'])} at {speed} mm/s, led by a "
                 f"{_leader(climb)} bead, {climb['size']} beads ({climb['large']} large)"
                 + (f"; over the rim, at {result['rim'] * 1e3:g} mm" if climb["height"] > result["rim"] else "")
-                + ("" if climb["out_of_pile"] else "; it has hung on a wall since the pouring")
+                + ("" if climb["out_of_pile"] else "; on the wall since the beads were poured")
             )
         return lines + wrapped(self.uncertainty(result))
 
@@ -351,7 +351,7 @@ def _members(tracks: Sequence[Track], beads: Beads) -> list[Member]:
 
 
 def _told_bridges(counts: Mapping[str, Any]) -> str:
-    return f"{counts['bridges']:.2f} a bead, {counts['contacts']:.2f} of them contacts"
+    return f"{counts['bridges']:.2f} per bead, {counts['contacts']:.2f} of them in contact"
 
 
 def _leader(climb: Mapping[str, Any]) -> str:

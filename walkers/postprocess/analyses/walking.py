@@ -52,11 +52,11 @@ SAME = 0.05
 NEAR = 1.5
 """Walkers whose mass centres come within this many lengths of one have met."""
 
-_CONTACTS = "contacts: the beads with walls in their order, then the pairs of beads that touched at the start"
+_CONTACTS = "contacts: each bead with the wall, in order, then the pairs of beads in contact at the start"
 _ROTATION = "rotation velocity -R dphi/dt of a bead"
 _SLIDING = f"sliding velocity; {_CONTACTS}"
-_OPEN = f"share of the time for which the contact is open; {_CONTACTS}"
-_SEPARATED = "share of the samples in which two beads are farther apart than the bridge between them reaches"
+_OPEN = f"fraction of the time during which the contact is open; {_CONTACTS}"
+_SEPARATED = "fraction of the samples in which two beads are farther apart than a bridge can reach"
 
 
 @dataclass(frozen=True)
@@ -64,18 +64,20 @@ class Trajectory:
     """``trajectory.parquet``: one row per sample and walker."""
 
     walker: Annotated[IntArray, "", "number of the walker, from 0"]
-    time: Annotated[FloatArray, "s", "from the begin of the drive"]
+    time: Annotated[FloatArray, "s", "time since the start of the drive"]
     cycle: Annotated[FloatArray, "", "time in cycles of the drive"]
-    x: Annotated[FloatArray, "m", "mass centre relative to the substrate"]
-    y: Annotated[FloatArray, "m", "mass centre relative to the substrate"]
-    z: Annotated[FloatArray, "m", "mass centre above the substrate"]
-    orientation: Annotated[FloatArray, "rad", "angle of the walker from the direction that it was to face"]
+    x: Annotated[FloatArray, "m", "centre of mass relative to the substrate"]
+    y: Annotated[FloatArray, "m", "centre of mass relative to the substrate"]
+    z: Annotated[FloatArray, "m", "height of the centre of mass above the substrate"]
+    orientation: Annotated[FloatArray, "rad", "angle between the heading and the direction given by facing"]
     velocity: Annotated[
-        FloatArray, "m/s", "mass centre relative to the substrate, along the heading (small beads to large ones)"
+        FloatArray,
+        "m/s",
+        "velocity of the centre of mass relative to the substrate, along the heading (from small to large beads)",
     ]
     rotation: Annotated[FloatArray, "m/s", _ROTATION, NUMBERED]
     sliding: Annotated[FloatArray, "m/s", _SLIDING, NUMBERED]
-    gap: Annotated[FloatArray, "m", f"gap, negative where they touch; {_CONTACTS}", NUMBERED]
+    gap: Annotated[FloatArray, "m", f"gap, negative for overlap; {_CONTACTS}", NUMBERED]
 
 
 @dataclass(frozen=True)
@@ -83,24 +85,22 @@ class WalkerRows:
     """``walkers.parquet``: one row per walker; means are over the cycles after the settling ones."""
 
     walker: Annotated[IntArray, "", "number of the walker, from 0"]
-    make: Annotated[IntArray, "", "number of the walker's make in the case, from 0: its dimers, then its clusters"]
-    facing: Annotated[
-        IntArray, "", "where it is to face at the start: 1 along the drive axis (right), -1 against it (left)"
-    ]
+    make: Annotated[IntArray, "", "number of the walker's make (body of the case), from 0: dimers, then clusters"]
+    facing: Annotated[IntArray, "", "given direction at the start: 1 along the drive axis (right), -1 opposite (left)"]
     start_angle: Annotated[FloatArray, "rad", "orientation at the start"]
     velocity: Annotated[
-        FloatArray, "m/s", "along the heading after the settling cycles, positive toward the large beads"
+        FloatArray, "m/s", "velocity along the heading after the settling cycles, positive toward the large beads"
     ]
-    standard_error: Annotated[FloatArray, "m/s", "of the fit of the velocity"]
+    standard_error: Annotated[FloatArray, "m/s", "standard error of the fitted velocity"]
     first_half: Annotated[FloatArray, "m/s", "velocity in the first half of the fitted cycles"]
     second_half: Annotated[FloatArray, "m/s", "velocity in the second half of the fitted cycles"]
-    steady: Annotated[BoolArray, "", f"whether the two halves agree within {percent(STEADY_DIFFERENCE)}"]
-    axial_velocity: Annotated[FloatArray, "m/s", "mass centre along the drive axis"]
-    lateral_velocity: Annotated[FloatArray, "m/s", "mass centre across the drive axis"]
+    steady: Annotated[BoolArray, "", f"whether first_half and second_half agree within {percent(STEADY_DIFFERENCE)}"]
+    axial_velocity: Annotated[FloatArray, "m/s", "velocity of the centre of mass along the drive axis"]
+    lateral_velocity: Annotated[FloatArray, "m/s", "velocity of the centre of mass across the drive axis"]
     orientation_mean: Annotated[FloatArray, "rad", "mean orientation after the settling cycles"]
     orientation_end: Annotated[FloatArray, "rad", "orientation at the end"]
     turned_at: Annotated[
-        FloatArray, "s", "when it was first, at the end of a cycle, off by more than a right angle; NaN if it never was"
+        FloatArray, "s", "end of the first cycle with an orientation beyond 90 degrees; NaN if there is none"
     ]
     separated_fraction: Annotated[FloatArray, "", _SEPARATED]
     rotation: Annotated[FloatArray, "m/s", _ROTATION, NUMBERED]
@@ -112,20 +112,18 @@ class WalkerRows:
 class BridgeRows:
     """``bridges.parquet``: one row per bridge and frame."""
 
-    time: Annotated[FloatArray, "s", "from the begin of the drive"]
+    time: Annotated[FloatArray, "s", "time since the start of the drive"]
     walker: Annotated[IntArray, "", "number of the walker, from 0"]
     contact: Annotated[
-        IntArray, "", "number of the contact, from 1: beads with walls, then pairs of beads; 0 for any other bridge"
+        IntArray, "", "number of the contact, from 1: beads with walls, then pairs of beads; 0 for other bridges"
     ]
     bead_1: Annotated[IntArray, "", "number of the bead in the run, from 0"]
     bead_2: Annotated[IntArray, "", "number of the other bead, -1 for a wall"]
     wall: Annotated[IntArray, "", "number of the wall, 0 for the floor if there is one, -1 for none"]
-    other_walker: Annotated[IntArray, "", "number of the walker that the bridge joins it to, -1 for none"]
-    gap: Annotated[FloatArray, "m", "gap, negative where they touch"]
+    other_walker: Annotated[IntArray, "", "number of the walker at the other end, -1 for none"]
+    gap: Annotated[FloatArray, "m", "gap, negative for overlap"]
     touching: Annotated[BoolArray, "", "whether the surfaces touch"]
-    normal_force: Annotated[
-        FloatArray, "N", "net normal force (capillary, viscous, elastic), positive where it pulls the two together"
-    ]
+    normal_force: Annotated[FloatArray, "N", "net normal force (capillary, viscous, elastic), positive for attraction"]
 
 
 class Walking(Analysis):
@@ -193,19 +191,19 @@ class Walking(Analysis):
         """Of all walkers, their contacts, makes and postures; sweeps have the contacts of dimers."""
         first, second = ways(uphill=result.get("goes_uphill", False))
         label = "along the heading, positive toward the large bead"
-        yield Quantity("velocity", f"velocity {label}", "m/s", "velocity", f"mean over the walkers, {label}")
+        yield Quantity("velocity", f"velocity {label}", "m/s", "velocity", f"mean velocity of the walkers, {label}")
         yield Quantity("velocity.smallest", "", "m/s", "smallest", "velocity of the slowest walker")
         told = "velocity of the fastest walker; the paper's error bar is largest minus smallest"
         yield Quantity("velocity.largest", "", "m/s", "largest", told)
-        told = "standard deviation of the velocities of the copies: how alike they are, no error of the mean"
+        told = "standard deviation of the velocities of the copies; not an error of the mean"
         yield Quantity("velocity.scatter", "", "m/s", "scatter", told)
         for name, way in (("right", first), ("left", second)):
-            label = f"velocity of those that started facing {way}"
+            label = f"velocity of walkers that started facing {way}"
             told = f"mean velocity of the walkers that started facing {name}"
             yield Quantity(f"{name}_facing", label, "m/s", f"{name}_facing", told)
         if result.get("turned_round"):
-            yield Quantity("kept_heading", "velocity of those that kept their heading", "m/s")
-        told = "mean of the mass centres along the drive axis, on a slope up it"
+            yield Quantity("kept_heading", "velocity of walkers that kept their heading", "m/s")
+        told = "mean velocity of the centres of mass along the drive axis; on a slope, uphill"
         yield Quantity("axial_velocity.mean", "velocity along the drive axis", "m/s", "axial_velocity", told)
         yield Quantity("lateral_velocity.mean", "velocity across the drive axis", "m/s")
         for bead in result.get("rotation", ("bead_1", "bead_2")):
@@ -222,20 +220,20 @@ class Walking(Analysis):
         told = "mean orientation at the end"
         yield Quantity("orientation_end", "orientation at the end", "rad", "orientation_end", told)
         for number, make in enumerate(result.get("makes", [])):
-            yield Quantity(f"makes.{number}.velocity", f"velocity of those of {_radii(make)} mm", "m/s")
-        yield Quantity("walkers", "walkers", column="walkers", meaning="copies")
-        label = f"of them steady: halves within {percent(STEADY_DIFFERENCE)}"
-        yield Quantity("steady", label, column="steady", meaning=f"how many of the walkers are {label[8:]}")
-        told = "how many of them turned by more than 90 degrees"
-        yield Quantity("turned_round", "of them turned round by more than 90°", column="turned_round", meaning=told)
-        told = "on a slope: how many of them end as they were to face, and tilt no more"
+            yield Quantity(f"makes.{number}.velocity", f"velocity of walkers with radii {_radii(make)} mm", "m/s")
+        yield Quantity("walkers", "walkers", column="walkers", meaning="number of walkers")
+        label = f"steady walkers: both halves agree within {percent(STEADY_DIFFERENCE)}"
+        yield Quantity("steady", label, column="steady", meaning=f"number of {label}")
+        told = "number of walkers that turned by more than 90 degrees"
+        yield Quantity("turned_round", "walkers that turned by more than 90°", column="turned_round", meaning=told)
+        told = "on a slope: number of walkers that end in the given direction and tilt no further"
         yield Quantity("posture.upright", "walkers that are upright", column="upright", meaning=told)
         yield from (Quantity(f"posture.{one}", f"walkers that are {one}") for one in POSTURES[1:])
-        yield Quantity("cycles", "cycles driven", column="cycles", meaning="driven, those to settle among them")
-        yield Quantity("settling_cycles", "of them to settle")
-        told = f"whether the run was ended early: all velocities were constant within {percent(CONSTANT)}"
+        yield Quantity("cycles", "cycles driven", column="cycles", meaning="cycles of the drive, including settling")
+        yield Quantity("settling_cycles", "settling cycles")
+        told = f"whether the run ended early, with all velocities constant within {percent(CONSTANT)}"
         yield Quantity("ended_early", column="ended_early", meaning=told)
-        yield Quantity("walkers_met", column="walkers_met", meaning="whether two of them came near each other")
+        yield Quantity("walkers_met", column="walkers_met", meaning="whether two walkers came close to each other")
         yield Quantity("gamma0", "dimensionless peak force Γ0")
         yield Quantity("sin_delta", "asymmetry sin δ")
 
@@ -277,7 +275,7 @@ class Walking(Analysis):
             told = f"for {100.0 * share:.0f} % of the time"
             warnings.append(f"beads of walkers are farther apart than a bridge reaches {told}")
         if result["walkers_met"] and not result["meet"]:
-            warnings.append("walkers came close to each other and are not independent: give them more spacing")
+            warnings.append("walkers came close to each other and are not independent: increase the spacing")
         return warnings
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
@@ -482,12 +480,12 @@ def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
     right, left = (
         "none" if speed is None else f"{_speed(speed)} mm/s" for speed in (axial["right_facing"], axial["left_facing"])
     )
-    round_ones = f"{result['turned_round']} of {result['walkers']} turned round"
+    round_ones = f"{result['turned_round']} of {result['walkers']} walkers turned round"
     return [
         *_headlines(result, drive, f"{round_ones}, axial velocity {_speed(axial['mean'])} mm/s"),
         f"  axial velocity, positive {'up' if tilted else 'to the right'}: started facing {first} "
         f"{right}, {second} {left}; {_steady(result)}",
-        f"  velocity   {_speed(kept['mean'])} mm/s along the heading, of the {kept['n']} that kept it"
+        f"  velocity   {_speed(kept['mean'])} mm/s along the heading, for the {kept['n']} that kept it"
         if kept["n"]
         else "  velocity   none: no walker kept its heading",
     ]
@@ -496,7 +494,7 @@ def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
 def _band(result: Mapping[str, Any]) -> str:
     """The band of the velocity, if a spread was run."""
     band = band_of(result, "velocity", result["velocity"]["mean"])
-    return f" ({band_text(band, 'm/s')}, 5 to 95 % over what nobody measured)" if band else ""
+    return f" ({band_text(band, 'm/s')}, 5 to 95 % over the uncertain values)" if band else ""
 
 
 def _numerical(result: Mapping[str, Any]) -> str:
@@ -504,7 +502,7 @@ def _numerical(result: Mapping[str, Any]) -> str:
     error, own = result["numerical_error"], abs(result["velocity"]["mean"] or 0.0)
     harder = f"{STIFFER:g} times Young's modulus"
     if error is None:
-        return f"numerical error: not measured for this case; run it at half the time step and with {harder}"
+        return f"numerical error: not measured for this case; run again at half the time step and with {harder}"
     if own < STEADY_SPEED:
         return f"numerical error {_error(error['total'])} (measured for this case: half the time step, {harder})"
     half_step, stiffer, total = (100.0 * error[name] / own for name in ("half_step", "stiffer", "total"))
@@ -537,7 +535,7 @@ def _told_posture(summary: Mapping[str, Any]) -> str:
     when = f" after {first} s" if first == last else f" after {first} to {last} s"
     told = {
         "upright": "upright to the end",
-        "leaning": "leaning, and may turn over yet",
+        "leaning": "leaning, may still turn over",
         "turned over": f"turned over{when if summary['turned_at'] else ''}",
     }
     there = [name for name in POSTURES if summary[name]]
@@ -557,7 +555,7 @@ def _radii(make: Mapping[str, Any]) -> str:
 
 def _steady(result: Mapping[str, Any]) -> str:
     """How many are steady, and why the run ended, each with its criterion."""
-    told = f"{result['steady']} of {result['walkers']} steady (halves within {percent(STEADY_DIFFERENCE)})"
+    told = f"{result['steady']} of {result['walkers']} steady (both halves agree within {percent(STEADY_DIFFERENCE)})"
     if result.get("ended_early"):
         told += f"; ended after {result['cycles']} cycles (constant within {percent(CONSTANT)})"
     return told

@@ -39,7 +39,7 @@ class Work:
 
     walker: Annotated[IntArray, "", "number of the walker, from 0"]
     cycle: Annotated[IntArray, "", "number of the cycle of the drive, from 0"]
-    work: Annotated[FloatArray, "J", "of the drive on the walker in this cycle"]
+    work: Annotated[FloatArray, "J", "work of the drive on the walker in this cycle"]
 
 
 class Working(Analysis):
@@ -69,10 +69,9 @@ class Working(Analysis):
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
         """Of a cycle, and of the way."""
         del result
-        yield Quantity(
-            "work", "of the drive in a cycle", "J", "work", "of the drive on a walker in a cycle, their mean"
-        )
-        told = "power of the drive over that of lifting a walker as fast as it walks, mean over the walkers"
+        told = "work of the drive on a walker per cycle, mean over the walkers"
+        yield Quantity("work", "of the drive per cycle", "J", "work", told)
+        told = "power of the drive over the power to lift a walker at its walking speed, mean over the walkers"
         yield Quantity("cost_of_transport", "cost of transport", "", "cost_of_transport", told)
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:

@@ -56,14 +56,14 @@ class RunReport:
 
 
 def report_run(directory: Path, to: Path | None = None, origins: Origins = None) -> Path:
-    """Write the report of a run: one HTML file to mail, which needs no network.
+    """Write the report of a run as one HTML file that needs no network.
 
     Parameters
     ----------
     directory, origins
         See `RunReport`.
     to
-        The file, of less than 5 MB; ``report.html`` in the run directory if None.
+        The file, smaller than 5 MB; None: ``report.html`` in the run directory.
 
     Raises
     ------
