@@ -110,9 +110,10 @@ def take_in(folder: Path) -> None:
         said = log.read_text(encoding="utf-8", errors="replace")
         ran, segment, changes = _as_run(case, written, now, said)
         deck = render_deck(ran, segment)
+        told = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
         if (folder / DECK_NAME).stat().st_mtime_ns > log.stat().st_mtime_ns:
-            changes.append(f"{DECK_NAME} is newer than {log.name}: what was edited since was not run")
-        _write(folder, ran, deck, segment, _judged(deck, folder, log), changes)
+            told.append(f"{DECK_NAME} is newer than {log.name}: if it was edited since, run it again")
+        _write(folder, ran, deck, segment, _judged(deck, folder, log), told)
     except (OSError, ValueError, KeyError, TypeError, DumpError) as error:
         raise refused(folder, f"the deck that was run by hand cannot be read ({error})") from error
 
@@ -237,10 +238,9 @@ def _origins(case: Case, edited: Mapping[str, float]) -> tuple[Origin, ...]:
     return (*kept, *(Origin(key, f"{value:.6g}{units[key]}", "given", value=value) for key, value in keys.items()))
 
 
-def _write(folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, changes: list[str]) -> None:
+def _write(folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, told: list[str]) -> None:
     """Write what a run directory has: case, layout, segment, tables, result, and last its manifest."""
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
-    told = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
     write_json(folder / CASE_NAME, case.as_dict(), at_once=False)
     write_json(folder / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
     of_segment = {**vars(segment), "root_mean_square_velocity": None, **vars(report), "by_hand": told}
