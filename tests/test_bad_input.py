@@ -186,6 +186,11 @@ REFUSED: list[tuple[str, str]] = [
     ("list --out {runs} --older-than soon", "expected an age with its unit"),
     ("list --out {runs} --where frequency", "expected KEY=VALUE"),
     ("list --out {runs} --where frequenzy=2", "no run has such a key"),
+    ("list --out {runs} --where frequency=60", '"frequency=60": expected a frequency with its unit'),
+    ("list --out {runs} --where 'frequency=60 Hzz'", '"frequency=60 Hzz": expected a frequency with its unit'),
+    ("list --out {runs} --where restitution=hard", '"restitution=hard": expected a number without a unit'),
+    ("run {case} {plain}", "plain: is a folder without a run"),
+    ("run {sweep_file} --out {runs}", "is a sweep: walkers sweep "),
     ("clean nonsense --yes --out {runs}", "nonsense: no such file, run or sweep"),
     ("plot {sweep} --y velocitty", 'did you mean "velocity"?'),
     ("plot {sweep} --y reason", '"reason" has no number'),
@@ -231,12 +236,20 @@ def there(
 ) -> dict[str, Path]:
     """What the commands of `REFUSED` are given."""
     run = run_directory(dimers={"replicates": 2}, run={"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 20})
-    names = {"broken": "broken", "folder": "folder.html", "file": "mine.toml", "bad": "bad.toml"}
+    names = {
+        "broken": "broken",
+        "folder": "folder.html",
+        "file": "mine.toml",
+        "bad": "bad.toml",
+        "plain": "plain",
+        "sweep_file": "grid.toml",
+    }
     found = {name: tmp_path / place for name, place in names.items()}
     for folder, file in (("broken", "sweep.json"), ("folder", "manifest.json")):
         found[folder].mkdir()
         (found[folder] / file).write_text("{")
-    for file, values in (("file", '"60 Hz"'), ("bad", '"60 Hz", "0 Hz"')):
+    found["plain"].mkdir()
+    for file, values in (("file", '"60 Hz"'), ("sweep_file", '"60 Hz"'), ("bad", '"60 Hz", "0 Hz"')):
         found[file].write_text(f'case = "fig1b"\naxes.drive.frequency = [{values}]\n')
     found |= {"runs": looked_through, "sweep": looked_through / "grid", "other": looked_through / "three"}
     return {**found, "run": run, "pile": pile_run, "archive": archive, "case": looked_through.parent / "base.toml"}
@@ -319,7 +332,7 @@ def test_files_that_are_no_cases_or_not_there(tmp_path: Path) -> None:
     for name, told in (
         (str(tmp_path / "nothing.toml"), "no such file"),
         ("fig1", 'did you mean "fig1b"'),
-        (str(tmp_path), "cannot be read"),
+        (str(tmp_path), "is a folder without a run"),
         ("x" * 300, "cannot be read"),
     ):
         assert told in _message("show", name)

@@ -44,6 +44,7 @@ def test_a_deck_run_by_hand_is_read_and_says_so(folder: Path, run_directory: Cal
     assert found.result["by_hand"] == ["run by hand"]
     assert {**found.result, "by_hand": 0} == {**same.result, "by_hand": 0}
     assert "warning: run by hand" in found.describe()
+    assert "(already run)" not in found.describe()
     assert found.case.document == make_case(run=SHORT).document
     for command in ("run", "plot", "report", "export --to vtk", "check files"):
         assert call(*command.split(), str(folder)).returncode == 0, command
@@ -93,12 +94,18 @@ def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None
     again = load(folder)
     assert again.result["velocity"]["mean"] < first
     assert "peak_acceleration 20, was 39.2; 1 other line(s)" in again.result["by_hand"][1]
+    assert "is newer than" not in again.describe()
+    _edit(folder, restitution="0.5")
+    assert "walker.lig is newer than" in load(folder).result["by_hand"][-1]
+    with pytest.raises(InputError, match="hand: its deck was edited and run by hand: --set is for cases"):
+        load(folder, changes={"drive.frequency": "70 Hz"})
 
 
 FAILS = {
     "an error of the engine": ({}, "pair_coeff      * *", "pair_coeff * * 3", "failed: the engine stopped: ERROR"),
     "a time step beyond the limits": ({"steps_per_cycle": "400"}, "", "", "failed: .*blow-up"),
     "steps that are no cycle": ({"time_step": "3e-6"}, "", "", "cannot be read .*not one cycle of 80 Hz"),
+    "a word for a number": ({"restitution": "high"}, "", "", 'variable restitution: expected a number, found "high"'),
     "a run that was stopped": (
         {"cycles": "4000", "peak_acceleration": "1.0"},
         "",

@@ -212,7 +212,7 @@ def test_piles_agree_until_they_are_chaotic(in_folder: Path) -> None:
     (told,) = json.loads(done.stdout)["checks"]
     *means, first, second = [line["what"] for line in told["lines"]]
     seed = load_case("pile-ci").seed
-    assert (first.startswith(f"start {seed}, one"), second.startswith(f"start {seed + 1}, one")) == (True, True)
+    assert (first.startswith(f"start {seed}, same"), second.startswith(f"start {seed + 1}, same")) == (True, True)
     assert [what.split(",")[0] for what in means][::2] == ["height of the beads", "touching pairs a bead"]
 
 

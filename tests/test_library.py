@@ -155,6 +155,22 @@ def test_a_library_elsewhere_is_named(own: Path, monkeypatch: pytest.MonkeyPatch
         ("[material.mine]", 'material = {"mine": {}}: unknown key'),
         ('[materials.glass]\ndensity = { value = "2 g/cm^3", source = "x" }', "materials.glass: is in the library of"),
         ('[[surface_pairs]]\nmaterials = ["glass", "ruby"]', "surface_pairs[0] = glass on ruby: is in the library of"),
+        (
+            '[materials.m]\ndensity = { value = "2 g/cm^3", source = "x", range = ["3 g/cm^3", "1 g/cm^3"] }',
+            'materials.m.density.range = ["3 g/cm^3", "1 g/cm^3"]: expected the lower end first',
+        ),
+        (
+            '[materials.m]\ndensity = { value = "2 g/cm^3", source = "x", range = ["3 g/cm^3", "4 g/cm^3"] }',
+            'materials.m.density.range = ["3 g/cm^3", "4 g/cm^3"]: expected two ends with the value between them',
+        ),
+        (
+            '[materials.m]\ndensity = { value = "2 g/cm^3", source = "x", range = ["1 g/cm^3"] }',
+            'materials.m.density.range = ["1 g/cm^3"]: too short',
+        ),
+        (
+            '[[surface_pairs]]\nmaterials = ["glas", "zirconia"]',
+            'surface_pairs[0].materials = "glas": not in the library; expected one of ruby, glass',
+        ),
     ],
 )
 def test_a_library_that_is_none_is_one_message(own: Path, text: str, told: str) -> None:

@@ -24,5 +24,5 @@ def test_the_drive_pays_for_what_slides(run_directory: Callable[..., Path]) -> N
     assert result["work"]["mean"] == pytest.approx(4.0 * case.drive.amplitude * 0.01 * pressed, rel=0.02)
     assert result["cost_of_transport"]["n"] == 0
     assert read_table(directory, "work")["work"][50:].mean() == pytest.approx(result["work"]["mean"])
-    assert f"of the drive in a cycle {1e9 * result['work']['mean']:.4g} nJ\n" in describe_result(directory, result)
+    assert f"of the drive per cycle {1e9 * result['work']['mean']:.4g} nJ\n" in describe_result(directory, result)
     assert len(figures_of(directory)["work"].axes) == 1

@@ -100,17 +100,24 @@ def case_at(
     changes
         Values put in place of the case's, by dotted keys.
     """
+    from walkers.sweeps.by_hand import is_deck_folder
+
     out = Path(out)
     if not isinstance(what, (str, Path)):
         return with_changes(what, changes), out
     there = placed(what, out)
     if there and there.kind in RECORDS and there.kind != "run":
-        find_input(there.path, "case")
+        find_input(what if is_sweep_file(Path(what)) else there.path, "case")
         raise refused(what, NOT_A_RUN[there.kind])
+    if there and there.kind == "folder":
+        raise refused(what, "is a folder without a run")
     if there is None or there.kind != "run":
         return load_case(what, changes), out
     with _told(there.path, "the case of the run cannot be read"):
         case = case_of(files_of(there.path))
+    if changes and not case.as_read and is_deck_folder(there.path):
+        told = "its deck was edited and run by hand: --set is for cases, and for runs of unedited ones"
+        raise refused(what, told)
     return with_changes(case, changes), there.path.parent
 
 

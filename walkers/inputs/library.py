@@ -16,7 +16,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from walkers.inputs.errors import InputError, Problem, refused
+from walkers.inputs.errors import InputError, Problem, refused, shown
 from walkers.inputs.origins import Whence
 from walkers.packages import offers, warn_of
 from walkers.physics import units
@@ -230,7 +230,21 @@ def read_library(folder: Path) -> dict[str, Any]:
         return {}
     tables = read_toml(path)
     check_library(tables, str(path))
+    _check_pairs(tables, str(path))
     return {"file": str(path), **tables}
+
+
+def _check_pairs(tables: Mapping[str, Any], source: str) -> None:
+    """Refuse surface pairs of materials that are in no library."""
+    library = Library(tables)
+    unknown = [
+        Problem(f"surface_pairs[{number}].materials", shown(name), f"not in the library; {told}")
+        for number, pair in enumerate(tables.get("surface_pairs", ()))
+        for name in pair["materials"]
+        if not library.has("materials", name) and (told := expected_of(name, library.names("materials")))
+    ]
+    if unknown:
+        raise InputError(source, unknown)
 
 
 @cache

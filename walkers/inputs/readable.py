@@ -115,10 +115,23 @@ def _comparable(value: Any) -> Hashable:
 def agrees(case: Mapping[str, Any], key: str, wanted: str) -> bool:
     """Whether a flattened case has a value, as a user writes both.
 
-    The key may be the end of one, such as ``frequency``, the value a number, with its unit or without, a text, or a
+    The key may be the end of one, such as ``frequency``, the value a number with its unit if it has one, a text, or a
     list as `readable` writes it.
     """
     return any(_is(one, value, wanted.strip().strip('"')) for one, value in case.items() if _ends(one, key))
+
+
+def check_wanted(case: Mapping[str, Any], key: str, wanted: str) -> None:
+    """Refuse what cannot be a value of a key, whose values in a flattened case are numbers: ValueError, what could."""
+    found = [(one, value) for one, value in case.items() if _ends(one, key)]
+    numbers = [one for one, value in found if isinstance(value, (int, float)) and not isinstance(value, bool)]
+    if not found or len(numbers) < len(found):
+        return
+    kind = kind_of(numbers[0])
+    try:
+        units.parse_quantity(wanted.strip().strip('"'), kind) if kind else float(wanted.strip().strip('"'))
+    except ValueError as error:
+        raise ValueError(str(error) if kind else "expected a number without a unit") from error
 
 
 def has_key(case: Mapping[str, Any], key: str) -> bool:

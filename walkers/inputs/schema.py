@@ -11,7 +11,7 @@ from dataclasses import MISSING, fields, is_dataclass
 from math import isfinite
 from typing import Annotated, Any, Generic, Literal, TypeVar, get_type_hints
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
@@ -212,6 +212,15 @@ class Sourced(Table, Generic[Q]):
     value: Q
     source: Annotated[str, Field(min_length=1)]
     range: tuple[Q, Q] | None = None
+
+    @field_validator("range")
+    @classmethod
+    def _has_the_value(cls, ends: tuple[Any, Any] | None, of: ValidationInfo) -> tuple[Any, Any] | None:
+        if ends is not None and not ends[0] < ends[1]:
+            raise ValueError("expected the lower end first: [low, high]")
+        if ends is not None and "value" in of.data and not ends[0] <= of.data["value"] <= ends[1]:
+            raise ValueError("expected two ends with the value between them")
+        return ends
 
 
 class MaterialTable(Table):

@@ -410,7 +410,7 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
     result = with_bands(directory, result)
     lines = [line for one in analyses_in(result) for line in one.lines(result)]
     lines = lines or [f"{result['case']}: {result['drive']}"]
-    if cached:
+    if cached and not result.get("by_hand"):  # it was never made by a command
         lines[0] += " (already run)"
     warnings = [f"  warning: {warning}" for warning in warnings_of(result)]
     return "\n".join([*lines, *lines_of_rest(result["rests_on"]), *warnings, f"  run        {directory}"])

@@ -19,6 +19,7 @@ from walkers.inputs.case import Case, settling_of
 from walkers.inputs.drive import Harmonic
 from walkers.inputs.errors import refused
 from walkers.inputs.origins import Origin
+from walkers.inputs.readable import kind_of
 from walkers.physics.matter import Contact
 from walkers.postprocess.analysis import tabulate
 from walkers.postprocess.dump import DumpError
@@ -109,7 +110,10 @@ def take_in(folder: Path) -> None:
         said = log.read_text(encoding="utf-8", errors="replace")
         ran, segment, changes = _as_run(case, written, now, said)
         deck = render_deck(ran, segment)
-        _write(folder, ran, deck, segment, _judged(deck, folder, log), changes)
+        told = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
+        if (folder / DECK_NAME).stat().st_mtime_ns > log.stat().st_mtime_ns:
+            told.append(f"{DECK_NAME} is newer than {log.name}: if it was edited since, run it again")
+        _write(folder, ran, deck, segment, _judged(deck, folder, log), told)
     except (OSError, ValueError, KeyError, TypeError, DumpError) as error:
         raise refused(folder, f"the deck that was run by hand cannot be read ({error})") from error
 
@@ -143,7 +147,7 @@ def _as_run(case: Case, written: str, now: str, said: str) -> tuple[Case, Segmen
     """
     given = {name: float(value) for name, value in _GIVEN.findall(written)}
     words = (_PRINTED.findall(said) or [""])[-1].split()
-    printed = {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
+    printed = {name: _number(name, value) for name, value in zip(words[::2], words[1::2], strict=True)}
     values, case = {**given, **printed}, case.for_cycles(case.run.attempts[0])
     edited = {name: values[name] for name, value in given.items() if values[name] != value}
     ran = _case_of(case, values, edited)
@@ -152,6 +156,13 @@ def _as_run(case: Case, written: str, now: str, said: str) -> tuple[Case, Segmen
     changes += [f"{name} {value:g}" for name, value in printed.items() if name not in given and _edited(name, now)]
     segment = Segment(0, rest + ran.run.steps, rest)
     return ran, segment, [*changes, *_other_changes(written, now, printed)]
+
+
+def _number(name: str, value: str) -> float:
+    try:
+        return float(value)
+    except ValueError as error:
+        raise ValueError(f'variable {name}: expected a number, found "{value}"') from error
 
 
 def _case_of(case: Case, values: Mapping[str, float], edited: Mapping[str, float]) -> Case:
@@ -223,13 +234,13 @@ def _origins(case: Case, edited: Mapping[str, float]) -> tuple[Origin, ...]:
     """Where the values of a case come from some of whose parameters were edited: these are given now."""
     keys = {_KEYS.get(name, name): value for name, value in edited.items()}
     kept = tuple(one for one in case.origins if one.key not in keys)
-    return (*kept, *(Origin(key, f"{value:.6g} (SI)", "given", value=value) for key, value in keys.items()))
+    units = {key: " (SI)" if kind_of(re.sub(r"_\d+$", "", key)) else "" for key in keys}
+    return (*kept, *(Origin(key, f"{value:.6g}{units[key]}", "given", value=value) for key, value in keys.items()))
 
 
-def _write(folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, changes: list[str]) -> None:
+def _write(folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, told: list[str]) -> None:
     """Write what a run directory has: case, layout, segment, tables, result, and last its manifest."""
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
-    told = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
     write_json(folder / CASE_NAME, case.as_dict(), at_once=False)
     write_json(folder / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
     of_segment = {**vars(segment), "root_mean_square_velocity": None, **vars(report), "by_hand": told}

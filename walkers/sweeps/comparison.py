@@ -99,7 +99,7 @@ def compare_runs(first: Side, second: Side) -> Comparison:
         text.append(aligned([["result", *names, "difference", "scatter of copies", "numerical error"], *apart]))
         text += _told_errors([side.directory for side in sides if side.directory], names)
     if same := [one["quantity"] for one, _ in pairs if one["first"] == one["second"]]:
-        text.append(f"the same in both: {', '.join(same)}")
+        text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
     contents: dict[str, Any] = {**dict(zip(_SIDES, names, strict=True)), "parameters": parameters}
     contents |= {"results": [one for one, _ in pairs], "not_run": not_run}

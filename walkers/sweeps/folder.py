@@ -22,7 +22,7 @@ from stat import S_ISDIR
 from typing import Any, Literal
 
 from walkers.inputs.errors import InputError, Problem, refused
-from walkers.inputs.readable import agrees, differing, flattened, has_key, readable
+from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, readable
 from walkers.inputs.rounding import rounded
 from walkers.physics.units import Kind, parse_quantity
 from walkers.postprocess.uncertainty import SPREAD_NAME
@@ -218,6 +218,11 @@ def select(
         if runs and not any(has_key(run.parameters, key) for run in runs):
             known = ", ".join(dict.fromkeys(one for run in runs for one in run.parameters))
             raise InputError("--where", [Problem(key, None, f"no run has such a key; they have {known}")])
+        for run in runs:
+            try:
+                check_wanted(run.parameters, key, value)
+            except ValueError as error:
+                raise refused("--where", f'"{text}": {error}') from error
         conditions.append((key, value))
     return [
         entry

@@ -254,7 +254,7 @@ def _drawn(panel: Panel, motion: Motion) -> Figure:
     """A panel of paths with the beads as they stand at the end."""
     from matplotlib.patches import Circle
 
-    from walkers.postprocess.figures import draw_panel
+    from walkers.postprocess.figures import MOST_NAMED, draw_panel
 
     reach = [np.concatenate([one.x for one in panel.lines]), np.concatenate([one.y for one in panel.lines])]
     wide, high = (float(np.ptp(one)) + 2e3 * motion.case.walkers[0].length for one in reach)
@@ -268,7 +268,8 @@ def _drawn(panel: Panel, motion: Motion) -> Figure:
     axes.set(xlabel=panel.x, aspect="equal", title=f"{panel.title}; beads at the end, to scale")
     axes.margins(0.08)
     figure.suptitle(plain_text(motion.case.title or motion.case.name))
-    figure.legend(loc="outside right upper")
+    more = f"the first {MOST_NAMED} walkers" if len(motion.walkers) > MOST_NAMED else None
+    figure.legend(loc="outside right upper", title=more)
     return figure
 
 

@@ -24,13 +24,14 @@ from walkers.physics.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.analyses.walking import spread
 from walkers.postprocess.analysis import Analysis, Measured, Quantity
 from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.figures import MOST_NAMED, Line, Panel, nested_widths
+from walkers.postprocess.figures import Line, Panel, nested_widths
 from walkers.postprocess.gait import STEADY_SPEED, walk
 from walkers.postprocess.motion import LEAST_SAMPLES, Group, Motion
 from walkers.postprocess.tables import Columns, columns_of
 
 _PARTS = 10
 """Of an interval between samples: with 20 samples a cycle a 200th of it, over which the force is that of its middle."""
+_MOST_NAMED = 6  # walkers for which the legend beside the panel has room; of more there is none
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class Working(Analysis):
         walker, cycle, work = run.tables["work"].values()
         lines, widths = [], nested_widths(walker.max() + 1)
         for number in range(walker.max() + 1):
-            these, label = walker == number, f"walker {number}" if number < MOST_NAMED else ""
+            these, label = walker == number, f"walker {number}" if walker.max() < _MOST_NAMED else ""
             lines.append(Line(cycle[these], 1e9 * work[these], label, number, width=widths[number]))
         settled = float(run.motion.case.run.settled_strobes)
         title = "Work of the drive on each walker; grey: settling"
