@@ -27,7 +27,6 @@ from walkers.postprocess.gait import (
     POSTURES,
     SEPARATED,
     STEADY_DIFFERENCE,
-    STEADY_SPEED,
     Gait,
     averages,
     came_near,
@@ -36,9 +35,9 @@ from walkers.postprocess.gait import (
     settled_samples,
     turned_over_at,
     walk,
-    ways,
 )
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
+from walkers.postprocess.sides import STEADY_SPEED, sides_apart, ways
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
 from walkers.postprocess.uncertainty import band_of, band_text, wrapped
 
@@ -47,8 +46,6 @@ if TYPE_CHECKING:
 
     from walkers.postprocess.figures import Panel
 
-SAME = 0.05
-"""Walkers that faced either way and differ by more than this share are told apart first of all."""
 NEAR = 1.5
 """Walkers whose mass centres come within this many lengths of one have met."""
 
@@ -452,14 +449,10 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     """How fast walkers are that kept their heading."""
     velocity = result["velocity"]
     toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
-    first, second = ways(uphill=result["goes_uphill"])
-    sides = result["right_facing"], result["left_facing"]
     headline = f"{_speed(velocity['mean'])} mm/s{_band(result)}, positive {toward}"
-    if all(side["n"] for side in sides):
-        one, other = (side["mean"] for side in sides)
-        if abs(one - other) > max(SAME * max(abs(one), abs(other)), STEADY_SPEED):  # the mean over both is no walker's
-            both = f"facing {first} {_speed(one)}, facing {second} {_speed(other)} mm/s"
-            headline = f"{both}{_band(result)}, positive {toward}"
+    if apart := sides_apart(result):  # the mean over both is no walker's
+        both = ", ".join(f"facing {way} {_speed(speed)}" for way, speed in apart.items())
+        headline = f"{both} mm/s{_band(result)}, positive {toward}"
     return [*_headlines(result, drive), f"  velocity   {headline}"]
 
 
@@ -472,7 +465,7 @@ def _of_sides(result: Mapping[str, Any]) -> list[str]:
         f"{_speed(side['mean'])} mm/s ({side['n']})" if side["n"] else "none"
         for side in (result["right_facing"], result["left_facing"])
     )
-    return [f"    started facing {first} {right}, {second} {left}; {_steady(result)}"]
+    return wrapped([f"started facing {first} {right}, {second} {left}; {_steady(result)}"])
 
 
 def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
