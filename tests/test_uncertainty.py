@@ -20,7 +20,9 @@ from walkers.inputs.readable import kind_of
 from walkers.inputs.rounding import rounded
 from walkers.physics.units import parse_quantity
 from walkers.pipeline import find_side
+from walkers.postprocess.analysis import describe_result
 from walkers.postprocess.sides import sides_apart
+from walkers.postprocess.uncertainty import band_text
 from walkers.sweeps.comparison import compare_runs
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.table import default_column, row_of
@@ -119,6 +121,14 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     up, down = (rounded(1e3 * speed, "mm/s") for speed in sides.values())
     assert list(sides) == ["up", "down"]
     assert f"up {up}, down {down} mm/s" in as_text(inventory(tmp_path))
+    # The band of a spread is that of one side, or is left out.
+    band = {"low": sides["up"] - 1e-3, "high": sides["up"] + 1e-3, "points": 64}
+    of_up, of_mean = (
+        describe_result(done.directory, {**done.result, "bands": {name: band}}) for name in ("right_facing", "velocity")
+    )
+    assert f" mm/s ({band_text((band['low'], band['high']), 'm/s')}, 5 to 95 % over" in of_up
+    assert "5 to 95 %" not in of_mean
+    assert "no band: the spread has that of the mean over both ways" in of_mean
     page = done.report(tmp_path / "report.html").read_text("utf-8")
     assert "liquid of 20 mN/m; 80 Hz" in page
     assert "plane tilted by 20°" in page

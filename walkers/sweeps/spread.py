@@ -25,7 +25,7 @@ from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runner.files import write_json
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
-from walkers.sweeps.table import load
+from walkers.sweeps.table import load, sides_differ
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -166,6 +166,8 @@ def run_spread(
         counts = {"forward": int((speeds > _AT_REST).sum()), "backward": int((speeds < -_AT_REST).sum())}
         counts |= {"at_rest": int((speeds.abs() <= _AT_REST).sum()), "separated": len(table) - len(together)}
     shown = [name for one in analyses_of(case) for name in one.headlines if name in one.columns]
+    if sides_differ(together):  # the mean over both is no walker's velocity
+        shown = ["right_facing" if name == "velocity" else name for name in shown]
     spread = Spread(
         directory=record.directory,
         varied=tuple(one for one in case.origins if one.range is not None),
@@ -210,7 +212,7 @@ def describe(spread: Spread) -> str:
             rounded(float(f"{one * factor:.3g}"), unit) for one in astuple(band)[:5]
         )
         ends = f"{low} to {high} {unit} (5 to 95 %), median {middle}; smallest {smallest}, largest {largest}"
-        lines.append(f"    {name:9}{ends}")
+        lines.append(f"    {name:8} {ends}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
         told = f"depends most on {ranks} (rank correlation)" if ranks else "on none of them clearly"
         if band.points < _LEAST_PER_VALUE * len(spread.varied):

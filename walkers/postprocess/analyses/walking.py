@@ -39,7 +39,7 @@ from walkers.postprocess.gait import (
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
 from walkers.postprocess.sides import STEADY_SPEED, sides_apart, ways
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
-from walkers.postprocess.uncertainty import band_of, band_text, wrapped
+from walkers.postprocess.uncertainty import band_of, band_text, bands_text, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -262,7 +262,11 @@ class Walking(Analysis):
 
     def uncertainty(self, result: Mapping[str, Any]) -> list[str]:
         """Of the velocity: what nobody measured, the numerical error; and how alike the copies are."""
-        return [*super().uncertainty(result), _numerical(result), *_scatter(result)]
+        known = super().uncertainty(result)
+        if result.get("bands") and (apart := sides_apart(result)):
+            told = bands_text(result, {"right_facing": "m/s"}, {"right_facing": next(iter(apart.values()))})
+            known = [told or "no band: the spread has that of the mean over both ways, which is no walker's velocity"]
+        return [*known, _numerical(result), *_scatter(result)]
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What makes the velocity doubtful."""
@@ -451,8 +455,9 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
     headline = f"{_speed(velocity['mean'])} mm/s{_band(result)}, positive {toward}"
     if apart := sides_apart(result):  # the mean over both is no walker's
-        both = ", ".join(f"facing {way} {_speed(speed)}" for way, speed in apart.items())
-        headline = f"{both} mm/s{_band(result)}, positive {toward}"
+        (first, one), (second, other) = apart.items()
+        up = f"{_speed(one)} mm/s{band}" if (band := _band(result)) else _speed(one)
+        headline = f"facing {first} {up}, facing {second} {_speed(other)} mm/s, positive {toward}"
     return [*_headlines(result, drive), f"  velocity   {headline}"]
 
 
@@ -487,8 +492,9 @@ def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
 
 
 def _band(result: Mapping[str, Any]) -> str:
-    """The band of the velocity, if a spread was run."""
-    band = band_of(result, "velocity", result["velocity"]["mean"])
+    """The band of the velocity, if a spread was run; of those that faced right or up, where the sides differ."""
+    name = "right_facing" if sides_apart(result) else "velocity"
+    band = band_of(result, name, result[name]["mean"])
     return f" ({band_text(band, 'm/s')}, 5 to 95 % over what nobody measured)" if band else ""
 
 
