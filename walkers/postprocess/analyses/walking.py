@@ -39,7 +39,7 @@ from walkers.postprocess.gait import (
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
 from walkers.postprocess.sides import STEADY_SPEED, sides_apart, ways
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
-from walkers.postprocess.uncertainty import band_of, band_text, bands_text, wrapped
+from walkers.postprocess.uncertainty import LEAST_PER_VALUE, band_of, band_text, bands_text, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -495,7 +495,11 @@ def _band(result: Mapping[str, Any]) -> str:
     """The band of the velocity, if a spread was run; of those that faced right or up, where the sides differ."""
     name = "right_facing" if sides_apart(result) else "velocity"
     band = band_of(result, name, result[name]["mean"])
-    return f" ({band_text(band, 'm/s')}, 5 to 95 % over what nobody measured)" if band else ""
+    if band is None:
+        return ""
+    points, values = result["bands"][name]["points"], sum(one["range"] is not None for one in result["rests_on"])
+    draws = f" of {points} draws" if points < LEAST_PER_VALUE * values else ""
+    return f" ({band_text(band, 'm/s')}, 5 to 95 %{draws} over what nobody measured)"
 
 
 def _numerical(result: Mapping[str, Any]) -> str:
