@@ -521,6 +521,14 @@ def _scatter(result: Mapping[str, Any]) -> list[str]:
     if count < 2 or result["turned_round"]:
         return []
     what = "walkers" if result["meet"] or "makes" in result else "copies"
+    if apart := sides_apart(result):  # what the sides differ by is no scatter
+        sides = zip(apart, (result["right_facing"], result["left_facing"]), strict=True)
+        each = [
+            f"the {side['n']} {what} facing {way} {_error(side['scatter'])}"
+            for way, side in sides
+            if side["scatter"] is not None
+        ]
+        return [f"scatter of {', of '.join(each)} (standard deviation)"] if each else []
     low, high = _speed(velocity["smallest"]), _speed(velocity["largest"])
     ends = "" if low == high else f"; {low} to {high} mm/s"
     return [f"scatter of the {count} {what} {_error(velocity['scatter'])} (standard deviation{ends})"]
