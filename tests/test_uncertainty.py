@@ -117,9 +117,11 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     told = done.describe()
     assert "plane tilted by 20°, right is up" in told
     assert "started facing up" in told
+    assert "scatter of" not in told  # of one walker a side there is none
     sides = sides_apart(done.result)
     up, down = (rounded(1e3 * speed, "mm/s") for speed in sides.values())
     assert list(sides) == ["up", "down"]
+    assert " mm/s, facing up\n" in describe(predict(case), done.result)
     assert f"up {up}, down {down} mm/s" in as_text(inventory(tmp_path))
     # The band of a spread is that of one side, or is left out.
     band = {"low": sides["up"] - 1e-3, "high": sides["up"] + 1e-3, "points": 64}
