@@ -161,7 +161,7 @@ def run_spread(
     together, counts = table, {}
     if "velocity" in table:
         together = table[~(table["separated_fraction"] > SEPARATED)]
-        speeds = together["velocity"]
+        speeds = together["right_facing" if sides_differ(together) else "velocity"]
         counts = {"forward": int((speeds > _AT_REST).sum()), "backward": int((speeds < -_AT_REST).sum())}
         counts |= {"at_rest": int((speeds.abs() <= _AT_REST).sum()), "separated": len(table) - len(together)}
     shown = [name for one in analyses_of(case) for name in one.headlines if name in one.columns]
