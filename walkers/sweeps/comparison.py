@@ -128,7 +128,7 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     numerical = hypot(*map(_numerical_error, results))
     units = result_columns([name for result in results for name in result["analyses"]])
     if any(map(sides_apart, results)):  # the mean over both is no walker's velocity
-        del units["velocity"]
+        units = {name: told for name, told in units.items() if name != "velocity"}
     uphill, pairs = all(result.get("goes_uphill") for result in results), []
     for name, (unit, _) in units.items():
         values = [_number_of(row.get(name)) for row in rows]
