@@ -255,7 +255,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     low, high = band_of({"bands": read_json(spread.directory / SPREAD_NAME)["bands"]}, "velocity", None) or (0.0, 0.0)
     assert (low, high) == (band.low, band.high)
     own = done.result["velocity"]["mean"]
-    assert f"({band_text((min(low, own), max(high, own)), 'm/s')}, 5 to 95 %" in done.describe()
+    assert f"({band_text((min(low, own), max(high, own)), 'm/s')}, 5 to 95 % of {band.points} draws" in done.describe()
     assert "uncertain:" not in done.describe()
     unspread = walkers.run(resolve_case({**GLASS, "run": {"cycles": 5}}, name="guessed"), runs_folder)
     assert "uncertain: volume fraction, viscosity ratio, contact angle, friction, restitution" in " ".join(

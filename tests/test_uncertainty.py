@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import walkers
@@ -16,9 +17,15 @@ from walkers.inputs.catalogue import catalogue
 from walkers.inputs.errors import InputError
 from walkers.inputs.numerical import STIFFER, measured, numerical_error
 from walkers.inputs.readable import kind_of
+from walkers.inputs.rounding import rounded
 from walkers.physics.units import parse_quantity
 from walkers.pipeline import find_side
+from walkers.postprocess.analysis import describe_result
+from walkers.postprocess.sides import sides_apart
+from walkers.postprocess.uncertainty import band_text
 from walkers.sweeps.comparison import compare_runs
+from walkers.sweeps.folder import as_text, inventory
+from walkers.sweeps.table import default_column, row_of
 from walkers.theory.prediction import describe, outside_of_the_paper, predict
 
 
@@ -97,7 +104,7 @@ def test_people_read_four_digits_and_each_number_by_its_name(runs_folder: Path) 
 
 def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> None:
     tables = {
-        "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2, "facing": "up"},
+        "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2},
         "beads": {"material": "ruby"},
         "liquid": {"surface_tension": "20 mN/m", "kinematic_viscosity": "5 mm^2/s", "density": "0.9 g/cm^3"},
         "boundary": {"material": "glass", "tilt": "20 deg"},
@@ -110,6 +117,20 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     told = done.describe()
     assert "plane tilted by 20°, right is up" in told
     assert "started facing up" in told
+    assert "scatter of" not in told  # of one walker a side there is none
+    sides = sides_apart(done.result)
+    up, down = (rounded(1e3 * speed, "mm/s") for speed in sides.values())
+    assert list(sides) == ["up", "down"]
+    assert " mm/s, facing up\n" in describe(predict(case), done.result)
+    assert f"up {up}, down {down} mm/s" in as_text(inventory(tmp_path))
+    # The band of a spread is that of one side, or is left out.
+    band = {"low": sides["up"] - 1e-3, "high": sides["up"] + 1e-3, "points": 64}
+    of_up, of_mean = (
+        describe_result(done.directory, {**done.result, "bands": {name: band}}) for name in ("right_facing", "velocity")
+    )
+    assert f" mm/s ({band_text((band['low'], band['high']), 'm/s')}, 5 to 95 % over" in of_up
+    assert "5 to 95 %" not in of_mean
+    assert "no band: the spread has that of the mean over both ways" in of_mean
     page = done.report(tmp_path / "report.html").read_text("utf-8")
     assert "liquid of 20 mN/m; 80 Hz" in page
     assert "plane tilted by 20°" in page
@@ -119,6 +140,10 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     text = compare_runs(first, second).text
     assert "facing up (mm/s)" in text
     assert "right_facing" not in text
+    assert "\nvelocity (mm/s)" not in text  # the mean over both is no walker's
+    frame = pd.DataFrame([row_of(done.result)])
+    assert default_column(frame) == "right_facing"
+    assert default_column(frame.drop(columns="upright")) == "velocity"
 
 
 @pytest.mark.parametrize(

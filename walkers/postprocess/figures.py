@@ -15,8 +15,9 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, series_look, styled
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.gait import averages, distance_walked, fit_slopes, gait, walk, ways
+from walkers.postprocess.gait import averages, distance_walked, fit_slopes, gait, walk
 from walkers.postprocess.motion import Group, even_frames, even_labels
+from walkers.postprocess.sides import ways
 from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:

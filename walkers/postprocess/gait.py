@@ -19,15 +19,15 @@ from walkers.inputs.case import CONSTANT
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.sides import STEADY_SPEED
 from walkers.postprocess.tables import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
 STEADY_DIFFERENCE = 0.05
-"""A walker is steady if the velocities of the two halves of the fitted cycles differ by less than this share …"""
-STEADY_SPEED = 1e-5
-"""… or by less than this, m/s."""
+"""A walker is steady if the velocities of the two halves of the fitted cycles differ by less than this share, or by
+`STEADY_SPEED`."""
 UPRIGHT = np.radians(15.0)
 """rad; how far off an upright walker may end."""
 _NO_MORE = np.radians(0.5)
@@ -289,11 +289,6 @@ def settled_samples(group: Group) -> slice:
     run = group.case.run
     samples = run.samples_per_cycle
     return slice(run.settled_strobes * samples, run.cycles // run.cycles_per_sample * samples)
-
-
-def ways(*, uphill: bool) -> tuple[str, str]:
-    """What the ways along the drive axis are called, the one that is positive first."""
-    return ("up", "down") if uphill else ("right", "left")
 
 
 def turned_over_at(group: Group) -> FloatArray:

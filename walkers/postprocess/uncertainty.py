@@ -16,6 +16,8 @@ from walkers.runner.files import read_json
 
 SPREAD_NAME = "spread.json"
 """In the directory of a spread (`spread_of`): its bands."""
+LEAST_PER_VALUE = 3
+"""Draws for each value that a spread varies, below which its band is rough and ranks are chance."""
 _OVER = "over the ranges of uncertain values"
 _WIDTH = 110
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.errors import refused
 from walkers.inputs.readable import differing, flattened, readable, readable_unit
 from walkers.inputs.rounding import percent, rounded
+from walkers.postprocess.sides import sides_apart, ways
 from walkers.postprocess.uncertainty import band_of, band_text, not_known, with_bands
 from walkers.runner.directory import case_of
 from walkers.sweeps.folder import aligned
@@ -23,6 +24,7 @@ from walkers.sweeps.table import (
     result_columns,
     result_in,
     row_of,
+    sides_differ,
     value_text,
     varied_columns,
     with_unit,
@@ -125,6 +127,8 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     scatters = [_scatters(run, result) for run, result in zip(runs, results, strict=True)]
     numerical = hypot(*map(_numerical_error, results))
     units = result_columns([name for result in results for name in result["analyses"]])
+    if any(map(sides_apart, results)):  # the mean over both is no walker's velocity
+        units = {name: told for name, told in units.items() if name != "velocity"}
     uphill, pairs = all(result.get("goes_uphill") for result in results), []
     for name, (unit, _) in units.items():
         values = [_number_of(row.get(name)) for row in rows]
@@ -163,9 +167,10 @@ def _told_errors(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
     results = [with_bands(run, result_in(run)) for run in runs]
     if not all("velocity" in result for result in results):
         return []
-    errors, own = [_numerical_error(one) for one in results], [_number_of(one["velocity"]["mean"]) for one in results]
+    name_of = "right_facing" if any(map(sides_apart, results)) else "velocity"
+    errors, own = [_numerical_error(one) for one in results], [_number_of(one[name_of]["mean"]) for one in results]
     lines, total = [], hypot(*errors)
-    if isfinite(total) and total > 0.0:
+    if isfinite(total + own[0] + own[1]) and total > 0.0:
         times = abs(own[1] - own[0]) / total
         told = "less than" if times < 1.0 else f"{_two_digits(times, '')} times"
         shares = " and ".join(
@@ -173,16 +178,21 @@ def _told_errors(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
             for name, error, value in zip(names, errors, own, strict=True)
             if value
         )
-        lines.append(f"the velocities differ by {told} their numerical error ({shares})")
+        what = (
+            "velocities"
+            if name_of == "velocity"
+            else f"velocities of those facing {ways(uphill=all(one['goes_uphill'] for one in results))[0]}"
+        )
+        lines.append(f"the {what} differ by {told} their numerical error ({shares})")
     lines += [
         f"{name}: the numerical error is not measured for this case"
         for name, error in zip(names, errors, strict=True)
         if not isfinite(error)
     ]
     for name, one, value in zip(names, results, own, strict=True):
-        if band := band_of(one, "velocity", value):
+        if band := band_of(one, name_of, value):
             lines.append(f"{name}: {band_text(band, 'm/s')} over the ranges of uncertain values (5 to 95 %)")
-        else:
+        elif not one.get("bands"):
             lines += [f"{name}: {sentence}" for sentence in not_known(one["rests_on"])]
     return ["\n".join(lines)] if lines else []
 
@@ -199,7 +209,8 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
         raise refused(source, f"expected sweeps that vary the same keys in the same units: {told}")
     tables = [load(directory) for directory in (first, second)]
     numbers = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
-    column = find_name("--y", column, numbers) if column else default_column(tables[0])
+    default = default_column(max(tables, key=sides_differ))
+    column = find_name("--y", column, numbers) if column else default
     both = _matched([table[table["status"] == "finished"] for table in tables], varied_columns(tables[0]))
     if both.empty:
         raise refused(source, "have no finished point in common")

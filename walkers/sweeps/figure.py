@@ -26,6 +26,7 @@ _NONE = "none"
 """Instead of a column: do not tell points apart so."""
 _SEEDS = ("run.seed", "seed")
 _SYMBOLS = {"gamma0": "Γ0", "sin_delta": "sin δ", "mass_asymmetry": "μ"}
+_SYMBOLS |= {"right_facing": "velocity, facing right (up)", "left_facing": "velocity, facing left (down)"}
 _LEAST_ASYMMETRIES = 3  # different radii are shown by sin δ from so many on
 _MOST_PANELS = 12  # more combinations of what is left are not told apart by panels
 _MARKERS = "osD^vXP<>*"

@@ -25,6 +25,7 @@ from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, readable
 from walkers.inputs.rounding import rounded
 from walkers.physics.units import Kind, parse_quantity
+from walkers.postprocess.sides import sides_apart
 from walkers.postprocess.uncertainty import SPREAD_NAME
 from walkers.runner.directory import (
     CASE_NAME,
@@ -68,7 +69,8 @@ class Entry:
     It is finished, running, failed, or interrupted: a run can be continued, of a sweep points are missing. Its
     age (s) counts from when it was finished or last written to; its size (bytes) is that of its files, of a sweep those
     of its runs. Its parameters are those of `walkers.inputs.readable.flattened`, of a sweep the numbers of values of
-    what varies. A run gave a velocity (mean over its walkers, m/s) or climbs; a sweep has points of some statuses.
+    what varies. A run gave a velocity (mean over its walkers, m/s; of the sides, by the way that they faced, where they
+    differ) or climbs; a sweep has points of some statuses.
     """
 
     name: str
@@ -81,6 +83,7 @@ class Entry:
     reason: str | None = None
     message: str | None = None
     velocity: float | None = None
+    sides: Mapping[str, float] = field(default_factory=dict)
     climbs: int | None = None
     points: Mapping[str, int] | None = None
     runs: Sequence[str] = ()
@@ -148,6 +151,7 @@ def _run(path: Path, now: float) -> Entry | None:
         result = recorded_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
         given = {"velocity": velocity.get("mean"), "climbs": None if climbs is None else len(climbs)}
+        given["sides"] = sides_apart(result)
     return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
 
 
@@ -292,7 +296,9 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
             status = f"{run.status}: {run.reason}" if run.reason else run.status
             result = "-" if run.climbs is None else f"{run.climbs} climb{'' if run.climbs == 1 else 's'}"
             if run.velocity is not None:
-                result = f"{rounded(1e3 * run.velocity, 'mm/s')} mm/s"
+                sides = run.sides or {"": run.velocity}
+                told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
+                result = f"{', '.join(told)} mm/s"
             values = [readable(key, run.parameters.get(key)) for key in varied]
             rows.append([run.name, status, result, age_text(run.age), bytes_text(run.size), *values])
         blocks.append(aligned(rows))

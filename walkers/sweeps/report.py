@@ -28,7 +28,7 @@ from walkers.postprocess.report.page import (
 )
 from walkers.postprocess.report.run import RunReport
 from walkers.sweeps.figure import readable_key
-from walkers.sweeps.table import ERRORS, RESULTS, load, value_text, varied_columns, with_unit
+from walkers.sweeps.table import ERRORS, SIDES, load, main_columns, sides_differ, value_text, varied_columns, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,7 +95,9 @@ def _table(frame: pd.DataFrame) -> dict[str, Any]:
     What is the same for all points is no column, of which a screen holds few: it is ``shared``, in words.
     """
     varied, units = varied_columns(frame), frame.attrs["units"]
-    results = [name for name in _SHOWN if name in frame and name not in varied and frame[name].notna().any()]
+    apart = sides_differ(frame)
+    wanted = [one for name in _SHOWN for one in (SIDES if apart and name == "velocity" else (name,))]
+    results = [name for name in wanted if name in frame and name not in varied and frame[name].notna().any()]
     shown = {name: (units[name], 1.0) for name in varied} | {name: readable_unit(units[name]) for name in results}
     heads = {name: with_unit(readable_key(name), unit) for name, (unit, _) in shown.items()}
     cells = {
@@ -125,7 +127,7 @@ def _cell(value: Any, size: float, unit: str) -> dict[str, Any]:
 
 def _overview(frame: pd.DataFrame) -> Model | None:
     """What came out against the number that varies most; a colour for each value of what varies besides."""
-    result = next((name for name in RESULTS if name in frame and frame[name].notna().any()), None)
+    result = next((name for name in main_columns(frame) if name in frame and frame[name].notna().any()), None)
     import pandas as pd
 
     varied, units = varied_columns(frame), frame.attrs["units"]

@@ -20,12 +20,12 @@ from walkers.inputs.sweep import Sweep, settings_in
 from walkers.physics.units import parse_quantity
 from walkers.postprocess.analysis import analyses, analyses_of
 from walkers.postprocess.gait import SEPARATED
-from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
+from walkers.postprocess.uncertainty import LEAST_PER_VALUE, SPREAD_NAME, spread_of
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runner.files import write_json
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
-from walkers.sweeps.table import load
+from walkers.sweeps.table import load, sides_differ
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,7 +35,6 @@ POINTS = 32
 _SEEDS = range(1, 65)
 """Of the scrambling, of which the one is taken whose columns hang together least: of few points in many dimensions some
 do by 0.7, and which of two values matters could not be told."""
-_LEAST_PER_VALUE = 3  # points for each value that is drawn, below which ranks are chance
 _AT_REST = 2e-5  # m/s: below, walkers are at rest, as in the sweeps that look for the threshold of motion
 _WORDS = {
     "forward": "walk toward the large bead",
@@ -162,10 +161,12 @@ def run_spread(
     together, counts = table, {}
     if "velocity" in table:
         together = table[~(table["separated_fraction"] > SEPARATED)]
-        speeds = together["velocity"]
+        speeds = together["right_facing" if sides_differ(together) else "velocity"]
         counts = {"forward": int((speeds > _AT_REST).sum()), "backward": int((speeds < -_AT_REST).sum())}
         counts |= {"at_rest": int((speeds.abs() <= _AT_REST).sum()), "separated": len(table) - len(together)}
     shown = [name for one in analyses_of(case) for name in one.headlines if name in one.columns]
+    if sides_differ(together):  # the mean over both is no walker's velocity
+        shown = ["right_facing" if name == "velocity" else name for name in shown]
     spread = Spread(
         directory=record.directory,
         varied=tuple(one for one in case.origins if one.range is not None),
@@ -186,7 +187,7 @@ def _band(values: pd.Series[float]) -> Band:
 
 def _ranks(table: pd.DataFrame, name: str, keys: tuple[str, ...]) -> dict[str, float]:
     """Rank correlations of a column with each key, the strongest first, if they are more than chance."""
-    if len(table) < _LEAST_PER_VALUE * len(keys) or table[name].nunique() < 2:
+    if len(table) < LEAST_PER_VALUE * len(keys) or table[name].nunique() < 2:
         return {}
     ranks = {key: float(table[key].rank().corr(table[name].rank())) for key in keys}
     certain = {key: rank for key, rank in ranks.items() if abs(rank) > 2.0 / sqrt(len(table) - 1)}
@@ -210,10 +211,10 @@ def describe(spread: Spread) -> str:
             rounded(float(f"{one * factor:.3g}"), unit) for one in astuple(band)[:5]
         )
         ends = f"{low} to {high} {unit} (5 to 95 %), median {middle}; smallest {smallest}, largest {largest}"
-        lines.append(f"    {name:9}{ends}")
+        lines.append(f"    {name:8} {ends}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
         told = f"depends most on {ranks} (rank correlation)" if ranks else "depends clearly on none of them"
-        if band.points < _LEAST_PER_VALUE * len(spread.varied):
+        if band.points < LEAST_PER_VALUE * len(spread.varied):
             told = "too few draws for rank correlations; the band is rough"
         lines.append(f"{'':13}{told}")
     found = [f"{count} {_WORDS[name]}" for name, count in spread.counts.items() if count]

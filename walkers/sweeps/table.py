@@ -28,6 +28,7 @@ from walkers.inputs.errors import InputError, Problem, WalkersError, refused
 from walkers.inputs.library import suggestion
 from walkers.inputs.rounding import DIGITS, NOISE
 from walkers.postprocess.analysis import RESULT_NAME, Described, analyses, analyses_in, analyses_of, current_result
+from walkers.postprocess.sides import differ
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, finished_run, is_locked, run_place, unfinished
 from walkers.runner.files import read_json, write_bytes, write_json
@@ -55,8 +56,9 @@ STATE = {
     "reason": ("", "name of the failure, or empty"),
     "run": ("", "run directory, relative to the folder where the table was made"),
 }
-RESULTS = ("velocity", "climbs")
-"""What is shown of a sweep if nothing else is asked for, the first that the table has."""
+_RESULTS = ("velocity", "climbs")
+SIDES = ("right_facing", "left_facing")
+"""Columns of velocities that are shown in place of their mean where `sides_differ`."""
 ERRORS = {"velocity": "scatter"}
 """Columns with the scatter of others over copies."""
 FORMATS = ("csv", "parquet", "json")
@@ -345,9 +347,22 @@ def varied_columns(frame: pd.DataFrame) -> list[str]:
     return [name for name, meaning in frame.attrs["meanings"].items() if meaning == _VARIED]
 
 
+def sides_differ(frame: pd.DataFrame) -> bool:
+    """Whether walkers that face up and down a slope differ at a point: the mean over both is no walker's velocity."""
+    if not {"upright", *SIDES} <= set(frame.columns):
+        return False
+    slopes = frame[frame["upright"].notna()]
+    return any(differ(float(one), float(other)) for one, other in zip(*(slopes[name] for name in SIDES), strict=True))
+
+
+def main_columns(frame: pd.DataFrame) -> list[str]:
+    """What is shown of a table if nothing else is asked for: the first of these that it has."""
+    return ["right_facing", *_RESULTS] if sides_differ(frame) else list(_RESULTS)
+
+
 def default_column(frame: pd.DataFrame) -> str:
     """The column of a table that is shown if nothing else is asked for."""
-    return next((name for name in RESULTS if name in frame), "frequency")
+    return next((name for name in main_columns(frame) if name in frame), "frequency")
 
 
 def find_name(option: str, wanted: str, names: Iterable[str]) -> str:
@@ -407,7 +422,8 @@ def short_text(frame: pd.DataFrame) -> str:
     """A table to look at: what varied, Γ0, sin δ, speeds in mm/s, status, run."""
     import pandas as pd
 
-    shown = frame.drop(columns=[name for name in frame.columns if name in _LEFT_OUT])
+    left_out = (_LEFT_OUT - set(SIDES)) | {"velocity"} if sides_differ(frame) else _LEFT_OUT
+    shown = frame.drop(columns=[name for name in frame.columns if name in left_out])
     units = dict(frame.attrs.get("units", {}))
     for name in shown.columns:
         if units.get(name) == "m/s":

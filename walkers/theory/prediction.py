@@ -216,7 +216,9 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
             "rotation": [rotation["bead_1"], rotation["bead_2"]],
             "sliding": [sliding[f"contact_{number}"] for number in (1, 2, 3)],
         }
-        lines.append(f"  engine                         {_speed(found)}{_details(found)}")
+        # The result has rotation and sliding of all walkers together.
+        mixed = side == "right_facing" and result["left_facing"]["n"] > 0
+        lines.append(f"  engine                         {_speed(found)}{', facing up' if mixed else _details(found)}")
     else:
         lines.append("  engine                         no run yet; do: walkers run CASE")
     lines += [

@@ -27,7 +27,6 @@ from walkers.postprocess.gait import (
     POSTURES,
     SEPARATED,
     STEADY_DIFFERENCE,
-    STEADY_SPEED,
     Gait,
     averages,
     came_near,
@@ -36,19 +35,17 @@ from walkers.postprocess.gait import (
     settled_samples,
     turned_over_at,
     walk,
-    ways,
 )
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
+from walkers.postprocess.sides import STEADY_SPEED, sides_apart, ways
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
-from walkers.postprocess.uncertainty import band_of, band_text, wrapped
+from walkers.postprocess.uncertainty import LEAST_PER_VALUE, band_of, band_text, bands_text, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from walkers.postprocess.figures import Panel
 
-SAME = 0.05
-"""Walkers that faced either way and differ by more than this share are told apart first of all."""
 NEAR = 1.5
 """Walkers whose mass centres come within this many lengths of one have met."""
 
@@ -263,7 +260,11 @@ class Walking(Analysis):
 
     def uncertainty(self, result: Mapping[str, Any]) -> list[str]:
         """Of the velocity: what nobody measured, the numerical error; and how alike the copies are."""
-        return [*super().uncertainty(result), _numerical(result), *_scatter(result)]
+        known = super().uncertainty(result)
+        if result.get("bands") and (apart := sides_apart(result)):
+            told = bands_text(result, {"right_facing": "m/s"}, {"right_facing": next(iter(apart.values()))})
+            known = [told or "no band: the spread has that of the mean over both ways, which is no walker's velocity"]
+        return [*known, _numerical(result), *_scatter(result)]
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What makes the velocity doubtful."""
@@ -450,14 +451,11 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     """How fast walkers are that kept their heading."""
     velocity = result["velocity"]
     toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
-    first, second = ways(uphill=result["goes_uphill"])
-    sides = result["right_facing"], result["left_facing"]
     headline = f"{_speed(velocity['mean'])} mm/s{_band(result)}, positive {toward}"
-    if all(side["n"] for side in sides):
-        one, other = (side["mean"] for side in sides)
-        if abs(one - other) > max(SAME * max(abs(one), abs(other)), STEADY_SPEED):  # the mean over both is no walker's
-            both = f"facing {first} {_speed(one)}, facing {second} {_speed(other)} mm/s"
-            headline = f"{both}{_band(result)}, positive {toward}"
+    if apart := sides_apart(result):  # the mean over both is no walker's
+        (first, one), (second, other) = apart.items()
+        up = f"{_speed(one)} mm/s{band}" if (band := _band(result)) else _speed(one)
+        headline = f"facing {first} {up}, facing {second} {_speed(other)} mm/s, positive {toward}"
     return [*_headlines(result, drive), f"  velocity   {headline}"]
 
 
@@ -470,7 +468,7 @@ def _of_sides(result: Mapping[str, Any]) -> list[str]:
         f"{_speed(side['mean'])} mm/s ({side['n']})" if side["n"] else "none"
         for side in (result["right_facing"], result["left_facing"])
     )
-    return [f"    started facing {first} {right}, {second} {left}; {_steady(result)}"]
+    return wrapped([f"started facing {first} {right}, {second} {left}; {_steady(result)}"])
 
 
 def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
@@ -492,9 +490,14 @@ def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
 
 
 def _band(result: Mapping[str, Any]) -> str:
-    """The band of the velocity, if a spread was run."""
-    band = band_of(result, "velocity", result["velocity"]["mean"])
-    return f" ({band_text(band, 'm/s')}, 5 to 95 % over the uncertain values)" if band else ""
+    """The band of the velocity, if a spread was run; of those that faced right or up, where the sides differ."""
+    name = "right_facing" if sides_apart(result) else "velocity"
+    band = band_of(result, name, result[name]["mean"])
+    if band is None:
+        return ""
+    points, values = result["bands"][name]["points"], sum(one["range"] is not None for one in result["rests_on"])
+    draws = f" of {points} draws" if points < LEAST_PER_VALUE * values else ""
+    return f" ({band_text(band, 'm/s')}, 5 to 95 %{draws} over the uncertain values)"
 
 
 def _numerical(result: Mapping[str, Any]) -> str:
@@ -516,6 +519,14 @@ def _scatter(result: Mapping[str, Any]) -> list[str]:
     if count < 2 or result["turned_round"]:
         return []
     what = "walkers" if result["meet"] or "makes" in result else "copies"
+    if apart := sides_apart(result):  # what the sides differ by is no scatter
+        sides = zip(apart, (result["right_facing"], result["left_facing"]), strict=True)
+        each = [
+            f"the {side['n']} {what} facing {way} {_error(side['scatter'])}"
+            for way, side in sides
+            if side["scatter"] is not None
+        ]
+        return [f"scatter of {', of '.join(each)} (standard deviation)"] if each else []
     low, high = _speed(velocity["smallest"]), _speed(velocity["largest"])
     ends = "" if low == high else f"; {low} to {high} mm/s"
     return [f"scatter of the {count} {what} {_error(velocity['scatter'])} (standard deviation{ends})"]

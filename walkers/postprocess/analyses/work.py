@@ -25,8 +25,9 @@ from walkers.postprocess.analyses.walking import spread
 from walkers.postprocess.analysis import Analysis, Measured, Quantity
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.figures import Line, Panel, nested_widths
-from walkers.postprocess.gait import STEADY_SPEED, walk
+from walkers.postprocess.gait import walk
 from walkers.postprocess.motion import LEAST_SAMPLES, Group, Motion
+from walkers.postprocess.sides import STEADY_SPEED
 from walkers.postprocess.tables import Columns, columns_of
 
 _PARTS = 10

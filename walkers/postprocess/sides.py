@@ -1,0 +1,29 @@
+"""Walkers that started facing either way along the drive axis: where the mean over both is no walker's velocity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+SAME = 0.05
+"""Velocities of walkers that faced either way and differ by more than this share are printed apart …"""
+STEADY_SPEED = 1e-5
+"""… and by more than this, m/s; halves of a run that differ by less are steady."""
+
+
+def ways(*, uphill: bool) -> tuple[str, str]:
+    """What the ways along the drive axis are called, the one that is positive first."""
+    return ("up", "down") if uphill else ("right", "left")
+
+
+def differ(one: float, other: float) -> bool:
+    """Whether mean velocities (m/s) of walkers that faced either way differ; not if one is NaN."""
+    return abs(one - other) > max(SAME * max(abs(one), abs(other)), STEADY_SPEED)
+
+
+def sides_apart(result: Mapping[str, Any]) -> dict[str, float]:
+    """Mean velocities (m/s) of the walkers of a result, by the way that they faced, if they differ; empty otherwise."""
+    right, left = ((result.get(name) or {}).get("mean") for name in ("right_facing", "left_facing"))
+    if right is None or left is None or not differ(right, left):
+        return {}
+    return dict(zip(ways(uphill=bool(result.get("goes_uphill"))), (right, left), strict=True))
