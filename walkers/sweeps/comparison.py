@@ -127,7 +127,7 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     scatters = [_scatters(run, result) for run, result in zip(runs, results, strict=True)]
     numerical = hypot(*map(_numerical_error, results))
     units = result_columns([name for result in results for name in result["analyses"]])
-    if any(map(sides_apart, results)):  # the mean over both is no walker's velocity
+    if any(map(_up_and_down, results)):  # the mean over both is no walker's velocity
         units = {name: told for name, told in units.items() if name != "velocity"}
     uphill, pairs = all(result.get("goes_uphill") for result in results), []
     for name, (unit, _) in units.items():
@@ -139,6 +139,11 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
                 cells[0] = cells[0].replace(name, _UPHILL[name])
             pairs.append((one, cells))
     return pairs
+
+
+def _up_and_down(result: Mapping[str, Any]) -> bool:
+    """Whether walkers that face up and down a slope differ."""
+    return bool(result.get("goes_uphill") and sides_apart(result))
 
 
 def _scatters(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
@@ -167,7 +172,7 @@ def _told_errors(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
     results = [with_bands(run, result_in(run)) for run in runs]
     if not all("velocity" in result for result in results):
         return []
-    name_of = "right_facing" if any(map(sides_apart, results)) else "velocity"
+    name_of = "right_facing" if any(map(_up_and_down, results)) else "velocity"
     errors, own = [_numerical_error(one) for one in results], [_number_of(one[name_of]["mean"]) for one in results]
     lines, total = [], hypot(*errors)
     if isfinite(total + own[0] + own[1]) and total > 0.0:
