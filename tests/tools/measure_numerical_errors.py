@@ -18,7 +18,7 @@ CASES = ("fig1b", "fig4a", "fig4b", "symmetric", "climber", "tray")
 OUT = Path("runs/numerical-errors")
 HEAD = f"""\
 # Numerical errors of the velocities of shipped cases, mm/s: how much a velocity changes at half the time step
-# (half_step), and then with beads of {numerical.STIFFER:g} times the Young's modulus (stiffer).
+# (half_step), and then with beads of {numerical.STIFFER:g} times the Young's modulus (stiffer). A hash names the case.
 # Written by tests/tools/measure_numerical_errors.py.
 """
 
@@ -41,7 +41,8 @@ def main() -> None:
         runs = [walkers.run(walkers.load_case(name, changes), OUT) for changes in changes_of(name)]
         own, half, harder = (1e3 * run.result["velocity"]["mean"] for run in runs)
         values = {"velocity": own, "half_step": half - own, "stiffer": harder - half}
-        blocks.append(f"[{name}]\n" + "".join(f"{key:9} = {value:.4g}\n" for key, value in values.items()))
+        lines = [f"{key:9} = {value:.4g}\n" for key, value in values.items()]
+        blocks.append(f'[{name}]\ncase      = "{numerical.digest(walkers.load_case(name))}"\n' + "".join(lines))
         print(blocks[-1])
     Path(numerical.__file__).with_name(numerical.TABLE).write_text("\n".join(blocks), encoding="utf-8")
 

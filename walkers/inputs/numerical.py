@@ -2,11 +2,13 @@
 
 Beads in a simulation are softer than their material, and the time step is finite. The table ``numerical_errors.toml``
 has, for shipped cases, how much the velocity changes at half the time step, and with beads that are `STIFFER` times as
-hard. ``tests/tools/measure_numerical_errors.py`` writes it.
+hard. ``tests/tools/measure_numerical_errors.py`` writes it. It knows a case by a hash, so that none is resolved here.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import tomllib
 from collections.abc import Mapping
 from functools import cache
@@ -14,7 +16,6 @@ from importlib import resources
 from typing import Any
 
 from walkers.inputs.case import Case
-from walkers.inputs.reading import load_case
 
 TABLE = "numerical_errors.toml"
 STIFFER = 10.0
@@ -24,8 +25,13 @@ STIFFER = 10.0
 @cache
 def measured() -> Mapping[str, Mapping[str, float]]:
     """By the names of cases the ``velocity``, and its change at ``half_step`` and with ``stiffer`` beads, m/s."""
-    table = tomllib.loads(resources.files("walkers.inputs").joinpath(TABLE).read_text("utf-8"))
-    return {name: {key: 1e-3 * value for key, value in of_case.items()} for name, of_case in table.items()}
+    keys = ("velocity", "half_step", "stiffer")
+    return {name: {key: 1e-3 * of_case[key] for key in keys} for name, of_case in _table().items()}
+
+
+@cache
+def _table() -> Mapping[str, Mapping[str, Any]]:
+    return tomllib.loads(resources.files("walkers.inputs").joinpath(TABLE).read_text("utf-8"))
 
 
 def numerical_error(case: Case) -> dict[str, float] | None:
@@ -36,21 +42,17 @@ def numerical_error(case: Case) -> dict[str, float] | None:
     dict
         ``half_step`` and ``stiffer``, the changes of the velocity; ``total``, the root of the sum of their squares.
     """
-    asked = _determinants(case)
-    for name, of_case in measured().items():
-        if asked == _shipped(name):
-            half_step, stiffer = of_case["half_step"], of_case["stiffer"]
+    asked = digest(case)
+    for name, of_case in _table().items():
+        if asked == of_case["case"]:
+            half_step, stiffer = (measured()[name][key] for key in ("half_step", "stiffer"))
             return {"half_step": half_step, "stiffer": stiffer, "total": (half_step**2 + stiffer**2) ** 0.5}
     return None
 
 
-@cache
-def _shipped(name: str) -> dict[str, Any]:
-    return _determinants(load_case(name))
-
-
-def _determinants(case: Case) -> dict[str, Any]:
-    """What the numerical error depends on: all that determines a run but its length, room and sampling."""
+def digest(case: Case) -> str:
+    """Twelve hex digits of what the numerical error depends on: a run's determinants but length, room and sampling."""
     found = case.determinants()
     makes = [{**one, "spacing": one["spacing"] if one["meet"] else None} for one in found["walkers"]]
-    return {**found, "walkers": makes, "run": found["run"]["time_step"]}
+    text = json.dumps({**found, "walkers": makes, "run": found["run"]["time_step"]}, sort_keys=True)
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()[:12]
