@@ -19,6 +19,7 @@ from walkers.runner.directory import (
     FinishedRun,
     case_of,
     finished_run,
+    is_deck_folder,
     is_locked,
     is_run_name,
     layout_of,
@@ -53,12 +54,12 @@ def placed(name: str | Path, out: Path = DEFAULT_OUT) -> Place | None:
 
     A folder shadows no shipped case by its name alone. That of a deck that was run by hand is made a run directory.
     """
-    from walkers.sweeps.by_hand import is_deck_folder, take_in
-
     path = Path(name)
     with suppress(OSError):  # a name that no file system takes
         for place in (path, out / path):
             if is_deck_folder(place) and str(name) not in shipped_cases():
+                from walkers.sweeps.by_hand import take_in
+
                 take_in(place)
             for kind, file in RECORDS.items():
                 if (place / file).is_file():
@@ -100,8 +101,6 @@ def case_at(
     changes
         Values put in place of the case's, by dotted keys.
     """
-    from walkers.sweeps.by_hand import is_deck_folder
-
     out = Path(out)
     if not isinstance(what, (str, Path)):
         return with_changes(what, changes), out

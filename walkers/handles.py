@@ -245,21 +245,24 @@ class Run:
         >>> walkers.run("fig1b", tmp).export("xyz", tmp / "walk.xyz", every=20).name
         'walk.xyz'
         """
-        from walkers.archive.writing import ArchiveOptions, write_archive
-        from walkers.postprocess.paraview import write_paraview, write_vtk
-        from walkers.postprocess.trajectory_files import SUFFIXES, write_trajectory
-        from walkers.sweeps.by_hand import write_folder
-
         place = _path(to)
         if form == "deck":
+            from walkers.sweeps.by_hand import write_folder
+
             return write_folder(self.case, place or Path(f"{self.directory.name}-deck"))
         if form == "archive":
+            from walkers.archive.writing import ArchiveOptions, write_archive
+
             return write_archive(self.finished_directory, place, ArchiveOptions(**options))
-        if form in SUFFIXES:
-            place = place or self.finished_directory / f"trajectory{SUFFIXES[form][0]}"
-            return write_trajectory(self.finished_directory, place, form, **options)
-        write = {"vtk": write_vtk, "paraview": write_paraview}[form]
-        return write(self.finished_directory, destination=place, **options)
+        if form in ("vtk", "paraview"):
+            from walkers.postprocess.paraview import write_paraview, write_vtk
+
+            write = write_vtk if form == "vtk" else write_paraview
+            return write(self.finished_directory, destination=place, **options)
+        from walkers.postprocess.trajectory_files import SUFFIXES, write_trajectory
+
+        place = place or self.finished_directory / f"trajectory{SUFFIXES[form][0]}"
+        return write_trajectory(self.finished_directory, place, form, **options)
 
 
 @dataclass(frozen=True)

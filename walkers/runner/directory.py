@@ -42,6 +42,8 @@ FAILURE_NAME = "failure.json"
 SEGMENTS = "segments"
 FIRST_SEGMENT = Path(SEGMENTS) / "0000"
 SEGMENT_NAME = "segment.json"
+DECK_RECORD_NAME = "deck.json"
+"""In the folder of a deck to be run by hand: its case and its text as they were written."""
 UNFINISHED = ".incomplete"
 REPLACED = ".replaced"
 _LONGEST_NAME = 80
@@ -154,6 +156,11 @@ def files_of_segments(directory: Path) -> list[str]:
     dumps = {name for one in layouts for name in (one.bead_dump, one.pair_bridge_dump, one.wall_bridge_dump)}
     by_hand = [directory] == segment_directories(directory)  # with tables and pictures beside
     return [path.relative_to(directory).as_posix() for path in found if not by_hand or path.name in dumps]
+
+
+def is_deck_folder(folder: Path) -> bool:
+    """Whether a deck to be run by hand was written into a folder."""
+    return (folder / DECK_RECORD_NAME).is_file() and (folder / DECK_NAME).is_file()
 
 
 def finished_run(directory: Path) -> FinishedRun | None:

@@ -24,7 +24,7 @@ from walkers.physics.matter import Contact
 from walkers.postprocess.analysis import tabulate
 from walkers.postprocess.dump import DumpError
 from walkers.runner.binary import find_engine, plugin_of, run_script
-from walkers.runner.directory import CASE_NAME, SEGMENT_NAME, layout_of, write_deck
+from walkers.runner.directory import CASE_NAME, DECK_RECORD_NAME, SEGMENT_NAME, layout_of, write_deck
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import EngineReport, judge
@@ -42,8 +42,6 @@ from walkers.templates.deck import (
 )
 from walkers.templates.parameters import PRINTED, suffixes
 
-RECORD_NAME = "deck.json"
-"""In the folder of a deck to be run by hand: its case and its text as they were written."""
 _LOGS = (OUTPUT_NAME, "log.liggghts")
 """Where `run_script` lets the engine's output go, and what LIGGGHTS writes anyhow."""
 _PRINTED = re.compile(rf"^{PRINTED} (.+)$", re.MULTILINE)
@@ -79,13 +77,8 @@ def write_folder(case: Case, folder: Path) -> Path:
     write_deck(deck, folder)
     (folder / SCALE_NAME).write_text(_SCALE, encoding="utf-8")
     (folder / RUN_NAME).write_text(run_script(plugin, deck.layout.ranks), encoding="utf-8")
-    write_json(folder / RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
+    write_json(folder / DECK_RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
     return folder / DECK_NAME
-
-
-def is_deck_folder(folder: Path) -> bool:
-    """Whether `write_folder` wrote a folder."""
-    return (folder / RECORD_NAME).is_file() and (folder / DECK_NAME).is_file()
 
 
 def take_in(folder: Path) -> None:
@@ -99,7 +92,7 @@ def take_in(folder: Path) -> None:
     if _is_current(folder):
         return
     try:
-        record = read_json(folder / RECORD_NAME)
+        record = read_json(folder / DECK_RECORD_NAME)
         case, written = Case.from_dict(record["case"]), str(record["deck"])
         now = (folder / DECK_NAME).read_text(encoding="utf-8", errors="surrogateescape")
         logs = [folder / name for name in _LOGS if (folder / name).is_file()]
