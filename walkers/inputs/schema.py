@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from math import isfinite
-from typing import Annotated, Any, Generic, Literal, TypeVar, get_type_hints
+from typing import Annotated, Any, Literal, get_type_hints
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
@@ -199,73 +199,6 @@ class EnvironmentTable(Table):
     """``[environment]``."""
 
     gravity: units.Acceleration = 9.81
-
-
-# --- a library file ---------------------------------------------------------------------------------------------------
-
-Q = TypeVar("Q")
-
-
-class Sourced(Table, Generic[Q]):
-    """``{ value = …, source = "…" }``: a number of a library, and both ends of where it can lie if it is uncertain."""
-
-    value: Q
-    source: Annotated[str, Field(min_length=1)]
-    range: tuple[Q, Q] | None = None
-
-    @field_validator("range")
-    @classmethod
-    def _has_the_value(cls, ends: tuple[Any, Any] | None, of: ValidationInfo) -> tuple[Any, Any] | None:
-        if ends is not None and not ends[0] < ends[1]:
-            raise ValueError("expected the lower end first: [low, high]")
-        if ends is not None and "value" in of.data and not ends[0] <= of.data["value"] <= ends[1]:
-            raise ValueError("expected two ends with the value between them")
-        return ends
-
-
-class MaterialTable(Table):
-    """``[materials."NAME"]``; the modulus of contacts is not this one but the case's ``contact.youngs_modulus``."""
-
-    density: Sourced[units.Density]
-    youngs_modulus: Sourced[Annotated[float, units.MODULUS]] | None = None
-    poissons_ratio: Sourced[Annotated[Number, Field(ge=-1, le=0.5)]] | None = None
-
-
-class LiquidTable(Table):
-    """``[liquids."NAME"]``, with one of the two viscosities."""
-
-    surface_tension: Sourced[units.SurfaceTension]
-    density: Sourced[units.Density]
-    kinematic_viscosity: Sourced[units.KinematicViscosity] | None = None
-    dynamic_viscosity: Sourced[units.DynamicViscosity] | None = None
-
-    @model_validator(mode="after")
-    def _has_a_viscosity(self) -> LiquidTable:
-        if (self.kinematic_viscosity is None) == (self.dynamic_viscosity is None):
-            raise ValueError("expected either kinematic_viscosity or dynamic_viscosity")
-        return self
-
-
-class SurfacePairTable(Table):
-    """``[[surface_pairs]]``: how wet surfaces of two materials touch."""
-
-    materials: tuple[str, str]
-    friction: Sourced[Coefficient] | None = None
-    rolling_friction: Sourced[Coefficient] | None = None
-    restitution: Sourced[Number] | None = None
-    minimum_separation_ratio: Sourced[Number] | None = None
-    viscosity_ratio: Sourced[Number] | None = None
-    volume_fraction: Sourced[Number] | None = None
-    contact_angle: Sourced[units.UpToRightAngle] | None = None
-
-
-class LibraryFile(Table):
-    """A library: materials, liquids and surface pairs, each number with its source; ``file`` is where it was read."""
-
-    file: str = ""
-    materials: dict[str, MaterialTable] = {}
-    liquids: dict[str, LiquidTable] = {}
-    surface_pairs: list[SurfacePairTable] = []
 
 
 # --- a case file ------------------------------------------------------------------------------------------------------
