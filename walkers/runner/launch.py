@@ -54,7 +54,8 @@ _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
 class Progress:
     """How far a run is: steps of the drive, done and in all; simulated time, s; wall time of this call, s.
 
-    ``made`` are the steps that were made in this call; ``resting`` says that the beads still come to rest.
+    ``made`` are the steps that were made in this call; ``resting`` says that the beads still come to rest,
+    ``may_end_early`` that the steps are those of all attempts, of which the last ones may not be needed.
     """
 
     step: int
@@ -63,6 +64,7 @@ class Progress:
     elapsed: float
     made: int = 0
     resting: bool = False
+    may_end_early: bool = False
 
     @property
     def share(self) -> str:
@@ -72,7 +74,7 @@ class Progress:
     def __str__(self) -> str:
         """How much is done, how fast, and how long the rest takes."""
         rate = self.made / self.elapsed if self.elapsed else 0.0
-        left = f"{(self.steps - self.step) / rate:.0f} s left" if rate else "starting"
+        left = f"{'at most ' * self.may_end_early}{(self.steps - self.step) / rate:.0f} s left" if rate else "starting"
         return f"{self.share}, {self.simulated:.3f} s simulated, {rate:.0f} steps/s, {left}"
 
 
