@@ -194,6 +194,7 @@ def compare(
 ) -> None:
     """Compare two runs or cases in parameters and results, or two sweeps point by point."""
     from walkers.finding import placed
+    from walkers.inputs.errors import each
     from walkers.pipeline import find_side
     from walkers.sweeps.comparison import compare_runs, compare_sweeps
 
@@ -207,7 +208,7 @@ def compare(
         for one in sweeps:
             refuse(one, True, "is a sweep; expected another sweep to compare with")
         refuse("--y", y is not None, "is for sweeps")
-        found = compare_runs(find_side(first, out, changes), find_side(second, out, changes))
+        found = compare_runs(*each(lambda one: find_side(one, out, changes), (first, second)))
     print_as(as_json, lambda: found.contents, lambda: found.text)
 
 
@@ -223,6 +224,7 @@ def climb(
 ) -> None:
     """Print probability, rate and speed of climbs in piles for each condition, with confidence intervals."""
     from walkers.finding import find
+    from walkers.inputs.errors import each
     from walkers.postprocess.drawing import FORMATS, check_place
     from walkers.sweeps import climbing
     from walkers.sweeps.climbing_figure import write_climbs
@@ -230,7 +232,7 @@ def climb(
     if to is not None:
         check_place(to, *(f".{form}" for form in FORMATS), ".csv")
     changes = changes_of(settings)
-    places = [find(one, out, changes).path for one in what]
+    places = each(lambda one: find(one, out, changes).path, what)
     conditions = climbing.conditions_in(places)
     tell(*(f"warning: {left}" for place in places if (left := climbing.unfinished_points(place))))
     lines: list[str] = []

@@ -101,6 +101,7 @@ def run(
 ) -> int:
     """Run cases and print the results. A finished run is only printed, an interrupted run continues."""
     from walkers.finding import case_at
+    from walkers.inputs.errors import each
     from walkers.pipeline import finished_at
     from walkers.progress import progress_of, progress_of_sweep
     from walkers.runner.failures import EngineFailure
@@ -108,7 +109,7 @@ def run(
 
     refuse("--points", points is not None and not spread, "is for --spread")
     # A mistake in the last file shows before the first run starts.
-    loaded = [case_at(case, out, changes_of(settings)) for case in cases]
+    loaded = each(lambda case: case_at(case, out, changes_of(settings)), cases)
     there = [None if settings or force else finished_at(case, out) for case in cases]
     check_folder("--out", out)
     if spread:

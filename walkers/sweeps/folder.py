@@ -69,8 +69,8 @@ class Entry:
     It is finished, running, failed, or interrupted: a run can be continued, of a sweep points are missing. Its
     age (s) counts from when it was finished or last written to; its size (bytes) is that of its files, of a sweep those
     of its runs. Its parameters are those of `walkers.inputs.readable.flattened`, of a sweep the numbers of values of
-    what varies. A run gave a velocity (mean over its walkers, m/s; of the sides, by the way that they faced, where they
-    differ) or climbs; a sweep has points of some statuses.
+    what varies. A run gave a velocity (mean over its walkers, m/s; of those facing up a slope where ``sides`` has the
+    velocities of both sides, which differ) or climbs; a sweep has points of some statuses.
     """
 
     name: str
@@ -150,8 +150,9 @@ def _run(path: Path, now: float) -> Entry | None:
     with suppress(OSError, ValueError, AttributeError, TypeError):
         result = recorded_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
-        given = {"velocity": velocity.get("mean"), "climbs": None if climbs is None else len(climbs)}
-        given["sides"] = sides_apart(result)
+        sides = sides_apart(result)
+        given = {"velocity": sides.get("up", velocity.get("mean")), "sides": sides}
+        given["climbs"] = None if climbs is None else len(climbs)
     return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
 
 
@@ -258,7 +259,7 @@ def as_json(entries: Sequence[Entry]) -> list[dict[str, Any]]:
     """Entries as JSON objects, SI units; ``varies`` has, of a run, the values by which runs of its case differ."""
     keys = {case: keys for case, _, keys in _varied([entry for entry in entries if not entry.is_sweep])}
     common = ("name", "case", "status", "age", "size")
-    of_runs = ("reason", "message", "velocity", "climbs")
+    of_runs = ("reason", "message", "velocity", "sides", "climbs")
     rows = []
     for entry in entries:
         shown = entry.parameters if entry.is_sweep else keys[entry.case]
