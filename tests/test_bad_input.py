@@ -211,6 +211,7 @@ REFUSED: list[tuple[str, str]] = [
         ("--orcid 0000-0002-1825-0097", "--orcid: expected an --author for each"),
         ("--author N --orcid 0000-0002-1825-0098", "--orcid: expected an ORCID"),
     )),
+    ("climb {pile} --within 5mm", "--within: '5mm': expected a time"),
     ("render {run} --fps 10", "--fps: is for --film"),
     *((f"render --film {{run}} {words}", told) for words, told in (
         ("--to walk.avi", "expected the name of a .mp4 or .gif file"),

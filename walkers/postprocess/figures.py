@@ -119,16 +119,24 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
     return [
         Panel(
-            "Distance along the heading; grey: settling",
+            f"Distance along the heading; grey: settling{_named(groups)}",
             "time (s)",
             "distance walked (mm)",
             walked,
             settled=begin,
             least=_LEAST_DISTANCE,
         ),
-        Panel("Orientation", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE),
-        Panel(f"Paths of the centres of mass, {seen}", *names, paths, least=_LEAST_DISTANCE),
+        Panel(
+            f"Orientation{_named(groups)}", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE
+        ),
+        Panel(f"Paths of the centres of mass, {seen}{_named(groups)}", *names, paths, least=_LEAST_DISTANCE),
     ]
+
+
+def _named(groups: list[Group]) -> str:
+    """How many walkers a legend names, where these are not all."""
+    count = sum(len(group.walkers) for group in groups)
+    return f" ({MOST_NAMED} of {count} walkers named)" if count > MOST_NAMED else ""
 
 
 def velocity_panel(case: Case, walkers: Columns) -> Panel:
@@ -278,9 +286,8 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
             line.set(**series_look(number), markevery=(0.02 * (number % 6), 0.12), linewidth=0.9)
     axes["walked"].set_title("grey: settling")
     letter_panels(axes.values())
-    more = f" (the first {MOST_NAMED})" if sum(len(group.walkers) for group in groups) > MOST_NAMED else ""
     handles = axes["walked"].get_legend_handles_labels()
-    told = f"walker: facing at the start, velocity{more}"
+    told = f"walker: facing at the start, velocity{_named(groups)}"
     figure.legend(*handles, loc="outside lower center", ncols=4, title=told)
     return figure
 
