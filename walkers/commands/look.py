@@ -36,9 +36,7 @@ _SWEEPS = offering("sweep")
 _ALL = "Include the runs of sweeps."
 _WHERE = 'Only runs with this value, such as "drive.frequency=80 Hz". Repeatable.'
 _TABLE = "Write the table of the sweep, with units, to this file (.csv, .parquet, .json)."
-_WITHIN = (
-    "Count climbs until this time of the drive, such as '5 s'; default: the end of the shortest run without a climb."
-)
+_WITHIN = "Count climbs until this time of the drive, such as '5 s'; default: end of the shortest run without a climb."
 _THRESHOLDS = "Print the number of climbs for other definitions of a climb."
 _PILES = "Sweeps, folders of runs, runs or cases of piles."
 _NULL = "Runs in which nothing can climb: also print their false climbs. Repeatable."

@@ -114,22 +114,20 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
             turned.append(Line(time, np.degrees(group.orientation[::strobe, place]), **look))
             along, across = way[:, place] @ group.drive_axis, way[:, place] @ group.across_axis
             paths.append(Line(-across, along, **look) if uphill else Line(along, across, **look))
-    begin = walked[-1].x[settled]
+    begin, named = walked[-1].x[settled], _named(groups)
     names = ("across the slope (mm)", "uphill (mm)") if uphill else ("along the drive axis (mm)", "across it (mm)")
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
     return [
         Panel(
-            f"Distance along the heading; grey: settling{_named(groups)}",
+            f"Distance along the heading; grey: settling{named}",
             "time (s)",
             "distance walked (mm)",
             walked,
             settled=begin,
             least=_LEAST_DISTANCE,
         ),
-        Panel(
-            f"Orientation{_named(groups)}", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE
-        ),
-        Panel(f"Paths of the centres of mass, {seen}{_named(groups)}", *names, paths, least=_LEAST_DISTANCE),
+        Panel(f"Orientation{named}", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE),
+        Panel(f"Paths of the centres of mass, {seen}{named}", *names, paths, least=_LEAST_DISTANCE),
     ]
 
 

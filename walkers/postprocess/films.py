@@ -126,7 +126,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def parse_time(option: str, text: str) -> float:
-    """Read a physical time that an option gives, ``0.1 s`` or a plain number of s, in s; an InputError if it is none."""
+    """Read a physical time that an option gives, ``0.1 s`` or a number of s, in s; an InputError if it is none."""
     try:
         return parse_quantity(f"{text} s" if text.replace(".", "", 1).isdigit() else text, DURATION)
     except ValueError as error:
