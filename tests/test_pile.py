@@ -431,7 +431,7 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     assert printed.count(f"0 of 2 runs, 0: 0 per run and second (0 to {upper:.3g} with 95% confidence)") == 16
     written = tmp_path / "climbs.csv"
     assert (
-        call("climb", str(out), "--within", "0.02s", "--to", str(written), check=True).stdout.count(
+        call("climb", str(out), "--to", str(written), "--within=10ms", check=True).stdout.count(
             "0 of 2 runs climbed"
         )
         == 1
