@@ -431,9 +431,7 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     assert printed.count(f"0 of 2 runs, 0: 0 per run and second (0 to {upper:.3g} with 95% confidence)") == 16
     written = tmp_path / "climbs.csv"
     assert (
-        call("climb", str(out), "--to", str(written), "--within=10ms", check=True).stdout.count(
-            "0 of 2 runs climbed"
-        )
+        call("climb", str(out), "--to", str(written), "--within=10ms", check=True).stdout.count("0 of 2 runs climbed")
         == 1
     )
     assert pd.read_csv(written)["rate_high"].to_list() == pytest.approx([upper] * 3, rel=1e-4)

@@ -44,7 +44,7 @@ _SWEEP_FILE = "A sweep file, or the name of a shipped sweep such as fig2."
 
 def new(
     name: str = Argument(metavar="NAME", help=_NAME),
-    kind: Literal["walker", "cluster", "pile"] = Option("walker", help="Kind of simulation."),
+    kind: Literal["walker", "cluster", "tray", "pile"] = Option("walker", help="Kind of simulation."),
     source: str | None = Option(None, "--from", metavar="CASE", help=_FROM, autocompletion=offering("case")),
 ) -> None:
     """Write a commented case file as a starting point."""

@@ -193,9 +193,9 @@ class Case:
         object.__setattr__(case, "told", told)
         return case
 
-    def renamed(self, name: str) -> Case:
-        """The same case under another name."""
-        return replace(self, name=name).read_from(self.document, self.told)
+    def renamed(self, name: str, title: str | None = None) -> Case:
+        """The same case under another name, or another title too."""
+        return replace(self, name=name, title=title or self.title).read_from(self.document, self.told)
 
     def for_cycles(self, cycles: int) -> Case:
         """The same for so many cycles at a stretch, of a case whose run ends when its velocities are constant."""

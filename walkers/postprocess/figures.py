@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,7 @@ MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """How events are marked (`walkers.postprocess.clusters.Event`)."""
 _HEIGHT = 1.6  # inches of a panel
+_LETTERS = 90  # of a line of a title
 _LEAST_DISTANCE, _LEAST_ANGLE, _LEAST_SPEED = 0.01, 0.1, 0.01
 """mm, ° and mm/s that axes show at least: rounding is no motion."""
 _SHOWN, _LONG = 8, 4.0  # images of a walker; lengths of a walker from which on they are centred on it
@@ -337,7 +339,8 @@ def _title(case: Case) -> str:
         if len(case.walkers[0].radii) == 2:
             gamma0 = f" ($\\Gamma_0$ = {dimer_of(case).gamma0(case.drive.peak_acceleration):.3g})"
     tilted = f", {case.boundary.tilted}" if case.boundary.tilted else ""
-    return f"{plain_text(case.title or case.name)}\n{shown}{tilted}, {case.drive.described()}{gamma0}"
+    title = "\n".join(wrap(plain_text(case.title or case.name), _LETTERS))
+    return f"{title}\n{shown}{tilted}, {case.drive.described()}{gamma0}"
 
 
 def _draw_strobe(axes: Axes, group: Group) -> None:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from walkers.inputs.rounding import duration_text
 from walkers.runner import failures
 from walkers.runner.binary import Engine, plugin_of, run_script, version_in
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME, Deck
@@ -74,7 +75,11 @@ class Progress:
     def __str__(self) -> str:
         """How much is done, how fast, and how long the rest takes."""
         rate = self.made / self.elapsed if self.elapsed else 0.0
-        left = f"{'at most ' * self.may_end_early}{(self.steps - self.step) / rate:.0f} s left" if rate else "starting"
+        left = (
+            f"{'at most ' * self.may_end_early}{duration_text((self.steps - self.step) / rate)} left"
+            if rate
+            else "starting"
+        )
         return f"{self.share}, {self.simulated:.3f} s simulated, {rate:.0f} steps/s, {left}"
 
 
