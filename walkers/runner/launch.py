@@ -75,11 +75,8 @@ class Progress:
     def __str__(self) -> str:
         """How much is done, how fast, and how long the rest takes."""
         rate = self.made / self.elapsed if self.elapsed else 0.0
-        left = (
-            f"{'at most ' * self.may_end_early}{duration_text((self.steps - self.step) / rate)} left"
-            if rate
-            else "starting"
-        )
+        left = duration_text((self.steps - self.step) / rate) if rate else ""
+        left = f"{'at most ' * self.may_end_early}{left} left" if left else "starting"
         return f"{self.share}, {self.simulated:.3f} s simulated, {rate:.0f} steps/s, {left}"
 
 
