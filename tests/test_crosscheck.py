@@ -177,6 +177,7 @@ def test_other_kinds_of_cases_agree(name: str, tmp_path: Path) -> None:
     To 0.1 nm without rolling friction, which amplifies rounding.
     """
     case = shortened(full_cases()[name], 3)
+    assert case.as_read
     found = compare([run(case, tmp_path).motion])
     assert found.chapter().failures == []
     assert found.starts[0].apart.max() < 1e-5

@@ -429,11 +429,12 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     upper = 3.6889 / found["seconds"]  # of no event (Garwood 1936)
     assert found["rate_interval"] == pytest.approx([0.0, upper], rel=1e-4)
     printed = call("climb", record.name, "--null", str(out), "--out", str(out), check=True).stdout
-    assert printed.count(f"0 of 2 runs, 0: 0 per run and second (0 to {upper:.3g} with 95% confidence)") == 16
+    assert printed.count(f"runs climbed; climbs 0: 0 per run and second (0 to {upper:.3g} with 95% confidence)") == 16
     written = tmp_path / "climbs.csv"
     assert call("climb", str(out), "--to", str(written), check=True).stdout.count("0 of 2 runs climbed") == 1
     assert pd.read_csv(written)["rate_high"].to_list() == pytest.approx([upper] * 3, rel=1e-4)
-    call("climb", str(out), "--to", str(written.with_suffix(".svg")), check=True)
+    printed = call("climb", str(out), "--to", str(written.with_suffix(".svg")), "--within=10ms", check=True).stdout
+    assert "0 of 2 runs climbed within 0.01 s" in printed
     assert "share that has climbed" in written.with_suffix(".svg").read_text()
     down = {"from": "3 g", "to": "1 g", "step": "1 g", "until_below": "1 mm/s"}
     descend = {"case": "base.toml", "descend": {"key": "drive.peak_acceleration", **down}}

@@ -101,10 +101,11 @@ def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch
     assert "\x1b" not in done.stderr
 
 
-@pytest.mark.parametrize("kind", ["walker", "cluster", "pile"])
+@pytest.mark.parametrize("kind", ["walker", "cluster", "tray", "pile"])
 def test_a_new_case_runs_as_it_is_and_with_each_line_that_is_commented_out(kind: str, in_folder: Path) -> None:
     assert call("new", "mine", "--kind", kind, check=True).stdout == "mine.toml\n"
-    short = ["--set", "run.duration=0.05s", "--set", "run.longest_settling=0s"] if kind == "pile" else []
+    short = ["--set", "run.duration=0.05s"] if kind in ("tray", "pile") else []
+    short += ["--set", "run.longest_settling=0s"] if kind == "pile" else []
     assert "mine: 170 Hz" if kind == "pile" else "mm/s" in call("run", "mine", *short, check=True).stdout
     text = Path("mine.toml").read_text()
     table, tried = "", 0

@@ -162,12 +162,17 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
 def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     case, engine = _turning(), find_engine()
 
+    shown = [0.0]
+
     def stop(progress: Progress) -> None:
+        shown.append(progress.step / progress.steps)
         if progress.made > 13 * case.run.steps_per_cycle:
             raise Stopped("enough")
 
     with pytest.raises(Stopped):
         make_runs([case], tmp_path / "stopped", engine, on_progress=stop)
+    assert shown == sorted(shown)  # the run begins again after 12 cycles, its progress does not
+    assert shown[-1] == pytest.approx(13 / sum(case.run.attempts), rel=0.1)
     dumps = []
     for folder in ("stopped", "at-a-stretch"):
         ((_, run),) = make_runs([case], tmp_path / folder, engine).runs.items()

@@ -42,6 +42,7 @@ def test_axes_multiply_and_the_last_runs_fastest(make: Make) -> None:
     found = [(case.drive.frequency, case.drive.peak_acceleration) for case in _cases(sweep)]
     assert found == [(f, pytest.approx(9.8 * a)) for f in (60.0, 80.0) for a in (1, 2, 4)]
     assert sweep.units == ("Hz", "g")
+    assert _cases(sweep)[1].title == "test: drive.frequency = 60 Hz, drive.peak_acceleration = 2 g"
     dotted = make(axes={"drive.frequency": ["60 Hz", "80 Hz"], "drive.peak_acceleration": ["1 g", "2 g", "4 g"]})
     assert (dotted.keys, dotted.rows) == (sweep.keys, sweep.rows)
 

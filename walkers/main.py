@@ -160,7 +160,9 @@ def _program() -> typer.Typer:
                 continue
             section, _, command = name.strip("_").rpartition("_")
             if section and section not in parts:
-                parts[section] = typer.Typer(cls=_OrCase, help=SECTIONS[section], **plain)
+                either = "CASE|COMMAND" if section == "check" else "COMMAND"
+                how: dict[str, Any] = {"help": SECTIONS[section], "subcommand_metavar": f"{either} [ARGS]..."}
+                parts[section] = typer.Typer(cls=_OrCase, **how, **plain)
                 program.add_typer(parts[section], name=section, rich_help_panel=heading)
             command = "CASE" if command == "case" else command
             home = parts.get(section, program)

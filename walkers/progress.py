@@ -9,6 +9,8 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from html import escape
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from walkers.inputs.rounding import duration_text
+
 if TYPE_CHECKING:
     from walkers.runner.launch import Progress
     from walkers.sweeps.scheduler import SweepProgress
@@ -37,10 +39,13 @@ def progress_of_sweep(name: str) -> Iterator[Callable[[SweepProgress], None]]:
     with _shown(name) as show:
 
         def advance(sweep: SweepProgress) -> None:
-            rate = (sweep.done - sweep.found) / sweep.elapsed if sweep.elapsed else 0.0
+            made = sweep.done - sweep.found
             words = f"{sweep.done} of {sweep.points} points done, {sweep.running} running, {sweep.failed} failed"
-            words += f", {rate:.2g} points/s"
-            words += f", {sweep.left:.0f} s left" if sweep.left is not None else ""
+            if made and (each := sweep.elapsed / made) < 10.0:
+                words += f", {60.0 / each:.0f} points per minute"
+            elif made:
+                words += f", {duration_text(each)} per point"
+            words += f", {duration_text(sweep.left)} left" if sweep.left is not None else ""
             if (worst := sweep.worst_failure) is not None:
                 words += f", worst failure: point {worst.point}, {worst.reason}"
             show(sweep.points, sweep.done + sweep.failed, words, sweep.elapsed)

@@ -200,7 +200,7 @@ def _at_an_angle(curves: Curves) -> Iterator[Line]:
         curves[f"{name}-spin"] = angle, -after.rolling / sphere.radius
         curves[f"{name}-rebound"] = angle, np.degrees(np.arctan(after.sliding / after.normal))
         expected = 1.0 - 0.092 * (1.0 + after.normal / before.normal) / np.tan(turn)
-        what = f"4: {name}, e_t of what slides all the way, 1 - μ(1+e)/tan θ"
+        what = f"4: {name}, e_t in gross sliding, 1 - μ(1+e)/tan θ"
         yield largest(what, expected[slides], kept[slides], STEP)
 
 
@@ -214,8 +214,8 @@ def _along_the_plane(curves: Curves) -> Iterator[Line]:
     slides = x > 7.0
     # 5/2 (1+e) times half of the overlap over the radius
     arm = 2.5 * STEEL.on_plane().depth(speed) / STEEL.radius
-    yield largest("5: surface of what slides all the way, s/(μ v_n) - 7", x[slides] - 7.0, surface[slides], arm)
-    yield largest("5: spin of what slides all the way, -5", -5.0, turn[slides], arm)
+    yield largest("5: surface velocity in gross sliding, s/(μ v_n) - 7", x[slides] - 7.0, surface[slides], arm)
+    yield largest("5: spin in gross sliding, -5", -5.0, turn[slides], arm)
 
 
 def _spinning(curves: Curves) -> Iterator[Line]:
@@ -227,7 +227,7 @@ def _spinning(curves: Curves) -> Iterator[Line]:
     beta = -after.sliding / before.sliding
     curves["spin"] = x, beta
     slides = x < 0.9
-    yield largest("6: -s'/s of what slides all the way, x - 1", x[slides] - 1.0, beta[slides], SLIP)
+    yield largest("6: -s'/s in gross sliding, x - 1", x[slides] - 1.0, beta[slides], SLIP)
     yield largest("6: restitution", 0.5, after.normal / before.normal, 0.005)
 
 

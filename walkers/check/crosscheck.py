@@ -23,8 +23,8 @@ from walkers.check.kernels import FloatArray
 from walkers.check.report import Chapter, Line, Verdict
 from walkers.handles import Run
 from walkers.inputs import resolve_case
-from walkers.inputs.case import Case, settling_of
-from walkers.inputs.reading import load_case, read_toml, shipped_cases
+from walkers.inputs.case import Case
+from walkers.inputs.reading import load_case, read_toml, shipped_cases, with_changes
 from walkers.inputs.text import rendered
 from walkers.pipeline import run
 from walkers.postprocess.gait import averages, walk
@@ -108,7 +108,8 @@ def crosscheck(
     >>> crosscheck(load_case("fig1b"), tmp).chapter().failures
     []
     """
-    return compare([make(replace(case, seed=case.seed + number), out).motion for number in range(seeds)], without)
+    cases = [with_changes(case, {"run.seed": case.seed + number} if number else {}) for number in range(seeds)]
+    return compare([make(one, out).motion for one in cases], without)
 
 
 def compare(motions: Sequence[Motion], without: Sequence[str] = ()) -> Comparison:
@@ -133,10 +134,11 @@ def shortened(case: Case, cycles: int) -> Case:
     least = 3 * rare
     if cycles < least or cycles % rare:
         raise ValueError(f"expected at least {least}" + (f", a multiple of {rare}" if rare > 1 else ""))
-    whole = case.run.cycles_per_segment >= case.run.cycles
-    segment = cycles if whole else min(case.run.cycles_per_segment, cycles)
-    lengths = {"cycles": cycles, "settling_cycles": settling_of(cycles), "cycles_per_segment": segment}
-    return replace(case, run=replace(case.run, until_steady=False, **lengths))
+    if not case.as_read:
+        raise ValueError("is for cases, and for runs of unedited ones")
+    lengths = ("cycles", "most_cycles", "duration", "settling_cycles")
+    run = {key: value for key, value in case.document.get("run", {}).items() if key not in lengths}
+    return resolve_case({**case.document, "run": {**run, "cycles": cycles}}, source=case.name, name=case.name)
 
 
 def simulate(motion: Motion, without: Collection[str] = ()) -> Motion:

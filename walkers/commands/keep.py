@@ -28,8 +28,8 @@ from walkers.commands.arguments import (
 from walkers.completion import offering
 
 _FORM = (
-    "deck: the LIGGGHTS deck of the case. vtk: .vtp files and a .pvd. paraview: the same, with a ParaView script. "
-    "xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an RO-Crate (.zip) to publish."
+    "deck: the LIGGGHTS deck of the case. vtk: .vtp and .vtm files with a .pvd. paraview: the same, with a ParaView "
+    "script. xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an RO-Crate (.zip) to publish."
 )
 _OUTPUT = "File or folder to write. Default: in the run's folder; archives: the current folder; decks: printed."
 _EVERY = "vtk, paraview, xyz, lammps: write every Nth sample; default: one per cycle, for xyz and lammps every sample."
@@ -119,6 +119,7 @@ def clean(
 ) -> int:
     """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay."""
     from walkers.finding import find
+    from walkers.inputs.errors import each
     from walkers.runner.directory import UNFINISHED
     from walkers.sweeps.folder import clean, plan_cleaning
 
@@ -126,10 +127,11 @@ def clean(
     refuse("--finished", finished and bool(runs), "has no meaning with given runs")
     refuse("--set", bool(settings) and not runs, "expected a case beside")
     changes = changes_of(settings)
-    given = [
-        folder if (folder := out / Path(one).name).suffix == UNFINISHED else find(one, out, changes).path
-        for one in runs or ()
-    ]
+
+    def place_of(one: str) -> Path:
+        return folder if (folder := out / Path(one).name).suffix == UNFINISHED else find(one, out, changes).path
+
+    given = each(place_of, runs or ())
     plan = plan_cleaning(out, given, finished=finished, case=case, older_than=older_than)
     print(plan.as_text())
     if dry_run or not (plan.remove or plan.locks):

@@ -36,7 +36,7 @@ _SWEEPS = offering("sweep")
 _ALL = "Include the runs of sweeps."
 _WHERE = 'Only runs with this value, such as "drive.frequency=80 Hz". Repeatable.'
 _TABLE = "Write the table of the sweep, with units, to this file (.csv, .parquet, .json)."
-_WITHIN = "Count climbs until this time of the drive, in s; default: the end of the shortest run without a climb."
+_WITHIN = "Count climbs until this time of the drive, such as '5 s'; default: end of the shortest run without a climb."
 _THRESHOLDS = "Print the number of climbs for other definitions of a climb."
 _PILES = "Sweeps, folders of runs, runs or cases of piles."
 _NULL = "Runs in which nothing can climb: also print their false climbs. Repeatable."
@@ -123,7 +123,7 @@ def render(
     out: Out = DEFAULT_OUT,
     to: Path | None = Option(None, help="File to write: .png; films: .mp4, .gif; default: in the run's folder."),
     walker: int | None = Option(None, min=0, help="Number of the walker to show; default: the first, or all beads."),
-    images: int | None = Option(None, min=1, max=20, help="Number of pictures; default: 6."),
+    images: int | None = Option(None, min=1, max=20, help="Largest number of pictures; default: 6."),
     interval: str | None = Option(None, help=_INTERVAL),
     film: bool = Option(False, "--film", help="Render a film instead of pictures."),
     size: str | None = Option(None, help="Film: 360p, 480p, 720p, 1080p, or pixels such as 1280x720; default: 720p."),
@@ -194,6 +194,7 @@ def compare(
 ) -> None:
     """Compare two runs or cases in parameters and results, or two sweeps point by point."""
     from walkers.finding import placed
+    from walkers.inputs.errors import each
     from walkers.pipeline import find_side
     from walkers.sweeps.comparison import compare_runs, compare_sweeps
 
@@ -207,7 +208,7 @@ def compare(
         for one in sweeps:
             refuse(one, True, "is a sweep; expected another sweep to compare with")
         refuse("--y", y is not None, "is for sweeps")
-        found = compare_runs(find_side(first, out, changes), find_side(second, out, changes))
+        found = compare_runs(*each(lambda one: find_side(one, out, changes), (first, second)))
     print_as(as_json, lambda: found.contents, lambda: found.text)
 
 
@@ -215,7 +216,7 @@ def climb(
     what: list[str] = Argument(metavar="WHAT", help=_PILES, autocompletion=_ANY),
     settings: Set = None,
     out: Out = DEFAULT_OUT,
-    within: float | None = Option(None, min=1e-9, help=_WITHIN),
+    within: str | None = Option(None, help=_WITHIN),
     thresholds: bool = Option(False, "--sensitivity", help=_THRESHOLDS),
     null: list[str] | None = Option(None, help=_NULL),
     to: Path | None = Option(None, help="Write the figure (.png, .svg, .pdf) or the table (.csv) to this file."),
@@ -223,14 +224,17 @@ def climb(
 ) -> None:
     """Print probability, rate and speed of climbs in piles for each condition, with confidence intervals."""
     from walkers.finding import find
+    from walkers.inputs.errors import each
     from walkers.postprocess.drawing import FORMATS, check_place
+    from walkers.postprocess.films import parse_time
     from walkers.sweeps import climbing
     from walkers.sweeps.climbing_figure import write_climbs
 
+    until = parse_time("--within", within) if within else None
     if to is not None:
         check_place(to, *(f".{form}" for form in FORMATS), ".csv")
     changes = changes_of(settings)
-    places = [find(one, out, changes).path for one in what]
+    places = each(lambda one: find(one, out, changes).path, what)
     conditions = climbing.conditions_in(places)
     tell(*(f"warning: {left}" for place in places if (left := climbing.unfinished_points(place))))
     lines: list[str] = []
@@ -243,7 +247,7 @@ def climb(
             found.append({"condition": label, "thresholds": climbing.sensitivity(one.runs)})
             lines += filter(None, [label, climbing.describe_sensitivity(found[-1]["thresholds"])])
     else:
-        found = [climbing.summarise(one, within) for one in conditions]
+        found = [climbing.summarise(one, until) for one in conditions]
         lines += map(climbing.describe, found)
         if to is not None:
             write_climbs(conditions, found, to)

@@ -44,7 +44,7 @@ _SWEEP_FILE = "A sweep file, or the name of a shipped sweep such as fig2."
 
 def new(
     name: str = Argument(metavar="NAME", help=_NAME),
-    kind: Literal["walker", "cluster", "pile"] = Option("walker", help="Kind of simulation."),
+    kind: Literal["walker", "cluster", "tray", "pile"] = Option("walker", help="Kind of simulation."),
     source: str | None = Option(None, "--from", metavar="CASE", help=_FROM, autocompletion=offering("case")),
 ) -> None:
     """Write a commented case file as a starting point."""
@@ -102,6 +102,7 @@ def run(
 ) -> int:
     """Run cases and print the results. A finished run is only printed, an interrupted run continues."""
     from walkers.finding import case_at
+    from walkers.inputs.errors import each
     from walkers.pipeline import finished_at
     from walkers.progress import progress_of, progress_of_sweep
     from walkers.runner.failures import EngineFailure
@@ -109,7 +110,7 @@ def run(
 
     refuse("--points", points is not None and not spread, "is for --spread")
     # A mistake in the last file shows before the first run starts.
-    loaded = [case_at(case, out, changes_of(settings)) for case in cases]
+    loaded = each(lambda case: case_at(case, out, changes_of(settings)), cases)
     there = [None if settings or force else finished_at(case, out) for case in cases]
     check_folder("--out", out)
     if spread:

@@ -20,7 +20,7 @@ def write_case(path: Path, kind: str = "walker", source: str | None = None) -> P
     path
         The file; ``.toml`` is appended if it is left out.
     kind
-        ``walker``, ``cluster`` or ``pile``.
+        ``walker``, ``cluster``, ``tray`` or ``pile``.
     source
         A shipped case whose file is copied instead.
 

@@ -102,6 +102,10 @@ class Run:
         fewer = FIRST_ATTEMPTS if self.until_steady else ()
         return (*(cycles for cycles in fewer if cycles < self.cycles), self.cycles)
 
+    def steps_until(self, cycles: int) -> int:
+        """Steps of the attempts up to the one for so many cycles."""
+        return self.steps_per_cycle * sum(one for one in self.attempts if one <= cycles)
+
     def for_cycles(self, cycles: int) -> Run:
         """The same for so many cycles at a stretch, of a run that ends when its velocities are constant."""
         if not self.until_steady:
@@ -189,9 +193,9 @@ class Case:
         object.__setattr__(case, "told", told)
         return case
 
-    def renamed(self, name: str) -> Case:
-        """The same case under another name."""
-        return replace(self, name=name).read_from(self.document, self.told)
+    def renamed(self, name: str, title: str | None = None) -> Case:
+        """The same case under another name, or another title too."""
+        return replace(self, name=name, title=title or self.title).read_from(self.document, self.told)
 
     def for_cycles(self, cycles: int) -> Case:
         """The same for so many cycles at a stretch, of a case whose run ends when its velocities are constant."""

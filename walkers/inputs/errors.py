@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from walkers.inputs.text import printable
 
+T = TypeVar("T")
+R = TypeVar("R")
 _LONGEST_VALUE = 80
 _LONGEST_TEXT = 1000
 """Letters of a value, and of a file's name or what was expected, that a message quotes."""
@@ -63,6 +66,22 @@ def refused(source: object, expected: str) -> InputError:
 def unusable(key: str, expected: str, value: object = None) -> InputError:
     """What cannot be used under a key; who reads the file adds its name and the value there (`messages.blaming`)."""
     return InputError("", [Problem(key, None if value is None else shown(value), expected)])
+
+
+def each(function: Callable[[T], R], things: Iterable[T]) -> list[R]:
+    """What a function gives for each thing, such as a name; raises one `InputError` with all that it refuses."""
+    given: list[R] = []
+    errors: list[InputError] = []
+    for thing in things:
+        try:
+            given.append(function(thing))
+        except InputError as error:
+            errors.append(error)
+    if errors:
+        all_of_them = InputError(errors[0].source, [one for error in errors for one in error.problems])
+        all_of_them.args = ("\n".join(dict.fromkeys(map(str, errors))),)  # each with its own source
+        raise all_of_them from errors[0]
+    return given
 
 
 def shown(value: object) -> str:

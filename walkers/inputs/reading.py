@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import InputError, check_utf8, refused, shortened
+from walkers.inputs.errors import InputError, check_utf8, each, refused, shortened
 from walkers.inputs.library import FILE_NAME, library_of, read_library, suggestion
 from walkers.packages import Offer, offers
 
@@ -107,8 +107,7 @@ def _changed(document: Mapping[str, Any], changes: Mapping[str, Any] | None, sou
     from walkers.inputs.messages import blaming, check_key
 
     with blaming(source):
-        for key in changes:
-            check_key(key)
+        each(check_key, changes)
         return changed(document, changes)
 
 

@@ -17,6 +17,7 @@ SHOWN_UNITS = {
 NOISE = {"": 1e-9, "mm/s": 1e-4, "mm": 1e-6, "°": 1e-3, "deg": 1e-3, "%": 1e-3, "nJ": 1e-6}
 """In the units that are shown: what is smaller is rounding, and printed as 0."""
 _LARGEST_WRITTEN_OUT = 1e7
+_LONGER = {"d": 86400.0, "h": 3600.0, "min": 60.0}
 
 
 def rounded(value: float, unit: str = "") -> str:
@@ -52,6 +53,12 @@ def with_decimals(value: float, decimals: int) -> str:
     decimals = min(decimals, max(0, DIGITS - 1 - size))
     text = f"{round(value, min(decimals, DIGITS - 1 - size)):.{decimals}f}"
     return "0" if float(text) == 0.0 else text
+
+
+def duration_text(seconds: float) -> str:
+    """A time in the largest unit of which it is at least two, such as ``3 d``."""
+    told = (f"{seconds / size:.0f} {unit}" for unit, size in _LONGER.items() if seconds >= 2 * size)
+    return next(told, f"{seconds:.0f} s")
 
 
 def percent(share: float) -> str:

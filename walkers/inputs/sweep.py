@@ -35,7 +35,7 @@ from walkers.inputs.axes import (
 )
 from walkers.inputs.case import BOUNDS, Case
 from walkers.inputs.changes import Value, changed, flatten
-from walkers.inputs.errors import InputError, Problem, refused, unusable
+from walkers.inputs.errors import InputError, Problem, each, refused, shortened, unusable
 from walkers.inputs.messages import blaming, check_key, validated
 from walkers.inputs.reading import find_input, read_case, read_toml, resolve_case, shipped
 from walkers.inputs.schema import Table
@@ -152,7 +152,9 @@ class Sweep:
             where = f"{self.source}: point {number} ({told})" if told else self.source
             with blaming(where):
                 document = changed(self.document, changes)
-            yield resolve_case(document, source=where, name=self.case_name)
+            case = resolve_case(document, source=where, name=self.case_name)
+            # The base case's title may say what does not hold here.
+            yield case.renamed(case.name, f"{shortened(self.name)}: {shortened(told)}") if told else case
 
 
 def shipped_sweeps() -> dict[str, Path]:
@@ -209,9 +211,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
             for key in keys:
                 if key in _SAME_RUN:
                     raise unusable(key, f"does not vary: points with another {key} alone are the same run")
-            for key in (*settings, *keys):
-                if key != "library":
-                    check_key(key)
+            each(check_key, [key for key in (*settings, *keys) if key != "library"])
             tables = changed(read_case(base, folder), settings)
             changed(tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,7 @@ MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """How events are marked (`walkers.postprocess.clusters.Event`)."""
 _HEIGHT = 1.6  # inches of a panel
+_LETTERS = 90  # of a line of a title
 _LEAST_DISTANCE, _LEAST_ANGLE, _LEAST_SPEED = 0.01, 0.1, 0.01
 """mm, ° and mm/s that axes show at least: rounding is no motion."""
 _SHOWN, _LONG = 8, 4.0  # images of a walker; lengths of a walker from which on they are centred on it
@@ -114,21 +116,27 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
             turned.append(Line(time, np.degrees(group.orientation[::strobe, place]), **look))
             along, across = way[:, place] @ group.drive_axis, way[:, place] @ group.across_axis
             paths.append(Line(-across, along, **look) if uphill else Line(along, across, **look))
-    begin = walked[-1].x[settled]
+    begin, named = walked[-1].x[settled], _named(groups)
     names = ("across the slope (mm)", "uphill (mm)") if uphill else ("along the drive axis (mm)", "across it (mm)")
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
     return [
         Panel(
-            "Distance along the heading; grey: settling",
+            f"Distance along the heading; grey: settling{named}",
             "time (s)",
             "distance walked (mm)",
             walked,
             settled=begin,
             least=_LEAST_DISTANCE,
         ),
-        Panel("Orientation", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE),
-        Panel(f"Paths of the centres of mass, {seen}", *names, paths, least=_LEAST_DISTANCE),
+        Panel(f"Orientation{named}", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE),
+        Panel(f"Paths of the centres of mass, {seen}{named}", *names, paths, least=_LEAST_DISTANCE),
     ]
+
+
+def _named(groups: list[Group]) -> str:
+    """How many walkers a legend names, where these are not all."""
+    count = sum(len(group.walkers) for group in groups)
+    return f" ({MOST_NAMED} of {count} walkers named)" if count > MOST_NAMED else ""
 
 
 def velocity_panel(case: Case, walkers: Columns) -> Panel:
@@ -278,9 +286,8 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
             line.set(**series_look(number), markevery=(0.02 * (number % 6), 0.12), linewidth=0.9)
     axes["walked"].set_title("grey: settling")
     letter_panels(axes.values())
-    more = f" (the first {MOST_NAMED})" if sum(len(group.walkers) for group in groups) > MOST_NAMED else ""
     handles = axes["walked"].get_legend_handles_labels()
-    told = f"walker: facing at the start, velocity{more}"
+    told = f"walker: facing at the start, velocity{_named(groups)}"
     figure.legend(*handles, loc="outside lower center", ncols=4, title=told)
     return figure
 
@@ -332,7 +339,8 @@ def _title(case: Case) -> str:
         if len(case.walkers[0].radii) == 2:
             gamma0 = f" ($\\Gamma_0$ = {dimer_of(case).gamma0(case.drive.peak_acceleration):.3g})"
     tilted = f", {case.boundary.tilted}" if case.boundary.tilted else ""
-    return f"{plain_text(case.title or case.name)}\n{shown}{tilted}, {case.drive.described()}{gamma0}"
+    title = "\n".join(wrap(plain_text(case.title or case.name), _LETTERS))
+    return f"{title}\n{shown}{tilted}, {case.drive.described()}{gamma0}"
 
 
 def _draw_strobe(axes: Axes, group: Group) -> None:

@@ -126,9 +126,9 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def parse_time(option: str, text: str) -> float:
-    """Read a physical time that an option gives, ``0.1 s``, in s; an InputError if it is none."""
+    """Read a physical time that an option gives, ``0.1 s`` or a number of s, in s; an InputError if it is none."""
     try:
-        return parse_quantity(text, DURATION)
+        return parse_quantity(f"{text} s" if text.replace(".", "", 1).isdigit() else text, DURATION)
     except ValueError as error:
         raise refused(option, f'{text!r}: expected a time such as "0.1 s"') from error
 

@@ -51,7 +51,7 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
         return wrapper.wrap(told) if told else []
 
     lines = listed("guessed", [one for one in rests if one["guessed"]])
-    whence = {"as given": "given", "calibrated": "calibrated", "library": "own library", "package": "package"}
+    whence = {"given": "given", "calibrated": "calibrated", "library": "own library", "package": "package"}
     for head, origin in whence.items():
         lines += listed(head, [one for one in rests if not one["guessed"] and one["origin"] == origin])
     return lines

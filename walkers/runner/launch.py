@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from walkers.inputs.rounding import duration_text
 from walkers.runner import failures
 from walkers.runner.binary import Engine, plugin_of, run_script, version_in
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME, Deck
@@ -54,7 +55,8 @@ _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
 class Progress:
     """How far a run is: steps of the drive, done and in all; simulated time, s; wall time of this call, s.
 
-    ``made`` are the steps that were made in this call; ``resting`` says that the beads still come to rest.
+    ``made`` are the steps that were made in this call; ``resting`` says that the beads still come to rest,
+    ``may_end_early`` that the steps are those of all attempts, of which the last ones may not be needed.
     """
 
     step: int
@@ -63,6 +65,7 @@ class Progress:
     elapsed: float
     made: int = 0
     resting: bool = False
+    may_end_early: bool = False
 
     @property
     def share(self) -> str:
@@ -72,7 +75,8 @@ class Progress:
     def __str__(self) -> str:
         """How much is done, how fast, and how long the rest takes."""
         rate = self.made / self.elapsed if self.elapsed else 0.0
-        left = f"{(self.steps - self.step) / rate:.0f} s left" if rate else "starting"
+        left = duration_text((self.steps - self.step) / rate) if rate else ""
+        left = f"{'at most ' * self.may_end_early}{left} left" if left else "starting"
         return f"{self.share}, {self.simulated:.3f} s simulated, {rate:.0f} steps/s, {left}"
 
 

@@ -419,6 +419,7 @@ VARIATIONS = {
     "min_overlap": (0.3, 0.5, 0.7),
 }
 """Other thresholds of `walkers.postprocess.clusters.ClimbCriteria`, tried one at a time."""
+_UNITS = {"min_rise": " m", "max_gap": " s"}
 
 
 def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
@@ -463,11 +464,12 @@ def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:
     """`sensitivity` as text; mm, s, mm/s."""
     lines = []
     for row in rows:
-        told = "as defined" if row["value"] is None else f"{row['threshold']} = {row['value']:g}"
-        speed = "-" if row["median_speed"] is None else f"{row['median_speed'] * 1e3:.2f} mm/s"
+        unit = _UNITS.get(row["threshold"], "")
+        told = "as defined" if row["value"] is None else f"{row['threshold']} = {row['value']:g}{unit}"
+        speed = f", median speed {row['median_speed'] * 1e3:.2f} mm/s" if row["climbs"] else ""
         lines.append(
-            f"  {told:20} {row['climbed']} of {row['runs']} runs, {_told_rate(row)}, {row['led_by_large']} led by "
-            f"a large bead, median {speed}"
+            f"  {told:20} {row['climbed']} of {row['runs']} runs climbed; climbs {_told_rate(row)}, "
+            f"{row['led_by_large']} led by a large bead{speed}"
         )
     return "\n".join(lines)
 

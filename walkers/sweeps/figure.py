@@ -377,11 +377,13 @@ def _scale_x(axes: Axes, x: Factor, log: str) -> None:
     if "x" in log:
         axes.set_xscale("log")
     apart = np.diff(x.levels) > 0.08 * (x.levels[-1] - x.levels[0])
-    if len(x.levels) <= _FEW_TICKS and apart.all():
+    if len(x.levels) <= _FEW_TICKS and apart.all() and not x.is_sample:
         axes.set_xticks(x.levels, [f"{x.exact(level):.4g}" for level in x.levels])
         axes.set_xticks([], minor=True)
     elif "x" not in log and all(float(level).is_integer() for level in x.levels):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    elif "x" not in log and x.is_sample:  # several panels side by side: long numbers would overlap
+        axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
 
 
 def _scale_y(axes: Axes, drawn: Drawn, log: str) -> None:

@@ -23,7 +23,7 @@ from typing import Any, Literal
 
 from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, readable
-from walkers.inputs.rounding import rounded
+from walkers.inputs.rounding import duration_text, rounded
 from walkers.physics.units import Kind, parse_quantity
 from walkers.postprocess.sides import sides_apart
 from walkers.postprocess.uncertainty import SPREAD_NAME
@@ -54,7 +54,6 @@ from walkers.sweeps.table import (
 
 Order = Literal["name", "status", "velocity", "age", "size"]
 AGE = Kind("age", "s", "7 d", 1e12)
-_AGES = {"d": 86400.0, "h": 3600.0, "min": 60.0}
 _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 _LOCK = ".lock"
 _MOST_LINES = 40
@@ -69,8 +68,8 @@ class Entry:
     It is finished, running, failed, or interrupted: a run can be continued, of a sweep points are missing. Its
     age (s) counts from when it was finished or last written to; its size (bytes) is that of its files, of a sweep those
     of its runs. Its parameters are those of `walkers.inputs.readable.flattened`, of a sweep the numbers of values of
-    what varies. A run gave a velocity (mean over its walkers, m/s; of the sides, by the way that they faced, where they
-    differ) or climbs; a sweep has points of some statuses.
+    what varies. A run gave a velocity (mean over its walkers, m/s; of those facing up a slope where ``sides`` has the
+    velocities of both sides, which differ) or climbs; a sweep has points of some statuses.
     """
 
     name: str
@@ -150,8 +149,9 @@ def _run(path: Path, now: float) -> Entry | None:
     with suppress(OSError, ValueError, AttributeError, TypeError):
         result = recorded_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
-        given = {"velocity": velocity.get("mean"), "climbs": None if climbs is None else len(climbs)}
-        given["sides"] = sides_apart(result)
+        sides = sides_apart(result)
+        given = {"velocity": sides.get("up", velocity.get("mean")), "sides": sides}
+        given["climbs"] = None if climbs is None else len(climbs)
     return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
 
 
@@ -258,7 +258,7 @@ def as_json(entries: Sequence[Entry]) -> list[dict[str, Any]]:
     """Entries as JSON objects, SI units; ``varies`` has, of a run, the values by which runs of its case differ."""
     keys = {case: keys for case, _, keys in _varied([entry for entry in entries if not entry.is_sweep])}
     common = ("name", "case", "status", "age", "size")
-    of_runs = ("reason", "message", "velocity", "climbs")
+    of_runs = ("reason", "message", "velocity", "sides", "climbs")
     rows = []
     for entry in entries:
         shown = entry.parameters if entry.is_sweep else keys[entry.case]
@@ -286,7 +286,7 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
     for sweep in sweeps:
         points = ", ".join(f"{number} {status}" for status, number in (sweep.points or {}).items())
         keys = ", ".join(f"{key} ({number})" for key, number in sweep.parameters.items())
-        rows.append([sweep.name, points, age_text(sweep.age), bytes_text(sweep.size), sweep.case, keys])
+        rows.append([sweep.name, points, duration_text(sweep.age), bytes_text(sweep.size), sweep.case, keys])
     blocks = [aligned(rows)] if sweeps else []
     for case, of_case, varied in _varied(runs):
         last = [key.rpartition(".")[2] for key in varied]
@@ -300,7 +300,7 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
                 told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
                 result = f"{', '.join(told)} mm/s"
             values = [readable(key, run.parameters.get(key)) for key in varied]
-            rows.append([run.name, status, result, age_text(run.age), bytes_text(run.size), *values])
+            rows.append([run.name, status, result, duration_text(run.age), bytes_text(run.size), *values])
         blocks.append(aligned(rows))
     total = [*counted({"sweep": len(sweeps)}), f"{len(runs)} run{'' if len(runs) == 1 else 's'}"]
     size = bytes_text(sum(entry.size for entry in entries))
@@ -318,12 +318,6 @@ def aligned(rows: Sequence[Sequence[str]]) -> str:
 def counted(counts: Mapping[str, int]) -> list[str]:
     """Numbers of things in words, without those of which there are none."""
     return [f"{number} {kind}{'s' if number > 1 else ''}" for kind, number in counts.items() if number]
-
-
-def age_text(seconds: float) -> str:
-    """An age in the largest unit of which it is at least two, such as ``3 d``."""
-    told = (f"{seconds / size:.0f} {unit}" for unit, size in _AGES.items() if seconds >= 2 * size)
-    return next(told, f"{seconds:.0f} s")
 
 
 def bytes_text(size: int) -> str:
@@ -353,7 +347,7 @@ class Cleaning:
                 if theirs:
                     told.append(f"stays, walkers did not write it: {theirs} (in {one.directory})")
             kind = "sweep" if one.is_sweep else one.status
-            rows.append([one.name, kind, age_text(one.age), bytes_text(size), why])
+            rows.append([one.name, kind, duration_text(one.age), bytes_text(size), why])
             total += size
         lines = [aligned(rows[:_MOST_LINES])] if rows else []
         lines += [f"and {len(rows) - _MOST_LINES} more"] if len(rows) > _MOST_LINES else []

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from walkers.inputs.case import Case
+from walkers.inputs.case import Case, Run
 from walkers.inputs.errors import Stopped, WalkersError
 from walkers.postprocess.analysis import tabulate
 from walkers.runner.binary import Engine, is_new, read_audit
@@ -171,15 +171,23 @@ def progress_at(place: Path) -> Progress | None:
         case = case_of(directory)
         done = [_read_segment(path) for path in segment_directories(directory)]
         (folder,) = (directory / SEGMENTS).glob("*.new")
-        steps = layout_of(folder).steps if case.run.until_steady else case.run.steps
+        run = case.run
+        cycles = layout_of(folder).steps // run.steps_per_cycle if run.until_steady else run.cycles
         begin = int(done[-1]["end"]) if done else 0
         start = drive_from(case, done)
         step = max(begin, last_step(folder / OUTPUT_NAME))
         seconds = time.time() - (folder / DECK_NAME).stat().st_mtime
     except (OSError, ValueError, KeyError, TypeError, WalkersError):
         return None
-    driven = 0 if start is None else step - start
-    return Progress(driven, steps, step * case.run.time_step, seconds, step - begin, start is None)
+    return _progress(run, cycles, step, start, seconds, step - begin)
+
+
+def _progress(run: Run, cycles: int, step: int, start: int | None, seconds: float, made: int) -> Progress:
+    """The progress where the attempt for so many cycles, whose drive begins at ``start``, is at a step."""
+    before = run.steps_until(cycles - 1)
+    done = before + (0 if start is None else step - start)
+    steps, simulated = run.steps_until(run.cycles), (before + step) * run.time_step
+    return Progress(done, steps, simulated, seconds, made, start is None, run.until_steady)
 
 
 def _are_constant(directory: Path) -> bool:
@@ -227,7 +235,7 @@ class OpenRun:
                     shutil.rmtree(directory)
                 self.done.clear()
             while (segment := self._next_segment(case)) is not None:
-                tell = _teller(case, segment, on_progress, made, begun) if on_progress else None
+                tell = _teller(self.case.run, cycles, segment, on_progress, made, begun) if on_progress else None
                 try:
                     self._make(segment, render(case, segment), tell, time_limit)
                 except BeadsOverTheTop as over:
@@ -292,16 +300,14 @@ class OpenRun:
 
 
 def _teller(
-    case: Case, segment: Segment, tell: _Tell, made: int = 0, begun: float | None = None
+    run: Run, cycles: int, segment: Segment, tell: _Tell, made: int = 0, begun: float | None = None
 ) -> Callable[[int], None]:
     """What makes of a segment's step the progress of its run."""
     since = time.perf_counter() if begun is None else begun
 
     def advance(step: int) -> None:
-        step, start = max(step, segment.begin), segment.drive_from
-        done, seconds = 0 if start is None else step - start, time.perf_counter() - since
-        simulated = step * case.run.time_step
-        tell(Progress(done, case.run.steps, simulated, seconds, made + step - segment.begin, start is None))
+        step, seconds = max(step, segment.begin), time.perf_counter() - since
+        tell(_progress(run, cycles, step, segment.drive_from, seconds, made + step - segment.begin))
 
     return advance
 
@@ -381,7 +387,8 @@ def _make_together(
                 (incomplete / name).mkdir(exist_ok=True)
                 write_json(incomplete / name / CASE_NAME, case.as_dict(), at_once=False)
             look_ahead()
-            tell = _teller(tried[first], first_segment(tried[first]), on_progress) if on_progress else None
+            segment = first_segment(tried[first])
+            tell = _teller(cases[first].run, cycles, segment, on_progress) if on_progress else None
             folder = incomplete / DECK_FOLDER
             report = launch(deck, folder, engine, on_step=tell, time_limit=time_limit, keep_open=locks)
             _part(incomplete, tried, deck, report)

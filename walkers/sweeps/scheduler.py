@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING
 
 from walkers.inputs.case import Case
 from walkers.inputs.errors import Stopped, WalkersError, check_utf8, refused
+from walkers.inputs.rounding import duration_text
 from walkers.inputs.sweep import Sweep
 from walkers.postprocess.analysis import current_result
 from walkers.runner.binary import Engine, find_engine
@@ -256,7 +257,7 @@ class SweepPlan:
             f"  points     {len(record.runs)}: {told}",
             f"  to do      {at_most}{len(missing)} points in {len(self.decks)} decks",
             f"  predicted  {at_most}{seconds + besides:.0f} core-seconds ({apart + besides:.0f} without shared decks), "
-            f"{until:.0f} s with {at_once} decks in parallel",
+            f"{duration_text(until)} with {at_once} decks in parallel",
             f"  directory  {record.directory}",
         ]
         return "\n".join(lines)

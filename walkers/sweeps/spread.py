@@ -204,7 +204,7 @@ def describe(spread: Spread) -> str:
     ]
     if spread.held:
         told = ", ".join(f"{one.key} {one.text}" for one in spread.held)
-        lines.append(f"    as given {told}: add ranges in [uncertain] to draw them too")
+        lines.append(f"    constant {told} (without a range in [uncertain])")
     for name, band in spread.bands.items():
         unit, factor = SHOWN_UNITS.get(units[name], (units[name], 1.0))
         low, middle, high, smallest, largest = (
